@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* call.c: see call.h. */
+#include "call.h"
+
+#include "available.h"
+#include "convert.h"
+
+/* An hs_poll_fn: lets signals be handled and reports progress; false when either raised. */
+static bool
+poll_python(void *context, double fraction)
+{
+    hs_call *call = context;
+    PyEval_RestoreThread(call->thread);
+    bool go_on = PyErr_CheckSignals() == 0;
+    if (go_on && call->progress != NULL) {
+        PyObject *result = PyObject_CallFunction(call->progress, "d", fraction);
+        go_on = result != NULL;
+        Py_XDECREF(result);
+    }
+    call->thread = PyEval_SaveThread();
+    return go_on;
+}
+
+static bool
+take_memory_limit(PyObject *object, hs_options *options)
+{
+    if (object == Py_None) {
+        options->find_limit = hs_available_memory;
+        return true;
+    }
+    options->memory_limit = PyFloat_AsDouble(object);
+    if (options->memory_limit == -1.0 && PyErr_Occurred()) {
+        return false;
+    }
+    if (!(options->memory_limit >= 0.0)) {
+        PyErr_Format(PyExc_ValueError, "memory_limit must be a number of bytes, got %R", object);
+        return false;
+    }
+    return true;
+}
+
+bool
+hs_call_init(hs_call *call, PyObject *const *arguments)
+{
+    *call = (hs_call){.options = hs_options_default()};
+    hs_options *options = &call->options;
+    const int   inclusive = PyObject_IsTrue(arguments[4]);
+    if (inclusive < 0 || !hs_points_of(arguments[0], &call->points) ||
+        !hs_cutoff_of(arguments[1], &options->cutoff) ||
+        !hs_box_of(arguments[2], arguments[3], call->points.ndim, &call->box, &call->has_box) ||
+        !hs_precision_of(arguments[5], &options->precision) ||
+        !hs_name_of(arguments[6], "kernel", &options->kernel) ||
+        !take_memory_limit(arguments[7], options)) {
+        return false;
+    }
+    options->inclusive = inclusive != 0;
+    call->progress = arguments[8] == Py_None ? NULL : arguments[8];
+    options->poll = poll_python;
+    options->poll_context = call;
+    return true;
+}
+
+void
+hs_call_release(hs_call *call)
+{
+    call->thread = PyEval_SaveThread();
+}
+
+void
+hs_call_acquire(hs_call *call)
+{
+    PyEval_RestoreThread(call->thread);
+    call->thread = NULL;
+}

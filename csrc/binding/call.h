@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* call.h: what the searching functions share: one set of arguments, and polling for Ctrl-C. */
+#ifndef HS_CALL_H
+#define HS_CALL_H
+
+#include "numpy_api.h"
+
+#include "../halfshell.h"
+
+/* The arguments of a search, as views; the Python arguments that they borrow from must stay alive. */
+typedef struct hs_call {
+    hs_points      points;
+    hs_box         box;
+    bool           has_box;
+    hs_options     options;
+    PyObject      *progress; /* borrowed; called with the fraction done, or NULL */
+    PyThreadState *thread;   /* saved while the GIL is released */
+} hs_call;
+
+/*
+ * Positional arguments of every search, in this order: points, cutoff, box, periodic, inclusive, precision,
+ * kernel, memory_limit (None: ask the machine), progress (None: no calls). Returns false with an exception set.
+ */
+enum { HS_CALL_ARGUMENTS = 9 };
+bool hs_call_init(hs_call *call, PyObject *const *arguments);
+
+/* Release and take the GIL around a call of the core; poll() takes it in between. */
+void hs_call_release(hs_call *call);
+void hs_call_acquire(hs_call *call);
+
+/* The box, or NULL for open space. */
+static inline const hs_box *
+hs_call_box(const hs_call *call)
+{
+    return call->has_box ? &call->box : NULL;
+}
+
+#endif

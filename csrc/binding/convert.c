@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* convert.c: see convert.h. */
+#include "convert.h"
+
+#include <string.h>
+
+bool
+hs_points_of(PyObject *object, hs_points *points)
+{
+    if (!PyArray_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "points must be an array, got %s",
+                     Py_TYPE(object)->tp_name);
+        return false;
+    }
+    PyArrayObject *array = (PyArrayObject *)object;
+    const int      type = PyArray_TYPE(array);
+    if ((type != NPY_FLOAT && type != NPY_DOUBLE) || PyArray_ISBYTESWAPPED(array)) {
+        PyErr_SetString(PyExc_TypeError, "points must be native float32 or float64");
+        return false;
+    }
+    if (PyArray_NDIM(array) != 2) {
+        PyErr_Format(PyExc_ValueError, "points must have shape (n, d), got %d dimension%s",
+                     PyArray_NDIM(array), PyArray_NDIM(array) == 1 ? "" : "s");
+        return false;
+    }
+    const npy_intp d = PyArray_DIM(array, 1);
+    if (d < 1 || d > HS_MAX_DIM) {
+        PyErr_Format(PyExc_ValueError,
+                     "points must have shape (n, d) with 1 <= d <= %d, got d = %zd", HS_MAX_DIM,
+                     (Py_ssize_t)d);
+        return false;
+    }
+    *points = (hs_points){.data = PyArray_DATA(array),
+                          .n = PyArray_DIM(array, 0),
+                          .ndim = (int)d,
+                          .real = type == NPY_FLOAT ? HS_FLOAT32 : HS_FLOAT64,
+                          .row_stride = PyArray_STRIDE(array, 0),
+                          .column_stride = PyArray_STRIDE(array, 1)};
+    return true;
+}
+
+bool
+hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given)
+{
+    *given = object != Py_None;
+    if (!*given) {
+        return true;
+    }
+    const unsigned long bits = PyLong_AsUnsignedLong(periodic);
+    if (bits == (unsigned long)-1 && PyErr_Occurred()) {
+        return false;
+    }
+    PyArrayObject *array = (PyArrayObject *)object;
+    if (!PyArray_Check(object) || PyArray_TYPE(array) != NPY_DOUBLE ||
+        !PyArray_ISCARRAY_RO(array) || PyArray_NDIM(array) != 2 ||
+        PyArray_DIM(array, 0) != ndim || PyArray_DIM(array, 1) != ndim) {
+        PyErr_Format(PyExc_ValueError, "box must be a float64 array of shape (%d, %d)", ndim, ndim);
+        return false;
+    }
+    const double *entries = PyArray_DATA(array);
+    *box = (hs_box){.ndim = ndim};
+    for (int l = 0; l < ndim; l++) {
+        box->periodic[l] = (bits >> l & 1) != 0;
+        memcpy(box->rows[l], entries + l * ndim, (size_t)ndim * sizeof(double));
+    }
+    return true;
+}
+
+bool
+hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
+{
+    unsigned seen = 0;
+    *want = 0;
+    if (!PyUnicode_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "quantities must be a string, got %s",
+                     Py_TYPE(object)->tp_name);
+        return false;
+    }
+    *letters = PyUnicode_AsUTF8(object);
+    if (*letters == NULL) {
+        return false;
+    }
+    for (const char *letter = *letters; *letter != '\0'; letter++) {
+        const char *known = strchr("ijdDSP", *letter);
+        const unsigned bit = known != NULL ? 1u << (known - "ijdDSP") : 0;
+        if (bit == 0 || (seen & bit)) {
+            seen = 0;
+            break;
+        }
+        seen |= bit;
+        *want |= *letter == 'P' ? HS_WANT_I | HS_WANT_J : bit;
+    }
+    if (seen == 0) {
+        PyErr_Format(PyExc_ValueError,
+                     "quantities must be some of the letters i j d D S P, each at most once, "
+                     "got %R",
+                     object);
+        return false;
+    }
+    return true;
+}
+
+bool
+hs_precision_of(PyObject *object, hs_precision *precision)
+{
+    static const char *const names[] = {"exact", "double", "single"};
+    for (int k = 0; PyUnicode_Check(object) && k < 3; k++) {
+        if (PyUnicode_CompareWithASCIIString(object, names[k]) == 0) {
+            *precision = (hs_precision)k;
+            return true;
+        }
+    }
+    PyErr_Format(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError,
+                 "precision must be 'exact', 'double' or 'single', got %R", object);
+    return false;
+}
+
+bool
+hs_name_of(PyObject *object, const char *argument, const char **name)
+{
+    *name = NULL;
+    if (object == Py_None) {
+        return true;
+    }
+    if (!PyUnicode_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "%s must be a string or None, got %s", argument,
+                     Py_TYPE(object)->tp_name);
+        return false;
+    }
+    *name = PyUnicode_AsUTF8(object);
+    return *name != NULL;
+}
+
+bool
+hs_cutoff_of(PyObject *object, double *cutoff)
+{
+    *cutoff = PyFloat_AsDouble(object);
+    return !(*cutoff == -1.0 && PyErr_Occurred());
+}

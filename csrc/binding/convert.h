@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * convert.h: Python arguments to the core's views. Types and shapes are checked here, values in the
+ * core. Every function returns false with an exception set when the argument is of the wrong kind.
+ */
+#ifndef HS_CONVERT_H
+#define HS_CONVERT_H
+
+#include "numpy_api.h"
+
+#include "../halfshell.h"
+
+/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. */
+bool hs_points_of(PyObject *object, hs_points *points);
+
+/*
+ * box: None, or a C-contiguous float64 array (d, d). periodic: int, bit l set when box vector l
+ * repeats. *given tells whether there is a box at all.
+ */
+bool hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given);
+
+/* A string of the letters i j d D S P, each at most once: its HS_WANT_ bits and its length. `pairs_letter` is set
+ * when P is among them. */
+bool hs_quantities_of(PyObject *object, const char **letters, unsigned *want);
+
+bool hs_precision_of(PyObject *object, hs_precision *precision);
+
+/* None or a string; the string borrows from the object. */
+bool hs_name_of(PyObject *object, const char *argument, const char **name);
+
+/* cutoff: anything that float() takes, except strings. */
+bool hs_cutoff_of(PyObject *object, double *cutoff);
+
+#endif

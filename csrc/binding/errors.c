@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* errors.c: see errors.h. Messages say what was wrong, the value, and what is allowed. */
+#include "errors.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* PyErr_Format knows no floating-point numbers; repr does, and shortest. */
+static PyObject *
+raise_with_number(PyObject *type, const char *format, double value)
+{
+    PyObject *number = PyFloat_FromDouble(value);
+    if (number != NULL) {
+        PyErr_Format(type, format, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_at(const char *format, const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError, format, (long long)failure->row,
+                     (long long)failure->column, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_memory(const hs_failure *failure)
+{
+    char text[256];
+    if (failure->expected_bytes > 0.0) {
+        snprintf(text, sizeof text,
+                 "the result would not fit: about %.3g pairs (%.3g GB) are expected, %.3g GB are "
+                 "allowed; use a smaller cutoff, fewer quantities, or count_pairs",
+                 failure->expected_pairs, failure->expected_bytes / 1e9,
+                 failure->limit_bytes / 1e9);
+    } else if (failure->expected_pairs > 0.0) {
+        snprintf(text, sizeof text,
+                 "out of memory after %.0f pairs; use a smaller cutoff, fewer quantities, or "
+                 "count_pairs",
+                 failure->expected_pairs);
+    } else {
+        snprintf(text, sizeof text, "not enough memory for the search");
+    }
+    PyErr_SetString(PyExc_MemoryError, text);
+    return NULL;
+}
+
+static PyObject *
+raise_kernel(const hs_options *options)
+{
+    const char *names[8];
+    const int   n = hs_kernel_names(names, 8);
+    PyObject   *known = PyTuple_New(n);
+    if (known == NULL) {
+        return NULL;
+    }
+    for (int k = 0; k < n; k++) {
+        PyObject *name = PyUnicode_FromString(names[k]);
+        if (name == NULL) {
+            Py_DECREF(known);
+            return NULL;
+        }
+        PyTuple_SET_ITEM(known, k, name);
+    }
+    PyErr_Format(PyExc_ValueError, "kernel must be one of %R on this CPU, got '%s'", known,
+                 options != NULL && options->kernel != NULL ? options->kernel : "");
+    Py_DECREF(known);
+    return NULL;
+}
+
+PyObject *
+hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
+{
+    switch (status) {
+    case HS_ERR_MEMORY: return raise_memory(failure);
+    case HS_ERR_CUTOFF:
+        return raise_with_number(PyExc_ValueError,
+                                 "cutoff must be finite and not negative, got %R",
+                                 failure->value);
+    case HS_ERR_NOT_FINITE:
+        return raise_at("points must be finite, got points[%lld, %lld] = %R", failure);
+    case HS_ERR_BOX_FINITE:
+        return raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
+    case HS_ERR_BOX_DEPENDENT:
+        PyErr_SetString(PyExc_ValueError, "the periodic vectors of box must be linearly "
+                                          "independent; these are exactly dependent");
+        return NULL;
+    case HS_ERR_TOO_MANY:
+        return raise_with_number(PyExc_OverflowError,
+                                 "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
+                                 failure->value);
+    case HS_ERR_SHIFT_RANGE:
+        if (failure->row < 0) {
+            PyErr_SetString(PyExc_OverflowError, "the shift S of a pair does not fit int32: the "
+                                                 "points lie too many box vectors apart; wrap "
+                                                 "them first");
+        } else {
+            PyErr_Format(PyExc_OverflowError,
+                         "points[%lld] lies more than 2**51 box vectors away, further than "
+                         "shifts are counted; wrap the points first",
+                         (long long)failure->row);
+        }
+        return NULL;
+    case HS_ERR_KERNEL: return raise_kernel(options);
+    case HS_ERR_INTERRUPTED:
+        if (!PyErr_Occurred()) {
+            PyErr_SetString(PyExc_SystemError, "interrupted without an exception");
+        }
+        return NULL;
+    case HS_OK:
+    case HS_STATUS_END: break;
+    }
+    PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status,
+                 hs_status_text(status));
+    return NULL;
+}

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* errors.h: the only place where a status of the core becomes a Python exception. */
+#ifndef HS_ERRORS_H
+#define HS_ERRORS_H
+
+#include "numpy_api.h"
+
+#include "../halfshell.h"
+
+/* Sets the exception for a status other than HS_OK; returns NULL for convenience. HS_ERR_INTERRUPTED expects
+ * that poll() has set one. options may be NULL. */
+PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options *options);
+
+#endif

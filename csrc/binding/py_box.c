@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_box.c: _core.box_measure and _core.box_wrap. */
+#include "py_functions.h"
+
+#include "convert.h"
+#include "errors.h"
+
+#include <string.h>
+
+static PyObject *
+heights_and_volume(const double *heights, int ndim, double volume)
+{
+    npy_intp  shape[1] = {ndim};
+    PyObject *array = PyArray_SimpleNew(1, shape, NPY_DOUBLE);
+    if (array == NULL) {
+        return NULL;
+    }
+    memcpy(PyArray_DATA((PyArrayObject *)array), heights, (size_t)ndim * sizeof(double));
+    return Py_BuildValue("(Nd)", array, volume);
+}
+
+PyObject *
+hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_box     box;
+    hs_failure failure;
+    bool       given;
+    double     heights[HS_MAX_DIM] = {0}, volume;
+    (void)module;
+    if (n_arguments != 2 || !PyArray_Check(arguments[0]) ||
+        PyArray_NDIM((PyArrayObject *)arguments[0]) != 2) {
+        PyErr_SetString(PyExc_TypeError, "box_measure takes a box (d, d) and periodic bits");
+        return NULL;
+    }
+    const npy_intp ndim = PyArray_DIM((PyArrayObject *)arguments[0], 0);
+    if (ndim < 1 || ndim > HS_MAX_DIM) {
+        PyErr_Format(PyExc_ValueError, "box must have shape (d, d) with 1 <= d <= %d", HS_MAX_DIM);
+        return NULL;
+    }
+    if (!hs_box_of(arguments[0], arguments[1], (int)ndim, &box, &given)) {
+        return NULL;
+    }
+    const hs_status status = hs_box_measure(&box, heights, &volume, &failure);
+    if (status != HS_OK) {
+        return hs_raise(status, &failure, NULL);
+    }
+    return heights_and_volume(heights, (int)ndim, volume);
+}
+
+PyObject *
+hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_points  points;
+    hs_box     box;
+    hs_failure failure;
+    bool       given;
+    hs_status  status;
+    (void)module;
+    if (n_arguments != 3) {
+        PyErr_SetString(PyExc_TypeError, "box_wrap takes points, a box and periodic bits");
+        return NULL;
+    }
+    if (!hs_points_of(arguments[0], &points) ||
+        !hs_box_of(arguments[1], arguments[2], points.ndim, &box, &given)) {
+        return NULL;
+    }
+    if (!given) {
+        PyErr_SetString(PyExc_TypeError, "box_wrap needs a box");
+        return NULL;
+    }
+    npy_intp  shape[2] = {(npy_intp)points.n, points.ndim};
+    PyObject *wrapped = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
+    PyObject *shifts = PyArray_SimpleNew(2, shape, NPY_INT64);
+    if (wrapped == NULL || shifts == NULL) {
+        Py_XDECREF(wrapped);
+        Py_XDECREF(shifts);
+        return NULL;
+    }
+    Py_BEGIN_ALLOW_THREADS
+    status = hs_box_wrap(&box, &points, PyArray_DATA((PyArrayObject *)wrapped),
+                         PyArray_DATA((PyArrayObject *)shifts), &failure);
+    Py_END_ALLOW_THREADS
+    if (status != HS_OK) {
+        Py_DECREF(wrapped);
+        Py_DECREF(shifts);
+        return hs_raise(status, &failure, NULL);
+    }
+    return Py_BuildValue("(NN)", wrapped, shifts);
+}

@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_explain.c: _core.explain, kernels, build_info: what would be done, what was done, with what. */
+#include "py_functions.h"
+
+#include "available.h"
+#include "call.h"
+#include "convert.h"
+#include "errors.h"
+
+/* Puts a new reference into a dictionary and gives it up; false on failure, also of `value`. */
+static bool
+put(PyObject *dict, const char *key, PyObject *value)
+{
+    const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
+    Py_XDECREF(value);
+    return done;
+}
+
+static PyObject *
+tuple_of_integers(const int64_t *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        PyObject *value = PyLong_FromLongLong(values[k]);
+        if (value == NULL) {
+            Py_CLEAR(tuple);
+        } else {
+            PyTuple_SET_ITEM(tuple, k, value);
+        }
+    }
+    return tuple;
+}
+
+static PyObject *
+tuple_of_floats(const double *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        PyObject *value = PyFloat_FromDouble(values[k]);
+        if (value == NULL) {
+            Py_CLEAR(tuple);
+        } else {
+            PyTuple_SET_ITEM(tuple, k, value);
+        }
+    }
+    return tuple;
+}
+
+static bool
+put_plan(PyObject *dict, const hs_plan *plan)
+{
+    return put(dict, "ndim", PyLong_FromLong(plan->ndim)) &&
+           put(dict, "n_periodic", PyLong_FromLong(plan->n_periodic)) &&
+           put(dict, "aligned", PyBool_FromLong(plan->aligned)) &&
+           put(dict, "reduced", PyBool_FromLong(plan->reduced)) &&
+           put(dict, "keeps_originals", PyBool_FromLong(plan->keeps_originals)) &&
+           put(dict, "all_pairs", PyBool_FromLong(plan->all_pairs)) &&
+           put(dict, "shape", tuple_of_integers(plan->shape, plan->ndim)) &&
+           put(dict, "cell_sizes", tuple_of_floats(plan->cell_size, plan->ndim)) &&
+           put(dict, "reach", tuple_of_integers(plan->reach, plan->ndim)) &&
+           put(dict, "images", tuple_of_integers(plan->images, plan->ndim)) &&
+           put(dict, "stencil_rows", PyLong_FromLongLong(plan->stencil_rows)) &&
+           put(dict, "expected_pairs", PyFloat_FromDouble(plan->expected_pairs)) &&
+           put(dict, "kernel", PyUnicode_FromString(plan->kernel));
+}
+
+static bool
+put_bytes(PyObject *dict, const hs_counters *counters)
+{
+    static const char *const names[HS_PURPOSE_END] = {
+        [HS_FOR_POINTS] = "points",         [HS_FOR_ORIGINALS] = "originals",
+        [HS_FOR_WRAPS] = "wraps",           [HS_FOR_ORDER] = "order",
+        [HS_FOR_CELLS] = "cells",           [HS_FOR_STENCIL] = "stencil",
+        [HS_FOR_CANDIDATES] = "candidates", [HS_FOR_INDICES] = "indices",
+        [HS_FOR_DISTANCES] = "distances",   [HS_FOR_VECTORS] = "vectors",
+        [HS_FOR_SHIFTS] = "shifts",         [HS_FOR_SORTING] = "sorting",
+    };
+    for (int p = 0; p < HS_PURPOSE_END; p++) {
+        if (!put(dict, names[p], PyLong_FromLongLong(counters->bytes[p]))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool
+put_counters(PyObject *dict, const hs_counters *counters)
+{
+    PyObject *bytes = PyDict_New();
+    if (bytes == NULL || !put_bytes(bytes, counters)) {
+        Py_XDECREF(bytes);
+        return false;
+    }
+    return put(dict, "bytes", bytes) &&
+           put(dict, "bytes_peak", PyLong_FromLongLong(counters->bytes_peak)) &&
+           put(dict, "groups", PyLong_FromLongLong(counters->groups)) &&
+           put(dict, "candidates", PyLong_FromLongLong(counters->candidates)) &&
+           put(dict, "pairs", PyLong_FromLongLong(counters->pairs)) &&
+           put(dict, "ambiguous", PyLong_FromLongLong(counters->ambiguous)) &&
+           put(dict, "by_float64", PyLong_FromLongLong(counters->by_float64)) &&
+           put(dict, "by_double_word", PyLong_FromLongLong(counters->by_double_word)) &&
+           put(dict, "by_integers", PyLong_FromLongLong(counters->by_integers));
+}
+
+PyObject *
+hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call     call;
+    hs_failure  failure;
+    hs_plan     plan;
+    hs_counters counters = {0};
+    hs_pairs   *pairs = NULL;
+    const char *letters;
+    (void)module;
+    if (n_arguments != HS_CALL_ARGUMENTS + 4) {
+        PyErr_Format(PyExc_TypeError, "explain takes %d arguments", HS_CALL_ARGUMENTS + 4);
+        return NULL;
+    }
+    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
+    if (!hs_call_init(&call, arguments) ||
+        !hs_quantities_of(more[0], &letters, &call.options.want)) {
+        return NULL;
+    }
+    const int sorted = PyObject_IsTrue(more[1]);
+    const int measure = PyObject_IsTrue(more[3]);
+    call.options.index_bytes = (int)PyLong_AsLong(more[2]);
+    call.options.sorted = sorted > 0;
+    if (sorted < 0 || measure < 0 || PyErr_Occurred()) {
+        return NULL;
+    }
+    hs_call_release(&call);
+    hs_status status =
+        hs_plan_make(&call.points, hs_call_box(&call), &call.options, &plan, &failure);
+    if (status == HS_OK && measure) {
+        call.options.counters = &counters;
+        status = hs_pairs_find(&call.points, hs_call_box(&call), &call.options, &pairs, &failure);
+    }
+    hs_call_acquire(&call);
+    hs_pairs_free(pairs);
+    if (status != HS_OK) {
+        return hs_raise(status, &failure, &call.options);
+    }
+    PyObject *dict = PyDict_New();
+    if (dict == NULL || !put_plan(dict, &plan) || (measure && !put_counters(dict, &counters))) {
+        Py_XDECREF(dict);
+        return NULL;
+    }
+    return dict;
+}
+
+PyObject *
+hs_py_kernels(PyObject *module, PyObject *ignored)
+{
+    const char *names[8];
+    const int   n = hs_kernel_names(names, 8);
+    PyObject   *tuple = PyTuple_New(n);
+    (void)module;
+    (void)ignored;
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        PyObject *name = PyUnicode_FromString(names[k]);
+        if (name == NULL) {
+            Py_CLEAR(tuple);
+        } else {
+            PyTuple_SET_ITEM(tuple, k, name);
+        }
+    }
+    return tuple;
+}
+
+#if defined(__clang__)
+#define COMPILER "clang " __clang_version__
+#elif defined(__GNUC__)
+#define COMPILER "gcc " __VERSION__
+#elif defined(_MSC_VER)
+#define COMPILER "msvc"
+#else
+#define COMPILER "unknown"
+#endif
+
+PyObject *
+hs_py_build_info(PyObject *module, PyObject *ignored)
+{
+    PyObject *dict = PyDict_New();
+    if (dict != NULL &&
+        put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
+#ifdef NDEBUG
+        put(dict, "assertions", PyBool_FromLong(0)) &&
+#else
+        put(dict, "assertions", PyBool_FromLong(1)) &&
+#endif
+#ifdef __SIZEOF_INT128__
+        put(dict, "int128", PyBool_FromLong(1)) &&
+#else
+        put(dict, "int128", PyBool_FromLong(0)) &&
+#endif
+        put(dict, "kernels", hs_py_kernels(module, ignored))) {
+        return dict;
+    }
+    Py_XDECREF(dict);
+    return NULL;
+}
+
+PyObject *
+hs_py_available_memory(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyFloat_FromDouble(hs_available_memory(NULL));
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* base.h: compiler macros that every file of the core may use, and nothing else. */
+#ifndef HS_BASE_H
+#define HS_BASE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Results must not depend on the compiler's mood: no fused multiply-add unless it is written. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#endif
+#ifdef __FAST_MATH__
+#error "halfshell decides by the rules of IEEE 754; -ffast-math breaks them"
+#endif
+
+#if defined(_MSC_VER)
+#define HS_ALWAYS_INLINE static __forceinline
+#define HS_NO_INLINE __declspec(noinline)
+#define HS_RESTRICT __restrict
+#define HS_UNLIKELY(x) (x)
+#else
+#define HS_ALWAYS_INLINE static inline __attribute__((always_inline))
+#define HS_NO_INLINE __attribute__((noinline))
+#define HS_RESTRICT restrict
+#define HS_UNLIKELY(x) __builtin_expect(!!(x), 0)
+#endif
+
+/* -DHS_HAVE_INT128=0 builds what compilers without a 128-bit integer build. */
+#if !defined(HS_HAVE_INT128)
+#if defined(__SIZEOF_INT128__)
+#define HS_HAVE_INT128 1
+#else
+#define HS_HAVE_INT128 0
+#endif
+#endif
+#if HS_HAVE_INT128
+__extension__ typedef __int128 hs_int128;
+__extension__ typedef unsigned __int128 hs_uint128;
+#endif
+
+/* States what the programmer guarantees, never what a user may get wrong. */
+#if defined(NDEBUG)
+#define HS_ASSERT(condition) ((void)0)
+#else
+#include <assert.h>
+#define HS_ASSERT(condition) assert(condition)
+#endif
+
+#endif

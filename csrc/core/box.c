@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* box.c: the public functions of a box alone: measure and wrap. */
+#include "../halfshell.h"
+
+#include "fpenv.h"
+#include "lattice.h"
+#include "points.h"
+#include "wrap.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Boxes are scaled to about this exponent, so that products of a few lengths stay finite. */
+static hs_scale
+scale_of_box(const hs_box *box)
+{
+    double largest = 0.0;
+    for (int l = 0; l < box->ndim; l++) {
+        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
+            largest = fmax(largest, fabs(box->rows[l][k]));
+        }
+    }
+    return hs_scale_of(largest > 0.0 ? ilogb(largest) : 0);
+}
+
+hs_status
+hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_lattice lattice;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = (hs_failure){.row = -1, .column = -1};
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_status      status = hs_box_check(box, failure);
+    if (status == HS_OK) {
+        const hs_scale scale = scale_of_box(box);
+        const hs_scale back = hs_scale_of(-scale.exponent);
+        hs_lattice_init_given(box, scale, &lattice);
+        double scaled_back = lattice.volume;
+        for (int r = 0; r < lattice.n_periodic; r++) {
+            const int l = lattice.axis_of_row[r];
+            scaled_back = hs_scale_apply(back, scaled_back);
+            if (heights != NULL) {
+                heights[l] = hs_scale_apply(back, lattice.period[l]);
+            }
+        }
+        if (volume != NULL) {
+            *volume = scaled_back;
+        }
+    }
+    hs_fpenv_leave(saved);
+    return status;
+}
+
+/* A tiny negative coordinate plus the length rounds to the length: keep it inside. */
+static void
+keep_inside(int ndim, const double *row, double *wrapped)
+{
+    int column = -1;
+    for (int k = 0; k < ndim; k++) {
+        if (row[k] != 0.0) {
+            if (column >= 0) {
+                return; /* not along a coordinate axis: no coordinate alone says what is inside */
+            }
+            column = k;
+        }
+    }
+    if (fabs(wrapped[column]) >= fabs(row[column])) {
+        wrapped[column] = nextafter(row[column], 0.0);
+    }
+}
+
+/* From the middle period to [0, 1): one more vector for each negative fraction. */
+static bool
+wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *turns)
+{
+    double magnitude = 0.0;
+    if (!hs_wrap_point(lattice, x, wrapped, turns, &magnitude)) {
+        return false;
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        const int r = lattice->row_of_axis[k];
+        if (r < 0) {
+            continue;
+        }
+        double t = 0.0;
+        for (int c = 0; c < lattice->ndim; c++) {
+            t += lattice->normal[k][c] * wrapped[c];
+        }
+        if (t < 0.0) {
+            turns[r]--;
+            for (int c = 0; c < lattice->ndim; c++) {
+                wrapped[c] += lattice->rows[r][c];
+            }
+            keep_inside(lattice->ndim, lattice->rows[r], wrapped);
+        }
+    }
+    return true;
+}
+
+static hs_status
+wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, double *wrapped,
+          int64_t *shift, hs_failure *failure)
+{
+    const hs_scale back = hs_scale_of(-scale.exponent);
+    const int      d = lattice->ndim;
+    for (int64_t i = 0; i < cloud->n; i++) {
+        double  x[HS_MAX_DIM], inside[HS_MAX_DIM];
+        int64_t turns[HS_MAX_DIM], given[HS_MAX_DIM];
+        for (int k = 0; k < d; k++) {
+            x[k] = hs_scale_apply(scale, cloud->x[i * d + k]);
+        }
+        if (!wrap_row(lattice, x, inside, turns) || !hs_lattice_shift(lattice, turns, given)) {
+            failure->row = i;
+            return HS_ERR_SHIFT_RANGE;
+        }
+        for (int k = 0; wrapped != NULL && k < d; k++) {
+            wrapped[i * d + k] = hs_scale_apply(back, inside[k]);
+        }
+        if (shift != NULL) {
+            memset(shift + i * d, 0, (size_t)d * sizeof(int64_t));
+            for (int l = 0; l < lattice->n_periodic; l++) {
+                shift[i * d + lattice->axis_of_row[l]] = -given[l];
+            }
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t *shift,
+            hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_lattice lattice;
+    hs_cloud   cloud;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = (hs_failure){.row = -1, .column = -1};
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_status      status = hs_box_check(box, failure);
+    if (status == HS_OK) {
+        status = hs_cloud_load(NULL, points, &cloud, failure);
+    }
+    if (status == HS_OK) {
+        const hs_scale scale = scale_of_box(box);
+        hs_lattice_init_given(box, scale, &lattice);
+        status = wrap_rows(&lattice, scale, &cloud, wrapped, shift, failure);
+        hs_cloud_free(NULL, &cloud);
+    }
+    hs_fpenv_leave(saved);
+    return status;
+}

@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * exact_float.h: the float stages of the decision, each a value with a proven bound on its error.
+ * For exact.c, measure.c and their tests only.
+ *
+ * ndim is passed beside the metric because callers that know it let the compiler unroll loops.
+ */
+#ifndef HS_EXACT_FLOAT_H
+#define HS_EXACT_FLOAT_H
+
+#include "bounds.h"
+#include "doubleword.h"
+#include "exact.h"
+
+#define HS_SAFE_EXPONENT (1024 - HS_RANGE_GUARD)
+
+typedef enum hs_verdict { HS_UNDECIDED, HS_WITHIN, HS_BEYOND } hs_verdict;
+
+/* D as computed; |computed D - D| <= error, Euclidean. */
+typedef struct hs_difference {
+    hs_dw  component[HS_MAX_DIM];
+    double error;
+} hs_difference;
+
+/* q - p: exact as double-words. An overflow leaves infinity or NaN in a component. */
+HS_ALWAYS_INLINE void
+hs_difference_plain(hs_difference *difference, const double *p, const double *q, int ndim)
+{
+    int k = 0; /* ndim is not 0: compilers wonder */
+    do
+        difference->component[k] = hs_two_difference(q[k], p[k]);
+    while (++k < ndim);
+    difference->error = 0.0;
+}
+
+/* q - p + shift * rows. False where the bound would not hold: a shift that float64 cannot hold, or
+ * terms too large. Needs metric->floats_usable. */
+HS_ALWAYS_INLINE bool
+hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const double *p,
+                      const double *q, const int64_t *shift, int ndim)
+{
+    const int64_t shift_end = INT64_C(1) << 53; /* every integer up to here is a float64 */
+    double        times[HS_MAX_DIM];
+    double        magnitude = 0.0, weighted = 0.0;
+
+    for (int l = 0; l < metric->n_rows; l++) {
+        if (shift[l] > shift_end || shift[l] < -shift_end)
+            return false;
+        times[l] = (double)shift[l];
+    }
+    int k = 0;
+    do {
+        hs_dw  sum = hs_two_difference(q[k], p[k]);
+        double size = fabs(q[k]) + fabs(p[k]);
+        double sums = 0.0;
+        for (int l = 0; l < metric->n_rows; l++) {
+            const double entry = metric->rows[l][k];
+            if (times[l] == 0.0 || entry == 0.0)
+                continue;
+            const hs_dw product = hs_two_product(times[l], entry);
+            sum = hs_dw_add(sum, product);
+            size += fabs(product.hi);
+            sums += 1.0;
+        }
+        difference->component[k] = sum;
+        magnitude += size;
+        weighted += sums * size;
+    } while (++k < ndim);
+    difference->error = HS_DW_ADD_ERROR * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT) * weighted;
+    return magnitude <= ldexp(1.0, HS_SAFE_EXPONENT); /* also false for NaN */
+}
+
+/* |D|^2 of the computed D in float64. */
+HS_ALWAYS_INLINE double
+hs_float64_square(const hs_difference *difference, int ndim)
+{
+    double square = difference->component[0].hi * difference->component[0].hi;
+    for (int k = 1; k < ndim; k++)
+        square += difference->component[k].hi * difference->component[k].hi;
+    return square;
+}
+
+/*
+ * First stage. The thresholds contain the rounding of `square`; an error e of D moves R^2 by at
+ * most 2 R e + e^2 <= 2 e (R + e). Written as differences, because those are exact near zero. A
+ * square on a threshold is decided: the thresholds are on the safe side of theirs.
+ */
+HS_ALWAYS_INLINE hs_verdict
+hs_float64_verdict(const hs_metric *metric, double square, double error)
+{
+    const double slack = 2.0 * error * (metric->cutoff + error);
+    if (metric->sure_in - square >= slack)
+        return HS_WITHIN;
+    if (square - metric->sure_out >= slack)
+        return HS_BEYOND;
+    return HS_UNDECIDED;
+}
+
+/* |D|^2 of the computed D as a double-word. */
+HS_ALWAYS_INLINE hs_dw
+hs_double_word_square(const hs_difference *difference, int ndim)
+{
+    hs_dw square = hs_dw_square(difference->component[0]);
+    for (int k = 1; k < ndim; k++)
+        square = hs_dw_add(square, hs_dw_square(difference->component[k]));
+    return square;
+}
+
+/* How far hs_double_word_square may be from |D|^2. */
+HS_ALWAYS_INLINE double
+hs_double_word_error(double square, double error, int ndim)
+{
+    const double roundings = HS_DW_SQUARE_ERROR + HS_DW_ADD_ERROR * (ndim - 1);
+    return roundings * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT) * square +
+           error * (2.0 * sqrt(square) + error);
+}
+
+/* Second stage. The difference to R^2 has itself a tiny relative error, so its sign is right. */
+HS_ALWAYS_INLINE hs_verdict
+hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference, int ndim)
+{
+    const hs_dw  square = hs_double_word_square(difference, ndim);
+    const hs_dw  excess = hs_dw_add(square, (hs_dw){-metric->square_hi, -metric->square_lo});
+    const double bound = hs_double_word_error(square.hi, difference->error, ndim);
+    if (fabs(excess.hi) > bound)
+        return excess.hi < 0.0 ? HS_WITHIN : HS_BEYOND;
+    return HS_UNDECIDED;
+}
+
+#endif

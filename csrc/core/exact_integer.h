@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * exact_integer.h: the last stage. Every float is an integer times a power of two, so that, for a
+ * common power, D and the cutoff are integers and compare exactly. No overflow, no rounding mode
+ * and no flushing can touch this; it always decides.
+ */
+#ifndef HS_EXACT_INTEGER_H
+#define HS_EXACT_INTEGER_H
+
+#include "doubleword.h"
+#include "exact.h"
+
+/* Sign of |D|^2 - cutoff^2: -1, 0 or 1. shift may be NULL. */
+int hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
+                       const int64_t *shift);
+
+/* D: component k is (value[k].hi + value[k].lo) * 2^*exponent within 2^-100 of the largest
+ * component, the largest being at least 2^128 and below 2^192, or all of them 0. */
+void hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
+                           const int64_t *shift, hs_dw *value, int *exponent);
+
+#endif

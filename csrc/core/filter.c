@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* filter.c: the float32 thresholds, every step of their computation rounded to the safe side. */
+#include "filter.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "bounds.h"
+#include "rounding.h"
+
+/* Sums and products of numbers >= 0, rounded up and down. */
+static double
+add_up(double a, double b)
+{
+    return hs_next_up(a + b);
+}
+
+static double
+multiply_up(double a, double b)
+{
+    return hs_next_up(a * b);
+}
+
+static double
+multiply_down(double a, double b)
+{
+    return hs_next_down(a * b);
+}
+
+/*
+ * How far the vector y - q that the kernel subtracts may be from D, Euclidean: the roundings of y
+ * and q to floats, what the caller knows of errors before that, and numbers flushed to zero.
+ */
+static double
+input_error(int ndim, double extent, double error, double unit, double tiny)
+{
+    const double rounding = multiply_up(HS_FILTER_INPUT_ROUNDINGS + HS_FILTER_SLACK, unit);
+    const double component = add_up(multiply_up(rounding, extent),
+                                    add_up(multiply_up(HS_FILTER_ERRORS, error),
+                                           multiply_up(HS_FILTER_FLUSHES, tiny)));
+    return multiply_up(hs_next_up(sqrt((double)ndim)), component);
+}
+
+void
+hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
+                    double tiny, double *in, double *out)
+{
+    const double a = input_error(ndim, extent, error, unit, tiny);
+    const double difference = multiply_up(HS_FILTER_DIFFERENCE_ROUNDINGS, unit);
+    const double roundings = multiply_up(HS_FILTER_SQUARE_ROUNDINGS * ndim, unit);
+    const double lost = multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny);
+    *in = -1.0;
+    *out = HUGE_VAL;
+    if (!(a <= DBL_MAX) || !(roundings < 0.5)) /* not for infinity and NaN either */
+        return;
+
+    /* n roundings in a row change a number by at most the factor 1 +- gamma. */
+    const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
+
+    const double far_root = multiply_up(hs_next_up(1.0 + difference), add_up(cutoff, a));
+    *out = add_up(multiply_up(multiply_up(far_root, far_root), hs_next_up(1.0 + gamma)), lost);
+
+    if (cutoff <= a)
+        return;
+    const double near_root =
+        multiply_down(hs_next_down(1.0 - difference), hs_next_down(cutoff - a));
+    const double near_square =
+        multiply_down(multiply_down(near_root, near_root), hs_next_down(1.0 - gamma));
+    if (near_square > lost)
+        *in = hs_next_down(near_square - lost);
+}
+
+/* Rounded outwards: s < in and s > out keep their meaning for every float s. */
+static float
+float_below(double x)
+{
+    const float rounded = x > FLT_MAX ? FLT_MAX : (float)x;
+    return (double)rounded > x ? nextafterf(rounded, -INFINITY) : rounded;
+}
+
+static float
+float_above(double x)
+{
+    const float rounded = x > FLT_MAX ? INFINITY : (float)x;
+    return (double)rounded < x ? nextafterf(rounded, INFINITY) : rounded;
+}
+
+hs_thresholds
+hs_thresholds_of(int ndim, double cutoff, double extent, double error)
+{
+    double in, out;
+    hs_threshold_bounds(ndim, cutoff, extent, error, HS_FILTER_UNIT, HS_FILTER_TINY, &in, &out);
+    return (hs_thresholds){float_below(in), float_above(out)};
+}

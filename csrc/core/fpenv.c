@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* fpenv.c: the floating-point control register on each kind of CPU. */
+#include "fpenv.h"
+
+#if defined(__SSE2__) || defined(_M_X64)
+
+#include <xmmintrin.h>
+
+/* Power-on value: round to nearest, every exception masked, no flag set, no flushing. */
+#define MXCSR_DEFAULT 0x1f80u
+
+hs_fpenv
+hs_fpenv_enter(void)
+{
+    const hs_fpenv saved = {_mm_getcsr()};
+    _mm_setcsr(MXCSR_DEFAULT);
+    return saved;
+}
+
+void
+hs_fpenv_leave(hs_fpenv saved)
+{
+    _mm_setcsr((unsigned)saved.control);
+}
+
+#elif defined(__aarch64__)
+
+/* FPCR holds rounding, flushing and traps, all off when zero; FPSR the flags. Each is 32 bits. */
+hs_fpenv
+hs_fpenv_enter(void)
+{
+    uint64_t control, flags;
+    __asm__ __volatile__("mrs %0, fpcr" : "=r"(control));
+    __asm__ __volatile__("mrs %0, fpsr" : "=r"(flags));
+    __asm__ __volatile__("msr fpcr, %0" : : "r"(UINT64_C(0)));
+    return (hs_fpenv){(control & UINT32_MAX) | flags << 32};
+}
+
+void
+hs_fpenv_leave(hs_fpenv saved)
+{
+    __asm__ __volatile__("msr fpcr, %0" : : "r"(saved.control & UINT32_MAX));
+    __asm__ __volatile__("msr fpsr, %0" : : "r"(saved.control >> 32));
+}
+
+#elif defined(_M_ARM64)
+
+#include <intrin.h>
+
+hs_fpenv
+hs_fpenv_enter(void)
+{
+    const uint64_t control = (uint64_t)_ReadStatusReg(ARM64_FPCR) & UINT32_MAX;
+    const uint64_t flags = (uint64_t)_ReadStatusReg(ARM64_FPSR);
+    _WriteStatusReg(ARM64_FPCR, 0);
+    return (hs_fpenv){control | flags << 32};
+}
+
+void
+hs_fpenv_leave(hs_fpenv saved)
+{
+    _WriteStatusReg(ARM64_FPCR, (__int64)(saved.control & UINT32_MAX));
+    _WriteStatusReg(ARM64_FPSR, (__int64)(saved.control >> 32));
+}
+
+#else
+
+#include <fenv.h>
+
+/* Flushing cannot be reached from here; CPUs of this kind start without it. */
+hs_fpenv
+hs_fpenv_enter(void)
+{
+    const hs_fpenv saved = {(uint64_t)(uint32_t)fegetround() |
+                            (uint64_t)(uint32_t)fetestexcept(FE_ALL_EXCEPT) << 32};
+    fesetround(FE_TONEAREST);
+    return saved;
+}
+
+void
+hs_fpenv_leave(hs_fpenv saved)
+{
+    fesetround((int)(uint32_t)saved.control);
+    feclearexcept(FE_ALL_EXCEPT);
+    feraiseexcept((int)(uint32_t)(saved.control >> 32));
+}
+
+#endif

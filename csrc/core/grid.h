@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * grid.h: cells. How many along each grid axis, which one a point is in, and how many cells away a
+ * neighbour can be. The number of cells follows the number of points, never the volume.
+ */
+#ifndef HS_GRID_H
+#define HS_GRID_H
+
+#include "scene.h"
+
+typedef struct hs_grid {
+    int      ndim;
+    int64_t  n_cells;             /* product of shape, at most 2 n + HS_GRID_SPARE_CELLS */
+    int64_t  shape[HS_MAX_DIM];   /* cells along each axis, at least 1 */
+    int64_t  stride[HS_MAX_DIM];  /* cell id = sum of index * stride; the first axis is fastest */
+    double   lower[HS_MAX_DIM];   /* t of the first face */
+    double   cell_size[HS_MAX_DIM];
+    double   cells_per_length[HS_MAX_DIM];
+    double   range[HS_MAX_DIM];   /* largest |difference of computed t_k| of a pair */
+    int64_t  reach[HS_MAX_DIM];   /* the same in cells, images counted on */
+    double   shift_error;         /* bound on the error of a shifted coordinate minus a centre */
+    double   expected_pairs;      /* if the points were spread evenly over the region they occupy */
+    bool     expectation_is_sure; /* all axes repeat, so that images make it even in the long range */
+} hs_grid;
+
+#define HS_GRID_SPARE_CELLS 64
+
+/* HS_ERR_MEMORY when a cutoff spans more than 2^31 images. */
+hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
+
+/* Cell index along axis k of a point with coordinate t; points beyond a face count as on it. */
+HS_ALWAYS_INLINE int64_t
+hs_grid_index(const hs_grid *grid, int k, double t)
+{
+    const double place = (t - grid->lower[k]) * grid->cells_per_length[k];
+    const int64_t last = grid->shape[k] - 1;
+    const int64_t index = place > 0.0 ? (int64_t)place : 0;
+    return index < last ? index : last;
+}
+
+#endif

@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * lattice.c: see lattice.h.
+ *
+ * Normals and heights need not be accurate, only consistent: whatever unit vector `normal[k]`
+ * is, |normal[k] . D| <= |D| holds, and scene.c measures how far a lattice vector moves a grid
+ * coordinate that it should not move. A bad normal makes cells wider, never an answer wrong.
+ */
+#include "lattice.h"
+
+#include "rank.h"
+#include "reduce.h"
+
+#include <math.h>
+#include <string.h>
+
+hs_scale
+hs_scale_of(int exponent)
+{
+    const int half = exponent / 2;
+    return (hs_scale){exponent, ldexp(1.0, -half), ldexp(1.0, half - exponent)};
+}
+
+static int
+collect_periodic_rows(const hs_box *box, double rows[][HS_MAX_DIM], int *axis_of_row)
+{
+    int n_periodic = 0;
+    for (int l = 0; l < box->ndim; l++) {
+        if (box->periodic[l]) {
+            memcpy(rows[n_periodic], box->rows[l], sizeof box->rows[l]);
+            axis_of_row[n_periodic++] = l;
+        }
+    }
+    return n_periodic;
+}
+
+hs_status
+hs_box_check(const hs_box *box, hs_failure *failure)
+{
+    double rows[HS_MAX_DIM][HS_MAX_DIM];
+    int    axis_of_row[HS_MAX_DIM];
+    if (box == NULL) {
+        return HS_OK;
+    }
+    const int n_periodic = collect_periodic_rows(box, rows, axis_of_row);
+    for (int r = 0; r < n_periodic; r++) {
+        for (int k = 0; k < box->ndim; k++) {
+            if (!isfinite(rows[r][k])) {
+                failure->row = axis_of_row[r];
+                failure->column = k;
+                failure->value = rows[r][k];
+                return HS_ERR_BOX_FINITE;
+            }
+        }
+    }
+    return hs_rows_independent(box->ndim, n_periodic, rows) ? HS_OK : HS_ERR_BOX_DEPENDENT;
+}
+
+/* If every row has one nonzero entry, in its own column: column[r] says where. */
+static bool
+rows_are_aligned(int ndim, int n_rows, const double rows[][HS_MAX_DIM], int *column)
+{
+    unsigned used = 0;
+    for (int r = 0; r < n_rows; r++) {
+        column[r] = -1;
+        for (int k = 0; k < ndim; k++) {
+            if (rows[r][k] != 0.0) {
+                if (column[r] >= 0) {
+                    return false;
+                }
+                column[r] = k;
+            }
+        }
+        if (column[r] < 0 || (used >> column[r] & 1u)) {
+            return false;
+        }
+        used |= 1u << column[r];
+    }
+    return true;
+}
+
+static double
+dot(int ndim, const double *a, const double *b)
+{
+    double sum = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        sum += a[k] * b[k];
+    }
+    return sum;
+}
+
+/* Largest entry brought near 1 by a power of two, so that squares neither overflow nor vanish.
+ * Returns that power's exponent. */
+static int
+copy_of_unit_size(int ndim, const double *row, double *copy)
+{
+    double largest = 0.0;
+    int    exponent;
+    for (int k = 0; k < ndim; k++) {
+        largest = fmax(largest, fabs(row[k]));
+    }
+    (void)frexp(largest, &exponent);
+    for (int k = 0; k < ndim; k++) {
+        copy[k] = ldexp(row[k], -exponent);
+    }
+    return exponent;
+}
+
+/* Remove from v what lies along n_basis orthonormal vectors (twice: the first pass rounds), then
+ * scale v to length 1. Returns its length before that. */
+static double
+orthonormalise(int ndim, int n_basis, double basis[][HS_MAX_DIM], double *v)
+{
+    for (int pass = 0; pass < 2; pass++) {
+        for (int b = 0; b < n_basis; b++) {
+            const double along = dot(ndim, v, basis[b]);
+            for (int k = 0; k < ndim; k++) {
+                v[k] -= along * basis[b][k];
+            }
+        }
+    }
+    const double length = sqrt(dot(ndim, v, v));
+    for (int k = 0; k < ndim; k++) {
+        v[k] = length > 0.0 ? v[k] / length : 0.0;
+    }
+    return length;
+}
+
+/* The unit vector that meets row r of B only. */
+static void
+set_periodic_normal(hs_lattice *lattice, int r, double *normal)
+{
+    double    basis[HS_MAX_DIM][HS_MAX_DIM];
+    const int ndim = lattice->ndim;
+    int       n_basis = 0;
+    for (int other = 0; other < lattice->n_periodic; other++) {
+        if (other != r) {
+            copy_of_unit_size(ndim, lattice->rows[other], basis[n_basis]);
+            orthonormalise(ndim, n_basis, basis, basis[n_basis]);
+            n_basis++;
+        }
+    }
+    copy_of_unit_size(ndim, lattice->rows[r], normal);
+    orthonormalise(ndim, n_basis, basis, normal);
+}
+
+/* Orthonormal vectors that no row of B meets, one for each open grid axis: of all coordinate axes the
+ * one that is least covered so far. */
+static void
+set_open_normals(hs_lattice *lattice)
+{
+    double    basis[HS_MAX_DIM][HS_MAX_DIM];
+    const int ndim = lattice->ndim;
+    int       n_basis = 0;
+    lattice->volume = 1.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int    exponent = copy_of_unit_size(ndim, lattice->rows[r], basis[n_basis]);
+        const double length = orthonormalise(ndim, n_basis, basis, basis[n_basis]);
+        lattice->volume *= ldexp(length, exponent);
+        n_basis++;
+    }
+    for (int k = 0; k < ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0) {
+            continue;
+        }
+        double best_length = -1.0;
+        for (int a = 0; a < ndim; a++) {
+            double trial[HS_MAX_DIM] = {0};
+            trial[a] = 1.0;
+            const double length = orthonormalise(ndim, n_basis, basis, trial);
+            if (length > best_length) {
+                best_length = length;
+                memcpy(basis[n_basis], trial, sizeof trial);
+            }
+        }
+        memcpy(lattice->normal[k], basis[n_basis], sizeof basis[n_basis]);
+        memcpy(lattice->direction[k], basis[n_basis], sizeof basis[n_basis]);
+        n_basis++;
+    }
+}
+
+static void
+set_general_axes(hs_lattice *lattice)
+{
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        lattice->row_of_axis[lattice->axis_of_row[r]] = r;
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int k = lattice->axis_of_row[r];
+        double   *normal = lattice->normal[k];
+        set_periodic_normal(lattice, r, normal);
+        double height = dot(lattice->ndim, normal, lattice->rows[r]);
+        if (height < 0.0) {
+            height = -height;
+            for (int c = 0; c < lattice->ndim; c++) {
+                normal[c] = -normal[c];
+            }
+        }
+        lattice->period[k] = height;
+        for (int c = 0; c < lattice->ndim; c++) {
+            lattice->direction[k][c] = height > 0.0 ? lattice->rows[r][c] / height : 0.0;
+        }
+    }
+    set_open_normals(lattice);
+}
+
+/* B diagonal: make the entries positive and let the grid axes be the coordinate axes. */
+static void
+set_aligned_axes(hs_lattice *lattice, const int *column)
+{
+    lattice->volume = 1.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int c = column[r];
+        if (lattice->rows[r][c] < 0.0) {
+            lattice->rows[r][c] = -lattice->rows[r][c];
+            for (int l = 0; l < lattice->n_periodic; l++) {
+                lattice->U[r][l] = -lattice->U[r][l];
+            }
+        }
+        lattice->row_of_axis[c] = r;
+        lattice->period[c] = lattice->rows[r][c];
+        lattice->volume *= lattice->rows[r][c];
+    }
+    for (int k = 0; k < lattice->ndim; k++) {
+        lattice->normal[k][k] = 1.0;
+        lattice->direction[k][k] = 1.0;
+    }
+}
+
+/* The given rows, scaled; B is the same for now. */
+static void
+take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
+{
+    *lattice = (hs_lattice){.ndim = ndim};
+    for (int k = 0; k < ndim; k++) {
+        lattice->row_of_axis[k] = -1;
+    }
+    if (box != NULL) {
+        lattice->n_periodic = collect_periodic_rows(box, lattice->given, lattice->axis_of_row);
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        lattice->U[r][r] = 1;
+        for (int k = 0; k < ndim; k++) {
+            lattice->scaled[r][k] = hs_scale_apply(scale, lattice->given[r][k]);
+            lattice->rows[r][k] = lattice->scaled[r][k];
+        }
+    }
+}
+
+/* Replaces B by a short basis. Returns whether it is axis-aligned then, as a box sheared by whole widths is. */
+static bool
+reduce_rows(hs_lattice *lattice, int *column)
+{
+    hs_reduction reduction;
+    bool         exact = true;
+    hs_reduce(lattice->ndim, lattice->n_periodic, lattice->scaled, &reduction);
+    lattice->reduced = reduction.changed;
+    memcpy(lattice->U, reduction.U, sizeof lattice->U);
+    memcpy(lattice->rows, reduction.rows, sizeof lattice->rows);
+    memcpy(lattice->row_error, reduction.error, sizeof lattice->row_error);
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        exact = exact && reduction.error[r] == 0.0;
+    }
+    return exact && rows_are_aligned(lattice->ndim, lattice->n_periodic, lattice->rows, column);
+}
+
+void
+hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
+{
+    int column[HS_MAX_DIM];
+    take_rows(box, ndim, scale, lattice);
+    lattice->aligned = rows_are_aligned(ndim, lattice->n_periodic, lattice->given, column) ||
+                       reduce_rows(lattice, column);
+    if (lattice->aligned) {
+        set_aligned_axes(lattice, column);
+    } else {
+        set_general_axes(lattice);
+    }
+}
+
+void
+hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice)
+{
+    take_rows(box, box->ndim, scale, lattice);
+    set_general_axes(lattice);
+}
+
+bool
+hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given)
+{
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        double  rough = 0.0; /* good to a relative 1e-15, enough to see an overflow coming */
+        int64_t sum = 0;
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            rough += fabs((double)reduced[r]) * fabs((double)lattice->U[r][l]);
+        }
+        if (rough >= 0x1p62) {
+            return false;
+        }
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            sum += reduced[r] * lattice->U[r][l];
+        }
+        given[l] = sum;
+    }
+    return true;
+}

@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* memory.c: see memory.h. A header in front of each block remembers its size. */
+#include "memory.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+typedef struct block_header {
+    void   *raw;   /* what malloc returned */
+    int64_t bytes; /* what the caller asked for */
+} block_header;
+
+#ifdef HS_TESTING
+static int64_t fail_countdown;
+static int64_t live_blocks;
+
+void
+hs_test_fail_allocation(int64_t nth)
+{
+    fail_countdown = nth;
+}
+
+int64_t
+hs_test_live_blocks(void)
+{
+    return live_blocks;
+}
+#endif
+
+void
+hs_account_init(hs_account *account, const hs_options *options)
+{
+    *account = (hs_account){0};
+    account->limit = options->memory_limit;
+    account->find_limit = options->find_limit;
+    account->find_context = options->find_context;
+}
+
+bool
+hs_account_allows(hs_account *account, double bytes)
+{
+    const double wanted = (double)account->held + bytes;
+    if (account->find_limit != NULL && wanted > HS_LIMIT_FREE) {
+        /* What is free now, and what this call already holds, may be used by this call. */
+        const double found = account->find_limit(account->find_context) + (double)account->held;
+        account->limit = fmin(account->limit, found);
+        account->find_limit = NULL;
+    }
+    return wanted <= account->limit;
+}
+
+void *
+hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
+{
+    const size_t overhead = sizeof(block_header) + HS_ALIGNMENT;
+    if (count < 0 || (uint64_t)count > (PTRDIFF_MAX - overhead) / size) {
+        return NULL;
+    }
+    const size_t bytes = (size_t)count * size;
+    if (account != NULL && !hs_account_allows(account, (double)bytes)) {
+        return NULL;
+    }
+#ifdef HS_TESTING
+    if (fail_countdown > 0 && --fail_countdown == 0) {
+        return NULL;
+    }
+#endif
+    void *raw = malloc(bytes + overhead);
+    if (raw == NULL) {
+        return NULL;
+    }
+#ifdef HS_TESTING
+    live_blocks++;
+#endif
+    const uintptr_t first = (uintptr_t)raw + sizeof(block_header);
+    const uintptr_t aligned = (first + HS_ALIGNMENT - 1) & ~(uintptr_t)(HS_ALIGNMENT - 1);
+    block_header   *header = (block_header *)aligned - 1;
+    header->raw = raw;
+    header->bytes = (int64_t)bytes;
+    if (account != NULL) {
+        account->held += (int64_t)bytes;
+        account->total.bytes[purpose] += (int64_t)bytes;
+        if (account->held > account->total.bytes_peak) {
+            account->total.bytes_peak = account->held;
+        }
+    }
+    return (void *)aligned;
+}
+
+void
+hs_free(hs_account *account, void *block)
+{
+    if (block == NULL) {
+        return;
+    }
+    block_header *header = (block_header *)block - 1;
+    if (account != NULL) {
+        account->held -= header->bytes;
+    }
+#ifdef HS_TESTING
+    live_blocks--;
+#endif
+    free(header->raw);
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* plan.c: what a search of a scene would do, read off the same structures that would do it. */
+#include "../halfshell.h"
+
+#include "fpenv.h"
+#include "search.h"
+
+#include <math.h>
+
+static void
+fill_plan(const hs_search *search, hs_plan *plan)
+{
+    const hs_scene *scene = &search->scene;
+    const hs_grid  *grid = &search->grid;
+    const double    unscale = hs_scale_apply(hs_scale_of(-scene->scale.exponent), 1.0);
+    *plan = (hs_plan){.ndim = scene->ndim,
+                      .n_periodic = scene->lattice.n_periodic,
+                      .aligned = scene->lattice.aligned,
+                      .reduced = scene->lattice.reduced,
+                      .keeps_originals = search->bins.originals != NULL,
+                      .all_pairs = grid->n_cells == 1,
+                      .stencil_rows = search->stencil.n_rows,
+                      .expected_pairs = grid->expected_pairs,
+                      .kernel = search->kernel->name};
+    for (int k = 0; k < scene->ndim; k++) {
+        plan->shape[k] = grid->shape[k];
+        plan->cell_size[k] = grid->cell_size[k] * unscale;
+        plan->reach[k] = grid->reach[k];
+        plan->images[k] = scene->lattice.row_of_axis[k] >= 0
+                              ? (grid->reach[k] + grid->shape[k] - 1) / grid->shape[k]
+                              : 0;
+    }
+}
+
+hs_status
+hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *options,
+             hs_plan *plan, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_search  search;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = (hs_failure){.row = -1, .column = -1};
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_status      status = hs_search_open(points, box, options, &search, failure);
+    if (status == HS_OK) {
+        fill_plan(&search, plan);
+        hs_search_close(&search);
+    }
+    hs_fpenv_leave(saved);
+    return status;
+}

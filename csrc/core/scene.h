@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * scene.h: points, box and cutoff in the form that the search works on: scaled by a power of two so
+ * that the cutoff has an ordinary size, wrapped into the box, with a bound on every rounding.
+ */
+#ifndef HS_SCENE_H
+#define HS_SCENE_H
+
+#include "exact.h"
+#include "lattice.h"
+#include "memory.h"
+#include "points.h"
+
+typedef struct hs_scene {
+    int        ndim;
+    int64_t    n;
+    hs_scale   scale;
+    hs_lattice lattice;
+    double     cutoff;        /* scaled; the true one, or an upper bound when `extreme` */
+    double     radius;        /* candidates are sought up to here; cutoff, or a little more */
+    bool       extreme;       /* scaling lost digits: pairs are decided on the originals */
+    hs_metric  metric;        /* decides on X, or on the originals if there are any */
+    double    *x;             /* owned; n * ndim, row-major: X, in the caller's order */
+    double    *originals;     /* owned; the same, as given; NULL where X holds every digit */
+    int64_t   *turns;         /* owned; n * n_periodic; NULL unless shifts or originals need them */
+    double     lower[HS_MAX_DIM]; /* range of t_k over the points (open), or of the period */
+    double     upper[HS_MAX_DIM];
+    double     x_largest[HS_MAX_DIM]; /* largest |X_k| */
+    double     x_error;       /* each component of X is within this of r - w B */
+    double     t_error[HS_MAX_DIM]; /* and each computed t_k of the true one, clamping included */
+    double     formula_error; /* precision="double": its |D| against the true one */
+} hs_scene;
+
+/*
+ * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing and
+ * any status but HS_ERR_KERNEL and HS_ERR_INTERRUPTED is possible.
+ */
+hs_status hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
+                        const hs_options *options, hs_scene *scene, hs_failure *failure);
+
+/* t_k of X. */
+HS_ALWAYS_INLINE double
+hs_scene_coordinate(const hs_scene *scene, const double *x, int k)
+{
+    if (scene->lattice.aligned) {
+        return x[k];
+    }
+    double t = 0.0;
+    for (int c = 0; c < scene->ndim; c++) {
+        t += scene->lattice.normal[k][c] * x[c];
+    }
+    return t;
+}
+
+void hs_scene_free(hs_account *account, hs_scene *scene);
+
+#endif

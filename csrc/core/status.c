@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* status.c: one sentence for each status. */
+#include "../halfshell.h"
+
+const char *
+hs_status_text(hs_status status)
+{
+    switch (status) {
+    case HS_OK: return "success";
+    case HS_ERR_MEMORY: return "not enough memory";
+    case HS_ERR_CUTOFF: return "cutoff must be finite and not negative";
+    case HS_ERR_NOT_FINITE: return "points must be finite";
+    case HS_ERR_BOX_FINITE: return "box must be finite";
+    case HS_ERR_BOX_DEPENDENT: return "periodic box vectors must be linearly independent";
+    case HS_ERR_TOO_MANY: return "too many points or pairs";
+    case HS_ERR_SHIFT_RANGE: return "a shift does not fit its integer type";
+    case HS_ERR_KERNEL: return "no such kernel on this CPU";
+    case HS_ERR_INTERRUPTED: return "interrupted";
+    case HS_STATUS_END: break;
+    }
+    return "unknown status";
+}

@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * stencil.c: see stencil.h.
+ *
+ * How far a neighbour can be along the first axis depends on the row: in a frame in which the
+ * directions of the grid axes are lower triangular, the offsets along the later axes bound some
+ * components of D from below, and what is left of the radius bounds the first. In aligned boxes
+ * this is the circle of cells around a point.
+ */
+#include "stencil.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DUALITY_DEFECT 1e-9 /* normals and directions further from dual than this are not used */
+#define FRAME_SLACK 1e-6    /* relative; covers the defect in 8 dimensions many times */
+
+typedef struct frame {
+    bool   usable;
+    double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
+} frame;
+
+/* Is v = sum_k (normal_k . v) direction_k, for every v? */
+static bool
+axes_are_dual(const hs_lattice *lattice)
+{
+    for (int a = 0; a < lattice->ndim; a++) {
+        for (int b = 0; b < lattice->ndim; b++) {
+            double sum = a == b ? -1.0 : 0.0;
+            for (int k = 0; k < lattice->ndim; k++) {
+                sum += lattice->normal[k][a] * lattice->direction[k][b];
+            }
+            if (!(fabs(sum) <= DUALITY_DEFECT)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Gram-Schmidt on the directions, first axis first; checked, not trusted. */
+static frame
+triangular_frame(const hs_lattice *lattice)
+{
+    frame     result = {.usable = axes_are_dual(lattice)};
+    double    q[HS_MAX_DIM][HS_MAX_DIM];
+    const int d = lattice->ndim;
+    for (int k = 0; k < d; k++) {
+        memcpy(q[k], lattice->direction[k], sizeof q[k]);
+        for (int pass = 0; pass < 2; pass++) {
+            for (int c = 0; c < k; c++) {
+                double along = 0.0;
+                for (int a = 0; a < d; a++) {
+                    along += q[k][a] * q[c][a];
+                }
+                for (int a = 0; a < d; a++) {
+                    q[k][a] -= along * q[c][a];
+                }
+                result.lower[k][c] += along;
+            }
+        }
+        double square = 0.0;
+        for (int a = 0; a < d; a++) {
+            square += q[k][a] * q[k][a];
+        }
+        result.lower[k][k] = sqrt(square);
+        if (!(result.lower[k][k] > 1e-3)) {
+            result.usable = false; /* nearly flat: the frame would be all rounding */
+            return result;
+        }
+        for (int a = 0; a < d; a++) {
+            q[k][a] /= result.lower[k][k];
+        }
+    }
+    return result;
+}
+
+/* How far the difference of two cell indices, as a length, can be from that of the true t. */
+static double
+slack_along(const hs_scene *scene, const hs_grid *grid, int k)
+{
+    const double extent = grid->cell_size[k] * (double)grid->shape[k];
+    return (grid->range[k] - scene->radius) + FRAME_SLACK * scene->radius + 0x1p-50 * extent;
+}
+
+/*
+ * Cells of the row at `offset` that a pair within the radius can reach. Returns false when there
+ * are none.
+ */
+static bool
+reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
+                hs_stencil_row *row)
+{
+    const double radius = scene->radius * (1.0 + FRAME_SLACK);
+    double       left = radius * radius; /* of the square, for the components still open */
+    double       low = -grid->range[0], high = grid->range[0];
+    if (axes->usable && grid->ndim > 1) {
+        double t_low[HS_MAX_DIM], t_high[HS_MAX_DIM];
+        for (int k = grid->ndim - 1; k >= 1; k--) {
+            /* Differences of t that points of these two cells can have, rounding included. */
+            const double slack = slack_along(scene, grid, k);
+            t_low[k] = fmax((row->offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
+            t_high[k] = fmin((row->offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
+        }
+        for (int c = grid->ndim - 1; c >= 0; c--) {
+            double least = 0.0, most = 0.0; /* of the component, without axis c's own part at c == 0 */
+            for (int k = c > 0 ? c : 1; k < grid->ndim; k++) {
+                const double a = axes->lower[k][c] * t_low[k], b = axes->lower[k][c] * t_high[k];
+                least += fmin(a, b);
+                most += fmax(a, b);
+            }
+            if (c > 0) {
+                const double gap = fmax(0.0, fmax(least, -most));
+                left -= gap * gap;
+                if (left < 0.0) {
+                    return false;
+                }
+            } else {
+                const double rest = sqrt(left);
+                const double slack = slack_along(scene, grid, 0);
+                low = fmax(low, (-rest - most) / axes->lower[0][0] - slack);
+                high = fmin(high, (rest - least) / axes->lower[0][0] + slack);
+            }
+        }
+    }
+    const double cells = grid->cells_per_length[0];
+    row->first = (int32_t)fmax(ceil(low * cells - 1.0 - 1e-5), -(double)grid->reach[0]);
+    row->last = (int32_t)fmin(floor(high * cells + 1.0 + 1e-5), (double)grid->reach[0]);
+    return row->first <= row->last;
+}
+
+/* The next offset in the order of the axes, the last axis slowest; false after the last one. */
+static bool
+advance(const hs_grid *grid, int32_t *offset)
+{
+    for (int k = 1; k < grid->ndim; k++) {
+        if (offset[k] < grid->reach[k]) {
+            offset[k]++;
+            return true;
+        }
+        offset[k] = (int32_t)-grid->reach[k];
+    }
+    return false;
+}
+
+double
+hs_stencil_bound(const hs_grid *grid)
+{
+    double rows = 1.0;
+    for (int k = 1; k < grid->ndim; k++) {
+        rows *= 2.0 * (double)grid->reach[k] + 1.0;
+    }
+    return 0.5 * (rows + 1.0);
+}
+
+hs_status
+hs_stencil_build(hs_account *account, const hs_scene *scene, const hs_grid *grid,
+                 hs_stencil *stencil)
+{
+    const double bound = hs_stencil_bound(grid);
+    const frame  axes = triangular_frame(&scene->lattice);
+    *stencil = (hs_stencil){0};
+    if (bound > (double)INT32_MAX) {
+        return HS_ERR_MEMORY;
+    }
+    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, (int64_t)bound, sizeof(hs_stencil_row));
+    if (stencil->rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_stencil_row row = {{0}, 0, 0};
+    (void)reach_along_row(scene, grid, &axes, &row);
+    row.first = 0; /* in the own row only what lies ahead */
+    row.last = row.last > 0 ? row.last : 0;
+    stencil->rows[stencil->n_rows++] = row;
+    /* From the zero offset on, counting up visits exactly the forward half. */
+    while (advance(grid, row.offset)) {
+        if (reach_along_row(scene, grid, &axes, &row)) {
+            stencil->rows[stencil->n_rows++] = row;
+        }
+    }
+    return HS_OK;
+}
+
+void
+hs_stencil_free(hs_account *account, hs_stencil *stencil)
+{
+    hs_free(account, stencil->rows);
+    stencil->rows = NULL;
+}

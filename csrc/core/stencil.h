@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * stencil.h: the forward half of the neighbouring rows of cells. A row is a line of cells along the
+ * first grid axis. With the offset of j's cell from i's counted over images, each pair of cells
+ * occurs once as a forward offset and once as its opposite, so following the forward ones only
+ * visits each pair of points once, in boxes of any size, without comparing indices.
+ */
+#ifndef HS_STENCIL_H
+#define HS_STENCIL_H
+
+#include "grid.h"
+
+/* Neighbouring row; offset[k] for axes k >= 1 (offset[0] unused). Cells from x + first to x + last
+ * of that row can hold neighbours of points in cell x. */
+typedef struct hs_stencil_row {
+    int32_t offset[HS_MAX_DIM];
+    int32_t first, last;
+} hs_stencil_row;
+
+typedef struct hs_stencil {
+    hs_stencil_row *rows; /* owned; rows[0] is the own row, with first = 0 */
+    int64_t         n_rows;
+} hs_stencil;
+
+/* HS_ERR_MEMORY when the rows do not fit. */
+hs_status hs_stencil_build(hs_account *account, const hs_scene *scene, const hs_grid *grid,
+                           hs_stencil *stencil);
+
+/* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
+double hs_stencil_bound(const hs_grid *grid);
+
+void hs_stencil_free(hs_account *account, hs_stencil *stencil);
+
+#endif

@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* wrap.c: see wrap.h. */
+#include "wrap.h"
+
+#include "doubleword.h"
+
+#include <math.h>
+
+#define WRAP_PASSES 4 /* each pass gains 50 bits; from 2^51 turns two are enough, two are spare */
+
+double
+hs_wrap_axis(double x, double length, int64_t *turns)
+{
+    const double half = 0.5 * length;
+    *turns = 0;
+    if (x >= -half && x <= half) {
+        return x;
+    }
+    double n = rint(x / length);
+    double inside;
+    if (fabs(n) <= 1.0) {
+        inside = x - n * length; /* n * length is exact, the difference by Sterbenz's lemma */
+    } else if (fabs(n) < HS_WRAP_LIMIT) {
+        /* The quotient was rounded, so n may be one off; either way x - n * length is a double,
+         * and a fused multiply-add returns it. */
+        inside = fma(-n, length, x);
+        if (inside > half) {
+            n += 1.0;
+        } else if (inside < -half) {
+            n -= 1.0;
+        }
+        inside = fma(-n, length, x);
+    } else {
+        *turns = HS_WRAP_UNKNOWN;
+        return remainder(x, length); /* exact by IEEE 754 for any quotient */
+    }
+    *turns = (int64_t)n;
+    return inside;
+}
+
+/* X = r - sum_l given_turns[l] * scaled row l, by a compensated dot product (Ogita, Rump and Oishi
+ * 2005, algorithm Dot2). */
+static void
+subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_turns,
+              double *inside, double *magnitude)
+{
+    for (int k = 0; k < lattice->ndim; k++) {
+        double sum = r[k];
+        double low = 0.0;
+        double absolute = fabs(r[k]);
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            const hs_dw product =
+                hs_two_product(-(double)given_turns[l], lattice->scaled[l][k]);
+            const hs_dw partial = hs_two_sum(sum, product.hi);
+            sum = partial.hi;
+            low += partial.lo + product.lo;
+            absolute += fabs(product.hi);
+        }
+        inside[k] = sum + low;
+        *magnitude = fmax(*magnitude, absolute);
+    }
+}
+
+bool
+hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_t *turns,
+              double *magnitude)
+{
+    int64_t given_turns[HS_MAX_DIM];
+    for (int k = 0; k < lattice->ndim; k++) {
+        inside[k] = r[k];
+        *magnitude = fmax(*magnitude, fabs(r[k]));
+    }
+    for (int row = 0; row < lattice->n_periodic; row++) {
+        turns[row] = 0;
+    }
+    for (int pass = 0; pass < WRAP_PASSES; pass++) {
+        bool moved = false;
+        for (int k = 0; k < lattice->ndim; k++) {
+            const int row = lattice->row_of_axis[k];
+            if (row < 0) {
+                continue;
+            }
+            double t = 0.0;
+            for (int c = 0; c < lattice->ndim; c++) {
+                t += lattice->normal[k][c] * inside[c];
+            }
+            const double n = rint(t / lattice->period[k]);
+            if (!(fabs(n) + fabs((double)turns[row]) < HS_WRAP_LIMIT)) {
+                return false;
+            }
+            turns[row] += (int64_t)n;
+            moved = moved || n != 0.0;
+        }
+        if (!moved) {
+            return true;
+        }
+        if (!hs_lattice_shift(lattice, turns, given_turns)) {
+            return false;
+        }
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            if (given_turns[l] > INT64_C(1) << 52 || given_turns[l] < -(INT64_C(1) << 52)) {
+                return false;
+            }
+        }
+        subtract_rows(lattice, r, given_turns, inside, magnitude);
+    }
+    return true;
+}

@@ -1,0 +1,236 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * halfshell.h: the public C interface. Every pair of points within a cutoff, decided
+ * exactly for the floating-point numbers that were given.
+ *
+ * Words: a point is a row of the input; the box is up to d row vectors, some of which repeat
+ * (periodic); a cell is one bin of the search grid; a shift S is a row of integers, one per
+ * box vector, zero where the box does not repeat; a pair is (i, j, S) with the vector
+ * D = point[j] - point[i] + S * box.
+ *
+ * Rules: nothing here prints, reads the environment or keeps state between calls. Every
+ * function may be called from several threads at once. On failure outputs are untouched or
+ * NULL, and `hs_failure` says what was wrong.
+ */
+#ifndef HALFSHELL_H
+#define HALFSHELL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define HS_MAX_DIM 8
+
+/* What a call came to. */
+typedef enum hs_status {
+    HS_OK = 0,
+    HS_ERR_MEMORY,        /* an allocation was refused, or the result passes memory_limit */
+    HS_ERR_CUTOFF,        /* the cutoff is negative, NaN or infinite */
+    HS_ERR_NOT_FINITE,    /* a coordinate is NaN or infinite: failure.row, failure.column */
+    HS_ERR_BOX_FINITE,    /* a box entry is NaN or infinite: failure.row, failure.column */
+    HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent */
+    HS_ERR_TOO_MANY,      /* 2^31 points or more, or more pairs than int64 counts */
+    HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
+    HS_ERR_KERNEL,        /* no kernel of that name on this CPU */
+    HS_ERR_INTERRUPTED,   /* poll() asked to stop */
+    HS_STATUS_END         /* number of codes, not a code */
+} hs_status;
+
+/* One plain sentence for a status; never NULL, static storage. */
+const char *hs_status_text(hs_status status);
+
+/* Details of a failure, as far as its status uses them. */
+typedef struct hs_failure {
+    int64_t row;            /* point or box vector, -1 when it does not apply */
+    int64_t column;         /* coordinate, -1 when it does not apply */
+    double  value;          /* the offending number */
+    double  expected_pairs; /* HS_ERR_MEMORY: pairs that were expected, or 0 */
+    double  expected_bytes; /* HS_ERR_MEMORY: bytes that they would need, or 0 */
+    double  limit_bytes;    /* HS_ERR_MEMORY: bytes that were allowed, or 0 */
+} hs_failure;
+
+typedef enum hs_real { HS_FLOAT32, HS_FLOAT64 } hs_real;
+
+/* The caller's coordinates, borrowed for the call. Strides are in bytes and may be zero or
+ * negative; entries need not be aligned. Native byte order. */
+typedef struct hs_points {
+    const void *data;
+    int64_t     n;      /* 0 <= n < 2^31 */
+    int         ndim;   /* 1 <= ndim <= HS_MAX_DIM */
+    hs_real     real;
+    ptrdiff_t   row_stride;
+    ptrdiff_t   column_stride;
+} hs_points;
+
+/* The box. Rows of axes that do not repeat are ignored. */
+typedef struct hs_box {
+    int    ndim;
+    bool   periodic[HS_MAX_DIM];
+    double rows[HS_MAX_DIM][HS_MAX_DIM]; /* rows[l][k]: component k of box vector l */
+} hs_box;
+
+/* How a pair near the cutoff is decided. */
+typedef enum hs_precision {
+    HS_EXACT,  /* by the real numbers that the inputs are */
+    HS_DOUBLE, /* by one float64 comparison of a fixed, unfused formula */
+    HS_SINGLE  /* by one float32 comparison of a fixed, unfused formula */
+} hs_precision;
+
+/* What to return for each pair: a union of these bits. */
+enum {
+    HS_WANT_I        = 1, /* lower point number */
+    HS_WANT_J        = 2, /* higher (or, for an image of the point itself, equal) number */
+    HS_WANT_DISTANCE = 4, /* |D|, float64, within 1 ulp, never on the wrong side of the cutoff */
+    HS_WANT_VECTOR   = 8, /* D, float64, each component within 1 ulp of |D| */
+    HS_WANT_SHIFT    = 16 /* S, int32 */
+};
+
+/* Bytes are accounted by what they are for. */
+typedef enum hs_purpose {
+    HS_FOR_POINTS,     /* the search's copy of the coordinates, in cell order */
+    HS_FOR_ORIGINALS,  /* coordinates as given, kept only where the copy had to be rounded */
+    HS_FOR_WRAPS,      /* per point: how many box vectors it was wrapped by */
+    HS_FOR_ORDER,      /* point numbers in cell order, and the cell of each while sorting */
+    HS_FOR_CELLS,      /* where each cell starts */
+    HS_FOR_STENCIL,    /* neighbouring cell rows */
+    HS_FOR_CANDIDATES, /* the gathered neighbourhood of one group */
+    HS_FOR_INDICES,    /* i and j */
+    HS_FOR_DISTANCES,  /* d */
+    HS_FOR_VECTORS,    /* D */
+    HS_FOR_SHIFTS,     /* S */
+    HS_FOR_SORTING,    /* scratch of sort=true */
+    HS_PURPOSE_END
+} hs_purpose;
+
+/* What a search did. Filled on request; every number is a count made by the search itself. */
+typedef struct hs_counters {
+    int64_t bytes[HS_PURPOSE_END]; /* allocated over the whole call, by purpose */
+    int64_t bytes_peak;            /* most bytes held at one time */
+    int64_t groups;                /* gathered neighbourhoods */
+    int64_t candidates;            /* pairs that the kernel tested */
+    int64_t pairs;                 /* pairs found */
+    int64_t ambiguous;             /* pairs that the float32 filter passed on */
+    int64_t by_float64;            /* of these: decided in float64 ... */
+    int64_t by_double_word;        /* ... in double-word arithmetic ... */
+    int64_t by_integers;           /* ... by integers */
+    int64_t polls;                 /* times that poll() was called */
+} hs_counters;
+
+/*
+ * Called now and then from the searching thread; fraction in [0, 1] is the work done.
+ * Return false to stop the search with HS_ERR_INTERRUPTED.
+ */
+typedef bool (*hs_poll_fn)(void *context, double fraction);
+
+/* Called at most once per call, when the result may be large: bytes that may still be used. */
+typedef double (*hs_limit_fn)(void *context);
+
+typedef struct hs_options {
+    double       cutoff;       /* finite, not negative; same unit as the points */
+    bool         inclusive;    /* whether |D| == cutoff counts */
+    bool         sorted;       /* ascending (i, j, S) */
+    hs_precision precision;
+    unsigned     want;         /* HS_WANT_ bits */
+    int          index_bytes;  /* 4 or 8: width of the caller's i and j, for the memory check */
+    const char  *kernel;       /* borrowed; NULL: the best of this CPU */
+    double       memory_limit; /* bytes that result and search may take; infinity: no limit */
+    hs_limit_fn  find_limit;   /* NULL, or asked for a further limit once more than 64 MB are needed */
+    void        *find_context;
+    hs_poll_fn   poll;         /* NULL: never */
+    void        *poll_context;
+    hs_counters *counters;     /* borrowed, filled also on failure; NULL: not wanted */
+} hs_options;
+
+/* Defaults: cutoff 0, inclusive, unsorted, exact, i and j of 8 bytes, no limit, no poll. */
+hs_options hs_options_default(void);
+
+/* A finished search: opaque, owned by the caller. */
+typedef struct hs_pairs hs_pairs;
+
+/*
+ * Find every pair within the cutoff, each once (half list): i < j, or i == j and the first
+ * nonzero component of S positive. (i, i, S = 0) is no pair; coincident points are.
+ *
+ * points, options  borrowed; points must not move during the call (a concurrent write may
+ *                  change the answer, it cannot corrupt memory: each number is read once)
+ * box              borrowed; NULL: open space
+ * pairs            receives an object to be freed with hs_pairs_free; NULL on failure
+ * failure          filled on failure; may be NULL
+ *
+ * Order: fixed by the scene; it does not depend on the kernel. Returns any status.
+ */
+hs_status hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
+                        hs_pairs **pairs, hs_failure *failure);
+
+/* The same search, counting only; options->want and ->sorted are ignored. */
+hs_status hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
+                         int64_t *count, hs_failure *failure);
+
+/* Number of pairs. */
+int64_t hs_pairs_length(const hs_pairs *pairs);
+
+/* Where hs_pairs_write puts the pairs. Each array is NULL, or caller-owned with room for
+ * hs_pairs_length() pairs; only what was wanted can be written. */
+typedef struct hs_pair_arrays {
+    int      index_bytes;  /* 4 or 8: int32 or int64 elements of the next three */
+    void    *i;            /* m */
+    void    *j;            /* m */
+    void    *both;         /* m * 2: i and j side by side */
+    double  *distance;     /* m */
+    double  *vector;       /* m * ndim */
+    int32_t *shift;        /* m * ndim */
+} hs_pair_arrays;
+
+/* Copy the pairs out, block by block, giving the search's own storage back as it goes. May be
+ * called once. Returns HS_OK, or HS_ERR_INTERRUPTED when poll() says so. */
+hs_status hs_pairs_write(hs_pairs *pairs, const hs_pair_arrays *arrays);
+
+/* NULL-safe. */
+void hs_pairs_free(hs_pairs *pairs);
+
+/* What a search of this scene would do, without doing it. */
+typedef struct hs_plan {
+    int         ndim;
+    int         n_periodic;
+    bool        aligned;              /* every periodic box vector lies along one coordinate axis */
+    bool        reduced;              /* the box was replaced by an equivalent, less skewed one */
+    bool        keeps_originals;      /* the search needs the coordinates as given beside its copy */
+    bool        all_pairs;            /* one cell: every point meets every point */
+    int64_t     shape[HS_MAX_DIM];    /* cells along each grid axis */
+    double      cell_size[HS_MAX_DIM];/* extent of a cell along each grid axis */
+    int64_t     reach[HS_MAX_DIM];    /* cells to look at on either side */
+    int64_t     images[HS_MAX_DIM];   /* periods that a pair can be apart; 0 on open axes */
+    int64_t     stencil_rows;         /* neighbouring rows of cells, own row included */
+    double      expected_pairs;       /* from the density; NaN where there is none */
+    const char *kernel;               /* static storage */
+} hs_plan;
+
+hs_status hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *options,
+                       hs_plan *plan, hs_failure *failure);
+
+/* Check a box: every periodic entry finite, periodic rows linearly independent (decided
+ * exactly). heights[l]: distance between the faces that box vector l connects, for periodic
+ * axes; volume: of the periodic vectors (length in 1-D, area in 2-D). Either may be NULL. */
+hs_status hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *failure);
+
+/*
+ * Wrap points into the box: wrapped = point + shift * box, each fraction along a periodic axis
+ * in [0, 1). wrapped: n * ndim, within 1 ulp of the largest term; along an axis-aligned box vector never equal to
+ * its length. shift: n * ndim; either may be NULL. Returns HS_ERR_SHIFT_RANGE for a shift
+ * beyond 2^51.
+ */
+hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped,
+                      int64_t *shift, hs_failure *failure);
+
+/* Names of the kernels that this CPU can run, best first; static storage. Writes at most
+ * `capacity` of them and returns how many there are. */
+int hs_kernel_names(const char **names, int capacity);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

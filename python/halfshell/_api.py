@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The public functions: signatures, defaults and documentation; the work is done in C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core, _inputs
+
+Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+
+
+def pairs(
+    points: Any,
+    cutoff: float,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    sort: bool = False,
+    index_dtype: npt.DTypeLike = np.int64,
+    precision: str = "exact",
+    kernel: str | None = None,
+    memory_limit: float | None = None,
+) -> Arrays:
+    """Find every pair of points within a cutoff, each once.
+
+    Parameters
+    ----------
+    points : array_like of float, shape (n, d)
+        Coordinates, any length unit, 1 <= d <= 8. float32 and float64 values are used as they
+        are; integers, booleans and float16 are converted exactly or refused. Points may lie anywhere,
+        also outside the box. An object with ``positions``, ``cell`` and ``pbc``, such as
+        ``ase.Atoms``, brings its own box and periodicity.
+    cutoff : float
+        Largest distance of a pair, in the unit of `points`; finite, not negative. It may be larger than
+        the box.
+    box : array_like of float, shape (d,) or (d, d), or Box, optional
+        Edge lengths, or edge vectors as rows, in the unit of `points`. None: open space. Rows of
+        axes that are not periodic are ignored and may be zero.
+    periodic : bool or sequence of bool, shape (d,), optional
+        Which box vectors repeat. Default: all with a box, none without.
+    quantities : str, default "ij"
+        Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
+        both indices. What is not asked for is not computed.
+    inclusive : bool, default True
+        Whether a pair at exactly `cutoff` counts.
+    sort : bool, default False
+        Ascending (i, j, S). Otherwise the order is fixed by the scene but not specified.
+    index_dtype : numpy.int64 or numpy.int32, default numpy.int64
+        Type of i, j and P.
+    precision : {"exact", "double", "single"}, default "exact"
+        "exact" decides by the real numbers that the inputs are. "double" and "single" decide by
+        one rounded comparison of a fixed formula, as most libraries do, and exist to be compared
+        with.
+    kernel : str, optional
+        One of ``kernels()``; for tests and timing. All give identical arrays.
+    memory_limit : float, optional
+        Bytes that search and result may take. Default: what the machine and its control group
+        have available.
+
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        One array per letter of `quantities`, in that order; a bare array for one letter. With m
+        pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with ``i < j``, or ``i == j`` for a point
+        and its own image; ``d`` float64 (m,); ``D`` float64 (m, d); ``S`` int32 (m, d);
+        ``P`` of `index_dtype` (m, 2). In real arithmetic ``D = points[j] - points[i] + S @ box``.
+
+        Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is positive.
+        (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within 1 ulp and never
+        on the wrong side of the cutoff; each component of D is within 1 ulp of d.
+
+    Raises
+    ------
+    TypeError
+        If an argument is of the wrong kind: strings, complex numbers, long double.
+    ValueError
+        If a coordinate or box entry is not finite, `cutoff` is negative or not finite, the
+        periodic box vectors are exactly linearly dependent, or a shape does not fit.
+    OverflowError
+        If a shift does not fit int32, or there are 2**31 points or more.
+    MemoryError
+        If the result would not fit `memory_limit`; decided from a sample before the search.
+
+    See Also
+    --------
+    count_pairs : the number of pairs, without storing them.
+    verify : check anybody's list of pairs.
+
+    Notes
+    -----
+    Points are sorted into cells, each cell's neighbourhood is gathered once, and pairs are tested in
+    float32 with a proven error bound; what is too near the cutoff to tell is decided in float64,
+    double-word arithmetic [1]_ and at last in integers, so that no pair is missed or invented. Time is
+    proportional to n plus the number of pairs; memory does not depend on the volume.
+
+    References
+    ----------
+    .. [1] Shewchuk, J. R. (1997). Adaptive precision floating-point arithmetic and fast robust
+       geometric predicates. Discrete & Computational Geometry 18, 305-363.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5)
+    >>> i.tolist(), j.tolist()
+    ([0], [1])
+
+    In a periodic box the first and the last point are neighbours too:
+
+    >>> i, j, d, S = hs.pairs([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5, box=[4.0, 4.0],
+    ...                       quantities="ijdS", sort=True)
+    >>> i.tolist(), j.tolist(), d.tolist(), S.tolist()
+    ([0, 0], [1, 2], [1.0, 1.0], [[0, 0], [-1, 0]])
+    """
+    return _pairs_with_progress(
+        points,
+        cutoff,
+        progress=None,
+        box=box,
+        periodic=periodic,
+        quantities=quantities,
+        inclusive=inclusive,
+        sort=sort,
+        index_dtype=index_dtype,
+        precision=precision,
+        kernel=kernel,
+        memory_limit=memory_limit,
+    )
+
+
+def _pairs_with_progress(
+    points: Any,
+    cutoff: float,
+    *,
+    progress: Callable[[float], object] | None,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    sort: bool = False,
+    index_dtype: npt.DTypeLike = np.int64,
+    precision: str = "exact",
+    kernel: str | None = None,
+    memory_limit: float | None = None,
+) -> Arrays:
+    """`pairs`, calling ``progress(fraction)`` now and then; for the command line."""
+    array, vectors, bits = _inputs.scene(points, box, periodic)
+    return _core.pairs(
+        array,
+        _inputs.as_cutoff(cutoff),
+        vectors,
+        bits,
+        inclusive,
+        precision,
+        kernel,
+        memory_limit,
+        progress,
+        quantities,
+        sort,
+        _inputs.as_index_bytes(index_dtype),
+    )
+
+
+def count_pairs(
+    points: Any,
+    cutoff: Any,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    precision: str = "exact",
+    kernel: str | None = None,
+    memory_limit: float | None = None,
+) -> int | npt.NDArray[np.int64]:
+    """Count the pairs of points within one or several cutoffs.
+
+    Parameters
+    ----------
+    points, box, periodic, inclusive, precision, kernel
+        As in `pairs`.
+    cutoff : float or array_like of float, shape (k,)
+        One cutoff, or several in ascending order.
+    memory_limit : float, optional
+        Bytes that the search may take.
+
+    Returns
+    -------
+    int or ndarray of int64, shape (k,)
+        The number of pairs of the half list for each cutoff.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pairs`; ValueError also if several cutoffs are not ascending.
+
+    See Also
+    --------
+    pairs : the pairs themselves.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> hs.count_pairs(points, 1.5)
+    1
+    >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
+    [0, 1, 2]
+    """
+    array, vectors, bits = _inputs.scene(points, box, periodic)
+
+    def count(one: float) -> int:
+        return _core.count_pairs(
+            array, one, vectors, bits, inclusive, precision, kernel, memory_limit, None
+        )
+
+    if np.ndim(cutoff) == 0:
+        return count(_inputs.as_cutoff(cutoff))
+    several = _inputs.as_real_array(cutoff, "cutoff").astype(np.float64)
+    if several.ndim != 1:
+        raise ValueError(f"cutoff must be a number or have shape (k,), got {several.shape}")
+    if not (several[1:] >= several[:-1]).all():
+        raise ValueError("several cutoffs must be ascending")
+    return np.array([count(one) for one in several.tolist()], dtype=np.int64)
+
+
+def kernels() -> list[str]:
+    """Names of the kernels that this CPU can run, the default one first.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> "scalar" in hs.kernels()
+    True
+    """
+    return list(_core.kernels())

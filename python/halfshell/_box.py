@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The periodic box as an object: named constructors, its measures, and wrapping."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core, _inputs
+
+
+class Box:
+    """A periodic box, for the `box` argument of all functions.
+
+    Parameters
+    ----------
+    vectors : array_like of float, shape (d, d) or (d,)
+        Box vectors as rows, or edge lengths along the coordinate axes. Any orientation and
+        handedness; the vectors must be linearly independent, which is decided exactly.
+
+    Attributes
+    ----------
+    vectors : ndarray of float64, shape (d, d)
+        The box vectors as rows; read-only.
+
+    Raises
+    ------
+    ValueError
+        If an entry is not finite, or the vectors are exactly linearly dependent.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> box = hs.Box.from_lengths_angles((2.0, 3.0, 4.0), (90.0, 90.0, 90.0))
+    >>> box.volume
+    24.0
+    >>> wrapped, shifts = box.wrap([[2.5, -1.0, 3.0]])
+    >>> wrapped.tolist(), shifts.tolist()
+    ([[0.5, 2.0, 3.0]], [[-1, 1, 0]])
+    """
+
+    __slots__ = ("_heights", "_volume", "vectors")
+
+    vectors: npt.NDArray[np.float64]
+
+    def __init__(self, vectors: Any) -> None:
+        array = _inputs.as_real_array(getattr(vectors, "vectors", vectors), "box")
+        if array.ndim not in (1, 2) or not 1 <= array.shape[0] <= _inputs.MAX_DIM:
+            raise ValueError(
+                f"box must have shape (d,) or (d, d) with 1 <= d <= {_inputs.MAX_DIM}, "
+                f"got {array.shape}"
+            )
+        own = _inputs.as_box(array, array.shape[0]).copy()
+        own.flags.writeable = False
+        self.vectors = own
+        self._heights, self._volume = _core.box_measure(own, (1 << own.shape[0]) - 1)
+        self._heights.flags.writeable = False
+
+    @classmethod
+    def from_matrix(cls, matrix: Any) -> Box:
+        """Box vectors as the rows of a (d, d) matrix."""
+        if np.ndim(matrix) != 2:
+            raise ValueError(f"matrix must have shape (d, d), got {np.shape(matrix)}")
+        return cls(matrix)
+
+    @classmethod
+    def orthorhombic(cls, *lengths: float) -> Box:
+        """Edges along the coordinate axes: ``Box.orthorhombic(10.0, 10.0, 20.0)``."""
+        return cls(list(lengths[0]) if len(lengths) == 1 and np.ndim(lengths[0]) else lengths)
+
+    @classmethod
+    def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:
+        """Crystallographic cell: lengths (a, b, c) and angles (alpha, beta, gamma) in degrees.
+
+        The first vector lies along x, the second in the xy plane. In two dimensions: lengths
+        (a, b) and the angle between them.
+
+        Raises
+        ------
+        ValueError
+            If no such cell exists.
+        """
+        edges = _inputs.as_real_array(lengths, "lengths").astype(np.float64)
+        degrees = np.atleast_1d(_inputs.as_real_array(angles, "angles").astype(np.float64))
+        if (edges.shape, degrees.shape) not in (((3,), (3,)), ((2,), (1,))):
+            raise ValueError(
+                "lengths and angles must be 3 and 3 numbers, or 2 and 1 in two dimensions, got "
+                f"shapes {edges.shape} and {degrees.shape}"
+            )
+        if not (np.isfinite(edges).all() and (edges > 0).all()):
+            raise ValueError(f"lengths must be finite and positive, got {edges.tolist()}")
+        if not ((degrees > 0) & (degrees < 180)).all():
+            raise ValueError(f"angles must be between 0 and 180 degrees, got {degrees.tolist()}")
+        cosines = [_cosine(angle) for angle in degrees.tolist()]
+        if len(cosines) == 1:
+            directions = [[1.0, 0.0], [cosines[0], math.sin(math.radians(degrees[0]))]]
+        else:
+            directions = _directions(*cosines, angles=degrees.tolist())
+        return cls(np.array(directions) * edges[:, None])
+
+    @property
+    def volume(self) -> float:
+        """Volume (length in one dimension, area in two), in the unit of the vectors to the d."""
+        return self._volume
+
+    @property
+    def perpendicular_heights(self) -> npt.NDArray[np.float64]:
+        """Distances between opposite faces, shape (d,): what a cutoff is compared with."""
+        return self._heights
+
+    def wrap(
+        self, points: Any, periodic: Any = None
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+        """Move points into the box by whole box vectors.
+
+        Parameters
+        ----------
+        points : array_like of float, shape (n, d)
+            Coordinates, in the unit of the box.
+        periodic : bool or sequence of bool, shape (d,), optional
+            Along which box vectors to move. Default: all.
+
+        Returns
+        -------
+        wrapped : ndarray of float64, shape (n, d)
+            ``points + shifts @ box``, with each fraction along a box vector in [0, 1) up to
+            rounding. Along a box vector that is parallel to a coordinate axis the coordinate is
+            never rounded up to the length itself.
+        shifts : ndarray of int64, shape (n, d)
+            Whole box vectors added.
+
+        Raises
+        ------
+        OverflowError
+            If a point lies more than 2**51 box vectors away.
+        """
+        array = _inputs.as_points(points)
+        ndim = self.vectors.shape[0]
+        if array.shape[1] != ndim:
+            raise ValueError(f"points must have shape (n, {ndim}) for this box, got {array.shape}")
+        return _core.box_wrap(
+            array, self.vectors, _inputs.as_periodic_bits(periodic, ndim, default=True)
+        )
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        return np.array(self.vectors, dtype=dtype, copy=copy)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Box) and np.array_equal(self.vectors, other.vectors)
+
+    def __hash__(self) -> int:
+        return hash(self.vectors.tobytes())
+
+    def __repr__(self) -> str:
+        return f"Box({self.vectors.tolist()})"
+
+
+def _cosine(degrees: float) -> float:
+    """Cosine that is exact for the angles of orthogonal and hexagonal cells."""
+    exact = {60.0: 0.5, 90.0: 0.0, 120.0: -0.5}
+    return exact.get(degrees, math.cos(math.radians(degrees)))
+
+
+def _directions(
+    cos_alpha: float, cos_beta: float, cos_gamma: float, angles: list[float]
+) -> list[list[float]]:
+    """Unit vectors along a, b and c in the usual orientation."""
+    sin_gamma = math.sqrt((1.0 - cos_gamma) * (1.0 + cos_gamma))
+    c_y = (cos_alpha - cos_beta * cos_gamma) / sin_gamma
+    square = 1.0 - cos_beta**2 - c_y**2
+    if square <= 0.0:
+        raise ValueError(f"no cell has the angles {angles}")
+    return [
+        [1.0, 0.0, 0.0],
+        [cos_gamma, sin_gamma, 0.0],
+        [cos_beta, c_y, math.sqrt(square)],
+    ]

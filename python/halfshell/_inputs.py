@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What users pass, brought to the few forms that the core takes.
+
+Types and shapes are settled here, exactly: an array is converted only when no value changes.
+Values (finite, not negative, independent) are checked in the core.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+MAX_DIM = 8
+_BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
+
+FloatArray = npt.NDArray[np.float64]
+PointArray = npt.NDArray[np.float32] | FloatArray
+
+
+def as_real_array(values: Any, name: str) -> npt.NDArray[Any]:
+    """An array of native float32 or float64 with exactly the given values.
+
+    Raises TypeError for kinds that are no real numbers and ValueError, with the place, for values
+    that float64 cannot hold.
+    """
+    array = _as_array(values, name)
+    kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "f" and size in (4, 8):
+        return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder("="))
+    if kind == "b" or (kind == "f" and size == 2):
+        return array.astype(np.float64)
+    if kind in "iu":
+        _refuse_big_integers(array, name)
+        return array.astype(np.float64)
+    if kind == "f":
+        raise TypeError(f"{name} must be float64 or narrower: {array.dtype} would be rounded")
+    if kind == "O":
+        return _from_objects(array, name)
+    raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
+
+
+def _as_array(values: Any, name: str) -> npt.NDArray[Any]:
+    if isinstance(values, np.ma.MaskedArray):
+        if np.ma.getmaskarray(values).any():
+            where = tuple(int(k) for k in np.argwhere(np.ma.getmaskarray(values))[0])
+            raise ValueError(f"{name} must not have masked elements, got one at {list(where)}")
+        return np.asarray(values.data)
+    if isinstance(values, np.ndarray):
+        return np.asarray(values)
+    if isinstance(values, (str, bytes)):
+        raise TypeError(f"{name} must hold real numbers, got {type(values).__name__}")
+    if not hasattr(values, "__array__") and hasattr(values, "__dlpack__"):
+        return np.from_dlpack(values)
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise ValueError(f"{name} must be a rectangular array of numbers: {error}") from None
+
+
+def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
+    if array.size == 0 or array.dtype.itemsize < 8:
+        return
+    suspects = (array > _BIGGEST_INTEGER) | (array < -_BIGGEST_INTEGER)
+    if not suspects.any():
+        return
+    for where in np.argwhere(suspects):
+        value = int(array[tuple(where)])
+        if int(float(value)) != value:
+            place = ", ".join(str(int(k)) for k in where)
+            raise ValueError(
+                f"{name}[{place}] = {value} is not a float64; integers beyond 2**53 are accepted "
+                "only when float64 holds them exactly"
+            )
+
+
+def _from_objects(array: npt.NDArray[Any], name: str) -> FloatArray:
+    """Plain Python floats, integers and booleans in an object array (mixed or too big for int64)."""
+    for where in np.ndindex(array.shape):
+        value = array[where]
+        if isinstance(value, (bool, float, np.float64, np.float32, np.float16, np.bool_)):
+            continue
+        place = ", ".join(str(k) for k in where)
+        if not isinstance(value, (int, np.integer)):
+            raise TypeError(
+                f"{name} must hold real numbers, got {type(value).__name__} at [{place}]"
+            )
+        try:
+            exact = int(float(value)) == int(value)
+        except OverflowError:
+            raise OverflowError(f"{name}[{place}] is too large for float64") from None
+        if not exact:
+            raise ValueError(f"{name}[{place}] = {value} is not a float64")
+    return array.astype(np.float64)
+
+
+def as_points(values: Any) -> PointArray:
+    """Points of shape (n, d); a list without elements counts as n = 0, d = 3."""
+    array = as_real_array(values, "points")
+    if array.ndim != 2 or not 1 <= array.shape[1] <= MAX_DIM:
+        if array.shape == (0,):
+            return np.empty((0, 3))
+        raise ValueError(
+            f"points must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {array.shape}"
+        )
+    if array.shape[0] >= 2**31:
+        raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
+    return array
+
+
+def as_box(values: Any, ndim: int) -> FloatArray:
+    """Box vectors as the rows of a float64 array (ndim, ndim), from rows, lengths or a Box."""
+    array = as_real_array(getattr(values, "vectors", values), "box")
+    if array.shape == (ndim,):
+        return np.diag(array.astype(np.float64))
+    if array.shape != (ndim, ndim):
+        raise ValueError(
+            f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} dimensions, "
+            f"got {array.shape}"
+        )
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
+    """Which axes repeat, as an integer with bit l set for box vector l."""
+    if values is None:
+        return (1 << ndim) - 1 if default else 0
+    if isinstance(values, (bool, np.bool_)):
+        return (1 << ndim) - 1 if values else 0
+    if isinstance(values, (str, bytes)):
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {values!r}")
+    array = np.asarray(values)
+    if array.dtype.kind != "b" and not (
+        array.dtype.kind in "iu" and bool(np.isin(array, (0, 1)).all())
+    ):
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {values!r}")
+    if array.shape == ():
+        return (1 << ndim) - 1 if array else 0
+    if array.shape != (ndim,):
+        raise ValueError(f"periodic must be a bool or {ndim} bools, got shape {array.shape}")
+    return sum(1 << axis for axis in range(ndim) if array[axis])
+
+
+def as_cutoff(value: Any) -> float:
+    """A plain number; anything that float64 would have to round is refused."""
+    if isinstance(value, float):
+        return value
+    array = as_real_array(value, "cutoff")
+    if array.ndim != 0:
+        raise TypeError(f"cutoff must be a number, got shape {array.shape}")
+    return float(array)
+
+
+def as_index_bytes(index_dtype: Any) -> int:
+    """4 or 8, for int32 or int64."""
+    try:
+        dtype = np.dtype(index_dtype)
+    except TypeError:
+        raise TypeError(f"index_dtype must be int32 or int64, got {index_dtype!r}") from None
+    if dtype.kind != "i" or dtype.itemsize not in (4, 8):
+        raise ValueError(f"index_dtype must be int32 or int64, got {dtype}")
+    return dtype.itemsize
+
+
+def scene(points: Any, box: Any, periodic: Any) -> tuple[PointArray, FloatArray | None, int]:
+    """Points, box and periodic bits; from an ASE-like object all three.
+
+    An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an error.
+    """
+    if hasattr(points, "positions") and hasattr(points, "cell") and hasattr(points, "pbc"):
+        if box is not None or periodic is not None:
+            given = "box" if box is not None else "periodic"
+            raise ValueError(f"{given} comes from the {type(points).__name__} object itself")
+        periodic = np.asarray(points.pbc, dtype=bool)
+        box = np.asarray(points.cell) if periodic.any() else None
+        points = points.positions
+        if box is None:
+            periodic = None
+    array = as_points(points)
+    ndim = array.shape[1]
+    if box is None:
+        if as_periodic_bits(periodic, ndim, default=False):
+            raise ValueError("periodic needs a box: give box, or leave periodic out")
+        return array, None, 0
+    return array, as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)

@@ -1,0 +1,239 @@
+"""What a correct answer is: every pair by exact rational arithmetic.
+
+This file is the definition that the fast search is held to. It is short, slow (every point
+meets every point) and independent: it uses Python integers and `fractions` and calls nothing
+of the compiled core.
+
+A pair is ``(i, j, S)`` with the vector ``D = points[j] - points[i] + S @ box``, S an integer
+row that is 0 on every axis that does not repeat. It counts when ``|D| <= cutoff`` (or
+``<``). Every float is taken as the real number that it is. The half list has each pair once:
+``i < j``, or ``i == j`` and the first nonzero component of S is positive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+__all__ = ["exact_square", "exact_vector", "reference_pairs", "ulp_error"]
+
+_Vector = list[int]
+_Pair = tuple[int, int, tuple[int, ...]]
+
+
+def reference_pairs(
+    points: Any, cutoff: Any, box: Any = None, periodic: Any = None, inclusive: bool = True
+) -> list[_Pair]:
+    """Find every pair within the cutoff, each once, in exact arithmetic.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, d)
+        Floats of any width, integers or Fractions; all finite.
+    cutoff : float
+        Largest distance, not negative.
+    box : array_like, shape (d,) or (d, d), optional
+        Edge lengths, or edge vectors as rows; the rows of axes that do not repeat are not
+        used. None: open space.
+    periodic : bool or sequence of bool, shape (d,), optional
+        Which axes repeat. Default: all with a box, none without.
+    inclusive : bool, default True
+        Whether a pair at exactly `cutoff` counts.
+
+    Returns
+    -------
+    list of (int, int, tuple of int)
+        The half list as ``(i, j, S)``, ascending.
+
+    Raises
+    ------
+    ValueError
+        If the periodic rows of `box` are linearly dependent, `cutoff` is negative, or
+        `periodic` is true without a box.
+
+    Examples
+    --------
+    >>> reference_pairs([[0.0], [0.75]], 0.25, box=[1.0])
+    [(0, 1, (-1,))]
+    >>> reference_pairs([[0.0]], 1.0, box=[1.0])
+    [(0, 0, (1,))]
+    """
+    rows, flags = _box_rows(box, periodic, np.shape(points)[1])
+    table, grid, (radius,) = _common_unit(
+        _fractions(points), [row for row, flag in zip(rows, flags) if flag], _fractions([[cutoff]])
+    )
+    if radius[0] < 0:
+        raise ValueError(f"cutoff is {cutoff}; it must not be negative")
+    limit = radius[0] ** 2
+    axes = [axis for axis, flag in enumerate(flags) if flag]
+    lattice = _Lattice(grid, axes, len(flags))
+
+    pairs = []
+    for i, p in enumerate(table):
+        for j in range(i, len(table)):
+            between = [a - b for a, b in zip(table[j], p)]
+            for shift, vector in lattice.images_within(between, limit):
+                square = _dot(vector, vector)
+                if square > limit or (square == limit and not inclusive):
+                    continue
+                if i < j or shift > (0,) * len(flags):
+                    pairs.append((i, j, shift))
+    return sorted(pairs)
+
+
+class _Lattice:
+    """The box vectors that repeat, in integers, ready to list the images near a vector.
+
+    ``ortho[k]`` is a multiple of what is left of vector k when everything along the vectors
+    before it is removed (Gram-Schmidt). Adding multiples of the vectors before k does not
+    change the component along ``ortho[k]``, and the squares of these components sum to at
+    most ``|D|**2``. So, from the last vector to the first, each shift is confined to an
+    interval whose ends are found exactly: no image within the limit is left out, however
+    skewed the box is and however far away the points are.
+    """
+
+    def __init__(self, vectors: list[_Vector], axes: list[int], ndim: int) -> None:
+        by_length = sorted(range(len(axes)), key=lambda k: _dot(vectors[k], vectors[k]))
+        self.ndim = ndim
+        self.axes = [axes[k] for k in by_length]
+        self.vectors = [vectors[k] for k in by_length]
+        self.ortho: list[_Vector] = []
+        for vector in self.vectors:
+            rest = [Fraction(x) for x in vector]
+            for other in self.ortho:
+                part = Fraction(_dot(vector, other), _dot(other, other))
+                rest = [x - part * y for x, y in zip(rest, other)]
+            if not any(rest):
+                raise ValueError("the periodic rows of box are linearly dependent")
+            scale = math.lcm(*(x.denominator for x in rest))
+            whole = [int(x * scale) for x in rest]
+            common = math.gcd(*whole)
+            self.ortho.append([x // common for x in whole])
+
+    def images_within(
+        self, vector: _Vector, limit: int
+    ) -> Iterator[tuple[tuple[int, ...], _Vector]]:
+        """Yield (S, vector + S @ box), among them every one of squared length <= limit."""
+        shift = [0] * self.ndim
+
+        def descend(k: int, vector: _Vector, left: Fraction):
+            if k < 0:
+                yield tuple(shift), vector
+                return
+            along, axis = self.ortho[k], self.axes[k]
+            length2 = _dot(along, along)
+            start, step = _dot(vector, along), _dot(self.vectors[k], along)
+            reach = math.isqrt(math.floor(left * length2))  # |start + s * step| <= reach
+            for s in range(-((reach + start) // step), (reach - start) // step + 1):
+                shift[axis] = s
+                moved = [x + s * y for x, y in zip(vector, self.vectors[k])]
+                yield from descend(
+                    k - 1, moved, left - Fraction((start + s * step) ** 2, length2)
+                )
+
+        yield from descend(len(self.axes) - 1, vector, Fraction(limit))
+
+
+def exact_vector(
+    points: Any, i: int, j: int, S: Sequence[int] | None = None, box: Any = None
+) -> list[Fraction]:
+    """Return ``points[j] - points[i] + S @ box`` as exact rational numbers.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, d)
+    i, j : int
+        Row numbers.
+    S : sequence of int, shape (d,), optional
+        Shift; None: zero.
+    box : array_like, shape (d,) or (d, d), optional
+        Needed where S is not zero.
+
+    Examples
+    --------
+    >>> exact_vector([[0.0], [0.75]], 0, 1, S=(-1,), box=[1.0])
+    [Fraction(-1, 4)]
+    """
+    p, q = _fractions([points[i], points[j]])
+    vector = [b - a for a, b in zip(p, q)]
+    if S is not None and any(S):
+        rows, _ = _box_rows(box, None, len(vector))
+        for s, row in zip(S, rows):
+            vector = [x + int(s) * y for x, y in zip(vector, row)]
+    return vector
+
+
+def exact_square(
+    points: Any, i: int, j: int, S: Sequence[int] | None = None, box: Any = None
+) -> Fraction:
+    """Return the squared length of `exact_vector`, exactly.
+
+    Examples
+    --------
+    >>> exact_square([[0.0, 0.0], [0.5, 1.0]], 0, 1)
+    Fraction(5, 4)
+    """
+    return sum((x * x for x in exact_vector(points, i, j, S, box)), Fraction(0))
+
+
+def ulp_error(distance: float, square: Fraction) -> Fraction:
+    """Return ``|distance - sqrt(square)|`` in units in the last place of the true distance.
+
+    The result is never too small, and too large by less than 2**-60.
+
+    Parameters
+    ----------
+    distance : float
+        A rounded distance.
+    square : Fraction
+        The exact squared distance, as from `exact_square`.
+
+    Examples
+    --------
+    >>> ulp_error(5.0, Fraction(25)) < Fraction(1, 2**60)
+    True
+    >>> round(ulp_error(math.nextafter(5.0, 6.0), Fraction(25)))
+    1
+    """
+    if square == 0:
+        return abs(Fraction(float(distance))) / Fraction(math.ulp(0.0))
+    size = square.numerator.bit_length() - square.denominator.bit_length()
+    bits = min(max(0, 128 - size // 2), 1140)  # 127 bits of the root, or all that an ulp sees
+    low = math.isqrt((square.numerator << 2 * bits) // square.denominator)
+    ends = [Fraction(low, 1 << bits), Fraction(low + 1, 1 << bits)]
+    unit = Fraction(math.ulp(float(ends[0])))
+    return max(abs(Fraction(float(distance)) - end) for end in ends) / unit
+
+
+def _box_rows(box: Any, periodic: Any, ndim: int) -> tuple[list[list[Fraction]], list[bool]]:
+    """Return the box as rows of Fractions, and which axes repeat."""
+    if box is None:
+        if periodic is not None and np.any(periodic):
+            raise ValueError("periodic needs a box")
+        return [[Fraction(0)] * ndim] * ndim, [False] * ndim
+    table = np.asarray(box)
+    rows = _fractions(np.diag(table) if table.ndim == 1 else table)
+    flags = np.broadcast_to(True if periodic is None else np.asarray(periodic), ndim)
+    return rows, [bool(flag) for flag in flags]
+
+
+def _fractions(table: Any) -> list[list[Fraction]]:
+    """Return a table of numbers as Fractions; floats keep their exact value."""
+    return [[Fraction(x) for x in np.asarray(row).tolist()] for row in table]
+
+
+def _common_unit(*tables: list[list[Fraction]]) -> list[list[_Vector]]:
+    """Multiply all tables by the same number so that every entry is an integer."""
+    unit = math.lcm(1, *(x.denominator for table in tables for row in table for x in row))
+    return [
+        [[x.numerator * (unit // x.denominator) for x in row] for row in table]
+        for table in tables
+    ]
+
+
+def _dot(a: Sequence[int], b: Sequence[int]) -> int:
+    return sum(x * y for x, y in zip(a, b))

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * harness.h: the test harness. A test file defines functions `static void property(void)` that
+ * CHECK things, and one `void test_<module>(void)` that RUNs them; main.c lists the modules.
+ * Silent on success; a failed check prints where and goes on.
+ */
+#ifndef HS_HARNESS_H
+#define HS_HARNESS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+extern int         harness_failures; /* failed checks so far */
+extern int         harness_tests;    /* tests run so far */
+extern const char *harness_filter;   /* run only tests whose name contains this, or NULL */
+
+#define CHECK(condition)                                                                  \
+    do {                                                                                  \
+        if (!(condition)) {                                                               \
+            fprintf(stderr, "%s:%d: %s: CHECK(%s)\n", __FILE__, __LINE__, __func__, #condition); \
+            harness_failures++;                                                           \
+        }                                                                                 \
+    } while (0)
+
+#define RUN(test)                                                        \
+    do {                                                                 \
+        if (harness_filter == NULL || strstr(#test, harness_filter)) {   \
+            harness_tests++;                                             \
+            test();                                                      \
+        }                                                                \
+    } while (0)
+
+/* A reproducible stream: xorshift64*, seeded per test. */
+typedef struct harness_random {
+    uint64_t state; /* not zero */
+} harness_random;
+
+static inline uint64_t
+random_bits(harness_random *random)
+{
+    uint64_t x = random->state;
+    x ^= x >> 12;
+    x ^= x << 25;
+    x ^= x >> 27;
+    random->state = x;
+    return x * UINT64_C(2685821657736338717);
+}
+
+/* Uniform in [0, 1). */
+static inline double
+random_unit(harness_random *random)
+{
+    return (double)(random_bits(random) >> 11) * 0x1p-53;
+}
+
+#endif

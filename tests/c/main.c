@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* main.c: runs the C tests. Usage: core_tests [part of a test's name] */
+#include "harness.h"
+
+int         harness_failures;
+int         harness_tests;
+const char *harness_filter;
+
+#define MODULE(name) void test_##name(void);
+#include "modules.h"
+#undef MODULE
+
+int
+main(int argc, char **argv)
+{
+    harness_filter = argc > 1 ? argv[1] : NULL;
+#define MODULE(name) test_##name();
+#include "modules.h"
+#undef MODULE
+    printf("%d passed, %d failed\n", harness_tests, harness_failures);
+    return harness_failures != 0 || harness_tests == 0;
+}

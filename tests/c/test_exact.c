@@ -1,0 +1,354 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_exact.c: the decision, against exact arithmetic that shares no code with it. */
+#include <float.h>
+
+#include "../../csrc/core/exact.h"
+#include "../../csrc/core/exact_integer.h"
+#include "bigint.h"
+#include "harness.h"
+
+void test_exact(void);
+
+typedef struct scene {
+    int     ndim, n_rows;
+    double  p[8], q[8], rows[8][8];
+    int64_t shift[8];
+    double  cutoff;
+} scene;
+
+/* Sign of |D|^2 - cutoff^2, the plain way. */
+static int
+true_sign(const scene *s)
+{
+    const big cutoff = big_from_double(s->cutoff);
+    const big square = big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q,
+                                  s->shift);
+    return big_compare(square, big_product(cutoff, cutoff));
+}
+
+/* The library's decisions, strict and inclusive, and its last stage alone must all agree. */
+static bool
+decides_like(const scene *s, int sign, hs_stages *stages)
+{
+    hs_metric metric;
+    bool      right;
+    hs_metric_init(&metric, s->ndim, s->n_rows, (const double(*)[8])s->rows, s->cutoff, true);
+    right = hs_metric_within(&metric, s->p, s->q, s->shift, stages) == (sign <= 0);
+    right = right && hs_metric_within(&metric, s->q, s->p, NULL, stages) ==
+                         hs_metric_within(&metric, s->p, s->q, NULL, stages);
+    right = right && hs_integer_compare(&metric, s->p, s->q, s->shift) == sign;
+    hs_metric_init(&metric, s->ndim, s->n_rows, (const double(*)[8])s->rows, s->cutoff, false);
+    return right && hs_metric_within(&metric, s->p, s->q, s->shift, stages) == (sign < 0);
+}
+
+/* A cutoff close to |D|: its float64 value or a neighbour of that. */
+static double
+cutoff_near(const scene *s, int steps)
+{
+    const big square = big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q,
+                                  s->shift);
+    int       exponent = 0;
+    if (square.sign != 0)
+        exponent = -2148 + 32 * square.n;
+    double cutoff = ldexp(sqrt(big_to_double(&square, -2148 - exponent)), exponent / 2);
+    for (; steps > 0; steps--)
+        cutoff = nextafter(cutoff, DBL_MAX);
+    for (; steps < 0; steps++)
+        cutoff = nextafter(cutoff, 0.0);
+    return cutoff <= DBL_MAX ? cutoff : DBL_MAX;
+}
+
+static double
+random_sign(harness_random *random)
+{
+    return random_bits(random) & 1 ? 1.0 : -1.0;
+}
+
+/* Numbers of one kind: everyday, dyadic, all exponents, extremes, subnormal, medium, decimal. */
+static double
+random_number(harness_random *random, int kind)
+{
+    static const double extremes[] = {0.0, 0x1p-1074, DBL_MIN, DBL_MAX, 1.0, 0x1p1023, 0x1p-1022};
+    const double        unit = 2.0 * random_unit(random) - 1.0;
+    switch (kind) {
+    case 0:
+        return 3.0 * unit;
+    case 1:
+        return (double)(random_bits(random) % 17) * 0.25 - 2.0;
+    case 2:
+        return ldexp(unit, (int)(random_bits(random) % 2098) - 1074);
+    case 3:
+        return random_sign(random) * extremes[random_bits(random) % 7];
+    case 4:
+        return random_sign(random) * ldexp((double)(random_bits(random) % 40), -1074);
+    case 5:
+        return ldexp(unit, (int)(random_bits(random) % 120) - 60);
+    default:
+        return ((double)(random_bits(random) % 17) - 8.0) * 0.1;
+    }
+}
+
+static int64_t
+random_shift(harness_random *random)
+{
+    static const int64_t extremes[] = {INT64_MIN, INT64_MAX, -(INT64_C(1) << 53),
+                                       (INT64_C(1) << 53) + 1};
+    switch (random_bits(random) % 5) {
+    case 0:
+        return 0;
+    case 1:
+        return (int64_t)(random_bits(random) % 5) - 2;
+    case 2:
+        return (int64_t)(random_bits(random) >> 11) - (INT64_C(1) << 52);
+    case 3:
+        return extremes[random_bits(random) % 4];
+    default:
+        return (int64_t)(random_bits(random) % 2001) - 1000;
+    }
+}
+
+static void
+every_stage_agrees_with_exact_arithmetic(void)
+{
+    harness_random random = {20240117};
+    hs_stages      stages = {0, 0, 0};
+    int            ties = 0;
+    for (int trial = 0; trial < 6000; trial++) {
+        const int common = (int)(random_bits(&random) % 7);
+        scene     s = {.ndim = 1 + (int)(random_bits(&random) % (trial % 10 ? 3 : 8))};
+        s.n_rows = (int)(random_bits(&random) % (unsigned)(s.ndim + 1));
+        for (int k = 0; k < s.ndim; k++) {
+            s.p[k] = random_number(&random, random_bits(&random) % 10 ? common : 2);
+            s.q[k] = random_bits(&random) % 8 ? random_number(&random, common) : s.p[k];
+            s.shift[k] = random_shift(&random);
+            for (int l = 0; l < s.n_rows; l++)
+                s.rows[l][k] = random_number(&random, random_bits(&random) % 10 ? common : 5);
+        }
+        s.cutoff = random_bits(&random) % 5 ? cutoff_near(&s, (int)(random_bits(&random) % 5) - 2)
+                                            : fabs(random_number(&random, common));
+        const int sign = true_sign(&s);
+        ties += sign == 0;
+        CHECK(decides_like(&s, sign, &stages));
+    }
+    CHECK(ties > 100);
+    CHECK(stages.by_float64 > 500 && stages.by_double_word > 500 && stages.by_integers > 500);
+}
+
+/* Coordinates of chosen width make the integers small, medium and large. */
+static void
+integers_of_every_size_agree(void)
+{
+    harness_random random = {77};
+    hs_stages      stages = {0, 0, 0};
+    for (int width = 1; width < 420; width++) {
+        for (int trial = 0; trial < 4; trial++) {
+            scene s = {.ndim = 1 + (int)(random_bits(&random) % 8)};
+            s.n_rows = trial % 2 ? s.ndim : 0;
+            for (int k = 0; k < s.ndim; k++) {
+                s.p[k] = random_number(&random, 0);
+                s.q[k] = ldexp(random_number(&random, 1), width / 2);
+                s.rows[k][k] = ldexp(1.0 + (double)(random_bits(&random) % 3), -width / 2);
+                s.shift[k] = random_shift(&random);
+            }
+            for (int step = -1; step <= 1; step++) {
+                s.cutoff = cutoff_near(&s, step);
+                CHECK(decides_like(&s, true_sign(&s), &stages));
+            }
+        }
+    }
+}
+
+/* The longest integers there can be: every bit of float64's range, times every bit of int64. */
+static void
+largest_integers_fit(void)
+{
+    hs_stages stages = {0, 0, 0};
+    for (int ndim = 1; ndim <= 8; ndim++) {
+        scene s = {.ndim = ndim, .n_rows = ndim};
+        for (int k = 0; k < ndim; k++) {
+            s.p[k] = -DBL_MAX;
+            s.q[k] = DBL_MAX;
+            s.shift[k] = INT64_MIN;
+            for (int l = 0; l < ndim; l++)
+                s.rows[l][k] = k == 0 && l == 0 ? -0x1p-1074 : -DBL_MAX;
+        }
+        s.cutoff = DBL_MAX;
+        CHECK(decides_like(&s, true_sign(&s), &stages));
+        for (int k = 0; k < ndim; k++)
+            s.shift[k] = 0;
+        s.q[0] = 0x1p-1074;
+        CHECK(decides_like(&s, true_sign(&s), &stages));
+    }
+}
+
+/* Whole-number distances in every binade: exact ties, and one unit in the last place beside them. */
+static void
+ties_hold_in_every_binade(void)
+{
+    static const double quadruples[][4] = {{1, 2, 2, 3}, {2, 3, 6, 7}, {1, 4, 8, 9},
+                                           {2, 6, 9, 11}, {0, 3, 4, 5}, {0, 0, 1, 1}};
+    hs_stages           stages = {0, 0, 0};
+    for (int exponent = -1074; exponent <= 1020; exponent++) {
+        const double *length = quadruples[(exponent + 1074) % 6];
+        scene         s = {.ndim = 3, .n_rows = 3};
+        for (int k = 0; k < 3; k++) {
+            s.p[k] = ldexp(length[k], exponent);
+            s.q[k] = -0.0;
+            s.rows[k][k] = ldexp(16.0, exponent < 1016 ? exponent : 1016);
+        }
+        const double distance = ldexp(length[3], exponent);
+        for (int side = -1; side <= 1; side++) {
+            s.cutoff = side == 0 ? distance : nextafter(distance, side < 0 ? 0.0 : INFINITY);
+            CHECK(decides_like(&s, -side, &stages));
+        }
+        s.shift[0] = 2; /* away, and back by the neighbouring float64 of that length */
+        s.q[0] = -2.0 * s.rows[0][0];
+        s.cutoff = distance;
+        CHECK(decides_like(&s, true_sign(&s), &stages));
+    }
+}
+
+/* Near ties with full significands, cutoffs from the smallest number to the largest. */
+static void
+near_ties_hold_in_every_binade(void)
+{
+    harness_random random = {4711};
+    hs_stages      stages = {0, 0, 0};
+    for (int exponent = -1074; exponent <= 1021; exponent++) {
+        for (int trial = 0; trial < 2; trial++) {
+            scene s = {.ndim = 2 + trial, .n_rows = trial, .shift = {1}};
+            for (int k = 0; k < s.ndim; k++) {
+                s.p[k] = ldexp(random_number(&random, 0), exponent);
+                s.q[k] = ldexp(random_number(&random, 0), exponent);
+                s.rows[0][k] = ldexp(random_number(&random, 0), exponent);
+            }
+            for (int step = -1; step <= 1; step++) {
+                s.cutoff = cutoff_near(&s, step);
+                CHECK(decides_like(&s, true_sign(&s), &stages));
+            }
+        }
+    }
+}
+
+/* (|D|^2 in float64 - |D|^2) / |D|^2, in units of 2^-53. */
+static double
+float64_error(const scene *s)
+{
+    double square = 0.0;
+    for (int k = 0; k < s->ndim; k++)
+        square += (s->q[k] - s->p[k]) * (s->q[k] - s->p[k]);
+    const big exact = big_square(s->ndim, 0, NULL, s->p, s->q, NULL);
+    const big error = big_difference(
+        big_product(big_from_double(square), big_from_bits(1, 1074, 1)), exact);
+    return big_to_double(&error, -2148) / big_to_double(&exact, -2148) * 0x1p53;
+}
+
+/*
+ * Every rounding of the float64 stage in the same direction and nearly as large as it can be. With
+ * v = 2^-53: the first two differences lie halfway between floats 1 + 2 k v; k is such that their
+ * squares (2 k^2 v is 1/2 and 3/2) and the sum of these, just above 2, are halfway too; and every
+ * further square is just lost in the sum, or just lifts it.
+ */
+static void
+float64_stage_survives_its_worst_case(void)
+{
+    const double   halfway[] = {47453132.0, 82191236.0}; /* sqrt(2^51), sqrt(3 * 2^51), even */
+    harness_random random = {99};
+    hs_stages      stages = {0, 0, 0};
+    double         least_reached = 1.0;
+    for (int trial = 0; trial < 28000; trial++) {
+        const double side = trial & 1 ? 1.0 : -1.0; /* the computed square is too large, too small */
+        const int    ndim = 2 + trial / 2 % 7;
+        scene        s = {.ndim = ndim};
+        for (int k = 0; k < ndim; k++) {
+            const double step = 2.0 * (double)(1 + random_bits(&random) % 4096);
+            s.p[k] = k < 2 ? side * 0x1p-53 : 0.0;
+            s.q[k] = k < 2 ? 1.0 + 0x1p-52 * (halfway[k] + side * step)
+                           : 0x1p-26 * (1.0 + side * 0x1p-40);
+        }
+        if (trial < 140) {
+            const double reached = side * float64_error(&s) / (ndim + 2);
+            least_reached = reached < least_reached ? reached : least_reached;
+        }
+        for (int step = -1; step <= 1; step++) {
+            hs_metric metric;
+            s.cutoff = cutoff_near(&s, step);
+            hs_metric_init(&metric, ndim, 0, NULL, s.cutoff, true);
+            CHECK(hs_metric_within(&metric, s.p, s.q, NULL, &stages) ==
+                  (hs_integer_compare(&metric, s.p, s.q, NULL) <= 0));
+        }
+    }
+    CHECK(stages.by_double_word > 0);
+    CHECK(least_reached > 0.999); /* of the d + 2 roundings that the stage allows for */
+}
+
+static void
+zero_cutoff_means_coincident(void)
+{
+    hs_stages stages = {0, 0, 0};
+    scene     s = {.ndim = 3, .n_rows = 1, .p = {0.1, -0.0, 3}, .q = {0.1, 0.0, 3}};
+    s.rows[0][0] = 0.5;
+    CHECK(decides_like(&s, 0, &stages));
+    s.shift[0] = 1;
+    s.q[0] = s.p[0] - 0.5;
+    CHECK(decides_like(&s, true_sign(&s), &stages));
+    s.shift[0] = 0;
+    s.q[0] = s.p[0];
+    s.q[1] = 0x1p-1074;
+    CHECK(decides_like(&s, 1, &stages));
+    s.cutoff = 0x1p-1074;
+    CHECK(decides_like(&s, 0, &stages));
+    s.q[2] = nextafter(3.0, 4.0);
+    CHECK(decides_like(&s, 1, &stages));
+    for (int k = 0; k < 3; k++)
+        s.p[k] = s.q[k] = 0.0;
+    s.cutoff = 0.0;
+    CHECK(decides_like(&s, 0, &stages));
+}
+
+/* precision="double" is a fixed formula; a lattice constant of 0.1 tells it from the exact one. */
+static void
+double_formula_is_the_fixed_one(void)
+{
+    harness_random random = {5};
+    for (int trial = 0; trial < 2000; trial++) {
+        scene           s = {.ndim = 3, .n_rows = 2};
+        volatile double square = 0.0; /* keeps the compiler from fusing or reordering */
+        for (int k = 0; k < 3; k++) {
+            s.p[k] = random_number(&random, 6);
+            s.q[k] = random_number(&random, 6);
+            s.rows[0][k] = random_number(&random, 6);
+            s.rows[1][k] = random_number(&random, 0);
+            s.shift[k] = (int64_t)(random_bits(&random) % 5) - 2;
+        }
+        for (int k = 0; k < 3; k++) {
+            volatile double first = (double)s.shift[0] * s.rows[0][k];
+            volatile double second = (double)s.shift[1] * s.rows[1][k];
+            volatile double offset = first + second;
+            volatile double difference = s.q[k] - s.p[k];
+            difference = difference + offset;
+            volatile double term = difference * difference;
+            square = square + term;
+        }
+        s.cutoff = cutoff_near(&s, (int)(random_bits(&random) % 3) - 1);
+        volatile double limit = s.cutoff * s.cutoff;
+        hs_metric       metric;
+        hs_metric_init(&metric, 3, 2, (const double(*)[8])s.rows, s.cutoff, true);
+        CHECK(hs_metric_within_double(&metric, s.p, s.q, s.shift) == (square <= limit));
+        metric.inclusive = false;
+        CHECK(hs_metric_within_double(&metric, s.p, s.q, s.shift) == (square < limit));
+    }
+}
+
+void
+test_exact(void)
+{
+    RUN(every_stage_agrees_with_exact_arithmetic);
+    RUN(integers_of_every_size_agree);
+    RUN(largest_integers_fit);
+    RUN(ties_hold_in_every_binade);
+    RUN(near_ties_hold_in_every_binade);
+    RUN(float64_stage_survives_its_worst_case);
+    RUN(zero_cutoff_means_coincident);
+    RUN(double_formula_is_the_fixed_one);
+}

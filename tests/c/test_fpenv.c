@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_fpenv.c: whatever the caller's floating-point environment, the core works in its own. */
+#include <fenv.h>
+#include <math.h>
+
+#include "../../csrc/core/fpenv.h"
+
+#include "../../csrc/core/exact.h"
+#include "harness.h"
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#define HS_CAN_FLUSH 1
+#else
+#define HS_CAN_FLUSH 0
+#endif
+
+void test_fpenv(void);
+
+static const int roundings[] = {FE_TONEAREST, FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
+
+/* Flush results and operands: FTZ is bit 15 of MXCSR, DAZ bit 6. */
+static void
+set_flushing(bool flush)
+{
+#if HS_CAN_FLUSH
+    _mm_setcsr((_mm_getcsr() & ~0x8040u) | (flush ? 0x8040u : 0u));
+#else
+    (void)flush;
+#endif
+}
+
+static bool
+rounds_to_nearest_without_flushing(void)
+{
+    volatile double one = 1.0, half_ulp = 0x1p-53, more = 0x1.8p-53, smallest = 0x1p-1074;
+    volatile float  smallest_float = 0x1p-149f;
+    return one + half_ulp == 1.0 && one + more > 1.0 && -one - half_ulp == -1.0 &&
+           smallest * 2.0 == 0x1p-1073 && smallest != 0.0 && smallest_float * 2.0f == 0x1p-148f;
+}
+
+static void
+entering_sets_and_leaving_restores(void)
+{
+    for (int mode = 0; mode < 4; mode++) {
+        for (int flush = 0; flush <= HS_CAN_FLUSH; flush++) {
+            fesetround(roundings[mode]);
+            set_flushing(flush);
+            feclearexcept(FE_ALL_EXCEPT);
+            feraiseexcept(FE_DIVBYZERO);
+            const hs_fpenv saved = hs_fpenv_enter();
+            const bool     inside = rounds_to_nearest_without_flushing();
+            const bool     nested_inside = (hs_fpenv_leave(hs_fpenv_enter()),
+                                        rounds_to_nearest_without_flushing());
+            hs_fpenv_leave(saved);
+            const int mode_after = fegetround();
+            const int flags_after = fetestexcept(FE_ALL_EXCEPT);
+#if HS_CAN_FLUSH
+            const bool flush_after = (_mm_getcsr() & 0x8040u) == 0x8040u;
+#else
+            const bool flush_after = false;
+#endif
+            set_flushing(false);
+            fesetround(FE_TONEAREST);
+            CHECK(inside && nested_inside);
+            CHECK(mode_after == roundings[mode]);
+            CHECK(flush_after == (bool)flush);
+            CHECK(flags_after == FE_DIVBYZERO);
+        }
+    }
+    feclearexcept(FE_ALL_EXCEPT);
+}
+
+/* Decisions and distances are the same whatever the caller had set. */
+static void
+decisions_ignore_the_callers_environment(void)
+{
+    harness_random random = {61};
+    for (int trial = 0; trial < 3000; trial++) {
+        const int     exponent = trial % 3 ? 0 : -1060;
+        double        p[3], q[3], rows[1][HS_MAX_DIM] = {{0}};
+        const int64_t shift[1] = {trial % 4};
+        double        cutoff = 0.0, first = 0.0;
+        bool          decided = false;
+        for (int k = 0; k < 3; k++) {
+            p[k] = ldexp(random_unit(&random), exponent);
+            q[k] = ldexp(random_unit(&random), exponent);
+            rows[0][k] = ldexp(random_unit(&random), exponent);
+            const double component = (q[k] - p[k] + (double)shift[0] * rows[0][k]);
+            cutoff = hypot(cutoff, component);
+        }
+        for (int mode = 0; mode < 4; mode++) {
+            for (int flush = 0; flush <= HS_CAN_FLUSH; flush++) {
+                hs_metric metric;
+                hs_stages stages = {0, 0, 0};
+                double    vector[3];
+                fesetround(roundings[mode]);
+                set_flushing(flush);
+                const hs_fpenv saved = hs_fpenv_enter();
+                hs_metric_init(&metric, 3, 1, (const double(*)[8])rows, cutoff, true);
+                const bool   within = hs_metric_within(&metric, p, q, shift, &stages);
+                const double distance = hs_metric_measure(&metric, p, q, shift, vector);
+                hs_fpenv_leave(saved);
+                set_flushing(false);
+                fesetround(FE_TONEAREST);
+                if (mode == 0 && !flush) {
+                    decided = within;
+                    first = distance;
+                }
+                CHECK(within == decided);
+                CHECK(distance == first);
+            }
+        }
+    }
+}
+
+void
+test_fpenv(void)
+{
+    RUN(entering_sets_and_leaving_restores);
+    RUN(decisions_ignore_the_callers_environment);
+}
