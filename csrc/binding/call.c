@@ -5,6 +5,7 @@
 #include "available.h"
 #include "convert.h"
 
+
 /* An hs_poll_fn: lets signals be handled and reports progress; false when either raised. */
 static bool
 poll_python(void *context, double fraction)
@@ -29,7 +30,10 @@ take_memory_limit(PyObject *object, hs_options *options)
         return true;
     }
     options->memory_limit = PyFloat_AsDouble(object);
-    if (options->memory_limit == -1.0 && PyErr_Occurred()) {
+    if (PyErr_Occurred()) {
+        PyErr_Clear();
+        PyErr_Format(PyExc_TypeError, "memory_limit must be a number of bytes, got %s",
+                     Py_TYPE(object)->tp_name);
         return false;
     }
     if (!(options->memory_limit >= 0.0)) {

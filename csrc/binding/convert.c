@@ -76,8 +76,7 @@ hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
                      Py_TYPE(object)->tp_name);
         return false;
     }
-    *letters = PyUnicode_AsUTF8(object);
-    if (*letters == NULL) {
+    if (!hs_name_of(object, "quantities", letters)) {
         return false;
     }
     for (const char *letter = *letters; *letter != '\0'; letter++) {
@@ -127,7 +126,12 @@ hs_name_of(PyObject *object, const char *argument, const char **name)
                      Py_TYPE(object)->tp_name);
         return false;
     }
-    *name = PyUnicode_AsUTF8(object);
+    Py_ssize_t length;
+    *name = PyUnicode_AsUTF8AndSize(object, &length);
+    if (*name != NULL && strlen(*name) != (size_t)length) {
+        PyErr_Format(PyExc_ValueError, "%s must not contain null characters", argument);
+        return false;
+    }
     return *name != NULL;
 }
 

@@ -33,7 +33,11 @@ static PyObject *
 raise_memory(const hs_failure *failure)
 {
     char text[256];
-    if (failure->expected_bytes > 0.0) {
+    if (isinf(failure->expected_bytes)) {
+        snprintf(text, sizeof text,
+                 "the result would not fit: the cutoff spans more images of the box than any memory "
+                 "holds pairs; use a smaller cutoff");
+    } else if (failure->expected_bytes > 0.0) {
         snprintf(text, sizeof text,
                  "the result would not fit: about %.3g pairs (%.3g GB) are expected, %.3g GB are "
                  "allowed; use a smaller cutoff, fewer quantities, or count_pairs",
@@ -68,7 +72,7 @@ raise_kernel(const hs_options *options)
         }
         PyTuple_SET_ITEM(known, k, name);
     }
-    PyErr_Format(PyExc_ValueError, "kernel must be one of %R on this CPU, got '%s'", known,
+    PyErr_Format(PyExc_ValueError, "kernel must be one of %R on this CPU, got '%.100s'", known,
                  options != NULL && options->kernel != NULL ? options->kernel : "");
     Py_DECREF(known);
     return NULL;

@@ -56,7 +56,7 @@ hs_two_difference(double a, double b)
 }
 
 #if !HS_FAST_FMA
-/* hi + lo == a exactly, each with at most 26 bits, so that their products are exact. [D], Veltkamp */
+/* hi + lo == a exactly, of at most 26 bits each, so that their products are exact. Veltkamp, [D] */
 HS_ALWAYS_INLINE hs_dw
 hs_split(double a)
 {
@@ -92,7 +92,7 @@ hs_two_square(double a)
 #endif
 }
 
-/* x + y with a relative error of at most 3 v^2 + 13 v^3, also where they cancel. [JMP] algorithm 6 */
+/* x + y, relative error at most 3 v^2 + 13 v^3, also where they cancel. [JMP] algorithm 6 */
 HS_ALWAYS_INLINE hs_dw
 hs_dw_add(hs_dw x, hs_dw y)
 {

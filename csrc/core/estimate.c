@@ -6,8 +6,7 @@
 
 #define SAMPLES 64         /* points that are counted; the error of the mean is then some per cent */
 #define SAMPLE_WORK 4.0e6  /* candidates and rows that sampling may cost, some milliseconds */
-#define MANY_IMAGES 1000   /* rows of images from which on the density decides: sampling would be slow */
-#define DENSITY_MARGIN 2.0 /* counts of images scatter less than this around their volume */
+#define MOST_PAIRS 0x1p62  /* more than int64 should be asked to count */
 #define SURE_ERRORS 3.0    /* standard errors below the mean at which a refusal is sure enough */
 
 /*
@@ -53,33 +52,61 @@ refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure 
     return HS_ERR_MEMORY;
 }
 
+/*
+ * Pairs that a fully periodic box must have: a ball of radius R holds at least as many lattice
+ * points as copies of the cell cover a ball of radius R less the cell's diameter.
+ */
+static double
+least_pairs(const hs_search *search)
+{
+    const hs_scene *scene = &search->scene;
+    const double    n = (double)scene->n;
+    double          diameter = 0.0;
+    for (int r = 0; r < scene->lattice.n_periodic; r++) {
+        double square = 0.0;
+        for (int k = 0; k < scene->ndim; k++) {
+            square += scene->lattice.rows[r][k] * scene->lattice.rows[r][k];
+        }
+        diameter += sqrt(square);
+    }
+    const double covered = fmax(0.0, 1.0 - diameter / scene->radius);
+    return search->grid.expected_pairs * pow(covered, scene->ndim) - 0.5 * n;
+}
+
 hs_status
 hs_estimate_by_density(hs_search *search, hs_failure *failure)
 {
     const double bytes_per_pair = hs_bytes_per_pair(&search->options, search->scene.ndim);
-    const double pairs = search->grid.expected_pairs;
-    const double images = hs_stencil_bound(&search->grid);
-    if (!search->grid.expectation_is_sure || images < MANY_IMAGES) {
+    if (search->scene.lattice.n_periodic < search->scene.ndim || search->scene.n == 0) {
         return HS_OK;
     }
-    if (pairs > 0x1p62) {
-        failure->value = pairs;
-        return bytes_per_pair > 0.0 ? refuse(search, pairs, bytes_per_pair, failure)
-                                    : HS_ERR_TOO_MANY;
+    const double least = least_pairs(search);
+    if (bytes_per_pair == 0.0 && least > MOST_PAIRS) {
+        failure->value = least;
+        return HS_ERR_TOO_MANY;
     }
-    if (!hs_account_allows(&search->account, pairs * bytes_per_pair / DENSITY_MARGIN)) {
-        return refuse(search, pairs, bytes_per_pair, failure);
+    if (!(least > 0.0) || hs_account_allows(&search->account, least * bytes_per_pair)) {
+        return HS_OK;
     }
-    return HS_OK;
+    return refuse(search, search->grid.expected_pairs, bytes_per_pair, failure);
 }
+
+/* What a sampled point has found; `budget` is the candidate count at which it stops. */
+typedef struct sample {
+    double  hits;
+    int64_t budget;
+} sample;
+
+/* An early stop leaves the hits too few: an estimate from below, which is the safe side here. */
+#define SAMPLE_STOPPED HS_STATUS_END
 
 static hs_status
 add_hits(void *context, hs_search *search, int32_t si, int32_t n_hits)
 {
-    (void)search;
+    sample *one = context;
     (void)si;
-    *(double *)context += n_hits;
-    return HS_OK;
+    one->hits += n_hits;
+    return search->n_candidates > one->budget ? SAMPLE_STOPPED : HS_OK;
 }
 
 hs_status
@@ -99,13 +126,13 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     for (; taken < samples && work < SAMPLE_WORK; taken++) {
         const int64_t si = (2 * taken + 1) * n / (2 * samples);
         const int64_t before = search->n_candidates;
-        double        hits = 0.0;
-        const hs_status status = hs_search_point(search, (int32_t)si, add_hits, &hits);
-        if (status != HS_OK) {
+        sample        one = {0.0, before + (int64_t)SAMPLE_WORK};
+        const hs_status status = hs_search_point(search, (int32_t)si, add_hits, &one);
+        if (status != HS_OK && status != SAMPLE_STOPPED) {
             return status;
         }
-        sum += hits;
-        squares += hits * hits;
+        sum += one.hits;
+        squares += one.hits * one.hits;
         work += (double)(search->n_candidates - before) + 8.0 * (double)search->stencil.n_rows;
     }
     const double mean = sum / (double)taken;

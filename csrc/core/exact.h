@@ -45,9 +45,9 @@ bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 
 /*
- * D = q - p + shift * rows and |D| of a pair that is within the cutoff. vector: ndim
- * doubles, each within 1 ulp of |D|, or NULL. Returns |D| within 1 ulp, at most the cutoff (inclusive)
- * or below it (strict).
+ * D = q - p + shift * rows and |D| of a pair that is within the cutoff. vector: ndim doubles, each
+ * within 1 ulp of |D|, or NULL. Returns |D| within 1 ulp, at most the cutoff (inclusive) or below
+ * it (strict).
  */
 double hs_metric_measure(const hs_metric *metric, const double *p, const double *q,
                          const int64_t *shift, double *vector);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* exact_integer.c: the comparison of |D| with the cutoff in integers of a fixed, sufficient size. */
+/* exact_integer.c: comparing |D| with the cutoff in integers of a fixed, sufficient size. */
 #include "exact_integer.h"
 
 #include <string.h>
@@ -8,8 +8,8 @@
 
 /*
  * Limbs of 64 bits that hold any component of D. In units of the smallest subnormal, 2^-1074, a
- * float64 has at most 2098 bits and a multiple of one by an int64 at most 2162; eight of those and
- * the two points sum to less than 2^2166. Two bits are for the sign and for the sum of 8 squares.
+ * float64 has at most 2098 bits and a multiple of one by an int64 at most 2161; eight of those and
+ * the two points sum to less than 2^2165. Two bits are for the sign and for the sum of 8 squares.
  */
 #define MAX_LIMBS 34
 

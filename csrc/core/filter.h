@@ -21,14 +21,14 @@ typedef struct hs_thresholds {
  * extent   largest |y_k| plus largest |q_k|, over all components, as the floats that the kernel
  *          reads; may be infinite or NaN (then nothing is sure)
  * error    bound on how far each component of y and q, before it was rounded to float32, was from
- *          the true value: |y64_k - Y_k| <= error for y and for q alike. Up to 2048 float64 roundings
- *          of y64 itself need not be counted
+ *          the true value: |y64_k - Y_k| <= error for y and for q alike. Up to 2048 float64
+ *          roundings of y64 itself need not be counted
  */
 hs_thresholds hs_thresholds_of(int ndim, double cutoff, double extent, double error);
 
-/* The same bounds for arithmetic with unit roundoff `unit` and smallest normal number `tiny`, before
- * they are rounded to float32. The product uses 2^-24 and 2^-126; the tests also try every number
- * of a tiny floating-point system. */
+/* The same bounds for arithmetic with unit roundoff `unit` and smallest normal number `tiny`,
+ * before they are rounded to float32. The product uses 2^-24 and 2^-126; the tests also try every
+ * number of a tiny floating-point system. */
 void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
                          double tiny, double *in, double *out);
 

@@ -20,7 +20,6 @@ typedef struct hs_grid {
     int64_t  reach[HS_MAX_DIM];   /* the same in cells, images counted on */
     double   shift_error;         /* bound on the error of a shifted coordinate minus a centre */
     double   expected_pairs;      /* if the points were spread evenly over the region they occupy */
-    bool     expectation_is_sure; /* all axes repeat, so that images make it even in the long range */
 } hs_grid;
 
 #define HS_GRID_SPARE_CELLS 64

@@ -23,21 +23,26 @@ exponent_of(double x)
     return x == 0.0 ? INT32_MIN / 2 : ilogb(x);
 }
 
+/* Sizes of the periodic box entries. */
 typedef struct magnitudes {
-    double largest;  /* of all coordinates and periodic box entries */
-    double smallest; /* nonzero one of these and the cutoff */
+    double largest;
+    double smallest;  /* not counting zeros */
+    double short_row; /* the least of the rows' largest entries; infinity without rows */
 } magnitudes;
 
 static magnitudes
 box_magnitudes(const hs_box *box)
 {
-    magnitudes found = {0.0, INFINITY};
+    magnitudes found = {0.0, INFINITY, INFINITY};
     for (int l = 0; box != NULL && l < box->ndim; l++) {
+        double row_largest = 0.0;
         for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
             const double size = fabs(box->rows[l][k]);
-            found.largest = fmax(found.largest, size);
+            row_largest = fmax(row_largest, size);
             found.smallest = size > 0.0 ? fmin(found.smallest, size) : found.smallest;
         }
+        found.largest = fmax(found.largest, row_largest);
+        found.short_row = box->periodic[l] ? fmin(found.short_row, row_largest) : found.short_row;
     }
     return found;
 }
@@ -46,13 +51,16 @@ box_magnitudes(const hs_box *box)
 static int
 choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *extreme)
 {
-    magnitudes found = box_magnitudes(box);
-    found.largest = fmax(found.largest, cloud->largest);
-    int exponent = exponent_of(cutoff > 0.0 ? cutoff : found.largest);
-    if (abs(exponent) <= ORDINARY_EXPONENT || (cutoff == 0.0 && found.largest == 0.0)) {
+    const magnitudes found = box_magnitudes(box);
+    /* With cutoff 0 the scene has another length to go by: its box, or where its points are. */
+    const double unit = cutoff > 0.0                   ? cutoff
+                        : found.short_row != INFINITY ? found.short_row
+                                                      : cloud->largest;
+    int exponent = exponent_of(unit);
+    if (unit == 0.0 || abs(exponent) <= ORDINARY_EXPONENT) {
         exponent = 0;
     }
-    const int largest = exponent_of(found.largest);
+    const int largest = exponent_of(fmax(found.largest, cloud->largest));
     if (largest - exponent > LARGEST_EXPONENT) {
         exponent = largest - LARGEST_EXPONENT;
     }
@@ -149,7 +157,7 @@ bound_errors(hs_scene *scene, double magnitude)
     }
     scene->x_error = scene->extreme ? SCALING_LOSS : 0.0;
     if (!lattice->aligned) {
-        const double terms = lattice->n_periodic + 2;
+        const double terms = 2 * lattice->n_periodic + 2;
         scene->x_error += 2.0 * UNIT * largest + terms * terms * 0x1p-104 * magnitude;
     }
     for (int k = 0; k < scene->ndim; k++) {

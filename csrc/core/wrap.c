@@ -6,6 +6,7 @@
 
 #include <math.h>
 
+#define TURNS_TAIL (INT64_C(1) << 26) /* splits 62 bits into 36 and 26, both exact as doubles */
 #define WRAP_PASSES 4 /* each pass gains 50 bits; from 2^51 turns two are enough, two are spare */
 
 double
@@ -38,8 +39,18 @@ hs_wrap_axis(double x, double length, int64_t *turns)
     return inside;
 }
 
-/* X = r - sum_l given_turns[l] * scaled row l, by a compensated dot product (Ogita, Rump and Oishi
- * 2005, algorithm Dot2). */
+/* sum + low -= factor * entry, by a compensated step (Ogita, Rump and Oishi 2005, Dot2). */
+HS_ALWAYS_INLINE void
+subtract_product(double factor, double entry, double *sum, double *low, double *absolute)
+{
+    const hs_dw product = hs_two_product(-factor, entry);
+    const hs_dw partial = hs_two_sum(*sum, product.hi);
+    *sum = partial.hi;
+    *low += partial.lo + product.lo;
+    *absolute += fabs(product.hi);
+}
+
+/* X = r - sum_l given_turns[l] * scaled row l. Turns of more than 52 bits are split into two doubles. */
 static void
 subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_turns,
               double *inside, double *magnitude)
@@ -49,12 +60,10 @@ subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_t
         double low = 0.0;
         double absolute = fabs(r[k]);
         for (int l = 0; l < lattice->n_periodic; l++) {
-            const hs_dw product =
-                hs_two_product(-(double)given_turns[l], lattice->scaled[l][k]);
-            const hs_dw partial = hs_two_sum(sum, product.hi);
-            sum = partial.hi;
-            low += partial.lo + product.lo;
-            absolute += fabs(product.hi);
+            const double  entry = lattice->scaled[l][k];
+            const int64_t tail = given_turns[l] % TURNS_TAIL;
+            subtract_product((double)(given_turns[l] - tail), entry, &sum, &low, &absolute);
+            subtract_product((double)tail, entry, &sum, &low, &absolute);
         }
         inside[k] = sum + low;
         *magnitude = fmax(*magnitude, absolute);
@@ -96,11 +105,6 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
         }
         if (!hs_lattice_shift(lattice, turns, given_turns)) {
             return false;
-        }
-        for (int l = 0; l < lattice->n_periodic; l++) {
-            if (given_turns[l] > INT64_C(1) << 52 || given_turns[l] < -(INT64_C(1) << 52)) {
-                return false;
-            }
         }
         subtract_rows(lattice, r, given_turns, inside, magnitude);
     }

@@ -21,7 +21,7 @@ double hs_wrap_axis(double x, double length, int64_t *turns);
  * In any box. r: ndim scaled coordinates. inside: receives X rounded, in the middle period
  * (|t_k| <= period/2) but for rounding. turns: receives n_periodic integers, over B. Returns false
  * beyond the limit. *magnitude: raised to the largest sum of absolute terms; the error of each
- * component of X is at most 2^-53 |X| + (n_periodic + 2)^2 2^-104 magnitude.
+ * component of X is at most 2^-53 |X| + (2 n_periodic + 2)^2 2^-104 magnitude.
  */
 bool hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_t *turns,
                    double *magnitude);

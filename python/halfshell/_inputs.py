@@ -158,7 +158,7 @@ def as_index_bytes(index_dtype: Any) -> int:
         dtype = np.dtype(index_dtype)
     except TypeError:
         raise TypeError(f"index_dtype must be int32 or int64, got {index_dtype!r}") from None
-    if dtype.kind != "i" or dtype.itemsize not in (4, 8):
+    if dtype not in (np.dtype(np.int32), np.dtype(np.int64)):
         raise ValueError(f"index_dtype must be int32 or int64, got {dtype}")
     return dtype.itemsize
 

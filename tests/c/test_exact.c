@@ -181,7 +181,7 @@ largest_integers_fit(void)
     }
 }
 
-/* Whole-number distances in every binade: exact ties, and one unit in the last place beside them. */
+/* Whole-number distances in every binade: exact ties, and the floats beside them. */
 static void
 ties_hold_in_every_binade(void)
 {
@@ -257,7 +257,7 @@ float64_stage_survives_its_worst_case(void)
     hs_stages      stages = {0, 0, 0};
     double         least_reached = 1.0;
     for (int trial = 0; trial < 28000; trial++) {
-        const double side = trial & 1 ? 1.0 : -1.0; /* the computed square is too large, too small */
+        const double side = trial & 1 ? 1.0 : -1.0; /* computed square too large, too small */
         const int    ndim = 2 + trial / 2 % 7;
         scene        s = {.ndim = ndim};
         for (int k = 0; k < ndim; k++) {
