@@ -138,7 +138,7 @@ typedef struct hs_options {
     int          index_bytes;  /* 4 or 8: width of the caller's i and j, for the memory check */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
     double       memory_limit; /* bytes that result and search may take; infinity: no limit */
-    hs_limit_fn  find_limit;   /* NULL, or asked for a further limit once more than 64 MB are needed */
+    hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;
     hs_poll_fn   poll;         /* NULL: never */
     void        *poll_context;
@@ -198,7 +198,7 @@ typedef struct hs_plan {
     int         n_periodic;
     bool        aligned;              /* every periodic box vector lies along one coordinate axis */
     bool        reduced;              /* the box was replaced by an equivalent, less skewed one */
-    bool        keeps_originals;      /* the search needs the coordinates as given beside its copy */
+    bool        keeps_originals;      /* coordinates as given are kept beside the wrapped */
     bool        all_pairs;            /* one cell: every point meets every point */
     int64_t     shape[HS_MAX_DIM];    /* cells along each grid axis */
     double      cell_size[HS_MAX_DIM];/* extent of a cell along each grid axis */
@@ -218,10 +218,10 @@ hs_status hs_plan_make(const hs_points *points, const hs_box *box, const hs_opti
 hs_status hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *failure);
 
 /*
- * Wrap points into the box: wrapped = point + shift * box, each fraction along a periodic axis
- * in [0, 1). wrapped: n * ndim, within 1 ulp of the largest term; along an axis-aligned box vector never equal to
- * its length. shift: n * ndim; either may be NULL. Returns HS_ERR_SHIFT_RANGE for a shift
- * beyond 2^51.
+ * Wrap points into the box: wrapped = point + shift * box, each fraction along a periodic axis in
+ * [0, 1). wrapped: n * ndim, within 1 ulp of the largest term; along an axis-aligned box vector
+ * never equal to its length. shift: n * ndim; either may be NULL. Returns HS_ERR_SHIFT_RANGE for a
+ * shift beyond 2^51.
  */
 hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped,
                       int64_t *shift, hs_failure *failure);

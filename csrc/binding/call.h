@@ -7,7 +7,8 @@
 
 #include "../halfshell.h"
 
-/* The arguments of a search, as views; the Python arguments that they borrow from must stay alive. */
+/* The arguments of a search, as views; the Python arguments that they borrow from must stay
+ * alive. */
 typedef struct hs_call {
     hs_points      points;
     hs_box         box;
@@ -18,8 +19,9 @@ typedef struct hs_call {
 } hs_call;
 
 /*
- * Positional arguments of every search, in this order: points, cutoff, box, periodic, inclusive, precision,
- * kernel, memory_limit (None: ask the machine), progress (None: no calls). Returns false with an exception set.
+ * Positional arguments of every search, in this order: points, cutoff, box, periodic, inclusive,
+ * precision, kernel, memory_limit (None: ask the machine), progress (None: no calls). Returns false
+ * with an exception set.
  */
 enum { HS_CALL_ARGUMENTS = 9 };
 bool hs_call_init(hs_call *call, PyObject *const *arguments);

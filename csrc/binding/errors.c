@@ -35,8 +35,8 @@ raise_memory(const hs_failure *failure)
     char text[256];
     if (isinf(failure->expected_bytes)) {
         snprintf(text, sizeof text,
-                 "the result would not fit: the cutoff spans more images of the box than any memory "
-                 "holds pairs; use a smaller cutoff");
+                 "the result would not fit: the cutoff spans more images of the box than any "
+                 "memory holds pairs; use a smaller cutoff");
     } else if (failure->expected_bytes > 0.0) {
         snprintf(text, sizeof text,
                  "the result would not fit: about %.3g pairs (%.3g GB) are expected, %.3g GB are "

@@ -7,8 +7,8 @@
 
 #include "../halfshell.h"
 
-/* Sets the exception for a status other than HS_OK; returns NULL for convenience. HS_ERR_INTERRUPTED expects
- * that poll() has set one. options may be NULL. */
+/* Sets the exception for a status other than HS_OK; returns NULL for convenience.
+ * HS_ERR_INTERRUPTED expects that poll() has set one. options may be NULL. */
 PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options *options);
 
 #endif

@@ -18,11 +18,6 @@ static PyMethodDef methods[] = {
     {NULL, NULL, 0, NULL},
 };
 
-/* Nothing to keep: no Python object outlives a call. */
-typedef struct module_state {
-    char unused;
-} module_state;
-
 static int
 module_exec(PyObject *module)
 {
@@ -45,7 +40,7 @@ static struct PyModuleDef definition = {
     .m_base = PyModuleDef_HEAD_INIT,
     .m_name = "halfshell._core",
     .m_doc = "The C core of halfshell. Private: use the functions of halfshell.",
-    .m_size = sizeof(module_state),
+    .m_size = 0, /* no state: no Python object outlives a call */
     .m_methods = methods,
     .m_slots = slots,
 };

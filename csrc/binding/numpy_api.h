@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* numpy_api.h: Python and NumPy, included the same way in every file of the binding. module.c defines
- * HS_IMPORTS_NUMPY and owns the API table; the others refer to it. */
+/* numpy_api.h: Python and NumPy, included the same way in every file of the binding. module.c
+ * defines HS_IMPORTS_NUMPY and owns the API table; the others refer to it. */
 #ifndef HS_NUMPY_API_H
 #define HS_NUMPY_API_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_explain.c: _core.explain, kernels, build_info: what would be done, what was done, with what. */
+/* py_explain.c: _core.explain, kernels, build_info: what would be done, what was done, with
+ * what. */
 #include "py_functions.h"
 
 #include "available.h"

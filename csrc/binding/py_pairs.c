@@ -8,7 +8,8 @@
 
 #include <string.h>
 
-/* One new array for a letter, and where the core shall write it. Returns a new reference or NULL. */
+/* One new array for a letter, and where the core shall write it. Returns a new reference or
+ * NULL. */
 static PyObject *
 array_for(char letter, npy_intp m, int ndim, hs_pair_arrays *arrays)
 {

@@ -2,8 +2,8 @@
 /* decide.c: see decide.h. */
 #include "decide.h"
 
-/* S = image + turns_i - turns_j over B, then over the rows as given. Without turns they are all known to
- * cancel or not to be needed. */
+/* S = image + turns_i - turns_j over B, then over the rows as given. Without turns they are all
+ * known to cancel or not to be needed. */
 static bool
 shift_as_given(const hs_search *search, int32_t si, int32_t sj, const int64_t *image,
                int64_t *given)

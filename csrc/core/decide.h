@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * decide.h: from a place in the gathered block back to the numbers that were given: the exact decision of
- * ambiguous hits, and the distance, vector and shift of a pair.
+ * decide.h: from a place in the gathered block back to the numbers that were given: the exact
+ * decision of ambiguous hits, and the distance, vector and shift of a pair.
  */
 #ifndef HS_DECIDE_H
 #define HS_DECIDE_H
@@ -24,8 +24,8 @@ typedef struct hs_traced {
 } hs_traced;
 
 /*
- * Trace the pair of point si and the candidate at `place`. `needs_given`: fill `given` also where the metric
- * can do without. HS_ERR_SHIFT_RANGE when a shift passes int64.
+ * Trace the pair of point si and the candidate at `place`. `needs_given`: fill `given` also where
+ * the metric can do without. HS_ERR_SHIFT_RANGE when a shift passes int64.
  */
 hs_status hs_trace(const hs_search *search, int32_t si, int32_t place, bool needs_given,
                    hs_cursor *cursor, hs_traced *pair);

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#define SAMPLES 64         /* points that are counted; the error of the mean is then some per cent */
+#define SAMPLES 64         /* points that are counted: an error of some per cent */
 #define SAMPLE_WORK 4.0e6  /* candidates and rows that sampling may cost, some milliseconds */
 #define MOST_PAIRS 0x1p62  /* more than int64 should be asked to count */
 #define SURE_ERRORS 3.0    /* standard errors below the mean at which a refusal is sure enough */
@@ -118,8 +118,8 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     if (n == 0 || hs_account_allows(&search->account, bound * bytes_per_pair)) {
         return HS_OK;
     }
-    /* Points are sampled evenly over the cells; each counts its forward half, so the mean over points
-     * times n estimates the pairs without bias. */
+    /* Points are sampled evenly over the cells; each counts its forward half, so the mean over
+     * points times n estimates the pairs without bias. */
     int64_t samples = n < SAMPLES ? n : SAMPLES;
     double  sum = 0.0, squares = 0.0, work = 0.0;
     int64_t taken = 0;

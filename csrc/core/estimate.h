@@ -11,15 +11,15 @@ double hs_bytes_per_pair(const hs_options *options, int ndim);
 
 /*
  * Before any work: a fully periodic box has at least so many pairs as its density says, less what a
- * cell's diameter can hide. HS_ERR_MEMORY when even these pass the limit, HS_ERR_TOO_MANY when int64 cannot
- * count them.
+ * cell's diameter can hide. HS_ERR_MEMORY when even these pass the limit, HS_ERR_TOO_MANY when
+ * int64 cannot count them.
  */
 hs_status hs_estimate_by_density(hs_search *search, hs_failure *failure);
 
 /*
- * After sorting into cells: HS_OK when a result is expected to fit the account's limit, and always when a cheap
- * bound shows it to be small. HS_ERR_MEMORY fills failure->expected_*. The margin is on the side of searching: a
- * result that turns out too large is refused when it is stored.
+ * After sorting into cells: HS_OK when a result is expected to fit the account's limit, and always
+ * when a cheap bound shows it to be small. HS_ERR_MEMORY fills failure->expected_*. The margin is
+ * on the side of searching: a result that turns out too large is refused when it is stored.
  */
 hs_status hs_estimate_by_sample(hs_search *search, hs_failure *failure);
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * gather.h: the neighbourhood of one group of points, copied once into contiguous float32 arrays
- * relative to a common centre, with the shift of its periodic image already added. All points of the
- * group are then tested against it in long, predictable loops: no ghosts, no minimum image per pair.
+ * relative to a common centre, with the shift of its periodic image already added. All points of
+ * the group are then tested against it in long, predictable loops: no ghosts, no minimum image per
+ * pair.
  */
 #ifndef HS_GATHER_H
 #define HS_GATHER_H

@@ -44,8 +44,8 @@ bound_images(const hs_scene *scene, const double *drift, double *images)
 }
 
 /*
- * How far adding lattice vectors can move t_k beyond whole periods, because normals are rounded: measured,
- * not assumed. Zero in aligned boxes.
+ * How far adding lattice vectors can move t_k beyond whole periods, because normals are rounded:
+ * measured, not assumed. Zero in aligned boxes.
  */
 static void
 bound_drift(const hs_scene *scene, const double *images, double *drift)
@@ -100,7 +100,8 @@ unit_ball(int ndim)
     return volume;
 }
 
-/* Cells along each axis for a pitch of radius / finer, and for about POINTS_PER_CELL along the first. */
+/* Cells along each axis for a pitch of radius / finer, and for about POINTS_PER_CELL along the
+ * first. */
 static void
 choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
               double *counts)
@@ -170,8 +171,8 @@ set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
 }
 
 /*
- * Estimated cost of a search, in candidates per point: tested pairs, plus what a neighbourhood costs to
- * visit, plus sorting unless there is one cell.
+ * Estimated cost of a search, in candidates per point: tested pairs, plus what a neighbourhood
+ * costs to visit, plus sorting unless there is one cell.
  */
 static double
 cost_per_point(const hs_scene *scene, const hs_grid *grid)

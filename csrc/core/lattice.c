@@ -144,8 +144,8 @@ set_periodic_normal(hs_lattice *lattice, int r, double *normal)
     orthonormalise(ndim, n_basis, basis, normal);
 }
 
-/* Orthonormal vectors that no row of B meets, one for each open grid axis: of all coordinate axes the
- * one that is least covered so far. */
+/* Orthonormal vectors that no row of B meets, one for each open grid axis: of all coordinate
+ * axes the one that is least covered so far. */
 static void
 set_open_normals(hs_lattice *lattice)
 {
@@ -247,7 +247,8 @@ take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
     }
 }
 
-/* Replaces B by a short basis. Returns whether it is axis-aligned then, as a box sheared by whole widths is. */
+/* Replaces B by a short basis. Returns whether it is axis-aligned then, as a box sheared by
+ * whole widths is. */
 static bool
 reduce_rows(hs_lattice *lattice, int *column)
 {

@@ -49,7 +49,8 @@ typedef struct hs_lattice {
 /* Periodic entries finite and periodic rows independent, decided exactly. NULL box: HS_OK. */
 hs_status hs_box_check(const hs_box *box, hs_failure *failure);
 
-/* The lattice in a short basis, for searching. box: checked, or NULL for open space in ndim dimensions. */
+/* The lattice in a short basis, for searching. box: checked, or NULL for open space in ndim
+ * dimensions. */
 void hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice);
 
 /* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows. */

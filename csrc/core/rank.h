@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * rank.h: are the periodic box vectors linearly independent? Decided exactly for the given floats,
- * by elimination modulo 62-bit primes: one prime of full rank proves independence, enough primes to pass
- * the Hadamard bound prove dependence. A rounded determinant can do neither.
+ * by elimination modulo 62-bit primes: one prime of full rank proves independence, enough primes to
+ * pass the Hadamard bound prove dependence. A rounded determinant can do neither.
  */
 #ifndef HS_RANK_H
 #define HS_RANK_H

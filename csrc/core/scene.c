@@ -170,8 +170,9 @@ bound_errors(hs_scene *scene, double magnitude)
 }
 
 /*
- * precision="double" computes D in float64 from the points as given: each of its m + 2 terms is rounded to
- * within 2^-53 of the largest partial sum. Candidates must be sought that much further out.
+ * precision="double" computes D in float64 from the points as given: each of its m + 2 terms is
+ * rounded to within 2^-53 of the largest partial sum. Candidates must be sought that much further
+ * out.
  */
 static double
 bound_formula(const hs_scene *scene, const hs_cloud *cloud)
@@ -179,9 +180,10 @@ bound_formula(const hs_scene *scene, const hs_cloud *cloud)
     const hs_lattice *lattice = &scene->lattice;
     double            total = 2.0 * hs_scale_apply(scene->scale, cloud->largest);
     if (lattice->n_periodic == 0) {
-        return 4.0 * UNIT * scene->cutoff * scene->ndim; /* differences of floats: relative error only */
+        /* Differences of floats have a relative error only. */
+        return 4.0 * UNIT * scene->cutoff * scene->ndim;
     }
-    double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B, between points and images in reach */
+    double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B of any pair in reach */
     for (int k = 0; k < scene->ndim; k++) {
         const int b = lattice->row_of_axis[k];
         if (b >= 0) {

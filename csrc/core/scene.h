@@ -32,8 +32,8 @@ typedef struct hs_scene {
 } hs_scene;
 
 /*
- * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing and
- * any status but HS_ERR_KERNEL and HS_ERR_INTERRUPTED is possible.
+ * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing
+ * and any status but HS_ERR_KERNEL and HS_ERR_INTERRUPTED is possible.
  */
 hs_status hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
                         const hs_options *options, hs_scene *scene, hs_failure *failure);

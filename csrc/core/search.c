@@ -130,8 +130,9 @@ gather_run(hs_search *search, int32_t si, int32_t end, const double *shift, cons
 }
 
 /*
- * Gather what the link's row has for a group in cell x, leaving out points before `from` of the image
- * 0 (the own row). Along a periodic first axis the range of cells may run over several images.
+ * Gather what the link's row has for a group in cell x, leaving out points before `from` of the
+ * image 0 (the own row). Along a periodic first axis the range of cells may run over several
+ * images.
  */
 static hs_status
 gather_link(hs_search *search, const hs_link *link, int64_t x, int32_t from)

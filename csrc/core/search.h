@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * search.h: the walk over all groups of points. Rows of cells in order, cells along each row, at most
- * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every point
- * of the group, and the decided hits are handed to a visitor.
+ * search.h: the walk over all groups of points. Rows of cells in order, cells along each row, at
+ * most HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every
+ * point of the group, and the decided hits are handed to a visitor.
  */
 #ifndef HS_SEARCH_H
 #define HS_SEARCH_H
@@ -21,9 +21,9 @@ typedef struct hs_link {
 typedef struct hs_search hs_search;
 
 /*
- * The decided hits of point si against the present block: n_hits entries of search->block.hits, which
- * are places in the block when search->lists_places, else point numbers. Anything but HS_OK ends the
- * walk with that status.
+ * The decided hits of point si against the present block: n_hits entries of search->block.hits,
+ * which are places in the block when search->lists_places, else point numbers. Anything but HS_OK
+ * ends the walk with that status.
  */
 typedef hs_status (*hs_visit_fn)(void *context, hs_search *search, int32_t si, int32_t n_hits);
 

@@ -103,7 +103,8 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
             t_high[k] = fmin((row->offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
         }
         for (int c = grid->ndim - 1; c >= 0; c--) {
-            double least = 0.0, most = 0.0; /* of the component, without axis c's own part at c == 0 */
+            /* Range of the component; of the first one, what the later axes add to it. */
+            double least = 0.0, most = 0.0;
             for (int k = c > 0 ? c : 1; k < grid->ndim; k++) {
                 const double a = axes->lower[k][c] * t_low[k], b = axes->lower[k][c] * t_high[k];
                 least += fmin(a, b);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * store.h: the pairs that have been found, in blocks that never move, with only the quantities that were asked
- * for. Filled by a search's visitor, emptied once into the caller's arrays.
+ * store.h: the pairs that have been found, in blocks that never move, with only the quantities that
+ * were asked for. Filled by a search's visitor, emptied once into the caller's arrays.
  */
 #ifndef HS_STORE_H
 #define HS_STORE_H

@@ -50,7 +50,8 @@ subtract_product(double factor, double entry, double *sum, double *low, double *
     *absolute += fabs(product.hi);
 }
 
-/* X = r - sum_l given_turns[l] * scaled row l. Turns of more than 52 bits are split into two doubles. */
+/* X = r - sum_l given_turns[l] * scaled row l. Turns of more than 52 bits are split into two
+ * doubles. */
 static void
 subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_turns,
               double *inside, double *magnitude)

@@ -45,7 +45,8 @@ typedef struct hs_kernel {
     hs_scan_fn unfused; /* s as plain rounded float32 operations, in the order given above */
 } hs_kernel;
 
-/* The best kernel of this CPU, or the one of that name; NULL if it is unknown or cannot run here. */
+/* The best kernel of this CPU, or the one of that name; NULL if it is unknown or cannot run
+ * here. */
 const hs_kernel *hs_kernel_select(const char *name);
 
 /* scan_scalar.c: plain C, any CPU; the specification of the others. */
