@@ -19,8 +19,7 @@ bool hs_points_of(PyObject *object, hs_points *points);
  */
 bool hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given);
 
-/* A string of the letters i j d D S P, each at most once: its HS_WANT_ bits and its length.
- * `pairs_letter` is set when P is among them. */
+/* A string of the letters i j d D S P, each at most once, and its HS_WANT_ bits; P wants i and j. */
 bool hs_quantities_of(PyObject *object, const char **letters, unsigned *want);
 
 bool hs_precision_of(PyObject *object, hs_precision *precision);

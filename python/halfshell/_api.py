@@ -34,12 +34,12 @@ def pairs(
     ----------
     points : array_like of float, shape (n, d)
         Coordinates, any length unit, 1 <= d <= 8. float32 and float64 values are used as they
-        are; integers, booleans and float16 are converted exactly or refused. Points may lie anywhere,
-        also outside the box. An object with ``positions``, ``cell`` and ``pbc``, such as
-        ``ase.Atoms``, brings its own box and periodicity.
+        are; integers, booleans and float16 are converted exactly or refused. Points may lie
+        anywhere, also outside the box. An object with ``positions``, ``cell`` and ``pbc``, such
+        as ``ase.Atoms``, brings its own box and periodicity.
     cutoff : float
-        Largest distance of a pair, in the unit of `points`; finite, not negative. It may be larger than
-        the box.
+        Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
+        larger than the box.
     box : array_like of float, shape (d,) or (d, d), or Box, optional
         Edge lengths, or edge vectors as rows, in the unit of `points`. None: open space. Rows of
         axes that are not periodic are ignored and may be zero.
@@ -72,9 +72,9 @@ def pairs(
         and its own image; ``d`` float64 (m,); ``D`` float64 (m, d); ``S`` int32 (m, d);
         ``P`` of `index_dtype` (m, 2). In real arithmetic ``D = points[j] - points[i] + S @ box``.
 
-        Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is positive.
-        (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within 1 ulp and never
-        on the wrong side of the cutoff; each component of D is within 1 ulp of d.
+        Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is
+        positive. (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within
+        1 ulp and never on the wrong side of the cutoff; each component of D is within 1 ulp of d.
 
     Raises
     ------
@@ -95,10 +95,11 @@ def pairs(
 
     Notes
     -----
-    Points are sorted into cells, each cell's neighbourhood is gathered once, and pairs are tested in
-    float32 with a proven error bound; what is too near the cutoff to tell is decided in float64,
-    double-word arithmetic [1]_ and at last in integers, so that no pair is missed or invented. Time is
-    proportional to n plus the number of pairs; memory does not depend on the volume.
+    Points are sorted into cells, each cell's neighbourhood is gathered once, and pairs are tested
+    in float32 with a proven error bound; what is too near the cutoff to tell is decided in
+    float64, double-word arithmetic [1]_ and at last in integers, so that no pair is missed or
+    invented. Time is proportional to n plus the number of pairs; memory does not depend on the
+    volume.
 
     References
     ----------

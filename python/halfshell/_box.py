@@ -69,7 +69,8 @@ class Box:
     @classmethod
     def orthorhombic(cls, *lengths: float) -> Box:
         """Edges along the coordinate axes: ``Box.orthorhombic(10.0, 10.0, 20.0)``."""
-        return cls(list(lengths[0]) if len(lengths) == 1 and np.ndim(lengths[0]) else lengths)
+        only: Any = lengths[0] if len(lengths) == 1 else lengths
+        return cls([only] if np.ndim(only) == 0 else list(only))
 
     @classmethod
     def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:
@@ -94,11 +95,11 @@ class Box:
             raise ValueError(f"lengths must be finite and positive, got {edges.tolist()}")
         if not ((degrees > 0) & (degrees < 180)).all():
             raise ValueError(f"angles must be between 0 and 180 degrees, got {degrees.tolist()}")
-        cosines = [_cosine(angle) for angle in degrees.tolist()]
-        if len(cosines) == 1:
-            directions = [[1.0, 0.0], [cosines[0], math.sin(math.radians(degrees[0]))]]
+        if len(edges) == 2:
+            angle = float(degrees[0])
+            directions = [[1.0, 0.0], [_cosine(angle), math.sin(math.radians(angle))]]
         else:
-            directions = _directions(*cosines, angles=degrees.tolist())
+            directions = _directions(degrees.tolist())
         return cls(np.array(directions) * edges[:, None])
 
     @property
@@ -164,10 +165,9 @@ def _cosine(degrees: float) -> float:
     return exact.get(degrees, math.cos(math.radians(degrees)))
 
 
-def _directions(
-    cos_alpha: float, cos_beta: float, cos_gamma: float, angles: list[float]
-) -> list[list[float]]:
+def _directions(angles: list[float]) -> list[list[float]]:
     """Unit vectors along a, b and c in the usual orientation."""
+    cos_alpha, cos_beta, cos_gamma = (_cosine(angle) for angle in angles)
     sin_gamma = math.sqrt((1.0 - cos_gamma) * (1.0 + cos_gamma))
     c_y = (cos_alpha - cos_beta * cos_gamma) / sin_gamma
     square = 1.0 - cos_beta**2 - c_y**2

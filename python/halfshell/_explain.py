@@ -96,7 +96,9 @@ def explain(
 
     Parameters
     ----------
-    points, cutoff, box, periodic, quantities, inclusive, sort, index_dtype, precision, kernel, memory_limit
+    points, cutoff, box, periodic, quantities, inclusive, sort
+        As in `pairs`.
+    index_dtype, precision, kernel, memory_limit
         As in `pairs`.
     measure : bool, default False
         Run the search too, and report its own counters: bytes allocated by purpose, candidates

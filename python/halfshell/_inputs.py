@@ -76,7 +76,7 @@ def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
 
 
 def _from_objects(array: npt.NDArray[Any], name: str) -> FloatArray:
-    """Plain Python floats, integers and booleans in an object array (mixed or too big for int64)."""
+    """Plain Python numbers in an object array: mixed, or integers too big for int64."""
     for where in np.ndindex(array.shape):
         value = array[where]
         if isinstance(value, (bool, float, np.float64, np.float32, np.float16, np.bool_)):
@@ -160,13 +160,14 @@ def as_index_bytes(index_dtype: Any) -> int:
         raise TypeError(f"index_dtype must be int32 or int64, got {index_dtype!r}") from None
     if dtype not in (np.dtype(np.int32), np.dtype(np.int64)):
         raise ValueError(f"index_dtype must be int32 or int64, got {dtype}")
-    return dtype.itemsize
+    return int(dtype.itemsize)
 
 
 def scene(points: Any, box: Any, periodic: Any) -> tuple[PointArray, FloatArray | None, int]:
     """Points, box and periodic bits; from an ASE-like object all three.
 
-    An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an error.
+    An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an
+    error.
     """
     if hasattr(points, "positions") and hasattr(points, "cell") and hasattr(points, "pbc"):
         if box is not None or periodic is not None:

@@ -26,8 +26,9 @@ class Verdict:
     n_expected, n_given : int
         Pairs that there are, and rows that the list has.
     missed, spurious, duplicate : ndarray of int64, shape (k, 2) or (k, 2 + d)
-        Pairs as rows (i, j, \\*S), or (i, j) when no shifts were given: not in the list, in the list but
-        beyond the cutoff, and listed more often than they should be (once for each surplus row).
+        Pairs as rows (i, j, \\*S), or (i, j) when no shifts were given: not in the list, in the
+        list but beyond the cutoff, and listed more often than they should be (once for each
+        surplus row).
     """
 
     n_expected: int
@@ -78,8 +79,8 @@ def verify(
     i, j : array_like of int, shape (m,)
         The pairs, in any order and orientation.
     S : array_like of int, shape (m, d), optional
-        Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, several images of
-        one pair of points are told apart by their number only.
+        Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, several images
+        of one pair of points are told apart by their number only.
     full : bool, default False
         Whether the list should have both (i, j, S) and (j, i, -S).
 
@@ -115,7 +116,7 @@ def verify(
         quantities="ijS",
         inclusive=inclusive,
     )
-    expected = np.column_stack(found).astype(np.int64)
+    expected = np.column_stack(tuple(found)).astype(np.int64)
     if S is None:
         expected = expected[:, :2]
     if full:

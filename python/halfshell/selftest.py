@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Check every kernel of this CPU against integers: ``halfshell selftest``.
 
 The answers come from `halfshell._reference`, which uses Python integers and nothing of the
@@ -11,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -82,13 +84,11 @@ def cases() -> Iterator[Case]:
 
 def check_case(case: Case) -> str:
     """Compare all kernels with the integers; return how many pairs there are."""
-    expected = reference_pairs(
-        case.points, case.cutoff, case.box, case.periodic, case.inclusive
-    )
+    expected = reference_pairs(case.points, case.cutoff, case.box, case.periodic, case.inclusive)
     quantities = "ijSd"
     for kernel in hs.kernels():
         i, j, S, d = case.find(kernel, quantities, sort=True)
-        found = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
+        found = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
         if found != expected:
             missed, spurious = set(expected) - set(found), set(found) - set(expected)
             raise AssertionError(
@@ -113,7 +113,7 @@ def check_large() -> str:
     first, *others = hs.kernels()
     expected = case.find(first, "ijdDS")
     for kernel in others:
-        for letter, a, b in zip("ijdDS", expected, case.find(kernel, "ijdDS")):
+        for letter, a, b in zip("ijdDS", expected, case.find(kernel, "ijdDS"), strict=True):
             if a.tobytes() != b.tobytes():
                 raise AssertionError(f"{letter} of kernels {first} and {kernel} differ")
     return f"{len(expected[0]):,} pairs"
@@ -136,7 +136,7 @@ def run(write: Callable[[str], Any] = print) -> int:
     write(f"halfshell {hs.__version__}, kernels {kernels}, each against Python integers")
     start = time.perf_counter()
     checks: list[tuple[str, Callable[[], str]]] = [
-        (case.name, lambda case=case: check_case(case)) for case in cases()  # type: ignore[misc]
+        (case.name, partial(check_case, case)) for case in cases()
     ]
     checks.append(("large: kernels agree bit for bit", check_large))
     failures = 0

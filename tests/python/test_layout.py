@@ -1,4 +1,4 @@
-"""The structure that csrc/README.md promises: who includes whom, and that every file is on the map."""
+"""The structure that csrc/README.md promises: who includes whom, and every file on the map."""
 
 import re
 from pathlib import Path

@@ -1,0 +1,810 @@
+"""The command line: what it reads, prints, writes, and how it refuses."""
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import types
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell import _api, _cli_pairs, _cli_peers, _cli_scene, _cli_verify, cli, selftest
+from halfshell._files import InputError, Scene, read_scene, replacing
+
+POINTS = np.random.default_rng(5).random((60, 3)) * 8
+BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
+
+
+@pytest.fixture
+def command(capsys):
+    """Run ``halfshell ARGS``; return (exit status, standard output, standard error)."""
+
+    def run(*args):
+        status = cli.main([str(arg) for arg in args])
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture
+def summary(command):
+    """Run ``halfshell pairs ARGS --json``; return what it says."""
+
+    def run(*args):
+        status, out, err = command("pairs", *args, "--json")
+        assert (status, err) == (0, "")
+        return json.loads(out)
+
+    return run
+
+
+@pytest.fixture
+def refusal(command):
+    """Run a command that must be refused in one line; return that line."""
+
+    def run(*args):
+        status, out, err = command(*args)
+        assert status == 2
+        assert out == ""
+        assert err.count("\n") == 1
+        assert err.startswith("halfshell: error: ")
+        assert "Traceback" not in err
+        return err
+
+    return run
+
+
+@pytest.fixture
+def npz(tmp_path):
+    """A triclinic scene as .npz."""
+    path = tmp_path / "scene.npz"
+    np.savez(path, points=POINTS, box=BOX)
+    return path
+
+
+@pytest.fixture
+def npy(tmp_path):
+    """An open scene as .npy."""
+    path = tmp_path / "scene.npy"
+    np.save(path, POINTS)
+    return path
+
+
+def as_set(i, j, S):
+    return set(zip(i.tolist(), j.tolist(), map(tuple, np.asarray(S).tolist()), strict=True))
+
+
+# pairs: what it reads ----------------------------------------------------------------------
+
+
+def test_without_a_file_the_quartz_and_a_cutoff_that_is_named(command):
+    status, out, err = command("pairs")
+    assert (status, err) == (0, "")
+    assert "alpha-quartz" in out
+    assert "4,608" in out
+    assert "5.31 Å   (chosen: about 50 neighbours at this density; --cutoff sets it)" in out
+    assert "121,344" in out
+    assert "1.60463 Å" in out
+    lines = out.splitlines()[1:]
+    assert all(line.startswith("  ") and line[19] == " " != line[20] for line in lines)  # aligned
+
+
+@pytest.mark.parametrize("extension", ["cif", "xyz", "extxyz", "vasp", "pdb", "traj", "gen"])
+def test_reads_what_ase_reads(summary, tmp_path, extension):
+    ase = pytest.importorskip("ase")
+    from ase.build import bulk
+    from ase.io import read, write
+
+    atoms = bulk("NaCl", "rocksalt", a=5.64, cubic=True) * (2, 2, 2)
+    atoms.rattle(0.05, seed=3)
+    path = tmp_path / ("POSCAR" if extension == "vasp" else f"scene.{extension}")
+    write(path, atoms, format=extension if extension != "pdb" else "proteindatabank")
+    seen = read(path)
+    told = summary(path, "--cutoff", "6")
+    assert told["points"] == len(atoms)
+    assert told["unit"] == "angstrom"
+    assert told["periodic"] == seen.pbc.tolist()
+    assert told["species"] == {"Cl": 32, "Na": 32}
+    assert told["pairs"] == hs.count_pairs(
+        seen.positions,
+        6.0,
+        box=seen.cell.array if seen.pbc.any() else None,
+        periodic=seen.pbc if seen.pbc.any() else None,
+    )
+    assert isinstance(seen, ase.Atoms)
+
+
+def test_reads_poscar_by_name(summary, tmp_path):
+    pytest.importorskip("ase")
+    from ase.build import bulk
+    from ase.io import write
+
+    write(tmp_path / "POSCAR", bulk("Cu", cubic=True))
+    assert summary(tmp_path / "POSCAR", "--cutoff", "2.6")["mean_coordination"] == 12
+
+
+def test_mixed_periodic_axes_come_from_the_file(summary, tmp_path):
+    pytest.importorskip("ase")
+    from ase.build import fcc111
+    from ase.io import write
+
+    slab = fcc111("Al", (3, 3, 3), vacuum=5.0)
+    slab.info.clear()
+    write(tmp_path / "slab.extxyz", slab)
+    told = summary(tmp_path / "slab.extxyz", "--cutoff", "3")
+    assert told["periodic"] == [True, True, False]
+    assert told["mean_coordination"] == (12 * 9 + 9 * 18) / 27
+
+
+def test_takes_the_named_frame_and_the_last_by_default(summary, refusal, tmp_path):
+    pytest.importorskip("ase")
+    from ase import Atoms
+    from ase.io import write
+
+    frames = [Atoms("H2", [[0, 0, 0], [0, 0, 1.0 + k]]) for k in range(3)]
+    write(tmp_path / "frames.xyz", frames)
+    assert summary(tmp_path / "frames.xyz", "--cutoff", "9")["nearest_distance"] == 3.0
+    first = summary(tmp_path / "frames.xyz", "--cutoff", "9", "--index", "0")
+    assert first["nearest_distance"] == 1.0
+    assert "has no frame 7" in refusal("pairs", tmp_path / "frames.xyz", "--index", "7")
+
+
+def test_format_forces_the_ase_format(summary, refusal, tmp_path):
+    pytest.importorskip("ase")
+    path = tmp_path / "structure.unheard-of"
+    path.write_text("2\n\nH 0 0 0\nH 0 0 1\n")
+    assert "unknown format" in refusal("pairs", path)
+    assert summary(path, "--format", "xyz", "--cutoff", "1")["pairs"] == 1
+    assert "nonsense" in refusal("pairs", path, "--format", "nonsense")
+
+
+def test_numpy_files_in_any_dimension(summary, tmp_path):
+    for ndim in (1, 2, 5):
+        points = np.random.default_rng(ndim).random((50, ndim))
+        np.save(tmp_path / "points.npy", points)
+        told = summary(tmp_path / "points.npy", "--cutoff", "0.25")
+        assert told["dimensions"] == ndim
+        assert told["box"] is None
+        assert told["pairs"] == hs.count_pairs(points, 0.25)
+
+
+def test_npz_brings_box_and_periodic(summary, npz, tmp_path):
+    assert summary(npz, "--cutoff", "3")["pairs"] == hs.count_pairs(POINTS, 3.0, box=BOX)
+    flags = np.array([True, False, True])
+    np.savez(tmp_path / "mixed.npz", points=POINTS, box=[8.0, 7.5, 9.0], periodic=flags)
+    told = summary(tmp_path / "mixed.npz", "--cutoff", "3")
+    assert told["periodic"] == flags.tolist()
+    assert told["pairs"] == hs.count_pairs(POINTS, 3.0, box=[8.0, 7.5, 9.0], periodic=flags)
+
+
+def test_box_and_periodic_options_take_the_place_of_the_file(summary, npz, npy):
+    lengths = summary(npy, "--cutoff", "2", "--box", "8,8,8")
+    assert lengths["pairs"] == hs.count_pairs(POINTS, 2.0, box=[8.0] * 3)
+    vectors = ",".join(map(str, BOX.ravel()))
+    assert summary(npy, "--cutoff", "2", f"--box={vectors}")["box"] == BOX.tolist()
+    mixed = summary(npz, "--cutoff", "2", "--periodic", "tfF")
+    assert mixed["periodic"] == [True, False, False]
+    assert mixed["pairs"] == hs.count_pairs(POINTS, 2.0, box=BOX, periodic=[True, False, False])
+    assert summary(npz, "--cutoff", "2", "--periodic", "F")["pairs"] == hs.count_pairs(POINTS, 2.0)
+
+
+def test_strict_leaves_out_the_pairs_at_the_cutoff(summary, tmp_path):
+    np.save(tmp_path / "two.npy", np.array([[0.0], [0.5]]))
+    assert summary(tmp_path / "two.npy", "--cutoff", "0.5")["pairs"] == 1
+    told = summary(tmp_path / "two.npy", "--cutoff", "0.5", "--strict")
+    assert (told["pairs"], told["nearest_distance"], told["inclusive"]) == (0, None, False)
+
+
+def test_kernel_and_precision_are_passed_on(summary, npz, kernel):
+    told = summary(npz, "--cutoff", "3", "--kernel", kernel, "--precision", "double")
+    assert (told["kernel"], told["precision"]) == (kernel, "double")
+
+
+def test_json_has_the_same_numbers_as_the_text(command, summary, npz):
+    told = summary(npz, "--cutoff", "3")
+    _, text, _ = command("pairs", npz, "--cutoff", "3")
+    assert f"{told['pairs']:,}" in text
+    assert f"{told['mean_coordination']:.6g}" in text
+    assert f"{told['nearest_distance']:.6g}" in text
+    assert "periodic TTT" in text
+    assert told["mean_coordination"] == 2 * told["pairs"] / 60
+
+
+def test_box_is_described_by_lengths_angles_and_what_repeats():
+    hexagonal = np.array([[2.0, 0.0, 0.0], [-1.0, 3.0**0.5, 0.0], [0.0, 0.0, 5.0]])
+    for box, periodic, text in [
+        (None, (False,) * 3, "none (open in every direction)"),
+        (hexagonal, (False,) * 3, "none (open in every direction)"),
+        (hexagonal, (True,) * 3, "2 x 2 x 5, angles 90 90 120, periodic TTT"),
+        (np.array([1.0, 2.5, 3.0]), (True,) * 3, "1 x 2.5 x 3, periodic TTT"),
+        (np.array([1.0, 2.0, 0.0]), (True, True, False), "1 x 2 x open, periodic TTF"),
+        (np.array([[1.0, 0.0], [1.0, 1.0]]), (True, True), "1 x 1.41421, angles 45, periodic TT"),
+        (np.ones(5), (True,) * 5, "1 x 1 x 1 x 1 x 1, periodic TTTTT"),
+    ]:
+        scene = Scene(np.ones((1, len(periodic))), box, periodic, "")
+        assert _cli_scene.describe_box(scene) == text
+
+
+def test_cutoff_is_chosen_in_any_scene(command, tmp_path):
+    random = np.random.default_rng(0)
+    scenes = {
+        "cube": (random.random((4000, 3)) * 70, None, None),
+        "plane": (random.random((4000, 2)) @ [[1.0, 2.0, 3.0], [-2.0, 0.0, 0.5]], None, None),
+        "slab": (
+            random.random((4000, 3)) * [50.0, 50.0, 9.0],
+            [50.0, 50.0, 500.0],
+            [True, True, False],
+        ),
+        "five": (random.random((4000, 5)), np.ones(5), [True] * 5),
+        "huge": (random.random((4000, 3)) * 1e300, None, None),
+    }
+    for name, (points, box, periodic) in scenes.items():
+        content = {"points": points}
+        if box is not None:
+            content.update(box=box, periodic=periodic)
+        np.savez(tmp_path / f"{name}.npz", **content)
+        status, out, _ = command("pairs", tmp_path / f"{name}.npz", "--json")
+        assert status == 0
+        assert 25 < json.loads(out)["mean_coordination"] < 100, name
+
+
+def test_small_molecule_gets_all_its_pairs(command, tmp_path):
+    np.save(tmp_path / "three.npy", np.array([[0.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]))
+    _, out, _ = command("pairs", tmp_path / "three.npy")
+    assert "all points are neighbours" in out
+    assert "pairs             3 " in out
+
+
+def test_scene_without_a_length_needs_a_cutoff(refusal, summary, tmp_path):
+    np.save(tmp_path / "same.npy", np.ones((70, 3)))
+    assert "give --cutoff" in refusal("pairs", tmp_path / "same.npy")
+    assert summary(tmp_path / "same.npy", "--cutoff", "0")["pairs"] == 70 * 69 // 2
+
+
+# pairs: what it writes ---------------------------------------------------------------------
+
+
+def test_npz_output_holds_the_pairs(summary, npz, tmp_path):
+    summary(npz, "--cutoff", "3", "-o", tmp_path / "out.npz")
+    i, j, d, S = hs.pairs(POINTS, 3.0, box=BOX, quantities="ijdS")
+    with np.load(tmp_path / "out.npz") as out:
+        assert set(out.files) == {"i", "j", "d", "S", "n", "cutoff", "inclusive"}
+        np.testing.assert_array_equal(out["i"], i)
+        np.testing.assert_array_equal(out["j"], j)
+        np.testing.assert_array_equal(out["d"], d)
+        np.testing.assert_array_equal(out["S"], S)
+        assert (out["n"], out["cutoff"], out["inclusive"]) == (60, 3.0, True)
+
+
+def test_csv_output_reads_back_to_the_same_numbers(summary, npz, tmp_path):
+    path = tmp_path / "out.csv"
+    summary(npz, "--cutoff", "3", "-o", path, "--quantities", "PSDdij", "--sort")
+    rows = list(csv.reader(path.read_text().splitlines()))
+    header = ["P0", "P1", "S0", "S1", "S2", "D0", "D1", "D2", "d", "i", "j"]
+    assert rows[0] == header
+    P, S, D, d, i, j = hs.pairs(POINTS, 3.0, box=BOX, quantities="PSDdij", sort=True)
+    table = np.array([[float(x) for x in row] for row in rows[1:]])
+    np.testing.assert_array_equal(table, np.column_stack([P, S, D, d, i, j]))
+
+
+def test_csv_is_written_in_blocks_without_loss():
+    columns = {"i": np.arange(150_000), "D": np.arange(300_000.0).reshape(-1, 2) / 3}
+    stream = io.BytesIO()
+    _cli_pairs.write_csv(stream, columns)
+    lines = stream.getvalue().decode().splitlines()
+    assert lines[0] == "i,D0,D1"
+    assert len(lines) == 150_001
+    assert lines[-1] == f"149999,{columns['D'][-1, 0]!s},{columns['D'][-1, 1]!s}"
+
+
+def test_empty_result_is_a_header_or_empty_arrays(summary, npy, tmp_path):
+    for name in ("out.csv", "out.npz"):
+        summary(npy, "--cutoff", "0", "-o", tmp_path / name)
+    assert (tmp_path / "out.csv").read_text() == "i,j,d\n"
+    assert np.load(tmp_path / "out.npz")["d"].shape == (0,)
+
+
+@pytest.mark.parametrize("name", ["g.png", "g.pdf", "g.svg"])
+def test_plot_makes_a_picture(command, npz, npy, tmp_path, name):
+    pytest.importorskip("matplotlib")
+    starts = {"png": b"\x89PNG\r\n\x1a\n", "pdf": b"%PDF-", "svg": b"<?xml"}
+    for scene in (npz, npy):
+        status, out, err = command("pairs", scene, "--cutoff", "3", "--plot", tmp_path / name)
+        assert (status, err) == (0, "")
+        assert f"plot written to   {tmp_path / name}" in out
+        content = (tmp_path / name).read_bytes()
+        assert content.startswith(starts[name[2:]])
+        assert len(content) > 2000
+
+
+def test_radial_distribution_of_an_ideal_gas_is_one():
+    points = np.random.default_rng(2).random((3000, 3))
+    d = hs.pairs(points, 0.3, box=np.ones(3), quantities="d")
+    r, g, normalised = _cli_scene.radial_distribution(
+        d, Scene(points, np.ones(3), (True,) * 3, ""), 0.3
+    )
+    assert normalised
+    assert len(r) == len(g) == 200
+    assert abs(g[100:].mean() - 1) < 0.01
+    # Where an axis is open there is no volume: the neighbours of a point per unit of distance.
+    scene = Scene(points, np.ones(3), (True, True, False), "")
+    _, raw, normalised = _cli_scene.radial_distribution(d, scene, 0.3)
+    assert not normalised
+    assert raw.sum() * (0.3 / 200) == pytest.approx(2 * len(d) / 3000)
+
+
+def test_output_is_not_touched_by_a_failing_search(monkeypatch, command, npz, tmp_path):
+    out = tmp_path / "out.npz"
+    out.write_bytes(b"old")
+    before = sorted(os.listdir(tmp_path))
+    for error in (MemoryError("too much"), ValueError("two\nlines"), KeyboardInterrupt()):
+
+        def pairs(*_, error=error, **__):
+            assert len(os.listdir(tmp_path)) == len(before) + 1
+            raise error
+
+        monkeypatch.setattr(hs, "pairs", pairs)
+        status, _, err = command("pairs", npz, "--cutoff", "3", "-o", out)
+        assert status == (130 if isinstance(error, KeyboardInterrupt) else 2)
+        assert err.count("\n") == 1
+        assert out.read_bytes() == b"old"
+        assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_output_is_not_touched_by_a_failing_write(monkeypatch, refusal, npz, tmp_path):
+    out = tmp_path / "out.npz"
+    out.write_bytes(b"old")
+
+    def savez(stream, **_):
+        stream.write(b"half of it")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", savez)
+    line = refusal("pairs", npz, "--cutoff", "3", "-o", out)
+    assert "out.npz: cannot be written: No space left on device" in line
+    assert out.read_bytes() == b"old"
+    assert sorted(os.listdir(tmp_path)) == ["out.npz", "scene.npz"]
+
+
+def test_output_is_checked_before_the_search(monkeypatch, refusal, npz, tmp_path):
+    def pairs(*_, **__):
+        raise AssertionError("searched")
+
+    monkeypatch.setattr(hs, "pairs", pairs)
+    missing = tmp_path / "missing" / "out.npz"
+    assert "cannot be written: No such file" in refusal("pairs", npz, "-o", missing)
+    assert "must end in .npz or .csv" in refusal("pairs", npz, "-o", tmp_path / "out.txt")
+    assert "must end in .png" in refusal("pairs", npz, "--plot", tmp_path / "out.gif")
+    assert "not overwritten" in refusal("pairs", npz, "-o", npz)
+    (tmp_path / "folder.npz").mkdir()
+    assert "not a regular file" in refusal("pairs", npz, "-o", tmp_path / "folder.npz")
+    assert sorted(os.listdir(tmp_path)) == ["folder.npz", "scene.npz"]
+
+
+def test_read_only_output_is_refused(monkeypatch, refusal, npz, tmp_path):
+    out = tmp_path / "out.npz"
+    out.touch()
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    assert "read-only" in refusal("pairs", npz, "-o", out)
+    assert out.read_bytes() == b""
+
+
+def test_replacing_keeps_mode_and_links(tmp_path):
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_bytes(b"old")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    with replacing(str(link)) as stream:
+        stream.write(b"new")
+        assert target.read_bytes() == b"old"
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+    assert target.stat().st_mode & 0o777 == 0o640
+    with pytest.raises(InputError, match="not a regular file"), replacing(os.devnull):
+        pass
+
+
+# How it refuses ----------------------------------------------------------------------------
+
+
+def test_unreadable_files_are_refused(refusal, tmp_path):
+    assert "missing.cif: no such file" in refusal("pairs", tmp_path / "missing.cif")
+    (tmp_path / "short.npy").write_bytes(b"\x93NUMPY")
+    assert "cannot be read as a NumPy file" in refusal("pairs", tmp_path / "short.npy")
+    (tmp_path / "empty.npy").write_bytes(b"")
+    assert "empty.npy: is empty" in refusal("pairs", tmp_path / "empty.npy")
+    (tmp_path / "text.npz").write_text("hello")
+    assert "as a NumPy file: it is none" in refusal("pairs", tmp_path / "text.npz")
+    np.save(tmp_path / "objects.npy", np.array([None]), allow_pickle=True)
+    assert "Python objects" in refusal("pairs", tmp_path / "objects.npy")
+    (tmp_path / "folder.npy").mkdir()
+    assert "Is a directory" in refusal("pairs", tmp_path / "folder.npy")
+
+
+def test_broken_and_empty_structure_files_are_refused(refusal, tmp_path):
+    pytest.importorskip("ase")
+    files = {
+        "broken.cif": "data_x\n_cell_length_a abc\n",
+        "broken.xyz": "3\n\nH 0 0 0\n",
+        "letters.xyz": "1\n\nH a b c\n",
+        "empty.xyz": "",
+        "none.xyz": "0\n\n",
+        "POSCAR": "x\n1.0\n1 0 0\n",
+    }
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+        assert f"{tmp_path / name}: " in refusal("pairs", tmp_path / name)
+
+
+def test_wrong_content_is_refused_with_its_place(refusal, tmp_path):
+    def line(*options, **arrays):
+        np.savez(tmp_path / "scene.npz", **arrays)
+        return refusal("pairs", tmp_path / "scene.npz", *options)
+
+    spoiled = POINTS.copy()
+    spoiled[7, 1] = np.nan
+    assert "point 7, coordinate 1 is nan" in line(points=spoiled)
+    assert "holds no points" in line(points=np.empty((0, 3)))
+    assert "shape (60,)" in line(points=POINTS[:, 0])
+    assert "must be numbers" in line(points=np.array([["a", "b"]]))
+    assert "must be numbers" in line(points=POINTS * 1j)
+    assert "no array 'points' (it holds positions)" in line(positions=POINTS)
+    assert "box has shape (2,)" in line(points=POINTS, box=[1.0, 2.0])
+    assert "finite" in line(points=POINTS, box=[1.0, 2.0, np.inf])
+    assert "'periodic' must be" in line(points=POINTS, box=np.ones(3), periodic="TTF")
+    assert "no box" in line(points=POINTS, periodic=True)
+    assert "no box" in line("--periodic", "TTT", points=POINTS)
+    dependent = np.array([[1.0, 0, 0], [2.0, 0, 0], [0, 0, 1.0]])
+    assert "scene.npz: " in line("--cutoff", "1", points=POINTS, box=dependent)
+    assert "scene.npz: " in line(points=POINTS, box=dependent)
+    assert "--box has 4 numbers" in line("--box", "1,2,3,4", points=POINTS)
+    assert "--periodic has 2 letters" in line("--periodic", "TF", points=POINTS, box=BOX)
+    assert "--index" in line("--index", "0", points=POINTS)
+
+
+def test_nan_in_a_structure_file_is_refused(refusal, tmp_path):
+    pytest.importorskip("ase")
+    (tmp_path / "nan.xyz").write_text("2\n\nH 0 0 0\nH 0 nan 1\n")
+    assert "point 1, coordinate 1 is nan" in refusal("pairs", tmp_path / "nan.xyz")
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        [],
+        ["unheard-of"],
+        ["pairs", "--unheard-of"],
+        ["pairs", "--cutoff"],
+        ["pairs", "--cutoff", "-1"],
+        ["pairs", "--cutoff", "nan"],
+        ["pairs", "--cutoff", "1e999"],
+        ["pairs", "--cutoff", "three"],
+        ["pairs", "--box", "1,x,3"],
+        ["pairs", "--periodic", "yes"],
+        ["pairs", "--quantities", "ijx"],
+        ["pairs", "--quantities", "ii"],
+        ["pairs", "--kernel", "abacus"],
+        ["pairs", "--precision", "half"],
+        ["pairs", "--index", "last"],
+        ["pairs", "--plot", "g.png", "--cutoff", "0"],
+        ["pairs", "--cut", "3"],
+        ["verify", "--sample", "few"],
+        ["verify", "--against", "oracle"],
+        ["verify", "--against", "ase", "--strict"],
+        ["verify", "--against", "ase", "--kernel", "scalar"],
+        ["info", "file"],
+    ],
+)
+def test_wrong_options_are_refused(refusal, args):
+    refusal(*args)
+
+
+def test_what_is_not_installed_is_named(monkeypatch, refusal, npz, tmp_path):
+    (tmp_path / "a.xyz").write_text("1\n\nH 0 0 0\n")
+    for name in ("ase", "ase.io", "ase.neighborlist", "matplotlib", "matplotlib.figure", "vesin"):
+        monkeypatch.setitem(sys.modules, name, None)
+    extra = "pip install 'halfshell[cli]'"
+    assert extra in refusal("pairs", tmp_path / "a.xyz")
+    assert extra in refusal("pairs", npz, "--plot", tmp_path / "g.png")
+    assert "pip install vesin" in refusal("verify", npz, "--against", "vesin")
+    assert "pip install ase" in refusal("verify", npz, "--against", "ase")
+    assert sorted(os.listdir(tmp_path)) == ["a.xyz", "scene.npz"]
+
+
+def test_too_little_memory_is_said_in_one_line(refusal, tmp_path):
+    np.save(tmp_path / "one.npy", np.array([[0.5, 0.5, 0.5]]))
+    line = refusal("pairs", tmp_path / "one.npy", "--box", "1e-6,1e-6,1e-6", "--cutoff", "1e3")
+    assert "one.npy: " in line
+
+
+def test_ase_remarks_are_passed_on_as_warnings(monkeypatch, command, tmp_path):
+    pytest.importorskip("ase")
+    import warnings
+
+    import ase.io
+
+    def read(*_, **__):
+        warnings.warn("odd\nfile", UserWarning, stacklevel=1)
+        return ase.Atoms("H2", [[0, 0, 0], [0, 0, 1]])
+
+    (tmp_path / "a.xyz").write_text("anything")
+    monkeypatch.setattr(ase.io, "read", read)
+    status, _, err = command("pairs", tmp_path / "a.xyz", "--cutoff", "1")
+    assert status == 0
+    assert err == f"halfshell: warning: {tmp_path / 'a.xyz'}: odd file\n"
+
+
+# verify ------------------------------------------------------------------------------------
+
+
+def test_own_list_is_right(command, npz, kernel):
+    status, out, err = command("verify", npz, "--cutoff", "3", "--kernel", kernel)
+    assert (status, err) == (0, "")
+    assert "by integers       0 missed, 0 spurious, 0 duplicate" in out
+    assert "every pair among all 60 points" in out
+    assert out.endswith("verdict           right\n")
+
+
+@pytest.mark.parametrize("options", [[], ["--periodic", "F"], ["--periodic", "TFT"]])
+@pytest.mark.parametrize("peer", ["ase", "matscipy", "matscipy-neighbours", "vesin"])
+def test_lists_of_peers_are_checked_by_their_rule(command, npz, peer, options):
+    for module in {"matscipy-neighbours": ["matscipy_neighbours"]}.get(peer, [peer, "ase"]):
+        pytest.importorskip(module)
+    status, out, err = command(
+        "verify", npz, "--cutoff", "3", "--against", peer, "--json", *options
+    )
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    assert told["ok"]
+    assert (told["inclusive"], told["full"]) == (False, True)
+    assert [check["by"] for check in told["checks"]] == ["search", "integers"]
+    assert told["list"].startswith(peer)
+
+
+def test_scipy_is_checked_by_its_rule_and_refuses_what_it_cannot(command, refusal, npz, npy):
+    pytest.importorskip("scipy")
+    status, out, _ = command("verify", npy, "--cutoff", "3", "--against", "scipy")
+    assert status == 0
+    assert "(d <= cutoff)" in out
+    box = ["--box", "8,8,8"]
+    assert command("verify", npy, "--cutoff", "3", "--against", "scipy", *box)[0] == 0
+    assert command("verify", npy, "--cutoff", "6", "--against", "scipy", *box)[0] == 1  # images
+    assert "right angles" in refusal("verify", npz, "--against", "scipy")
+    assert "[0, L)" in refusal("verify", npy, "--against", "scipy", "--box", "4,4,4")
+
+
+def test_two_dimensions_are_put_to_peers_in_three(command, tmp_path):
+    pytest.importorskip("ase")
+    np.savez(tmp_path / "flat.npz", points=POINTS[:, :2], box=BOX[:2, :2])
+    assert command("verify", tmp_path / "flat.npz", "--cutoff", "2", "--against", "ase")[0] == 0
+
+
+def test_rounding_of_a_peer_is_found_at_ties(command, tmp_path):
+    pytest.importorskip("scipy")
+    np.save(tmp_path / "lattice.npy", np.indices((9, 9, 9)).reshape(3, -1).T * 0.1)
+    args = ["verify", tmp_path / "lattice.npy", "--cutoff", "0.3", "--sample", "100"]
+    status, out, _ = command(*args, "--against", "scipy")
+    assert status == 1
+    assert "WRONG" in out
+    assert "spurious: i=15 j=" in out
+    assert "distance - cutoff = +9.252e-18" in out
+    assert command(*args)[0] == 0
+
+
+def test_wrong_rows_are_found_both_ways(monkeypatch, command, npz):
+    i, j, S = hs.pairs(POINTS, 3.0, box=BOX, quantities="ijS", sort=True)
+    i, j = j, i  # either way round is right
+    S = -S.astype(np.int64)
+
+    def ask(_scene, _cutoff):
+        wrong_i = np.r_[i[1:], i[5], 3]  # the first missed, one twice, one invented
+        wrong_j = np.r_[j[1:], j[5], 3]
+        shifts = np.r_[S[1:], S[5:6], [[9, 9, 9]]]
+        return _cli_peers.PairList(wrong_i, wrong_j, shifts, inclusive=True, full=False)
+
+    peer = _cli_peers.Peer((), "oracle", ask)
+    monkeypatch.setitem(_cli_peers.PEERS, "oracle", peer)
+    status, out, _ = command("verify", npz, "--cutoff", "3", "--against", "oracle", "--json")
+    assert status == 1
+    for check in json.loads(out)["checks"]:
+        assert (check["missed"], check["spurious"], check["duplicate"]) == (1, 1, 1)
+        assert check["examples"]["missed"] == [[j[0], i[0], *(-S[0])]]
+        assert check["examples"]["spurious"] == [[3, 3, 9, 9, 9]]
+        assert check["examples"]["duplicate"] == [[j[5], i[5], *(-S[5])]]
+    status, out, _ = command("verify", npz, "--cutoff", "3", "--against", "oracle")
+    assert "1 missed, 1 spurious, 1 duplicate" in out
+    assert "spurious: i=3 j=3 S=[9, 9, 9]" in out
+
+
+def test_a_peer_that_fails_is_an_error_in_one_line(monkeypatch, refusal, npz):
+    def ask(_scene, _cutoff):
+        raise RuntimeError("no\nlist")
+
+    monkeypatch.setitem(_cli_peers.PEERS, "oracle", _cli_peers.Peer((), "oracle", ask))
+    line = refusal("verify", npz, "--against", "oracle")
+    assert "oracle gives no list: RuntimeError: no list" in line
+
+
+def test_large_scene_is_sampled_and_says_so(command, npz):
+    status, out, _ = command("verify", npz, "--cutoff", "3", "--sample", "20")
+    assert status == 0
+    assert "of the 60 points" in out
+    status, out, _ = command("verify", npz, "--cutoff", "3", "--sample", "0", "--json")
+    assert json.loads(out)["checks"][0]["points"] == 60
+
+
+def test_sample_is_smaller_where_a_point_has_many_images(command, tmp_path):
+    np.savez(tmp_path / "small.npz", points=POINTS[:40] / 8, box=np.ones(3))
+    args = ["verify", tmp_path / "small.npz", "--cutoff", "3", "--json"]
+    status, out, _ = command(*args)
+    assert status == 0
+    assert json.loads(out)["checks"][0]["points"] < 40
+
+
+def test_sample_is_points_near_one_another(npz):
+    scene = read_scene(str(npz))
+    rows = _cli_verify.sample_points(scene, 24)
+    assert 6 <= len(rows) <= 24
+    assert len(set(rows.tolist())) == len(rows)
+    inside = hs.count_pairs(POINTS[rows], 3.0, box=BOX) / len(rows)
+    anywhere = hs.count_pairs(POINTS[: len(rows)], 3.0, box=BOX) / len(rows)
+    assert inside > anywhere
+    assert len(_cli_verify.sample_points(scene, 1)) == 1
+    assert _cli_verify.sample_points(scene, 60) is None
+
+
+def test_sample_of_a_long_list_is_compared_with_the_search(monkeypatch, command, npz):
+    pytest.importorskip("ase")
+    monkeypatch.setattr(_cli_verify, "SEARCH_ROWS", 500)
+    status, out, _ = command("verify", npz, "--cutoff", "3", "--against", "ase", "--json")
+    assert status == 0
+    assert json.loads(out)["checks"][0]["points"] < 60
+
+
+# info, selftest and the process ------------------------------------------------------------
+
+
+def test_info_names_version_kernels_and_build(command):
+    status, out, err = command("info")
+    assert (status, err) == (0, "")
+    for word in (hs.__version__, *hs.kernels(), np.__version__, "compiler", "cpu"):
+        assert word in out
+    told = json.loads(command("info", "--json")[1])
+    assert told["kernels"] == list(hs.kernels())
+    assert told["kernel used"] == hs.kernels()[0]
+
+
+def test_selftest_passes_its_status_on(monkeypatch, command):
+    monkeypatch.setattr(selftest, "run", lambda: 0)
+    assert command("selftest")[0] == 0
+    monkeypatch.setattr(selftest, "run", lambda: 2)
+    assert command("selftest")[0] == 1
+
+
+def test_help_and_version(capsys):
+    for args in (["--help"], ["pairs", "--help"], ["verify", "--help"], ["--version"]):
+        with pytest.raises(SystemExit) as stop:
+            cli.main(args)
+        assert stop.value.code == 0
+    assert hs.__version__ in capsys.readouterr().out
+
+
+def python(script, **options):
+    return subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=120, **options
+    )
+
+
+def test_imports_nothing_that_is_not_needed(npz):
+    script = (
+        "import sys; from halfshell.cli import main;"
+        "status = main(sys.argv[1:]);"
+        "print({'ase', 'scipy', 'matplotlib', 'rich', 'pandas'} & set(sys.modules));"
+        "sys.exit(status)"
+    )
+    for args in (["pairs"], ["pairs", str(npz), "--json"], ["info"], ["verify", str(npz)]):
+        done = subprocess.run(
+            [sys.executable, "-c", script, *args], capture_output=True, text=True, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.splitlines()[-1] == "set()"
+
+
+def test_module_runs_and_exits_with_the_status(tmp_path):
+    run = [sys.executable, "-m", "halfshell", "pairs", "--cutoff", "2"]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0
+    assert "6,144" in done.stdout
+    done = subprocess.run([*run, tmp_path / "no.cif"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert done.stderr == f"halfshell: error: {tmp_path / 'no.cif'}: no such file\n"
+
+
+def test_output_encoding_without_the_unit_sign():
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    done = python("from halfshell.cli import main; main(['pairs'])", env=environment)
+    assert "5.31 A " in done.stdout, done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="named pipes and signals of POSIX")
+def test_ctrl_c_is_one_line_and_status_130(tmp_path):
+    pipe = tmp_path / "points.npy"
+    os.mkfifo(pipe)
+    run = [sys.executable, "-m", "halfshell", "pairs", str(pipe)]
+    with subprocess.Popen(
+        run, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        with open(pipe, "wb"):  # returns once the command waits for our bytes
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert (out, err) == ("", "halfshell: interrupted\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_reader_that_goes_away_is_no_traceback():
+    run = [sys.executable, "-m", "halfshell", "info"]
+    with subprocess.Popen(run, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 1
+
+
+# The progress bar --------------------------------------------------------------------------
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def searching(seconds, clock):
+    """A search that takes some seconds of a clock and tells its progress every 10 ms."""
+    search = _api._pairs_with_progress
+
+    def pairs(*args, progress, **options):
+        for k in range(round(seconds * 100)):
+            clock.now += 0.01
+            if progress is not None:
+                progress(k / (seconds * 100))
+        return search(*args, progress=None, **options)
+
+    return pairs
+
+
+@pytest.mark.parametrize(
+    ("seconds", "terminal", "options", "shown"),
+    [
+        (2.0, True, [], True),
+        (0.4, True, [], False),
+        (2.0, False, [], False),
+        (2.0, True, ["--no-progress"], False),
+        (2.0, True, ["--json"], False),
+    ],
+)
+def test_progress_bar_only_for_long_work_on_a_terminal(
+    monkeypatch, npy, seconds, terminal, options, shown
+):
+    pytest.importorskip("rich")
+    clock = types.SimpleNamespace(now=0.0)
+    time = types.SimpleNamespace(monotonic=lambda: clock.now, perf_counter=lambda: clock.now)
+    screen = Terminal() if terminal else io.StringIO()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(_cli_pairs, "time", time)
+    monkeypatch.setattr(_api, "_pairs_with_progress", searching(seconds, clock))
+    monkeypatch.setenv("TERM", "xterm")
+    assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
+    assert ("searching" in screen.getvalue()) == shown
+
+
+def test_progress_comes_from_the_search(monkeypatch, npz):
+    told = []
+    i, j = _api._pairs_with_progress(POINTS, 3.0, progress=told.append, box=BOX)
+    np.testing.assert_array_equal([i, j], hs.pairs(POINTS, 3.0, box=BOX))
+    assert all(0 <= fraction <= 1 for fraction in told)

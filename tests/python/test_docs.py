@@ -1,0 +1,69 @@
+"""What the documentation shows runs, and signatures agree with the stubs."""
+
+import ast
+import doctest
+import importlib
+import inspect
+import pkgutil
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+ROOT = Path(__file__).resolve().parents[2]
+MODULES = ["halfshell", *(f"halfshell.{m.name}" for m in pkgutil.iter_modules(hs.__path__))]
+
+
+@pytest.mark.parametrize("name", [m for m in MODULES if m != "halfshell.__main__"])
+def test_examples_in_docstrings_run(name):
+    module = importlib.import_module(name)
+    failures, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert failures == 0
+
+
+@pytest.mark.parametrize("name", [name for name in hs.__all__ if name != "Verdict"])
+def test_public_functions_have_examples(name):
+    doc = inspect.getdoc(getattr(hs, name))
+    assert ">>>" in doc
+
+
+@pytest.mark.parametrize("name", ["count_pairs", "explain", "pairs", "verify"])
+def test_every_argument_is_documented(name):
+    function = getattr(hs, name)
+    head = inspect.getdoc(function).split("Returns\n")[0]
+    for argument in inspect.signature(function).parameters:
+        assert re.search(rf"\b{argument}\b", head), argument
+
+
+def test_readme_notebook_example_runs(capsys):
+    text = (ROOT / "README.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "README.md", "exec"), names)
+    assert len(names["i"]) == len(names["S"]) > 200_000
+    assert names["i"].dtype == np.int64
+    assert "algorithm" in capsys.readouterr().out
+
+
+def test_readme_commands_create_what_they_need():
+    text = (ROOT / "README.md").read_text()
+    commands = re.findall(r"```bash\n(.*?)\n```", text)
+    assert len(commands) == 2
+    for command in commands:
+        assert command.startswith("python3 -m venv .venv && ")
+
+
+def test_every_file_that_the_readme_names_exists():
+    for name in ("README.md", "CONTRIBUTING.md"):
+        for target in re.findall(r"\]\(([\w./-]+)\)", (ROOT / name).read_text()):
+            assert (ROOT / target).exists(), target
+
+
+def test_stub_and_module_name_the_same_functions():
+    core = importlib.import_module("halfshell._core")
+    stub = ast.parse((ROOT / "python/halfshell/_core.pyi").read_text())
+    named = {node.name for node in stub.body if isinstance(node, ast.FunctionDef)}
+    assert named == {name for name in dir(core) if not name.startswith("_")}
