@@ -3,6 +3,8 @@
 #include "kernel.h"
 
 #include "../halfshell.h"
+#include "cpu.h"
+#include "target.h"
 
 #include <string.h>
 
@@ -13,6 +15,10 @@ always(void)
 }
 
 static const hs_kernel kernels[] = {
+#if HS_X86_64
+    {"avx512", hs_cpu_has_avx512, hs_scan_avx512, hs_scan_avx512_unfused},
+    {"avx2", hs_cpu_has_avx2, hs_scan_avx2, hs_scan_avx2_unfused},
+#endif
     {"scalar", always, hs_scan_scalar, hs_scan_scalar},
 };
 

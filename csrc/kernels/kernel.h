@@ -54,4 +54,18 @@ int32_t hs_scan_scalar(const hs_candidates *candidates, int32_t first, int32_t l
                        const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
                        bool *ambiguous);
 
+/* scan_avx2.c, scan_avx512.c: x86-64 only. */
+int32_t hs_scan_avx2(const hs_candidates *candidates, int32_t first, int32_t last,
+                     const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
+                     bool *ambiguous);
+int32_t hs_scan_avx2_unfused(const hs_candidates *candidates, int32_t first, int32_t last,
+                             const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
+                             bool *ambiguous);
+int32_t hs_scan_avx512(const hs_candidates *candidates, int32_t first, int32_t last,
+                       const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
+                       bool *ambiguous);
+int32_t hs_scan_avx512_unfused(const hs_candidates *candidates, int32_t first, int32_t last,
+                               const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
+                               bool *ambiguous);
+
 #endif
