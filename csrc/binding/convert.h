@@ -19,7 +19,8 @@ bool hs_points_of(PyObject *object, hs_points *points);
  */
 bool hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given);
 
-/* A string of the letters i j d D S P, each at most once, and its HS_WANT_ bits; P wants i and j. */
+/* A string of the letters i j d D S P, each at most once, and its HS_WANT_ bits; P wants i and
+ * j. */
 bool hs_quantities_of(PyObject *object, const char **letters, unsigned *want);
 
 bool hs_precision_of(PyObject *object, hs_precision *precision);

@@ -16,6 +16,14 @@
 #include <cpuid.h>
 #endif
 
+enum { DETECTED = 1, HAS_AVX2 = 2, HAS_AVX512 = 4 };
+
+#if defined(_MSC_VER)
+#define ATOMIC_INT volatile long
+#else
+#define ATOMIC_INT _Atomic int
+#endif
+
 typedef struct registers {
     uint32_t a, b, c, d;
 } registers;
@@ -59,20 +67,50 @@ has_bits(uint64_t word, uint64_t bits)
     return (word & bits) == bits;
 }
 
+static int
+detect_features(void)
+{
+    const uint32_t fma_popcnt_avx = 1u << 12 | 1u << 23 | 1u << 28;             /* leaf 1, ecx */
+    const uint32_t avx2 = 1u << 5;                                              /* leaf 7, ebx */
+    const uint32_t f_dq_bw_vl = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31;      /* leaf 7, ebx */
+    const uint64_t saved = saved_registers();
+    const uint32_t extended = cpuid(7).b;
+    int            found = DETECTED;
+    if (has_bits(saved, 0x6) && /* xmm, ymm */
+        has_bits(cpuid(1).c, fma_popcnt_avx) && has_bits(extended, avx2)) {
+        found |= HAS_AVX2;
+        found |= has_bits(saved, 0xe6) && /* and opmask, zmm */
+                         has_bits(extended, f_dq_bw_vl)
+                     ? HAS_AVX512
+                     : 0;
+    }
+    return found;
+}
+
+/*
+ * Asked once in a process: in a virtual machine every cpuid is a trip to the host, tens of
+ * microseconds. Threads that come here together find the same and write the same.
+ */
+static int
+features(void)
+{
+    static ATOMIC_INT known;
+    if (known == 0) {
+        known = detect_features();
+    }
+    return (int)known;
+}
+
 bool
 hs_cpu_has_avx2(void)
 {
-    const uint32_t fma_popcnt_avx = 1u << 12 | 1u << 23 | 1u << 28; /* leaf 1, ecx */
-    return has_bits(saved_registers(), 0x6) &&                      /* xmm, ymm */
-           has_bits(cpuid(1).c, fma_popcnt_avx) && has_bits(cpuid(7).b, 1u << 5);
+    return (features() & HAS_AVX2) != 0;
 }
 
 bool
 hs_cpu_has_avx512(void)
 {
-    const uint32_t f_dq_bw_vl = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31; /* leaf 7, ebx */
-    return hs_cpu_has_avx2() && has_bits(saved_registers(), 0xe6) && /* and opmask, zmm */
-           has_bits(cpuid(7).b, f_dq_bw_vl);
+    return (features() & HAS_AVX512) != 0;
 }
 
 #else

@@ -131,9 +131,7 @@ class _Lattice:
             for s in range(-((reach + start) // step), (reach - start) // step + 1):
                 shift[axis] = s
                 moved = [x + s * y for x, y in zip(vector, self.vectors[k])]
-                yield from descend(
-                    k - 1, moved, left - Fraction((start + s * step) ** 2, length2)
-                )
+                yield from descend(k - 1, moved, left - Fraction((start + s * step) ** 2, length2))
 
         yield from descend(len(self.axes) - 1, vector, Fraction(limit))
 
@@ -230,8 +228,7 @@ def _common_unit(*tables: list[list[Fraction]]) -> list[list[_Vector]]:
     """Multiply all tables by the same number so that every entry is an integer."""
     unit = math.lcm(1, *(x.denominator for table in tables for row in table for x in row))
     return [
-        [[x.numerator * (unit // x.denominator) for x in row] for row in table]
-        for table in tables
+        [[x.numerator * (unit // x.denominator) for x in row] for row in table] for table in tables
     ]
 
 

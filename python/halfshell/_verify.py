@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -202,6 +201,8 @@ def _confirm(
     verdict: Verdict, points: Any, cutoff: float, box: Any, inclusive: bool
 ) -> None:
     """Recompute the differences in rational arithmetic, which shares nothing with the search."""
+    from fractions import Fraction  # here, because importing it takes longer than the rest
+
     square = Fraction(float(cutoff)) ** 2
     for rows, should_be_within in ((verdict.missed, True), (verdict.spurious, False)):
         for i, j, *shift in rows[:_CONFIRMED].tolist():

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether two answers are the same, and who is right where they are not.
+
+A result becomes one sorted array of integers, a key for each pair, so that lists of millions
+of pairs are compared in a second or two. Every pair on which two lists differ is then judged
+in rational arithmetic, so that a difference is never put down to the wrong side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import Scene
+
+__all__ = ["Verdict", "compare", "compare_counts", "half_keys", "is_pair"]
+
+Keys = NDArray[np.int64]
+
+# Shifts between -_REACH and _REACH have a key of their own.
+_REACH = 31
+_JUDGED = 500  # of each kind are judged one by one; rational arithmetic is slow
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How an answer differs from ours. Counts are of pairs of the half list."""
+
+    missed: int = 0  # ours has them, the peer has not
+    spurious: int = 0  # the peer has them, we have not
+    duplicate: int = 0  # the peer has them more than once
+    beyond: int = 0  # judged pairs that are not explained by the peer's rounding
+    ours_wrong: int = 0  # judged pairs on which the peer is right
+    judged: int = 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether the pairs are ours but for some within rounding of the cutoff."""
+        return self.beyond == 0
+
+    def __str__(self) -> str:
+        words = {
+            "missed": self.missed,
+            "spurious": self.spurious,
+            "duplicate": self.duplicate,
+            "beyond rounding": self.beyond,
+        }
+        return ", ".join(f"{count} {word}" for word, count in words.items() if count) or "same"
+
+
+def half_keys(scene: Scene, i: Any, j: Any, shift: Any = None, full: bool = False) -> Keys:
+    """Turn pairs into sorted keys of the half list.
+
+    Parameters
+    ----------
+    i, j : array_like, shape (m,)
+        Point numbers, of any integer type.
+    shift : array_like, shape (m, d), optional
+        Shifts. Without them pairs are told apart by their point numbers alone, which is
+        enough wherever `scene.has_images` is false.
+    full : bool, default False
+        Whether each pair is present in both directions.
+
+    Returns
+    -------
+    numpy.ndarray of int64, shape (m,) or (m / 2,)
+    """
+    i = np.asarray(i).astype(np.int64)
+    j = np.asarray(j).astype(np.int64)
+    if shift is None:
+        low, high = np.minimum(i, j), np.maximum(i, j)
+        keys = np.sort(low * scene.n + high)
+    else:
+        s = np.asarray(shift).astype(np.int64)
+        if s.size and np.abs(s).max() > _REACH:
+            raise ValueError(f"a shift beyond {_REACH} has no key")
+        leading = np.zeros(len(i), dtype=np.int64)
+        for axis in range(s.shape[1]):
+            leading = np.where(leading == 0, s[:, axis], leading)
+        turn = (i > j) | ((i == j) & (leading < 0))
+        low, high = np.minimum(i, j), np.maximum(i, j)
+        s = np.where(turn[:, None], -s, s)
+        keys = low * scene.n + high
+        for axis in range(s.shape[1]):
+            keys = keys * (2 * _REACH + 1) + (s[:, axis] + _REACH)
+        keys.sort()
+    # A full list holds every key twice, so every other one is the half list; what is present
+    # once or three times shows up as missing or duplicate.
+    return keys[::2] if full else keys
+
+
+def compare(scene: Scene, ours: Keys, theirs: Keys, inclusive: bool, band: float,
+            shifts: bool) -> Verdict:  # fmt: skip
+    """Compare two half lists of keys.
+
+    Parameters
+    ----------
+    inclusive : bool
+        The tie rule of both lists.
+    band : float
+        Differences are the peer's rounding where the distance is within this fraction of the
+        cutoff.
+    shifts : bool
+        Whether the keys were made with shifts.
+    """
+    unique = np.unique(theirs)
+    missed = np.setdiff1d(ours, unique, assume_unique=True)
+    spurious = np.setdiff1d(unique, ours, assume_unique=True)
+    beyond = ours_wrong = 0
+    sample = [(key, True) for key in missed[:_JUDGED]]
+    sample += [(key, False) for key in spurious[:_JUDGED]]
+    for key, in_ours in sample:
+        i, j, shift = _decode(scene, int(key), shifts)
+        inside, relative = is_pair(scene, i, j, shift, inclusive)
+        ours_wrong += inside != in_ours
+        beyond += abs(relative) > band
+    return Verdict(
+        len(missed), len(spurious), len(theirs) - len(unique), beyond, ours_wrong, len(sample)
+    )
+
+
+def compare_counts(ours: int, theirs: int) -> Verdict:
+    """Compare two numbers of pairs; which pairs differ is not known."""
+    return Verdict(missed=max(ours - theirs, 0), spurious=max(theirs - ours, 0))
+
+
+def is_pair(
+    scene: Scene, i: int, j: int, shift: tuple[int, ...] | None, inclusive: bool
+) -> tuple[bool, float]:
+    """Decide one pair in rational arithmetic.
+
+    Returns whether it is within the cutoff, and by how much its distance passes the cutoff,
+    as a fraction of the cutoff. Without `shift` the nearest image is meant.
+    """
+    rows = scene.rows
+    between = [Fraction(b) - Fraction(a) for a, b in zip(*scene.points[[i, j]], strict=True)]
+    if rows is None:
+        vectors = [between]
+    elif shift is not None:
+        vectors = [_moved(between, rows, np.array(shift))]
+    else:
+        vectors = [_moved(between, rows, near) for near in _nearest(scene, rows, i, j)]
+    square = min(sum(x * x for x in vector) for vector in vectors)
+    limit = Fraction(scene.cutoff) ** 2
+    inside = square <= limit if inclusive else square < limit
+    # sqrt(1 + e) - 1 = e / 2 where it matters, and the sign is exact.
+    return inside, float((square - limit) / limit) / 2.0
+
+
+def _nearest(scene: Scene, rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
+    """Shifts of the image of j that is nearest to i, several where rounding leaves it open."""
+    between = scene.points[j] - scene.points[i]
+    periodic = np.array(scene.periodic, dtype=np.float64)
+    near = -np.rint(between @ np.linalg.inv(rows)) * periodic
+    steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * scene.dim), axis=-1)
+    shifts = near + np.unique(steps.reshape(-1, scene.dim) * periodic, axis=0)
+    squares = np.sum((between + shifts @ rows) ** 2, axis=1)
+    nearest: NDArray[np.float64] = shifts[squares <= squares.min() * (1.0 + 1e-9)]
+    return nearest
+
+
+def _moved(between: list[Fraction], rows: NDArray[np.float64], shift: Any) -> list[Fraction]:
+    """Add `shift` box vectors to a vector."""
+    return [
+        part + sum(int(s) * Fraction(row[axis]) for s, row in zip(shift, rows, strict=True))
+        for axis, part in enumerate(between)
+    ]
+
+
+def _decode(scene: Scene, key: int, shifts: bool) -> tuple[int, int, tuple[int, ...] | None]:
+    """Undo `half_keys` for one key."""
+    if not shifts:
+        return (*divmod(key, scene.n), None)
+    parts: list[int] = []
+    for _ in range(scene.dim):
+        key, part = divmod(key, 2 * _REACH + 1)
+        parts.insert(0, part - _REACH)
+    return (*divmod(key, scene.n), tuple(parts))

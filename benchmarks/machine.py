@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a figure depends on besides the code: the machine, the kernel, the versions."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+__all__ = ["available_bytes", "facts", "pin_to_core", "touch_memory"]
+
+
+def pin_to_core(core: int | None = None) -> int | None:
+    """Keep this process on one core, by default the last that it may use.
+
+    Returns the core, or None where the system does not offer it.
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        return None
+    core = max(os.sched_getaffinity(0)) if core is None else core
+    os.sched_setaffinity(0, {core})
+    return core
+
+
+def available_bytes() -> int:
+    """Return how much memory may be used without swapping, 2 GiB where it is not known."""
+    for line in _read("/proc/meminfo").splitlines():
+        if line.startswith("MemAvailable:"):
+            return int(line.split()[1]) * 1024
+    return 2 << 30
+
+
+def touch_memory(n_bytes: int) -> None:
+    """Write to `n_bytes` of memory once and give them back.
+
+    On a virtual machine the first use of a page may be many times slower than any later one,
+    which would be charged to whoever comes first.
+    """
+    block = 8 << 20  # large enough for huge pages, small enough to come from free memory first
+    held = [np.ones(block, dtype=np.uint8) for _ in range(n_bytes // block)]
+    del held
+
+
+def facts(label: str | None = None, simd: str = "") -> dict[str, Any]:
+    """Return the columns that every row of a result file begins with."""
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": label or f"{platform.system()} {platform.machine()}",
+        "cpu": _cpu_model(),
+        "cores": os.cpu_count() or 1,
+        "kernel": simd,
+        "commit": _commit(),
+        "os": platform.release().partition("-")[0],
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "huge_pages": _chosen(_read("/sys/kernel/mm/transparent_hugepage/enabled")),
+        "governor": _read("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor").strip(),
+        "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else "",
+    }
+
+
+def _read(path: str) -> str:
+    """Return the text of a file, empty where it cannot be read."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except OSError:
+        return ""
+
+
+def _chosen(text: str) -> str:
+    """Return what stands in brackets: "always [madvise] never" gives "madvise"."""
+    return text.partition("[")[2].partition("]")[0]
+
+
+def _cpu_model() -> str:
+    for line in _read("/proc/cpuinfo").splitlines():
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _commit() -> str:
+    """Return the commit of this checkout, marked where files have been changed since."""
+    here = Path(__file__).resolve().parent
+    try:
+        said = subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=10"],
+            cwd=here, capture_output=True, text=True, check=True, timeout=10,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return said.stdout.strip()
