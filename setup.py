@@ -19,6 +19,7 @@ else:
     compile_args = [
         "-std=c11",
         "-O3",
+        "-g0",
         "-ffp-contract=off",
         "-fvisibility=hidden",
         "-Wall",

@@ -2,12 +2,15 @@
 /* memory.c: see memory.h. A header in front of each block remembers its size. */
 #include "memory.h"
 
+#include "pages.h"
+
 #include <math.h>
 #include <stdlib.h>
 
 typedef struct block_header {
-    void   *raw;   /* what malloc returned */
-    int64_t bytes; /* what the caller asked for */
+    void   *raw;    /* what malloc returned, or the mapping */
+    size_t  length; /* of the mapping; 0 for malloc */
+    int64_t bytes;  /* what the caller asked for */
 } block_header;
 
 #ifdef HS_TESTING
@@ -49,11 +52,33 @@ hs_account_allows(hs_account *account, double bytes)
     return wanted <= account->limit;
 }
 
+/* An aligned block with its header filled, but for the bytes. NULL when refused. */
+static void *
+take_block(size_t bytes)
+{
+    void  *raw;
+    size_t length;
+    if (bytes >= HS_PAGES_FROM) {
+        void *block = hs_pages_alloc(bytes, &raw, &length);
+        if (block != NULL) {
+            ((block_header *)block)[-1] = (block_header){.raw = raw, .length = length};
+            return block;
+        }
+    }
+    raw = malloc(bytes + sizeof(block_header) + HS_ALIGNMENT);
+    if (raw == NULL) {
+        return NULL;
+    }
+    const uintptr_t first = (uintptr_t)raw + sizeof(block_header);
+    const uintptr_t aligned = (first + HS_ALIGNMENT - 1) & ~(uintptr_t)(HS_ALIGNMENT - 1);
+    ((block_header *)aligned)[-1] = (block_header){.raw = raw};
+    return (void *)aligned;
+}
+
 void *
 hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
 {
-    const size_t overhead = sizeof(block_header) + HS_ALIGNMENT;
-    if (count < 0 || (uint64_t)count > (PTRDIFF_MAX - overhead) / size) {
+    if (count < 0 || (uint64_t)count > (PTRDIFF_MAX / 2) / size) {
         return NULL;
     }
     const size_t bytes = (size_t)count * size;
@@ -65,18 +90,14 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
         return NULL;
     }
 #endif
-    void *raw = malloc(bytes + overhead);
-    if (raw == NULL) {
+    void *block = take_block(bytes);
+    if (block == NULL) {
         return NULL;
     }
 #ifdef HS_TESTING
     live_blocks++;
 #endif
-    const uintptr_t first = (uintptr_t)raw + sizeof(block_header);
-    const uintptr_t aligned = (first + HS_ALIGNMENT - 1) & ~(uintptr_t)(HS_ALIGNMENT - 1);
-    block_header   *header = (block_header *)aligned - 1;
-    header->raw = raw;
-    header->bytes = (int64_t)bytes;
+    ((block_header *)block)[-1].bytes = (int64_t)bytes;
     if (account != NULL) {
         account->held += (int64_t)bytes;
         account->total.bytes[purpose] += (int64_t)bytes;
@@ -84,7 +105,7 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
             account->total.bytes_peak = account->held;
         }
     }
-    return (void *)aligned;
+    return block;
 }
 
 void
@@ -93,12 +114,16 @@ hs_free(hs_account *account, void *block)
     if (block == NULL) {
         return;
     }
-    block_header *header = (block_header *)block - 1;
+    const block_header header = ((block_header *)block)[-1];
     if (account != NULL) {
-        account->held -= header->bytes;
+        account->held -= header.bytes;
     }
 #ifdef HS_TESTING
     live_blocks--;
 #endif
-    free(header->raw);
+    if (header.length > 0) {
+        hs_pages_free(header.raw, header.length);
+    } else {
+        free(header.raw);
+    }
 }
