@@ -36,46 +36,60 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
         const hs_scale scale = scale_of_box(box);
         const hs_scale back = hs_scale_of(-scale.exponent);
         hs_lattice_init_given(box, scale, &lattice);
-        double scaled_back = lattice.volume;
-        for (int r = 0; r < lattice.n_periodic; r++) {
+        for (int r = 0; heights != NULL && r < lattice.n_periodic; r++) {
             const int l = lattice.axis_of_row[r];
-            scaled_back = hs_scale_apply(back, scaled_back);
-            if (heights != NULL) {
-                heights[l] = hs_scale_apply(back, lattice.period[l]);
-            }
+            heights[l] = hs_scale_apply(back, lattice.period[l]);
         }
         if (volume != NULL) {
-            *volume = scaled_back;
+            *volume = hs_lattice_volume(&lattice, scale.exponent);
         }
     }
     hs_fpenv_leave(saved);
     return status;
 }
 
-/* A tiny negative coordinate plus the length rounds to the length: keep it inside. */
-static void
-keep_inside(int ndim, const double *row, double *wrapped)
+/* The only entry of row r, in a column where no other row has one; -1 when there is no such. Then
+ * that coordinate alone says what is inside along row r. */
+static int
+own_column(const hs_lattice *lattice, int r)
 {
     int column = -1;
-    for (int k = 0; k < ndim; k++) {
-        if (row[k] != 0.0) {
+    for (int k = 0; k < lattice->ndim; k++) {
+        if (lattice->rows[r][k] != 0.0) {
             if (column >= 0) {
-                return; /* not along a coordinate axis: no coordinate alone says what is inside */
+                return -1;
             }
             column = k;
         }
     }
-    if (fabs(wrapped[column]) >= fabs(row[column])) {
-        wrapped[column] = nextafter(row[column], 0.0);
+    for (int other = 0; other < lattice->n_periodic; other++) {
+        if (other != r && lattice->rows[other][column] != 0.0) {
+            return -1;
+        }
+    }
+    return column;
+}
+
+/* A tiny negative coordinate plus the length rounds to the length: keep it inside. */
+static void
+keep_inside(const hs_lattice *lattice, double *wrapped)
+{
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        const int k = own_column(lattice, r);
+        if (k >= 0 && fabs(wrapped[k]) >= fabs(lattice->rows[r][k])) {
+            wrapped[k] = nextafter(lattice->rows[r][k], 0.0);
+        }
     }
 }
 
-/* From the middle period to [0, 1): one more vector for each negative fraction. */
+/* From the middle period to [0, 1): one more vector for each negative fraction. Rounded once, from
+ * the point as given, so that points that are inside stay as they are. */
 static bool
 wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *turns)
 {
+    double middle[HS_MAX_DIM];
     double magnitude = 0.0;
-    if (!hs_wrap_point(lattice, x, wrapped, turns, &magnitude)) {
+    if (!hs_wrap_point(lattice, x, middle, turns, &magnitude)) {
         return false;
     }
     for (int k = 0; k < lattice->ndim; k++) {
@@ -85,16 +99,14 @@ wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *t
         }
         double t = 0.0;
         for (int c = 0; c < lattice->ndim; c++) {
-            t += lattice->normal[k][c] * wrapped[c];
+            t += lattice->normal[k][c] * middle[c];
         }
-        if (t < 0.0) {
-            turns[r]--;
-            for (int c = 0; c < lattice->ndim; c++) {
-                wrapped[c] += lattice->rows[r][c];
-            }
-            keep_inside(lattice->ndim, lattice->rows[r], wrapped);
-        }
+        turns[r] -= t < 0.0;
     }
+    if (!hs_wrap_by(lattice, x, turns, wrapped, &magnitude)) {
+        return false;
+    }
+    keep_inside(lattice, wrapped);
     return true;
 }
 

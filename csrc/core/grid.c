@@ -195,7 +195,8 @@ hs_status
 hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
 {
     double images[HS_MAX_DIM] = {0}, drift[HS_MAX_DIM] = {0}, counts[HS_MAX_DIM];
-    double volume = scene->lattice.volume; /* of the periodic part, times the open extents */
+    /* Of the periodic part, times the open extents. */
+    double volume = hs_lattice_volume(&scene->lattice, 0);
     *grid = (hs_grid){.ndim = scene->ndim};
     for (int pass = 0; pass < 3; pass++) {
         bound_images(scene, drift, images);

@@ -126,6 +126,29 @@ orthonormalise(int ndim, int n_basis, double basis[][HS_MAX_DIM], double *v)
     return length;
 }
 
+static void
+start_volume(hs_lattice *lattice)
+{
+    lattice->volume_mantissa = 1.0;
+    lattice->volume_exponent = 0;
+}
+
+/* By length * 2^exponent. */
+static void
+multiply_volume(hs_lattice *lattice, double length, int exponent)
+{
+    int carried;
+    lattice->volume_mantissa = frexp(lattice->volume_mantissa * length, &carried);
+    lattice->volume_exponent += carried + exponent;
+}
+
+double
+hs_lattice_volume(const hs_lattice *lattice, int exponent)
+{
+    return ldexp(lattice->volume_mantissa,
+                 lattice->volume_exponent + lattice->n_periodic * exponent);
+}
+
 /* The unit vector that meets row r of B only. */
 static void
 set_periodic_normal(hs_lattice *lattice, int r, double *normal)
@@ -152,11 +175,11 @@ set_open_normals(hs_lattice *lattice)
     double    basis[HS_MAX_DIM][HS_MAX_DIM];
     const int ndim = lattice->ndim;
     int       n_basis = 0;
-    lattice->volume = 1.0;
+    start_volume(lattice);
     for (int r = 0; r < lattice->n_periodic; r++) {
         const int    exponent = copy_of_unit_size(ndim, lattice->rows[r], basis[n_basis]);
         const double length = orthonormalise(ndim, n_basis, basis, basis[n_basis]);
-        lattice->volume *= ldexp(length, exponent);
+        multiply_volume(lattice, length, exponent);
         n_basis++;
     }
     for (int k = 0; k < ndim; k++) {
@@ -208,7 +231,7 @@ set_general_axes(hs_lattice *lattice)
 static void
 set_aligned_axes(hs_lattice *lattice, const int *column)
 {
-    lattice->volume = 1.0;
+    start_volume(lattice);
     for (int r = 0; r < lattice->n_periodic; r++) {
         const int c = column[r];
         if (lattice->rows[r][c] < 0.0) {
@@ -219,7 +242,7 @@ set_aligned_axes(hs_lattice *lattice, const int *column)
         }
         lattice->row_of_axis[c] = r;
         lattice->period[c] = lattice->rows[r][c];
-        lattice->volume *= lattice->rows[r][c];
+        multiply_volume(lattice, lattice->rows[r][c], 0);
     }
     for (int k = 0; k < lattice->ndim; k++) {
         lattice->normal[k][k] = 1.0;

@@ -42,7 +42,8 @@ typedef struct hs_lattice {
     double  row_error[HS_MAX_DIM];           /* ... each entry within this; 0 when aligned */
     double  normal[HS_MAX_DIM][HS_MAX_DIM];  /* unit vectors */
     double  period[HS_MAX_DIM];              /* normal[k] . B along k: the height; 0 when open */
-    double  volume;                          /* of the periodic rows, scaled; roughly */
+    double  volume_mantissa; /* the volume of the periodic rows, scaled, ... */
+    int     volume_exponent; /* ... is mantissa * 2^exponent: products of lengths overflow */
     double  direction[HS_MAX_DIM][HS_MAX_DIM]; /* D = sum_k (normal[k] . D) direction[k] */
 } hs_lattice;
 
@@ -55,6 +56,9 @@ void hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *la
 
 /* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows. */
 void hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice);
+
+/* Volume of the periodic rows, each length times 2^exponent; 1 without rows. */
+double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 
 /* S over the periodic rows as given, from a shift over B; false when it passes 2^62. */
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);

@@ -314,7 +314,8 @@ hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
         /* The scaled cutoff may have been rounded or flushed: take a bound. */
         scene->cutoff += SCALING_LOSS;
     }
-    hs_lattice_init(box, points->ndim, scene->scale, &scene->lattice);
+    /* Without points nothing has an image, however small the box is. */
+    hs_lattice_init(points->n > 0 ? box : NULL, points->ndim, scene->scale, &scene->lattice);
     scene->formula_error =
         options->precision == HS_DOUBLE ? bound_formula(scene, &cloud) : 0.0;
     scene->radius = scene->cutoff + scene->formula_error;

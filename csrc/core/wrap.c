@@ -72,10 +72,21 @@ subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_t
 }
 
 bool
+hs_wrap_by(const hs_lattice *lattice, const double *r, const int64_t *turns, double *inside,
+           double *magnitude)
+{
+    int64_t given_turns[HS_MAX_DIM];
+    if (!hs_lattice_shift(lattice, turns, given_turns)) {
+        return false;
+    }
+    subtract_rows(lattice, r, given_turns, inside, magnitude);
+    return true;
+}
+
+bool
 hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_t *turns,
               double *magnitude)
 {
-    int64_t given_turns[HS_MAX_DIM];
     for (int k = 0; k < lattice->ndim; k++) {
         inside[k] = r[k];
         *magnitude = fmax(*magnitude, fabs(r[k]));
@@ -104,10 +115,9 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
         if (!moved) {
             return true;
         }
-        if (!hs_lattice_shift(lattice, turns, given_turns)) {
+        if (!hs_wrap_by(lattice, r, turns, inside, magnitude)) {
             return false;
         }
-        subtract_rows(lattice, r, given_turns, inside, magnitude);
     }
     return true;
 }

@@ -26,4 +26,11 @@ double hs_wrap_axis(double x, double length, int64_t *turns);
 bool hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_t *turns,
                    double *magnitude);
 
+/*
+ * X = r - turns * B, rounded, for turns over B; without turns r itself. Returns false when a turn
+ * over the given rows passes 2^62. *magnitude as above.
+ */
+bool hs_wrap_by(const hs_lattice *lattice, const double *r, const int64_t *turns, double *inside,
+                double *magnitude);
+
 #endif

@@ -134,7 +134,7 @@ def verify(
         duplicate=surplus[twice],
     )
     if S is not None:
-        _confirm(verdict, array, cutoff, vectors, inclusive)
+        _confirm(verdict, array, cutoff, vectors, flags, inclusive)
     return verdict
 
 
@@ -198,7 +198,7 @@ def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArra
 
 
 def _confirm(
-    verdict: Verdict, points: Any, cutoff: float, box: Any, inclusive: bool
+    verdict: Verdict, points: Any, cutoff: float, box: Any, periodic: list[bool], inclusive: bool
 ) -> None:
     """Recompute the differences in rational arithmetic, which shares nothing with the search."""
     from fractions import Fraction  # here, because importing it takes longer than the rest
@@ -208,6 +208,8 @@ def _confirm(
         for i, j, *shift in rows[:_CONFIRMED].tolist():
             if i == j and not any(shift):
                 continue  # a point with itself is never a pair
+            if any(s and not repeats for s, repeats in zip(shift, periodic)):
+                continue  # nor is anything across an axis that does not repeat
             distance = sum(
                 (
                     Fraction(float(points[j, k]))
