@@ -31,10 +31,12 @@ hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure
 HS_ALWAYS_INLINE int64_t
 hs_grid_index(const hs_grid *grid, int k, double t)
 {
-    const double place = (t - grid->lower[k]) * grid->cells_per_length[k];
+    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k];
     const int64_t last = grid->shape[k] - 1;
-    const int64_t index = place > 0.0 ? (int64_t)place : 0;
-    return index < last ? index : last;
+    if (!(place < (double)last)) { /* compared first: it may be beyond any integer */
+        return last;
+    }
+    return place > 0.0 ? (int64_t)place : 0;
 }
 
 #endif

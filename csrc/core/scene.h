@@ -23,7 +23,7 @@ typedef struct hs_scene {
     double    *x;             /* owned; n * ndim, row-major: X, in the caller's order */
     double    *originals;     /* owned; the same, as given; NULL where X holds every digit */
     int64_t   *turns;         /* owned; n * n_periodic; NULL unless shifts or originals need them */
-    double     lower[HS_MAX_DIM]; /* range of t_k over the points (open), or of the period */
+    double     lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
     double     upper[HS_MAX_DIM];
     double     x_largest[HS_MAX_DIM]; /* largest |X_k| */
     double     x_error;       /* each component of X is within this of r - w B */

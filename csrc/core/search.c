@@ -4,12 +4,15 @@
 
 #include "decide.h"
 #include "estimate.h"
+#include "focus.h"
 
 #include <math.h>
 #include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 21)
+/* Points from which on loading and sorting take some milliseconds too. */
+#define POLL_POINTS (INT64_C(1) << 17)
 
 static int64_t
 floor_divide(int64_t a, int64_t b)
@@ -296,6 +299,7 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
     hs_status   status =
         hs_scene_init(account, points, box, options, &search->scene, failure);
     if (status == HS_OK) {
+        hs_focus_ranges(&search->scene);
         status = hs_grid_init(&search->scene, &search->grid, failure);
     }
     if (status == HS_OK) {
@@ -308,8 +312,14 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
         search->links = hs_alloc(account, HS_FOR_STENCIL, search->stencil.n_rows, sizeof(hs_link));
         status = search->links == NULL ? HS_ERR_MEMORY : HS_OK;
     }
+    if (status == HS_OK && points->n > POLL_POINTS) {
+        status = hs_search_poll(search);
+    }
     if (status == HS_OK) {
         status = hs_bins_build(account, &search->scene, &search->grid, &search->bins);
+    }
+    if (status == HS_OK && points->n > POLL_POINTS) {
+        status = hs_search_poll(search);
     }
     if (status == HS_OK) {
         status = hs_block_init(account, points->ndim, &search->block);

@@ -170,7 +170,7 @@ _MEASURED = (
 def _reason(plan: dict[str, Any], n: int) -> str:
     if plan["all_pairs"]:
         return "testing every pair costs less than sorting into cells"
-    return f"{plan['stencil_rows']} rows of cells hold the neighbours of a cell of {n} points"
+    return f"{n} points sorted into cells; a cell has neighbours in {plan['stencil_rows']} rows of cells"
 
 
 def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
