@@ -86,7 +86,8 @@ enum {
     HS_WANT_J        = 2, /* higher (or, for an image of the point itself, equal) number */
     HS_WANT_DISTANCE = 4, /* |D|, float64, within 1 ulp, never on the wrong side of the cutoff */
     HS_WANT_VECTOR   = 8, /* D, float64, each component within 1 ulp of |D| */
-    HS_WANT_SHIFT    = 16 /* S, int32 */
+    HS_WANT_SHIFT    = 16, /* S, int32 */
+    HS_WANT_BOTH     = 32  /* i and j side by side */
 };
 
 /* Bytes are accounted by what they are for. */

@@ -31,6 +31,9 @@ take_memory_limit(PyObject *object, hs_options *options)
     }
     options->memory_limit = PyFloat_AsDouble(object);
     if (PyErr_Occurred()) {
+        if (!PyErr_ExceptionMatches(PyExc_TypeError)) {
+            return false;
+        }
         PyErr_Clear();
         PyErr_Format(PyExc_TypeError, "memory_limit must be a number of bytes, got %s",
                      Py_TYPE(object)->tp_name);

@@ -66,11 +66,15 @@ hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *giv
     return true;
 }
 
+/* The bit of a letter in "ijdDSP" is its HS_WANT_ bit. */
+_Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 &&
+                   HS_WANT_VECTOR == 8 && HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32,
+               "hs_quantities_of counts on this");
+
 bool
 hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
 {
     unsigned seen = 0;
-    *want = 0;
     if (!PyUnicode_Check(object)) {
         PyErr_Format(PyExc_TypeError, "quantities must be a string, got %s",
                      Py_TYPE(object)->tp_name);
@@ -87,8 +91,8 @@ hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
             break;
         }
         seen |= bit;
-        *want |= *letter == 'P' ? HS_WANT_I | HS_WANT_J : bit;
     }
+    *want = seen;
     if (seen == 0) {
         PyErr_Format(PyExc_ValueError,
                      "quantities must be some of the letters i j d D S P, each at most once, "

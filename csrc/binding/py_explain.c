@@ -189,11 +189,6 @@ hs_py_build_info(PyObject *module, PyObject *ignored)
 #else
         put(dict, "assertions", PyBool_FromLong(1)) &&
 #endif
-#ifdef __SIZEOF_INT128__
-        put(dict, "int128", PyBool_FromLong(1)) &&
-#else
-        put(dict, "int128", PyBool_FromLong(0)) &&
-#endif
         put(dict, "kernels", hs_py_kernels(module, ignored))) {
         return dict;
     }

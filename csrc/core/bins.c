@@ -2,13 +2,19 @@
 /* bins.c: a stable counting sort, O(n + cells). See bins.h. */
 #include "bins.h"
 
+#include "poll.h"
+
 #include <string.h>
 
 /* The cell of every point, and in start[c + 1] how many points cell c has. */
-static void
-count_points(const hs_scene *scene, const hs_grid *grid, uint32_t *cells, int32_t *start)
+static hs_status
+count_points(const hs_scene *scene, const hs_grid *grid, const hs_options *options,
+             uint32_t *cells, int32_t *start)
 {
     for (int64_t i = 0; i < scene->n; i++) {
+        if (hs_poll_points(options, i + 1) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
         const double *x = scene->x + i * scene->ndim;
         int64_t       cell = 0;
         for (int k = 0; k < scene->ndim; k++) {
@@ -17,6 +23,7 @@ count_points(const hs_scene *scene, const hs_grid *grid, uint32_t *cells, int32_
         cells[i] = (uint32_t)cell;
         start[cell + 1]++;
     }
+    return HS_OK;
 }
 
 /* On entry start[c + 1] counts cell c; on return start[c] is where cell c begins. */
@@ -69,19 +76,25 @@ place_point(const hs_scene *scene, int64_t i, int64_t si, hs_bins *bins)
     }
 }
 
-static void
-place_points(const hs_scene *scene, const uint32_t *cells, int64_t n_cells, hs_bins *bins)
+static hs_status
+place_points(const hs_scene *scene, const uint32_t *cells, int64_t n_cells,
+             const hs_options *options, hs_bins *bins)
 {
     int32_t *next = bins->start; /* while placing, start[c] runs ahead to the end of cell c */
     for (int64_t i = 0; i < scene->n; i++) {
         place_point(scene, i, next[cells[i]]++, bins);
+        if (hs_poll_points(options, i + 1) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
     }
     memmove(next + 1, next, (size_t)n_cells * sizeof(int32_t));
     next[0] = 0;
+    return HS_OK;
 }
 
 hs_status
-hs_bins_build(hs_account *account, hs_scene *scene, const hs_grid *grid, hs_bins *bins)
+hs_bins_build(hs_account *account, const hs_options *options, hs_scene *scene,
+              const hs_grid *grid, hs_bins *bins)
 {
     *bins = (hs_bins){.n = scene->n,
                       .ndim = scene->ndim,
@@ -99,9 +112,11 @@ hs_bins_build(hs_account *account, hs_scene *scene, const hs_grid *grid, hs_bins
             status = HS_ERR_MEMORY;
         } else {
             memset(bins->start, 0, (size_t)(grid->n_cells + 1) * sizeof(int32_t));
-            count_points(scene, grid, cells, bins->start);
-            accumulate(bins->start, grid->n_cells);
-            place_points(scene, cells, grid->n_cells, bins);
+            status = count_points(scene, grid, options, cells, bins->start);
+            if (status == HS_OK) {
+                accumulate(bins->start, grid->n_cells);
+                status = place_points(scene, cells, grid->n_cells, options, bins);
+            }
             hs_free(account, cells);
         }
     }

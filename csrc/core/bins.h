@@ -19,8 +19,10 @@ typedef struct hs_bins {
     int64_t *turns;         /* owned or NULL; n * n_periodic */
 } hs_bins;
 
-/* Sorts; takes the scene's arrays over or frees them. On failure holds nothing. */
-hs_status hs_bins_build(hs_account *account, hs_scene *scene, const hs_grid *grid, hs_bins *bins);
+/* Sorts, polling now and then; takes the scene's arrays over or frees them. On failure holds
+ * nothing. */
+hs_status hs_bins_build(hs_account *account, const hs_options *options, hs_scene *scene,
+                        const hs_grid *grid, hs_bins *bins);
 
 void hs_bins_free(hs_account *account, hs_bins *bins);
 

@@ -151,7 +151,8 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     const hs_fpenv saved = hs_fpenv_enter();
     hs_status      status = hs_box_check(box, failure);
     if (status == HS_OK) {
-        status = hs_cloud_load(NULL, points, &cloud, failure);
+        const hs_options options = hs_options_default();
+        status = hs_cloud_load(NULL, points, &options, &cloud, failure);
     }
     if (status == HS_OK) {
         const hs_scale scale = scale_of_box(box);

@@ -36,6 +36,7 @@ hs_bytes_per_pair(const hs_options *options, int ndim)
         stored += want & bit ? sizeof(int32_t) : 0.0;
         returned += want & bit ? options->index_bytes : 0.0;
     }
+    returned += want & HS_WANT_BOTH ? 2.0 * options->index_bytes : 0.0;
     const double measures = (want & HS_WANT_DISTANCE ? sizeof(double) : 0.0) +
                             (want & HS_WANT_VECTOR ? sizeof(double) * ndim : 0.0) +
                             (want & HS_WANT_SHIFT ? sizeof(int32_t) * ndim : 0.0);
@@ -69,7 +70,7 @@ least_pairs(const hs_search *search)
         }
         diameter += sqrt(square);
     }
-    const double covered = fmax(0.0, 1.0 - diameter / scene->radius);
+    const double covered = fmax(0.0, 1.0 - diameter / scene->cutoff);
     return search->grid.expected_pairs * pow(covered, scene->ndim) - 0.5 * n;
 }
 

@@ -45,12 +45,15 @@ bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 
 /*
- * D = q - p + shift * rows and |D| of a pair that is within the cutoff. vector: ndim doubles, each
- * within 1 ulp of |D|, or NULL. Returns |D| within 1 ulp, at most the cutoff (inclusive) or below
- * it (strict).
+ * D = q - p + shift * rows and |D|. vector: ndim doubles, each within 1 ulp of |D|, or NULL.
+ * Returns |D| within 1 ulp; rounding may lift it onto the cutoff or beyond: see hs_keep_within.
  */
 double hs_metric_measure(const hs_metric *metric, const double *p, const double *q,
                          const int64_t *shift, double *vector);
+
+/* The distance of a pair that was decided to be within: at most the cutoff (inclusive), or below
+ * it (strict). Still within 1 ulp, because the true distance is on that side too. */
+double hs_keep_within(double distance, double cutoff, bool inclusive);
 
 /*
  * precision="double": the fixed float64 formula that most libraries use, unfused and in this

@@ -13,8 +13,9 @@
 #define UNIT 0x1p-53
 /* Relative room for the few roundings between a bound and its use. */
 #define SLACK 0x1p-40
-/* Cells per axis that doubles still tell apart with ease. */
+/* Cells per axis that int32 windows and doubles tell apart, and in all: cell ids are uint32. */
 #define MOST_CELLS_PER_AXIS 0x1p31
+#define MOST_CELLS 4294967295.0
 /* Points that a cell along the first axis should hold: enough to pay for gathering its
  * neighbourhood, few enough that the neighbourhood is not much larger than the cutoff. */
 #define POINTS_PER_CELL 12.0
@@ -114,11 +115,11 @@ choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double dens
             const double wanted = POINTS_PER_CELL / (density * area);
             pitch = fmin(fmax(wanted, 0.25 * grid->range[0]), 4.0 * grid->range[0]);
         }
-        counts[k] = floor(fmin(extent / pitch, MOST_CELLS_PER_AXIS));
-        if (!(counts[k] >= 1.0)) {
-            counts[k] = 1.0; /* also where the extent is zero */
+        counts[k] = 1.0;
+        if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
+            counts[k] = floor(fmin(extent / pitch, MOST_CELLS_PER_AXIS));
         }
-        area *= extent / counts[k];
+        area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
     }
 }
 
@@ -156,12 +157,13 @@ set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
         grid->n_cells *= grid->shape[k];
         grid->lower[k] = scene->lower[k];
         grid->cell_size[k] = extent / counts[k];
-        grid->cells_per_length[k] = extent > 0.0 ? counts[k] / extent : 0.0;
+        /* One cell needs no place in it, and a subnormal extent no infinite scale. */
+        grid->cells_per_length[k] = counts[k] > 1.0 || !open ? counts[k] / extent : 0.0;
         const double cells = grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) +
                              0x1p-50 * counts[k];
         if (open && !(cells < counts[k] - 1.0)) {
             grid->reach[k] = grid->shape[k] - 1;
-        } else if (cells < MOST_CELLS_PER_AXIS) {
+        } else if (cells < MOST_CELLS_PER_AXIS - 2.0) { /* windows of cells are int32 */
             grid->reach[k] = (int64_t)cells + 1;
         } else {
             return HS_ERR_MEMORY;
@@ -214,13 +216,13 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
     grid->shift_error = bound_shift_error(scene, images);
 
     const double density = (double)scene->n / volume;
-    const double ball = unit_ball(scene->ndim) * pow(scene->radius, scene->ndim);
+    const double ball = unit_ball(scene->ndim) * pow(scene->cutoff, scene->ndim);
     grid->expected_pairs = 0.5 * (double)scene->n * density * ball;
     const double neighbours = density * ball;
     /* Narrower rows test fewer pairs that are too far apart, and cost more rows to visit. */
     const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;
     choose_counts(scene, grid, finer, density, counts);
-    cap_counts(scene->ndim, 2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, counts);
+    cap_counts(scene->ndim, fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS), counts);
     hs_status    status = set_shape(scene, counts, grid);
     const double cost = status == HS_OK ? cost_per_point(scene, grid) : INFINITY;
 

@@ -83,11 +83,14 @@ hs_metric_measure(const hs_metric *metric, const double *p, const double *q, con
     default:
         done = measure_in_floats(metric, p, q, shift, metric->ndim, vector, &distance);
     }
-    if (!done)
-        distance = measure_in_integers(metric, p, q, shift, vector);
+    return done ? distance : measure_in_integers(metric, p, q, shift, vector);
+}
 
-    /* Rounding may have lifted |D| onto the cutoff or beyond; the decision stands. */
-    if (metric->inclusive)
-        return distance < metric->cutoff ? distance : metric->cutoff;
-    return distance < metric->cutoff ? distance : nextafter(metric->cutoff, 0.0);
+double
+hs_keep_within(double distance, double cutoff, bool inclusive)
+{
+    if (distance < cutoff) {
+        return distance;
+    }
+    return inclusive ? cutoff : nextafter(cutoff, 0.0);
 }

@@ -13,6 +13,9 @@ typedef struct block_header {
     int64_t bytes;  /* what the caller asked for */
 } block_header;
 
+_Static_assert(sizeof(block_header) <= HS_PAGES_HEADROOM, "the header lies in the headroom");
+_Static_assert(sizeof(block_header) <= HS_ALIGNMENT, "and in front of an aligned block");
+
 #ifdef HS_TESTING
 static int64_t fail_countdown;
 static int64_t live_blocks;

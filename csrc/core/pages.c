@@ -18,7 +18,7 @@
 
 #include <sys/mman.h>
 
-#define PAGE ((size_t)4096)
+#define PAGE ((size_t)65536) /* a multiple of the page size of every Linux */
 
 void *
 hs_pages_alloc(size_t bytes, void **mapping, size_t *length)

@@ -4,14 +4,14 @@
 
 #include "estimate.h"
 #include "fpenv.h"
+#include "record.h"
 #include "sort.h"
-#include "store.h"
 
 #include <math.h>
 #include <string.h>
 
 /* Pairs written between two calls of poll(). */
-#define POLL_PAIRS (INT64_C(1) << 20)
+#define POLL_PAIRS (INT64_C(1) << 18)
 
 struct hs_pairs {
     hs_search search; /* closed: kept for its account, options and scene */
@@ -52,12 +52,25 @@ images_repeat(const hs_search *search)
 static unsigned
 choose_stored(const hs_search *search)
 {
-    unsigned stored = search->options.want;
-    if (search->options.sorted) {
+    unsigned stored = search->options.want & ~(unsigned)HS_WANT_BOTH;
+    if (search->options.sorted || (search->options.want & HS_WANT_BOTH)) {
         stored |= HS_WANT_I | HS_WANT_J;
+    }
+    if (search->options.sorted) {
         stored |= images_repeat(search) ? HS_WANT_SHIFT : 0;
     }
     return stored;
+}
+
+/* Now that their number is known: the caller's arrays beside what is held, some of which is given
+ * back while they are written. */
+static bool
+result_fits(hs_pairs *pairs)
+{
+    hs_search   *search = &pairs->search;
+    const double bytes =
+        (double)pairs->store.n_pairs * hs_bytes_per_pair(&search->options, search->scene.ndim);
+    return hs_account_allows(&search->account, fmax(0.0, bytes - (double)search->account.held));
 }
 
 static hs_status
@@ -67,7 +80,12 @@ find_pairs(hs_pairs *pairs, hs_failure *failure)
     hs_store  *store = &pairs->store;
     hs_status  status = hs_estimate_by_sample(search, failure);
     if (status == HS_OK) {
-        status = hs_search_walk(search, hs_store_visit, store);
+        status = hs_search_walk(search, hs_record_hits, store);
+    }
+    if (status == HS_OK && !result_fits(pairs)) {
+        failure->expected_bytes =
+            (double)store->n_pairs * hs_bytes_per_pair(&search->options, store->ndim);
+        status = HS_ERR_MEMORY;
     }
     if (status == HS_OK && search->options.sorted && store->n_pairs > 0) {
         status = hs_store_merge(store);
@@ -155,14 +173,15 @@ hs_pairs_length(const hs_pairs *pairs)
     return pairs->store.n_pairs;
 }
 
-/* n indices, in order or as `order` says, to every `stride`-th element of the array. */
+/* n indices, from `first` on or as `order` says, to every `stride`-th element of the array. */
 static void
-write_index(void *array, int index_bytes, int64_t at, int64_t stride, const int32_t *from,
-            const int64_t *order, int64_t n)
+write_index(void *array, int index_bytes, int64_t at, int64_t stride, const int32_t *indices,
+            int64_t first, const int64_t *order, int64_t n)
 {
     if (array == NULL) {
         return;
     }
+    const int32_t *from = indices + first;
     if (index_bytes == 8) {
         int64_t *to = (int64_t *)array + at;
         for (int64_t p = 0; p < n; p++) {
@@ -176,43 +195,42 @@ write_index(void *array, int index_bytes, int64_t at, int64_t stride, const int3
     }
 }
 
-/* n rows of `size` bytes, in order or as `order` says. */
+/* n rows of `size` bytes, from `first` on or as `order` says. */
 static void
-write_rows(void *array, int64_t at, const void *from, const int64_t *order, int64_t n,
-           size_t size)
+write_rows(void *array, int64_t at, const void *rows, int64_t first, const int64_t *order,
+           int64_t n, size_t size)
 {
     if (array == NULL) {
         return;
     }
-    char *to = (char *)array + (size_t)at * size;
+    const char *from = (const char *)rows + (size_t)first * size;
+    char       *to = (char *)array + (size_t)at * size;
     if (order == NULL) {
         memcpy(to, from, (size_t)n * size);
         return;
     }
     for (int64_t p = 0; p < n; p++) {
-        memcpy(to + (size_t)p * size, (const char *)from + (size_t)order[p] * size, size);
+        memcpy(to + (size_t)p * size, from + (size_t)order[p] * size, size);
     }
 }
 
-/* Pairs [first, first + n) of the block, or of the order over it, to place `at` on. */
+/* Pairs [first, first + n) of the first block, or of the order over it, to place `at` on. */
 static void
 write_part(const hs_pairs *pairs, const hs_pair_arrays *arrays, int64_t first, int64_t n,
            int64_t at)
 {
     const hs_pair_block *block = pairs->store.first;
     const int64_t       *order = pairs->order != NULL ? pairs->order + first : NULL;
-    const int64_t        skip = order != NULL ? 0 : first;
+    const int64_t        from = order != NULL ? 0 : first;
     const size_t         d = (size_t)pairs->store.ndim;
     const int            bytes = arrays->index_bytes;
-    write_index(arrays->i, bytes, at, 1, block->i + skip, order, n);
-    write_index(arrays->j, bytes, at, 1, block->j + skip, order, n);
-    write_index(arrays->both, bytes, 2 * at, 2, block->i + skip, order, n);
-    write_index(arrays->both, bytes, 2 * at + 1, 2, block->j + skip, order, n);
-    write_rows(arrays->distance, at, block->distance + skip, order, n, sizeof(double));
-    write_rows(arrays->vector, at, block->vector + skip * (int64_t)d, order, n,
-               d * sizeof(double));
-    write_rows(arrays->shift, at, block->shift + skip * (int64_t)d, order, n,
-               d * sizeof(int32_t));
+    write_index(arrays->i, bytes, at, 1, block->i, from, order, n);
+    write_index(arrays->j, bytes, at, 1, block->j, from, order, n);
+    write_index(arrays->both, bytes, 2 * at, 2, block->i, from, order, n);
+    write_index(arrays->both, bytes, 2 * at + 1, 2, block->j, from, order, n);
+    write_rows(arrays->distance, at, block->distance, from, order, n, sizeof(double));
+    write_rows(arrays->vector, at, block->vector, from, order, n, d * sizeof(double));
+    write_rows(arrays->shift, at, block->shift, from, order, n, d * sizeof(int32_t));
 }
 
 hs_status
@@ -220,17 +238,16 @@ hs_pairs_write(hs_pairs *pairs, const hs_pair_arrays *arrays)
 {
     hs_store *store = &pairs->store;
     int64_t   at = 0;
-    while (store->first != NULL) {
+    for (; store->first != NULL; hs_store_drop_first(store)) {
         for (int64_t first = 0; first < store->first->n; first += POLL_PAIRS) {
             const int64_t left = store->first->n - first;
             const int64_t n = left < POLL_PAIRS ? left : POLL_PAIRS;
             write_part(pairs, arrays, first, n, at);
             at += n;
-        }
-        hs_store_drop_first(store);
-        const hs_status status = hs_search_poll(&pairs->search);
-        if (status != HS_OK) {
-            return status;
+            const hs_status status = at > POLL_PAIRS ? hs_search_poll(&pairs->search) : HS_OK;
+            if (status != HS_OK) {
+                return status;
+            }
         }
     }
     return HS_OK;

@@ -12,7 +12,7 @@ fill_plan(const hs_search *search, hs_plan *plan)
 {
     const hs_scene *scene = &search->scene;
     const hs_grid  *grid = &search->grid;
-    const double    unscale = hs_scale_apply(hs_scale_of(-scene->scale.exponent), 1.0);
+    const double    unscale = hs_scale_apply(scene->unscale, 1.0);
     *plan = (hs_plan){.ndim = scene->ndim,
                       .n_periodic = scene->lattice.n_periodic,
                       .aligned = scene->lattice.aligned,

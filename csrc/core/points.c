@@ -2,6 +2,8 @@
 /* points.c: see points.h. Magnitudes are compared as bit patterns, which order like numbers. */
 #include "points.h"
 
+#include "poll.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -44,9 +46,31 @@ name_first_bad(const hs_cloud *cloud, hs_failure *failure)
     failure->value = cloud->x[at];
 }
 
-hs_status
-hs_cloud_load(hs_account *account, const hs_points *points, hs_cloud *cloud, hs_failure *failure)
+/* Loads in parts, with a question after each full one. */
+static hs_status
+load_parts(const hs_points *points, const hs_options *options, double *x, uint64_t *largest)
 {
+    hs_status status = HS_OK;
+    *largest = 0;
+    for (int64_t first = 0; first < points->n && status == HS_OK; first += HS_POLL_POINTS) {
+        const int64_t  left = points->n - first;
+        hs_points      part = *points;
+        part.n = left < HS_POLL_POINTS ? left : HS_POLL_POINTS;
+        part.data = (const char *)points->data + first * points->row_stride;
+        double        *to = x + first * points->ndim;
+        const uint64_t found =
+            points->real == HS_FLOAT32 ? load_rows_f32(&part, to) : load_rows_f64(&part, to);
+        *largest = found > *largest ? found : *largest;
+        status = hs_poll_points(options, part.n);
+    }
+    return status;
+}
+
+hs_status
+hs_cloud_load(hs_account *account, const hs_points *points, const hs_options *options,
+              hs_cloud *cloud, hs_failure *failure)
+{
+    uint64_t largest;
     *cloud = (hs_cloud){.n = points->n, .ndim = points->ndim};
     if (points->n > INT32_MAX) {
         failure->value = (double)points->n;
@@ -56,8 +80,11 @@ hs_cloud_load(hs_account *account, const hs_points *points, hs_cloud *cloud, hs_
     if (cloud->x == NULL) {
         return HS_ERR_MEMORY;
     }
-    const uint64_t largest = points->real == HS_FLOAT32 ? load_rows_f32(points, cloud->x)
-                                                        : load_rows_f64(points, cloud->x);
+    const hs_status status = load_parts(points, options, cloud->x, &largest);
+    if (status != HS_OK) {
+        hs_cloud_free(account, cloud);
+        return status;
+    }
     if (largest >= INFINITY_BITS) {
         name_first_bad(cloud, failure);
         hs_cloud_free(account, cloud);

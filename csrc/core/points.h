@@ -16,10 +16,10 @@ typedef struct hs_cloud {
     double  largest; /* largest |x|, 0 without points */
 } hs_cloud;
 
-/* Copies and checks. HS_ERR_NOT_FINITE names the first bad row and column; HS_ERR_TOO_MANY from
- * 2^31 points on. On failure the cloud holds nothing. */
-hs_status hs_cloud_load(hs_account *account, const hs_points *points, hs_cloud *cloud,
-                        hs_failure *failure);
+/* Copies and checks, polling now and then. HS_ERR_NOT_FINITE names the first bad row and column;
+ * HS_ERR_TOO_MANY from 2^31 points on. On failure the cloud holds nothing. */
+hs_status hs_cloud_load(hs_account *account, const hs_points *points, const hs_options *options,
+                        hs_cloud *cloud, hs_failure *failure);
 
 /* Smallest nonzero |x|; infinity when there is none. */
 double hs_cloud_smallest(const hs_cloud *cloud);

@@ -2,6 +2,7 @@
 /* scene.c: see scene.h. */
 #include "scene.h"
 
+#include "poll.h"
 #include "wrap.h"
 
 #include <math.h>
@@ -74,7 +75,7 @@ choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *e
 }
 
 static hs_status
-wrap_aligned(hs_scene *scene, hs_failure *failure)
+wrap_aligned(hs_scene *scene, const hs_options *options, hs_failure *failure)
 {
     const hs_lattice *lattice = &scene->lattice;
     for (int64_t i = 0; i < scene->n; i++) {
@@ -94,12 +95,15 @@ wrap_aligned(hs_scene *scene, hs_failure *failure)
             }
             scene->x_largest[k] = fmax(scene->x_largest[k], fabs(x[k]));
         }
+        if (hs_poll_points(options, i + 1) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
     }
     return HS_OK;
 }
 
 static hs_status
-wrap_general(hs_scene *scene, double *magnitude, hs_failure *failure)
+wrap_general(hs_scene *scene, const hs_options *options, double *magnitude, hs_failure *failure)
 {
     const int m = scene->lattice.n_periodic;
     for (int64_t i = 0; i < scene->n; i++) {
@@ -112,6 +116,9 @@ wrap_general(hs_scene *scene, double *magnitude, hs_failure *failure)
         for (int k = 0; k < scene->ndim; k++) {
             x[k] = inside[k];
             scene->x_largest[k] = fmax(scene->x_largest[k], fabs(x[k]));
+        }
+        if (hs_poll_points(options, i + 1) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
         }
     }
     return HS_OK;
@@ -279,8 +286,8 @@ fill_scene(hs_account *account, hs_cloud *cloud, const hs_options *options, hs_s
     }
     hs_status status = take_points(account, cloud, options, scene);
     if (status == HS_OK) {
-        status = scene->lattice.aligned ? wrap_aligned(scene, failure)
-                                        : wrap_general(scene, &magnitude, failure);
+        status = scene->lattice.aligned ? wrap_aligned(scene, options, failure)
+                                        : wrap_general(scene, options, &magnitude, failure);
     }
     if (status != HS_OK) {
         return status;
@@ -303,12 +310,13 @@ hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
     }
     hs_status status = hs_box_check(box, failure);
     if (status == HS_OK) {
-        status = hs_cloud_load(account, points, &cloud, failure);
+        status = hs_cloud_load(account, points, options, &cloud, failure);
     }
     if (status != HS_OK) {
         return status;
     }
     scene->scale = hs_scale_of(choose_exponent(&cloud, box, options->cutoff, &scene->extreme));
+    scene->unscale = hs_scale_of(-scene->scale.exponent);
     scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
     if (scene->extreme && options->cutoff > 0.0) {
         /* The scaled cutoff may have been rounded or flushed: take a bound. */

@@ -15,6 +15,7 @@ typedef struct hs_scene {
     int        ndim;
     int64_t    n;
     hs_scale   scale;
+    hs_scale   unscale;       /* the way back */
     hs_lattice lattice;
     double     cutoff;        /* scaled; the true one, or an upper bound when `extreme` */
     double     radius;        /* candidates are sought up to here; cutoff, or a little more */
@@ -50,6 +51,13 @@ hs_scene_coordinate(const hs_scene *scene, const double *x, int k)
         t += scene->lattice.normal[k][c] * x[c];
     }
     return t;
+}
+
+/* A length that the metric measured, in the caller's unit. */
+HS_ALWAYS_INLINE double
+hs_scene_restore(const hs_scene *scene, double length)
+{
+    return scene->extreme ? length : hs_scale_apply(scene->unscale, length);
 }
 
 void hs_scene_free(hs_account *account, hs_scene *scene);

@@ -5,14 +5,13 @@
 #include "decide.h"
 #include "estimate.h"
 #include "focus.h"
+#include "poll.h"
 
 #include <math.h>
 #include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 21)
-/* Points from which on loading and sorting take some milliseconds too. */
-#define POLL_POINTS (INT64_C(1) << 17)
 
 static int64_t
 floor_divide(int64_t a, int64_t b)
@@ -25,13 +24,8 @@ hs_status
 hs_search_poll(hs_search *search)
 {
     search->work_since_poll = 0;
-    if (search->options.poll == NULL) {
-        return HS_OK;
-    }
-    search->n_polls++;
-    return search->options.poll(search->options.poll_context, search->fraction)
-               ? HS_OK
-               : HS_ERR_INTERRUPTED;
+    search->n_polls += search->options.poll != NULL;
+    return hs_poll(&search->options, search->fraction);
 }
 
 /* Float32 thresholds of the present block, by the precision that was asked for. */
@@ -200,6 +194,7 @@ set_links(hs_search *search, const int64_t *index)
     const hs_lattice *lattice = &search->scene.lattice;
     const hs_grid    *grid = &search->grid;
     search->n_links = 0;
+    search->work_since_poll += search->stencil.n_rows;
     for (int64_t s = 0; s < search->stencil.n_rows; s++) {
         const hs_stencil_row *row = &search->stencil.rows[s];
         hs_link              *link = &search->links[search->n_links];
@@ -232,9 +227,9 @@ visit_row(hs_search *search, const int64_t *index, const int32_t *start)
 {
     set_links(search, index);
     for (int64_t x = 0; x < search->grid.shape[0]; x++) {
-        for (int32_t first = start[x]; first < start[x + 1]; first += HS_GROUP_POINTS) {
-            const int32_t end = start[x + 1];
-            const int32_t last = end - first > HS_GROUP_POINTS ? first + HS_GROUP_POINTS : end;
+        const int32_t end = start[x + 1];
+        for (int32_t first = start[x], last; first < end; first = last) {
+            last = end - first > HS_GROUP_POINTS ? first + HS_GROUP_POINTS : end;
             const hs_status status = visit_group(search, x, first, last);
             if (status != HS_OK) {
                 return status;
@@ -312,14 +307,8 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
         search->links = hs_alloc(account, HS_FOR_STENCIL, search->stencil.n_rows, sizeof(hs_link));
         status = search->links == NULL ? HS_ERR_MEMORY : HS_OK;
     }
-    if (status == HS_OK && points->n > POLL_POINTS) {
-        status = hs_search_poll(search);
-    }
     if (status == HS_OK) {
-        status = hs_bins_build(account, &search->scene, &search->grid, &search->bins);
-    }
-    if (status == HS_OK && points->n > POLL_POINTS) {
-        status = hs_search_poll(search);
+        status = hs_bins_build(account, options, &search->scene, &search->grid, &search->bins);
     }
     if (status == HS_OK) {
         status = hs_block_init(account, points->ndim, &search->block);

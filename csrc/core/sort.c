@@ -7,8 +7,8 @@
 
 #include <string.h>
 
-/* Points between two calls of poll(). */
-#define POLL_POINTS 4096
+/* Pairs between two calls of poll(). */
+#define POLL_PAIRS (INT64_C(1) << 18)
 
 static bool
 is_before(const hs_pair_block *block, int ndim, int64_t a, int64_t b)
@@ -82,16 +82,27 @@ hs_sort_pairs(hs_search *search, const hs_store *store, int64_t n_points, int64_
     memset(start, 0, (size_t)(n_points + 1) * sizeof(int64_t));
     for (int64_t p = 0; p < store->n_pairs; p++) {
         start[block->i[p] + 1]++;
+        if (p % POLL_PAIRS == POLL_PAIRS - 1 && hs_search_poll(search) != HS_OK) {
+            status = HS_ERR_INTERRUPTED;
+            goto done;
+        }
     }
     for (int64_t i = 0; i < n_points; i++) {
         start[i + 1] += start[i];
     }
     for (int64_t p = 0; p < store->n_pairs; p++) {
         places[start[block->i[p]]++] = p; /* start[i] runs ahead to the end of row i */
+        if (p % POLL_PAIRS == POLL_PAIRS - 1 && hs_search_poll(search) != HS_OK) {
+            status = HS_ERR_INTERRUPTED;
+            goto done;
+        }
     }
-    for (int64_t i = 0, first = 0; i < n_points && status == HS_OK; first = start[i++]) {
+    for (int64_t i = 0, first = 0, work = 0; i < n_points && status == HS_OK;
+         first = start[i++]) {
         sort_row(block, store->ndim, places + first, start[i] - first);
-        if (i % POLL_POINTS == 0) {
+        work += start[i] - first;
+        if (work > POLL_PAIRS) {
+            work = 0;
             status = hs_search_poll(search);
         }
     }

@@ -3,6 +3,7 @@
 #ifndef HS_SORT_H
 #define HS_SORT_H
 
+#include "search.h"
 #include "store.h"
 
 /*

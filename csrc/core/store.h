@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * store.h: the pairs that have been found, in blocks that never move, with only the quantities that
- * were asked for. Filled by a search's visitor, emptied once into the caller's arrays.
+ * were asked for. Emptied once into the caller's arrays.
  */
 #ifndef HS_STORE_H
 #define HS_STORE_H
 
-#include "search.h"
+#include "memory.h"
 
 /* One block; arrays are NULL for what is not stored. Owned by the store. */
 typedef struct hs_pair_block {
@@ -28,8 +28,8 @@ typedef struct hs_store {
 
 void hs_store_init(hs_account *account, int ndim, unsigned stored, hs_store *store);
 
-/* A hs_visit_fn; context is the hs_store. */
-hs_status hs_store_visit(void *store, hs_search *search, int32_t si, int32_t n_hits);
+/* Makes room for n more pairs in store->last. */
+hs_status hs_store_reserve(hs_store *store, int64_t n);
 
 /* Turns the blocks into one of exactly n_pairs; keeps order. */
 hs_status hs_store_merge(hs_store *store);

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* poll.h: asking the caller whether to go on. */
+#ifndef HS_POLL_H
+#define HS_POLL_H
+
+#include "../halfshell.h"
+#include "base.h"
+
+/* Points that loading, wrapping and sorting handle between two questions: some milliseconds. */
+#define HS_POLL_POINTS (INT64_C(1) << 17)
+
+/* HS_OK, or HS_ERR_INTERRUPTED when the caller wants to stop. */
+HS_ALWAYS_INLINE hs_status
+hs_poll(const hs_options *options, double fraction)
+{
+    return options->poll == NULL || options->poll(options->poll_context, fraction)
+               ? HS_OK
+               : HS_ERR_INTERRUPTED;
+}
+
+/* The same once in HS_POLL_POINTS points; `done` counts them from 1. */
+HS_ALWAYS_INLINE hs_status
+hs_poll_points(const hs_options *options, int64_t done)
+{
+    return HS_UNLIKELY(done % HS_POLL_POINTS == 0) ? hs_poll(options, 0.0) : HS_OK;
+}
+
+#endif
