@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +12,40 @@ import numpy.typing as npt
 from halfshell import _core, _inputs
 
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+Letter = Literal["i", "j", "d", "D", "S", "P"]
+Precision = Literal["exact", "double", "single"]
 
 
+class _CountOptions(TypedDict, total=False):
+    """For type checkers: the keywords of `count_pairs`."""
+
+    box: Any
+    periodic: Any
+    inclusive: bool
+    precision: Precision
+    kernel: str | None
+    memory_limit: float | None
+
+
+class _PairOptions(_CountOptions, total=False):
+    """The keywords of `pairs`, without `quantities`, on which the type of the result depends."""
+
+    sort: bool
+    index_dtype: npt.DTypeLike
+
+
+@overload
+def pairs(
+    points: Any, cutoff: float, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
+@overload
+def pairs(
+    points: Any, cutoff: float, *, quantities: Letter, **options: Unpack[_PairOptions]
+) -> npt.NDArray[Any]: ...
+@overload
+def pairs(
+    points: Any, cutoff: float, *, quantities: str, **options: Unpack[_PairOptions]
+) -> Arrays: ...
 def pairs(
     points: Any,
     cutoff: float,
@@ -24,7 +56,7 @@ def pairs(
     inclusive: bool = True,
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
-    precision: str = "exact",
+    precision: Precision = "exact",
     kernel: str | None = None,
     memory_limit: float | None = None,
 ) -> Arrays:
@@ -35,8 +67,9 @@ def pairs(
     points : array_like of float, shape (n, d)
         Coordinates, any length unit, 1 <= d <= 8. float32 and float64 values are used as they
         are; integers, booleans and float16 are converted exactly or refused. Points may lie
-        anywhere, also outside the box. An object with ``positions``, ``cell`` and ``pbc``, such
-        as ``ase.Atoms``, brings its own box and periodicity.
+        anywhere, also outside the box. ``[]`` counts as shape (0, 3). An object with
+        ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
+        periodicity.
     cutoff : float
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box.
@@ -55,9 +88,11 @@ def pairs(
     index_dtype : numpy.int64 or numpy.int32, default numpy.int64
         Type of i, j and P.
     precision : {"exact", "double", "single"}, default "exact"
-        "exact" decides by the real numbers that the inputs are. "double" and "single" decide by
-        one rounded comparison of a fixed formula, as most libraries do, and exist to be compared
-        with.
+        "exact" decides by the real numbers that the inputs are. The others decide by one rounded
+        comparison, as most libraries do, and exist to be compared with: "double" by a fixed
+        formula in float64; "single" in float32 relative to the centre of a group of neighbouring
+        points, so that its answer near the cutoff also depends on the other points and their
+        order.
     kernel : str, optional
         One of ``kernels()``; for tests and timing. All give identical arrays.
     memory_limit : float, optional
@@ -79,14 +114,21 @@ def pairs(
     Raises
     ------
     TypeError
-        If an argument is of the wrong kind: strings, complex numbers, long double.
+        If an argument is of the wrong kind: strings, complex numbers, long double, objects that
+        cannot be converted to an array, flags that are not bools.
     ValueError
-        If a coordinate or box entry is not finite, `cutoff` is negative or not finite, the
-        periodic box vectors are exactly linearly dependent, or a shape does not fit.
+        If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
+        finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
+        linearly dependent, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
+        or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
+        without `box`, or `box` or `periodic` beside an object that brings its own.
     OverflowError
-        If a shift does not fit int32, or there are 2**31 points or more.
+        If there are 2**31 points or more, a number is too large for float64, or a shift that was
+        asked for does not fit int32; also if a point lies more than 2**51 box vectors away in a
+        box that is not axis-aligned, or in any box when S is asked for.
     MemoryError
-        If the result would not fit `memory_limit`; decided from a sample before the search.
+        If the result would not fit `memory_limit`: as a rule decided from a sample before the
+        search, otherwise during the search.
 
     See Also
     --------
@@ -98,8 +140,12 @@ def pairs(
     Points are sorted into cells, each cell's neighbourhood is gathered once, and pairs are tested
     in float32 with a proven error bound; what is too near the cutoff to tell is decided in
     float64, double-word arithmetic [1]_ and at last in integers, so that no pair is missed or
-    invented. Time is proportional to n plus the number of pairs; memory does not depend on the
-    volume.
+    invented. Scenes of evenly spread points take time in proportion to n plus the number of
+    pairs, strongly clustered ones more. Memory does not depend on the volume.
+
+    If you come from ASE: its lists are full and strict, so ask for ``inclusive=False``, and note
+    that each pair is here once. If you come from SciPy: ``boxsize`` may be a scalar there, but
+    lengths have shape (d,) here.
 
     References
     ----------
@@ -147,7 +193,7 @@ def _pairs_with_progress(
     inclusive: bool = True,
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
-    precision: str = "exact",
+    precision: Precision = "exact",
     kernel: str | None = None,
     memory_limit: float | None = None,
 ) -> Arrays:
@@ -158,17 +204,31 @@ def _pairs_with_progress(
         _inputs.as_cutoff(cutoff),
         vectors,
         bits,
-        inclusive,
+        _inputs.as_flag(inclusive, "inclusive"),
         precision,
         kernel,
         memory_limit,
         progress,
         quantities,
-        sort,
+        _inputs.as_flag(sort, "sort"),
         _inputs.as_index_bytes(index_dtype),
     )
 
 
+@overload
+def count_pairs(
+    points: Any,
+    cutoff: float | np.floating[Any] | np.integer[Any],
+    **options: Unpack[_CountOptions],
+) -> int: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
+) -> npt.NDArray[np.int64]: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Any, **options: Unpack[_CountOptions]
+) -> int | npt.NDArray[np.int64]: ...
 def count_pairs(
     points: Any,
     cutoff: Any,
@@ -176,7 +236,7 @@ def count_pairs(
     box: Any = None,
     periodic: Any = None,
     inclusive: bool = True,
-    precision: str = "exact",
+    precision: Precision = "exact",
     kernel: str | None = None,
     memory_limit: float | None = None,
 ) -> int | npt.NDArray[np.int64]:
@@ -187,7 +247,7 @@ def count_pairs(
     points, box, periodic, inclusive, precision, kernel
         As in `pairs`.
     cutoff : float or array_like of float, shape (k,)
-        One cutoff, or several in ascending order.
+        One cutoff, or several in ascending order. k cutoffs cost k searches.
     memory_limit : float, optional
         Bytes that the search may take.
 
@@ -199,7 +259,8 @@ def count_pairs(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`; ValueError also if several cutoffs are not ascending.
+        As `pairs`; ValueError also if several cutoffs are not ascending. MemoryError only if the
+        search itself would not fit: no pair is stored.
 
     See Also
     --------
@@ -214,6 +275,7 @@ def count_pairs(
     >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
     [0, 1, 2]
     """
+    inclusive = _inputs.as_flag(inclusive, "inclusive")
     array, vectors, bits = _inputs.scene(points, box, periodic)
 
     def count(one: float) -> int:
@@ -221,14 +283,10 @@ def count_pairs(
             array, one, vectors, bits, inclusive, precision, kernel, memory_limit, None
         )
 
-    if np.ndim(cutoff) == 0:
-        return count(_inputs.as_cutoff(cutoff))
-    several = _inputs.as_real_array(cutoff, "cutoff").astype(np.float64)
-    if several.ndim != 1:
-        raise ValueError(f"cutoff must be a number or have shape (k,), got {several.shape}")
-    if not (several[1:] >= several[:-1]).all():
-        raise ValueError("several cutoffs must be ascending")
-    return np.array([count(one) for one in several.tolist()], dtype=np.int64)
+    cutoffs = _inputs.as_cutoffs(cutoff)
+    if isinstance(cutoffs, float):
+        return count(cutoffs)
+    return np.array([count(one) for one in cutoffs.tolist()], dtype=np.int64)
 
 
 def kernels() -> list[str]:

@@ -17,9 +17,10 @@ class Box:
 
     Parameters
     ----------
-    vectors : array_like of float, shape (d, d) or (d,)
-        Box vectors as rows, or edge lengths along the coordinate axes. Any orientation and
-        handedness; the vectors must be linearly independent, which is decided exactly.
+    vectors : array_like of float, shape (d, d) or (d,), or Box
+        Box vectors as rows, or edge lengths along the coordinate axes, in the unit of the points;
+        1 <= d <= 8. Any orientation and handedness; the vectors must be linearly independent,
+        which is decided exactly.
 
     Attributes
     ----------
@@ -28,8 +29,15 @@ class Box:
 
     Raises
     ------
+    TypeError
+        If the entries are not real numbers, or are long doubles.
     ValueError
-        If an entry is not finite, or the vectors are exactly linearly dependent.
+        If an entry is not finite, the vectors are exactly linearly dependent, or the shape does
+        not fit.
+
+    Notes
+    -----
+    A box does not change. Boxes with equal vectors are equal, and may be keys of a dict.
 
     Examples
     --------
@@ -42,9 +50,7 @@ class Box:
     ([[0.5, 2.0, 3.0]], [[-1, 1, 0]])
     """
 
-    __slots__ = ("_heights", "_volume", "vectors")
-
-    vectors: npt.NDArray[np.float64]
+    __slots__ = ("_heights", "_vectors", "_volume")
 
     def __init__(self, vectors: Any) -> None:
         array = _inputs.as_real_array(getattr(vectors, "vectors", vectors), "box")
@@ -55,34 +61,104 @@ class Box:
             )
         own = _inputs.as_box(array, array.shape[0]).copy()
         own.flags.writeable = False
-        self.vectors = own
+        self._vectors = own
         self._heights, self._volume = _core.box_measure(own, (1 << own.shape[0]) - 1)
         self._heights.flags.writeable = False
 
     @classmethod
     def from_matrix(cls, matrix: Any) -> Box:
-        """Box vectors as the rows of a (d, d) matrix."""
-        if np.ndim(matrix) != 2:
-            raise ValueError(f"matrix must have shape (d, d), got {np.shape(matrix)}")
-        return cls(matrix)
+        """Box vectors as the rows of a matrix.
 
-    @classmethod
-    def orthorhombic(cls, *lengths: float) -> Box:
-        """Edges along the coordinate axes: ``Box.orthorhombic(10.0, 10.0, 20.0)``."""
-        only: Any = lengths[0] if len(lengths) == 1 else lengths
-        return cls([only] if np.ndim(only) == 0 else list(only))
+        Parameters
+        ----------
+        matrix : array_like of float, shape (d, d)
+            Box vectors as rows, in the unit of the points; 1 <= d <= 8.
 
-    @classmethod
-    def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:
-        """Crystallographic cell: lengths (a, b, c) and angles (alpha, beta, gamma) in degrees.
-
-        The first vector lies along x, the second in the xy plane. In two dimensions: lengths
-        (a, b) and the angle between them.
+        Returns
+        -------
+        Box
 
         Raises
         ------
+        TypeError
+            If the entries are not real numbers, or are long doubles.
         ValueError
-            If no such cell exists.
+            If `matrix` is not square, an entry is not finite, or the vectors are exactly linearly
+            dependent.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.Box.from_matrix([[2.0, 0.0], [1.0, 3.0]]).volume
+        6.0
+        """
+        array = _inputs.as_real_array(matrix, "matrix")
+        if array.ndim != 2:
+            raise ValueError(f"matrix must have shape (d, d), got {array.shape}")
+        return cls(array)
+
+    @classmethod
+    def orthorhombic(cls, *lengths: float) -> Box:
+        """Edges along the coordinate axes.
+
+        Parameters
+        ----------
+        *lengths : float
+            Edge lengths, in the unit of the points, one for each of 1 to 8 dimensions; or one
+            sequence of them. Not zero.
+
+        Returns
+        -------
+        Box
+
+        Raises
+        ------
+        TypeError
+            If a length is not a real number, or is a long double.
+        ValueError
+            If a length is zero or not finite, or there are none or more than 8.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.Box.orthorhombic(10.0, 10.0, 20.0).volume
+        2000.0
+        """
+        only: Any = lengths[0] if len(lengths) == 1 else lengths
+        array = np.atleast_1d(_inputs.as_real_array(only, "lengths"))
+        if array.ndim != 1:
+            raise ValueError(f"lengths must have shape (d,), got {array.shape}")
+        return cls(array)
+
+    @classmethod
+    def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:
+        """Crystallographic cell: the first vector along x, the second in the xy plane.
+
+        Parameters
+        ----------
+        lengths : array_like of float, shape (3,) or (2,)
+            Edge lengths (a, b, c), or (a, b) in two dimensions, in the unit of the points.
+        angles : array_like of float, shape (3,) or (1,) or a number
+            Angles in degrees: alpha between b and c, beta between a and c, gamma between a and b;
+            in two dimensions gamma alone. Cosines of 60, 90 and 120 degrees are exact.
+
+        Returns
+        -------
+        Box
+
+        Raises
+        ------
+        TypeError
+            If the entries are not real numbers, or are long doubles.
+        ValueError
+            If there are not 3 and 3 or 2 and 1 of them, a length is not finite and positive, an
+            angle is not between 0 and 180 degrees, or no cell has these angles.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.Box.from_lengths_angles((2.0, 4.0), 90.0).vectors.tolist()
+        [[2.0, 0.0], [0.0, 4.0]]
         """
         edges = _inputs.as_real_array(lengths, "lengths").astype(np.float64)
         degrees = np.atleast_1d(_inputs.as_real_array(angles, "angles").astype(np.float64))
@@ -101,6 +177,11 @@ class Box:
         else:
             directions = _directions(degrees.tolist())
         return cls(np.array(directions) * edges[:, None])
+
+    @property
+    def vectors(self) -> npt.NDArray[np.float64]:
+        """The box vectors as rows, shape (d, d); read-only."""
+        return self._vectors
 
     @property
     def volume(self) -> float:
@@ -122,7 +203,7 @@ class Box:
         points : array_like of float, shape (n, d)
             Coordinates, in the unit of the box.
         periodic : bool or sequence of bool, shape (d,), optional
-            Along which box vectors to move. Default: all.
+            Along which box vectors to move. Default: all. The others are ignored.
 
         Returns
         -------
@@ -135,8 +216,24 @@ class Box:
 
         Raises
         ------
+        TypeError
+            If `points` or `periodic` is of the wrong kind: strings, complex numbers, long double.
+        ValueError
+            If a coordinate is not finite, or `points` or `periodic` does not have the d of the
+            box.
         OverflowError
             If a point lies more than 2**51 box vectors away.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> box = hs.Box([[2.0, 0.0], [1.0, 4.0]])
+        >>> wrapped, shifts = box.wrap([[2.5, 1.0], [1.5, -1.0]])
+        >>> wrapped.tolist(), shifts.tolist()
+        ([[0.5, 1.0], [2.5, 3.0]], [[-1, 0], [0, 1]])
+        >>> wrapped, shifts = hs.Box([2.0, 4.0]).wrap([[2.5, 5.0]], periodic=[True, False])
+        >>> wrapped.tolist()
+        [[0.5, 5.0]]
         """
         array = _inputs.as_points(points)
         ndim = self.vectors.shape[0]
@@ -153,7 +250,12 @@ class Box:
         return isinstance(other, Box) and np.array_equal(self.vectors, other.vectors)
 
     def __hash__(self) -> int:
-        return hash(self.vectors.tobytes())
+        # Numbers, not bytes: 0.0 and -0.0 are equal, whatever the rounding mode.
+        return hash(tuple(self.vectors.ravel().tolist()))
+
+    def __reduce__(self) -> tuple[type[Box], tuple[npt.NDArray[np.float64]]]:
+        # Copies are built anew: arrays that are unpickled or deep-copied can be written to.
+        return type(self), (self.vectors,)
 
     def __repr__(self) -> str:
         return f"Box({self.vectors.tolist()})"

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
+from halfshell._api import Precision
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,13 @@ class Explanation:
         With ``measure=True``, counts made by the search itself: ``bytes`` by purpose,
         ``bytes_peak``, ``groups``, ``candidates``, ``pairs``, ``ambiguous``, ``by_float64``,
         ``by_double_word``, ``by_integers``. Otherwise empty.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> plan = hs.explain([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5)
+    >>> plan.n, plan.ndim, plan.reason
+    (3, 2, 'testing every pair costs less than sorting into cells')
     """
 
     algorithm: str
@@ -87,7 +95,7 @@ def explain(
     inclusive: bool = True,
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
-    precision: str = "exact",
+    precision: Precision = "exact",
     kernel: str | None = None,
     memory_limit: float | None = None,
     measure: bool = False,
@@ -120,6 +128,9 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
+    inclusive = _inputs.as_flag(inclusive, "inclusive")
+    sort = _inputs.as_flag(sort, "sort")
+    measure = _inputs.as_flag(measure, "measure")
     array, vectors, bits = _inputs.scene(points, box, periodic)
     index_bytes = _inputs.as_index_bytes(index_dtype)
     plan = _core.explain(
@@ -140,7 +151,7 @@ def explain(
     ndim = plan["ndim"]
     return Explanation(
         algorithm="all-pairs" if plan["all_pairs"] else "grid",
-        reason=_reason(plan, len(array)),
+        reason=_reason(plan),
         n=len(array),
         ndim=ndim,
         shape=plan["shape"],
@@ -167,10 +178,12 @@ _MEASURED = (
 )
 
 
-def _reason(plan: dict[str, Any], n: int) -> str:
+def _reason(plan: dict[str, Any]) -> str:
     if plan["all_pairs"]:
         return "testing every pair costs less than sorting into cells"
-    return f"{n} points sorted into cells; a cell has neighbours in {plan['stencil_rows']} rows of cells"
+    n_rows = plan["stencil_rows"]
+    rows = "row" if n_rows == 1 else "rows"
+    return f"each point is compared with {n_rows} {rows} of cells (forward half)"
 
 
 def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:

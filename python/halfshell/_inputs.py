@@ -7,6 +7,7 @@ Values (finite, not negative, independent) are checked in the core.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,13 @@ FloatArray = npt.NDArray[np.float64]
 PointArray = npt.NDArray[np.float32] | FloatArray
 
 
-def as_real_array(values: Any, name: str) -> npt.NDArray[Any]:
+def as_real_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
     """An array of native float32 or float64 with exactly the given values.
 
     Raises TypeError for kinds that are no real numbers and ValueError, with the place, for values
-    that float64 cannot hold.
+    that float64 cannot hold. `single` is what a message says that a value without a shape must do.
     """
-    array = _as_array(values, name)
+    array = as_array(values, name, single)
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "f" and size in (4, 8):
         return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder("="))
@@ -37,26 +38,45 @@ def as_real_array(values: Any, name: str) -> npt.NDArray[Any]:
     if kind == "f":
         raise TypeError(f"{name} must be float64 or narrower: {array.dtype} would be rounded")
     if kind == "O":
-        return _from_objects(array, name)
-    raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
+        return _from_objects(array, name, single)
+    must = "hold real numbers" if array.ndim else single
+    raise TypeError(f"{name} must {must}, got dtype {array.dtype}")
 
 
-def _as_array(values: Any, name: str) -> npt.NDArray[Any]:
+def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
+    """An array of whatever dtype; TypeError or ValueError, with the name, if there is none.
+
+    What a conversion raises (a tensor on another device, or one that requires its gradient) is the
+    cause of the TypeError.
+    """
     if isinstance(values, np.ma.MaskedArray):
         if np.ma.getmaskarray(values).any():
-            where = tuple(int(k) for k in np.argwhere(np.ma.getmaskarray(values))[0])
-            raise ValueError(f"{name} must not have masked elements, got one at {list(where)}")
+            where = np.argwhere(np.ma.getmaskarray(values))[0]
+            raise ValueError(f"{_element(name, where)} must not be masked")
         return np.asarray(values.data)
     if isinstance(values, np.ndarray):
         return np.asarray(values)
     if isinstance(values, (str, bytes)):
-        raise TypeError(f"{name} must hold real numbers, got {type(values).__name__}")
-    if not hasattr(values, "__array__") and hasattr(values, "__dlpack__"):
-        return np.from_dlpack(values)
+        raise TypeError(f"{name} must {single}, got {type(values).__name__}")
     try:
+        if not hasattr(values, "__array__") and hasattr(values, "__dlpack__"):
+            return np.from_dlpack(values)
         return np.asarray(values)
+    except MemoryError:
+        raise
     except ValueError as error:
-        raise ValueError(f"{name} must be a rectangular array of numbers: {error}") from None
+        raise ValueError(f"{name} must be a rectangular array of numbers: {error}") from error
+    except Exception as error:
+        raise TypeError(
+            f"{name} cannot be converted to an array: "
+            f"{type(values).__name__} raised {type(error).__name__}: {error}"
+        ) from error
+
+
+def _element(name: str, where: Iterable[Any]) -> str:
+    """``points[2, 1]``, or the name alone for a single number."""
+    place = ", ".join(str(int(k)) for k in where)
+    return f"{name}[{place}]" if place else name
 
 
 def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
@@ -68,30 +88,32 @@ def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
     for where in np.argwhere(suspects):
         value = int(array[tuple(where)])
         if int(float(value)) != value:
-            place = ", ".join(str(int(k)) for k in where)
             raise ValueError(
-                f"{name}[{place}] = {value} is not a float64; integers beyond 2**53 are accepted "
-                "only when float64 holds them exactly"
+                f"{_element(name, where)} = {value} is not a float64; integers beyond 2**53 are "
+                "accepted only when float64 holds them exactly"
             )
 
 
-def _from_objects(array: npt.NDArray[Any], name: str) -> FloatArray:
+def _from_objects(array: npt.NDArray[Any], name: str, single: str) -> FloatArray:
     """Plain Python numbers in an object array: mixed, or integers too big for int64."""
     for where in np.ndindex(array.shape):
         value = array[where]
         if isinstance(value, (bool, float, np.float64, np.float32, np.float16, np.bool_)):
             continue
-        place = ", ".join(str(k) for k in where)
         if not isinstance(value, (int, np.integer)):
-            raise TypeError(
-                f"{name} must hold real numbers, got {type(value).__name__} at [{place}]"
-            )
+            kind = type(value).__name__
+            if not where:
+                raise TypeError(f"{name} must {single}, got {kind}")
+            raise TypeError(f"{name} must hold real numbers, got {kind} at {list(where)}")
         try:
             exact = int(float(value)) == int(value)
         except OverflowError:
-            raise OverflowError(f"{name}[{place}] is too large for float64") from None
+            power = f"{'-' if value < 0 else ''}2**{int(value).bit_length() - 1}"
+            raise OverflowError(
+                f"{_element(name, where)} = about {power} is too large for float64"
+            ) from None
         if not exact:
-            raise ValueError(f"{name}[{place}] = {value} is not a float64")
+            raise ValueError(f"{_element(name, where)} = {value} is not a float64")
     return array.astype(np.float64)
 
 
@@ -130,7 +152,7 @@ def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
         return (1 << ndim) - 1 if values else 0
     if isinstance(values, (str, bytes)):
         raise TypeError(f"periodic must be a bool or {ndim} bools, got {values!r}")
-    array = np.asarray(values)
+    array = as_array(values, "periodic")
     if array.dtype.kind != "b" and not (
         array.dtype.kind in "iu" and bool(np.isin(array, (0, 1)).all())
     ):
@@ -146,10 +168,38 @@ def as_cutoff(value: Any) -> float:
     """A plain number; anything that float64 would have to round is refused."""
     if isinstance(value, float):
         return value
-    array = as_real_array(value, "cutoff")
+    array = as_real_array(value, "cutoff", "be a number")
     if array.ndim != 0:
         raise TypeError(f"cutoff must be a number, got shape {array.shape}")
     return float(array)
+
+
+def as_cutoffs(value: Any) -> float | FloatArray:
+    """One cutoff, or several in ascending order, which are finite and not negative."""
+    if isinstance(value, float):
+        return value
+    array = as_real_array(value, "cutoff", "be a number").astype(np.float64)
+    if array.ndim == 0:
+        return float(array)
+    if array.ndim != 1:
+        raise ValueError(f"cutoff must be a number or have shape (k,), got {array.shape}")
+    for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
+        raise ValueError(f"cutoff must be finite and not negative, got cutoff[{k}] = {array[k]}")
+    for k in np.flatnonzero(array[1:] < array[:-1]):
+        raise ValueError(
+            f"several cutoffs must be ascending, got cutoff[{k}] = {array[k]} before "
+            f"cutoff[{k + 1}] = {array[k + 1]}"
+        )
+    return array
+
+
+def as_flag(value: Any, name: str) -> bool:
+    """A bool; also one of NumPy's, and the integers 0 and 1."""
+    if isinstance(value, (bool, np.bool_)) or (
+        isinstance(value, (int, np.integer)) and value in (0, 1)
+    ):
+        return bool(value)
+    raise TypeError(f"{name} must be True or False, got {value!r}")
 
 
 def as_index_bytes(index_dtype: Any) -> int:

@@ -90,8 +90,14 @@ def verify(
 
     Raises
     ------
+    TypeError
+        If `i`, `j` or `S` does not hold whole numbers, `inclusive` or `full` is not a bool, or a
+        part of the scene is of the wrong kind.
     ValueError
-        If i, j and S do not fit each other or the points.
+        If `i`, `j` and `S` do not fit each other or the points, or the scene is refused by
+        `pairs`.
+    OverflowError, MemoryError
+        As `pairs`, for the right list.
 
     Examples
     --------
@@ -103,6 +109,8 @@ def verify(
     >>> verdict.missed.tolist(), verdict.spurious.tolist()
     ([[0, 1], [1, 2]], [[0, 2]])
     """
+    full = _inputs.as_flag(full, "full")
+    inclusive = _inputs.as_flag(inclusive, "inclusive")
     array, vectors, bits = _inputs.scene(points, box, periodic)
     ndim = array.shape[1]
     given = _rows(i, j, S, len(array), ndim)
@@ -142,11 +150,13 @@ def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
     """The list as rows (i, j) or (i, j, *S), checked."""
     columns = []
     for name, values in (("i", i), ("j", j)):
-        column = np.asarray(values)
+        column = _inputs.as_array(values, name)
         if column.size and column.dtype.kind not in "iu":
             raise TypeError(f"{name} must hold integers, got dtype {column.dtype}")
         if column.ndim != 1:
             raise ValueError(f"{name} must have shape (m,), got {column.shape}")
+        if column.size and n == 0:
+            raise ValueError(f"{name} must be empty: there are no points")
         if column.size and (int(column.min()) < 0 or int(column.max()) >= n):
             raise ValueError(f"{name} must be point numbers from 0 to {n - 1}")
         columns.append(column.astype(np.int64))
@@ -156,7 +166,7 @@ def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
         )
     if S is None:
         return np.column_stack(columns)
-    shifts = np.asarray(S)
+    shifts = _inputs.as_array(S, "S")
     if shifts.shape != (len(columns[0]), ndim):
         raise ValueError(f"S must have shape ({len(columns[0])}, {ndim}), got {shifts.shape}")
     if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):
@@ -214,9 +224,7 @@ def _confirm(
                 (
                     Fraction(float(points[j, k]))
                     - Fraction(float(points[i, k]))
-                    + sum(
-                        s * Fraction(float(box[axis, k])) for axis, s in enumerate(shift) if s
-                    )
+                    + sum(s * Fraction(float(box[axis, k])) for axis, s in enumerate(shift) if s)
                 )
                 ** 2
                 for k in range(points.shape[1])

@@ -1,0 +1,95 @@
+"""What type checkers infer: the overloads of the public functions, under mypy --strict."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import halfshell as hs
+
+GOOD = """
+from typing import Any, assert_type
+
+import numpy as np
+import numpy.typing as npt
+
+import halfshell as hs
+
+p = np.zeros((3, 3))
+quantities: str = input()
+anything: Any = quantities
+options: dict[str, Any] = {"box": [1.0, 1.0, 1.0]}
+
+assert_type(hs.pairs(p, 1.0), tuple[npt.NDArray[Any], npt.NDArray[Any]])
+assert_type(hs.pairs(p, 1, quantities="ij"), tuple[npt.NDArray[Any], npt.NDArray[Any]])
+assert_type(hs.pairs(p, 1.0, quantities="d", sort=True), npt.NDArray[Any])
+assert_type(
+    hs.pairs(p, 1.0, quantities=quantities), npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+)
+total = hs.pairs(p, 1.0, box=[2.0] * 3, periodic=True, quantities="d").sum()
+i, j = hs.pairs(p, 1.0, index_dtype=np.int32, precision="double", kernel=None, memory_limit=1e9)
+i, j, d, S = hs.pairs(p, 1.0, quantities="ijdS", inclusive=False)
+hs.pairs(p, 1.0, **options)
+
+n: int = hs.count_pairs(p, 1.0)
+assert_type(hs.count_pairs(p, 1), int)
+assert_type(hs.count_pairs(p, np.float32(1.0), precision="single"), int)
+assert_type(hs.count_pairs(p, [0.5, 1.0]), npt.NDArray[np.int64])
+assert_type(hs.count_pairs(p, (1, 2), inclusive=False), npt.NDArray[np.int64])
+assert_type(hs.count_pairs(p, np.linspace(0.0, 1.0)), npt.NDArray[np.int64])
+
+plan: hs.Explanation = hs.explain(p, 1.0, precision="exact")
+verdict: hs.Verdict = hs.verify(p, 1.0, i, j)
+box = hs.Box.orthorhombic(1.0, 1.0)
+assert_type(box.vectors, npt.NDArray[np.float64])
+assert_type(box.wrap(p), tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]])
+"""
+
+BAD = {
+    "hs.pairs(p, 1.0, precision='half')": "arg-type|call-overload",
+    "hs.pairs(p, 1.0, boks=None)": "call-overload",
+    "hs.pairs(p, 1.0).sum()": "attr-defined",
+    "m: int = hs.count_pairs(p, [1.0])": "assignment",
+    "hs.count_pairs(p, 1.0, sort=True)": "call-overload",
+    "hs.explain(p, 1.0, precision='half')": "arg-type",
+    "hs.Box([1.0]).vectors = p": "misc",
+}
+
+needs_mypy = pytest.mark.skipif(
+    importlib.util.find_spec("mypy") is None, reason="mypy is not installed"
+)
+
+
+def mypy(folder, text):
+    """Run mypy --strict on a text, against the halfshell that is being tested."""
+    (folder / "snippet.py").write_text(text)
+    (folder / "mypy.ini").write_text("[mypy]\nstrict = true\ncache_dir = cache\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "snippet.py"], cwd=folder, capture_output=True, text=True
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_package_says_that_it_is_typed():
+    assert (Path(hs.__file__).parent / "py.typed").exists()
+
+
+@needs_mypy
+def test_results_have_the_types_that_the_arguments_say(tmp_path):
+    status, output = mypy(tmp_path, GOOD)
+    assert status == 0, output
+
+
+@needs_mypy
+def test_wrong_calls_are_found(tmp_path):
+    head = "import numpy as np\nimport halfshell as hs\np = np.zeros((3, 3))\n"
+    status, output = mypy(tmp_path, head + "\n".join(BAD) + "\n")
+    assert status == 1, output
+    reported = [line for line in output.splitlines() if line.startswith("snippet.py:")]
+    for number, (line, codes) in enumerate(BAD.items(), start=4):
+        said = [text for text in reported if text.startswith(f"snippet.py:{number}: error")]
+        assert any(f"[{code}]" in text for text in said for code in codes.split("|")), (
+            f"{line}\n{output}"
+        )
