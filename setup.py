@@ -34,7 +34,7 @@ else:
     if os.environ.get("HS_DEBUG"):
         compile_args += ["-O0", "-g3", "-UNDEBUG"]
     if os.environ.get("HS_SANITIZE"):
-        compile_args += ["-g", "-UNDEBUG", "-fsanitize=address,undefined"]
+        compile_args += ["-g", "-UNDEBUG", "-fsanitize=address,undefined,float-cast-overflow"]
         link_args += ["-fsanitize=address,undefined"]
 
 sources = [

@@ -49,7 +49,9 @@ raise_memory(const hs_failure *failure)
                  "count_pairs",
                  failure->expected_pairs);
     } else {
-        snprintf(text, sizeof text, "not enough memory for the search");
+        snprintf(text, sizeof text,
+                 "not enough memory for the search itself, before any pair: %.3g bytes are allowed",
+                 failure->limit_bytes);
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
@@ -100,16 +102,10 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                                  "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
                                  failure->value);
     case HS_ERR_SHIFT_RANGE:
-        if (failure->row < 0) {
-            PyErr_SetString(PyExc_OverflowError, "the shift S of a pair does not fit int32: the "
-                                                 "points lie too many box vectors apart; wrap "
-                                                 "them first");
-        } else {
-            PyErr_Format(PyExc_OverflowError,
-                         "points[%lld] lies more than 2**51 box vectors away, further than "
-                         "shifts are counted; wrap the points first",
-                         (long long)failure->row);
-        }
+        PyErr_Format(PyExc_OverflowError,
+                     "points[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
+                     "and S holds 2**31; wrap the points first",
+                     (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
     case HS_ERR_INTERRUPTED:

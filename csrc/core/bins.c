@@ -18,7 +18,8 @@ count_points(const hs_scene *scene, const hs_grid *grid, const hs_options *optio
         const double *x = scene->x + i * scene->ndim;
         int64_t       cell = 0;
         for (int k = 0; k < scene->ndim; k++) {
-            cell += hs_grid_index(grid, k, hs_scene_coordinate(scene, x, k)) * grid->stride[k];
+            const double t = hs_lattice_coordinate(&scene->lattice, x, k);
+            cell += hs_grid_index(grid, k, t) * grid->stride[k];
         }
         cells[i] = (uint32_t)cell;
         start[cell + 1]++;

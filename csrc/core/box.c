@@ -10,7 +10,9 @@
 #include <math.h>
 #include <string.h>
 
-/* Boxes are scaled to about this exponent, so that products of a few lengths stay finite. */
+#define LARGEST_EXPONENT 1000
+
+/* Only boxes near the end of the range are scaled, to leave room for sums of a few lengths. */
 static hs_scale
 scale_of_box(const hs_box *box)
 {
@@ -20,7 +22,8 @@ scale_of_box(const hs_box *box)
             largest = fmax(largest, fabs(box->rows[l][k]));
         }
     }
-    return hs_scale_of(largest > 0.0 ? ilogb(largest) : 0);
+    const int exponent = largest > 0.0 ? ilogb(largest) : 0;
+    return hs_scale_of(exponent > LARGEST_EXPONENT ? exponent - LARGEST_EXPONENT : 0);
 }
 
 hs_status
@@ -37,7 +40,7 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
         const hs_scale back = hs_scale_of(-scale.exponent);
         hs_lattice_init_given(box, scale, &lattice);
         for (int r = 0; heights != NULL && r < lattice.n_periodic; r++) {
-            const int l = lattice.axis_of_row[r];
+            const int l = lattice.vector_of_row[r];
             heights[l] = hs_scale_apply(back, lattice.period[l]);
         }
         if (volume != NULL) {
@@ -89,6 +92,7 @@ wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *t
 {
     double middle[HS_MAX_DIM];
     double magnitude = 0.0;
+    bool   moved = false;
     if (!hs_wrap_point(lattice, x, middle, turns, &magnitude)) {
         return false;
     }
@@ -97,11 +101,12 @@ wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *t
         if (r < 0) {
             continue;
         }
-        double t = 0.0;
-        for (int c = 0; c < lattice->ndim; c++) {
-            t += lattice->normal[k][c] * middle[c];
-        }
-        turns[r] -= t < 0.0;
+        turns[r] -= hs_lattice_coordinate(lattice, middle, k) < 0.0;
+        moved = moved || turns[r] != 0;
+    }
+    if (!moved) {
+        memcpy(wrapped, x, (size_t)lattice->ndim * sizeof *x);
+        return true;
     }
     if (!hs_wrap_by(lattice, x, turns, wrapped, &magnitude)) {
         return false;
@@ -127,12 +132,14 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
             return HS_ERR_SHIFT_RANGE;
         }
         for (int k = 0; wrapped != NULL && k < d; k++) {
-            wrapped[i * d + k] = hs_scale_apply(back, inside[k]);
+            const bool stays = inside[k] == x[k]; /* scaling may have lost its last digits */
+            wrapped[i * d + k] =
+                stays ? cloud->x[i * d + k] : hs_scale_apply(back, inside[k]);
         }
         if (shift != NULL) {
             memset(shift + i * d, 0, (size_t)d * sizeof(int64_t));
             for (int l = 0; l < lattice->n_periodic; l++) {
-                shift[i * d + lattice->axis_of_row[l]] = -given[l];
+                shift[i * d + lattice->vector_of_row[l]] = -given[l];
             }
         }
     }
@@ -157,7 +164,11 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     if (status == HS_OK) {
         const hs_scale scale = scale_of_box(box);
         hs_lattice_init_given(box, scale, &lattice);
-        status = wrap_rows(&lattice, scale, &cloud, wrapped, shift, failure);
+        /* First without writing: a point that cannot be wrapped leaves the outputs alone. */
+        status = wrap_rows(&lattice, scale, &cloud, NULL, NULL, failure);
+        if (status == HS_OK) {
+            status = wrap_rows(&lattice, scale, &cloud, wrapped, shift, failure);
+        }
         hs_cloud_free(NULL, &cloud);
     }
     hs_fpenv_leave(saved);

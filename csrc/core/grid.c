@@ -218,6 +218,9 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
     const double density = (double)scene->n / volume;
     const double ball = unit_ball(scene->ndim) * pow(scene->cutoff, scene->ndim);
     grid->expected_pairs = 0.5 * (double)scene->n * density * ball;
+    if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
+        grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
+    }
     const double neighbours = density * ball;
     /* Narrower rows test fewer pairs that are too far apart, and cost more rows to visit. */
     const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;

@@ -3,7 +3,7 @@
  * lattice.c: see lattice.h.
  *
  * Normals and heights need not be accurate, only consistent: whatever unit vector `normal[k]`
- * is, |normal[k] . D| <= |D| holds, and scene.c measures how far a lattice vector moves a grid
+ * is, |normal[k] . D| <= |D| holds, and grid.c measures how far a lattice vector moves a grid
  * coordinate that it should not move. A bad normal makes cells wider, never an answer wrong.
  */
 #include "lattice.h"
@@ -22,13 +22,13 @@ hs_scale_of(int exponent)
 }
 
 static int
-collect_periodic_rows(const hs_box *box, double rows[][HS_MAX_DIM], int *axis_of_row)
+collect_periodic_rows(const hs_box *box, double rows[][HS_MAX_DIM], int *vector_of_row)
 {
     int n_periodic = 0;
     for (int l = 0; l < box->ndim; l++) {
         if (box->periodic[l]) {
             memcpy(rows[n_periodic], box->rows[l], sizeof box->rows[l]);
-            axis_of_row[n_periodic++] = l;
+            vector_of_row[n_periodic++] = l;
         }
     }
     return n_periodic;
@@ -38,15 +38,15 @@ hs_status
 hs_box_check(const hs_box *box, hs_failure *failure)
 {
     double rows[HS_MAX_DIM][HS_MAX_DIM];
-    int    axis_of_row[HS_MAX_DIM];
+    int    vector_of_row[HS_MAX_DIM];
     if (box == NULL) {
         return HS_OK;
     }
-    const int n_periodic = collect_periodic_rows(box, rows, axis_of_row);
+    const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
     for (int r = 0; r < n_periodic; r++) {
         for (int k = 0; k < box->ndim; k++) {
             if (!isfinite(rows[r][k])) {
-                failure->row = axis_of_row[r];
+                failure->row = vector_of_row[r];
                 failure->column = k;
                 failure->value = rows[r][k];
                 return HS_ERR_BOX_FINITE;
@@ -206,10 +206,10 @@ static void
 set_general_axes(hs_lattice *lattice)
 {
     for (int r = 0; r < lattice->n_periodic; r++) {
-        lattice->row_of_axis[lattice->axis_of_row[r]] = r;
+        lattice->row_of_axis[lattice->vector_of_row[r]] = r;
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
-        const int k = lattice->axis_of_row[r];
+        const int k = lattice->vector_of_row[r];
         double   *normal = lattice->normal[k];
         set_periodic_normal(lattice, r, normal);
         double height = dot(lattice->ndim, normal, lattice->rows[r]);
@@ -259,7 +259,7 @@ take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
         lattice->row_of_axis[k] = -1;
     }
     if (box != NULL) {
-        lattice->n_periodic = collect_periodic_rows(box, lattice->given, lattice->axis_of_row);
+        lattice->n_periodic = collect_periodic_rows(box, lattice->given, lattice->vector_of_row);
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
         lattice->U[r][r] = 1;
@@ -302,29 +302,77 @@ hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice
     }
 }
 
+/*
+ * The vector that meets given row l with product 1 and the other rows not at all: a combination of
+ * the same vectors of the short basis, which are known well however skewed the box is. Scaled by
+ * 2^*exponent to have an ordinary size.
+ */
+static void
+dual_of_given(const hs_lattice *reduced, int l, double *dual, int *exponent)
+{
+    const int d = reduced->ndim;
+    *exponent = -INT32_MAX / 4;
+    for (int k = 0; k < d; k++) {
+        const int r = reduced->row_of_axis[k];
+        if (r >= 0 && reduced->U[r][l] != 0) {
+            const int e = ilogb((double)reduced->U[r][l]) - ilogb(reduced->period[k]);
+            *exponent = e > *exponent ? e : *exponent;
+        }
+    }
+    for (int c = 0; c < d; c++) {
+        dual[c] = 0.0;
+        for (int k = 0; k < d; k++) {
+            const int r = reduced->row_of_axis[k];
+            if (r >= 0 && reduced->U[r][l] != 0) {
+                int          e;
+                const double period = frexp(reduced->period[k], &e);
+                dual[c] += ldexp((double)reduced->U[r][l] / period * reduced->normal[k][c],
+                                 -e - *exponent);
+            }
+        }
+    }
+}
+
 void
 hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice)
 {
+    hs_lattice reduced;
+    hs_lattice_init(box, box->ndim, scale, &reduced);
     take_rows(box, box->ndim, scale, lattice);
-    set_general_axes(lattice);
+    lattice->volume_mantissa = reduced.volume_mantissa;
+    lattice->volume_exponent = reduced.volume_exponent;
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        const int k = lattice->vector_of_row[l];
+        double   *normal = lattice->normal[k];
+        int       exponent;
+        dual_of_given(&reduced, l, normal, &exponent);
+        const double length = orthonormalise(lattice->ndim, 0, NULL, normal);
+        lattice->row_of_axis[k] = l;
+        lattice->period[k] = length > 0.0 ? ldexp(1.0 / length, -exponent) : 0.0;
+    }
+    for (int c = 0; reduced.aligned && !reduced.reduced && c < box->ndim; c++) {
+        if (reduced.row_of_axis[c] >= 0) { /* nothing to round */
+            lattice->period[lattice->vector_of_row[reduced.row_of_axis[c]]] = reduced.period[c];
+        }
+    }
 }
 
 bool
 hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given)
 {
     for (int l = 0; l < lattice->n_periodic; l++) {
-        double  rough = 0.0; /* good to a relative 1e-15, enough to see an overflow coming */
-        int64_t sum = 0;
+        double   rough = 0.0, size = 0.0; /* the sum, and what its rounding is relative to */
+        uint64_t sum = 0; /* modulo 2^64: exact once the sum is known to be small */
         for (int r = 0; r < lattice->n_periodic; r++) {
-            rough += fabs((double)reduced[r]) * fabs((double)lattice->U[r][l]);
+            const double term = (double)reduced[r] * (double)lattice->U[r][l];
+            rough += term;
+            size += fabs(term);
+            sum += (uint64_t)reduced[r] * (uint64_t)lattice->U[r][l];
         }
-        if (rough >= 0x1p62) {
+        if (!(fabs(rough) + 0x1p-48 * size < 0x1p62)) {
             return false;
         }
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            sum += reduced[r] * lattice->U[r][l];
-        }
-        given[l] = sum;
+        given[l] = sum <= INT64_MAX ? (int64_t)sum : -(int64_t)(UINT64_MAX - sum) - 1;
     }
     return true;
 }

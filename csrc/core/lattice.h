@@ -33,7 +33,7 @@ typedef struct hs_lattice {
     int     n_periodic;
     bool    aligned;                         /* B is diagonal: t_k is coordinate k itself */
     bool    reduced;                         /* B is not the given rows (up to sign) */
-    int     axis_of_row[HS_MAX_DIM];         /* box vector that periodic row r is */
+    int     vector_of_row[HS_MAX_DIM];         /* box vector that periodic row r is */
     int     row_of_axis[HS_MAX_DIM];         /* row of B along grid axis k, or -1: open */
     double  given[HS_MAX_DIM][HS_MAX_DIM];   /* periodic rows as given, not scaled */
     double  scaled[HS_MAX_DIM][HS_MAX_DIM];  /* the same, scaled */
@@ -47,6 +47,20 @@ typedef struct hs_lattice {
     double  direction[HS_MAX_DIM][HS_MAX_DIM]; /* D = sum_k (normal[k] . D) direction[k] */
 } hs_lattice;
 
+/* t_k of X, rounded; coordinate k itself in an aligned lattice. */
+HS_ALWAYS_INLINE double
+hs_lattice_coordinate(const hs_lattice *lattice, const double *x, int k)
+{
+    if (lattice->aligned) {
+        return x[k];
+    }
+    double t = 0.0;
+    for (int c = 0; c < lattice->ndim; c++) {
+        t += lattice->normal[k][c] * x[c];
+    }
+    return t;
+}
+
 /* Periodic entries finite and periodic rows independent, decided exactly. NULL box: HS_OK. */
 hs_status hs_box_check(const hs_box *box, hs_failure *failure);
 
@@ -54,7 +68,8 @@ hs_status hs_box_check(const hs_box *box, hs_failure *failure);
  * dimensions. */
 void hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice);
 
-/* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows. */
+/* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows, axis k
+ * is box vector k. Only rows, normals, periods and the volume are set. */
 void hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice);
 
 /* Volume of the periodic rows, each length times 2^exponent; 1 without rows. */

@@ -93,6 +93,9 @@ find_pairs(hs_pairs *pairs, hs_failure *failure)
             status = hs_sort_pairs(search, store, search->scene.n, &pairs->order);
         }
     }
+    if (status == HS_ERR_SHIFT_RANGE) {
+        failure->row = search->failed_point;
+    }
     if (status == HS_ERR_MEMORY && failure->expected_pairs == 0.0) {
         failure->expected_pairs = (double)store->n_pairs;
         failure->limit_bytes = search->account.limit;
@@ -157,6 +160,9 @@ hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *opt
     hs_status      status = hs_search_open(points, box, &counting, &search, failure);
     if (status == HS_OK) {
         status = hs_search_walk(&search, count_hits, &found);
+        if (status == HS_ERR_SHIFT_RANGE) {
+            failure->row = search.failed_point;
+        }
         hs_search_report(&search, found);
         hs_search_close(&search);
     }

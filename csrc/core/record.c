@@ -27,7 +27,7 @@ put_shift(const hs_lattice *lattice, const int64_t *given, bool negate, int32_t 
         if (value < INT32_MIN || value > INT32_MAX) {
             return false;
         }
-        shift[lattice->axis_of_row[l]] = (int32_t)value;
+        shift[lattice->vector_of_row[l]] = (int32_t)value;
     }
     return true;
 }
@@ -83,6 +83,9 @@ visit_places(hs_store *store, const hs_search *search, int32_t si, int32_t n_hit
     const int32_t  i = bins->order[si];
     const bool     measures = (store->stored & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) != 0;
     const bool     shifts = (store->stored & (HS_WANT_SHIFT | HS_WANT_VECTOR)) != 0;
+    /* Shifts that only sort the images of one pair may leave out what all of these share: the turns
+     * by which i and j were wrapped, which can be too many for int32. */
+    const bool keys_only = (search->options.want & HS_WANT_SHIFT) == 0;
     for (int32_t h = 0; h < n_hits; h++) {
         const int64_t at = block->n + h;
         hs_traced     pair;
@@ -95,9 +98,13 @@ visit_places(hs_store *store, const hs_search *search, int32_t si, int32_t n_hit
         const bool    negate =
             j < i || (j == i && shifts && is_backward(pair.given, bins->n_periodic));
         put_indices(block, at, i, j);
-        if (block->shift != NULL && !put_shift(&search->scene.lattice, pair.given, negate,
-                                               block->shift + at * store->ndim)) {
-            return HS_ERR_SHIFT_RANGE;
+        if (block->shift != NULL) {
+            int64_t key[HS_MAX_DIM];
+            if ((keys_only && !hs_lattice_shift(&search->scene.lattice, pair.image, key)) ||
+                !put_shift(&search->scene.lattice, keys_only ? key : pair.given, negate,
+                           block->shift + at * store->ndim)) {
+                return HS_ERR_SHIFT_RANGE;
+            }
         }
         if (measures) {
             put_measures(store, search, &pair, negate, block, at);

@@ -22,18 +22,14 @@
 
 #include "doubleword.h"
 
-#define MAX_COEFFICIENT (INT64_C(1) << 52)
+#define MAX_COEFFICIENT (INT64_C(1) << 61)
+#define COEFFICIENT_TAIL (INT64_C(1) << 26) /* splits them into 35 and 26 bits, exact as doubles */
 
-/* Exchanging rows ends only if each exchange gains a factor; this one is customary. */
-#define LOVASZ 0.99
-
+#define LOVASZ 0.99 /* the factor that each exchange of rows must gain, so that they end */
 /* What a step must gain to count: far above rounding, so that ties are left alone. */
 #define NOTABLY_LESS (1.0 - 0x1p-40)
 
-/*
- * Bounds on work, several times what any box was seen to need that ends by itself. Only rows
- * that agree to all digits of a double, and so need coefficients beyond 2^52, run into them.
- */
+/* Bounds on work, several times what any box was seen to need that ends by itself. */
 enum { MAX_STEPS = 2000, MAX_SWEEPS = 16, MAX_REFUSED = 100, MAX_PASSES = 8 };
 
 /* x * 2^exponent, where the largest |x[k]| is in [0.5, 1): squares neither overflow nor vanish. */
@@ -120,7 +116,7 @@ add_exactly(double sum[], int m, double b)
 static double
 combine(const basis *b, const int64_t coefficients[], int c, double *error)
 {
-    double sum[2 * HS_MAX_DIM + 1], size = 0.0, value = 0.0, lost = 0.0;
+    double sum[4 * HS_MAX_DIM + 1], size = 0.0, value = 0.0, lost = 0.0;
     int    m = 0;
     for (int l = 0; l < b->n_rows; l++) {
         size += fabs((double)coefficients[l]) * fabs(b->given[l][c]);
@@ -129,12 +125,15 @@ combine(const basis *b, const int64_t coefficients[], int c, double *error)
     for (int l = 0; l < b->n_rows; l++) {
         double given = coefficients[l] != 0 ? b->given[l][c] : 0.0, entry = given * scale;
         if (entry / scale != given) {
-            lost = 0x1p-890; /* 8 rows, 2^52 times half of 2^-1074, times 2^120 */
+            lost = 0x1p-890; /* 8 rows, 2^61 times half of 2^-1074, times 2^120 */
         }
         if (entry != 0.0) {
-            /* Exact for subnormal entries too: a multiple of the entry's last bit. */
-            hs_dw product = hs_two_product((double)coefficients[l], entry);
-            m = add_exactly(sum, add_exactly(sum, m, product.lo), product.hi);
+            /* Exact for subnormal entries too: multiples of the entry's last bit. */
+            const int64_t tail = coefficients[l] % COEFFICIENT_TAIL;
+            const hs_dw   high = hs_two_product((double)(coefficients[l] - tail), entry);
+            const hs_dw   low = hs_two_product((double)tail, entry);
+            m = add_exactly(sum, add_exactly(sum, m, low.lo), low.hi);
+            m = add_exactly(sum, add_exactly(sum, m, high.lo), high.hi);
         }
     }
     for (int i = 0; i < m; i++) {
@@ -151,7 +150,7 @@ combine(const basis *b, const int64_t coefficients[], int c, double *error)
     return value / scale;
 }
 
-/* out = row - multiple * other; false when an entry passes 2^52. */
+/* out = row - multiple * other; false when an entry passes 2^61. */
 static bool
 subtract_integers(int n, const int64_t row[], int64_t multiple, const int64_t other[],
                   int64_t out[])
@@ -232,7 +231,7 @@ coefficient(const basis *b, int k, int j)
 /*
  * Bring the coefficients of the k-th row to one half or less. One sweep does unless the row is
  * very long: then each takes off what double precision can see, and the next sees more. A
- * coefficient beyond 2^52 is left, and so is one that drowns in the rounding of a long row.
+ * coefficient beyond 2^61 is left, and so is one that drowns in the rounding of a long row.
  */
 static void
 size_reduce(basis *b, int k)

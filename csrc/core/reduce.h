@@ -15,14 +15,14 @@
 typedef struct hs_reduction {
     int     n_rows;
     bool    changed;                       /* U is not the identity */
-    int64_t U[HS_MAX_DIM][HS_MAX_DIM];     /* |U[k][l]| <= 2^52 */
+    int64_t U[HS_MAX_DIM][HS_MAX_DIM];     /* |U[k][l]| <= 2^61 */
     double  rows[HS_MAX_DIM][HS_MAX_DIM];  /* B rounded to float64 ... */
     double  error[HS_MAX_DIM];             /* ... each entry of row k within this */
 } hs_reduction;
 
 /*
  * rows: n_rows linearly independent rows (see rank.h) of ndim finite doubles. Any scale, 1e-300 to
- * 1e300, rows of very different length too. Where a row would need a coefficient beyond 2^52, the
+ * 1e300, rows of very different length too. Where a row would need a coefficient beyond 2^61, the
  * reduction stops early: the result is always a valid basis, at worst the given one.
  */
 void hs_reduce(int ndim, int n_rows, const double rows[][HS_MAX_DIM], hs_reduction *reduction);

@@ -134,7 +134,8 @@ find_ranges(hs_scene *scene)
             lower = upper = 0.0;
         } else {
             for (int64_t i = 0; i < scene->n; i++) {
-                const double t = hs_scene_coordinate(scene, scene->x + i * scene->ndim, k);
+                const double *x = scene->x + i * scene->ndim;
+                const double  t = hs_lattice_coordinate(&scene->lattice, x, k);
                 lower = t < lower ? t : lower;
                 upper = t > upper ? t : upper;
             }
@@ -318,8 +319,10 @@ hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
     scene->scale = hs_scale_of(choose_exponent(&cloud, box, options->cutoff, &scene->extreme));
     scene->unscale = hs_scale_of(-scene->scale.exponent);
     scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
+    scene->cutoff_low = scene->cutoff;
     if (scene->extreme && options->cutoff > 0.0) {
-        /* The scaled cutoff may have been rounded or flushed: take a bound. */
+        /* The scaled cutoff may have been rounded or flushed: take bounds. */
+        scene->cutoff_low -= SCALING_LOSS;
         scene->cutoff += SCALING_LOSS;
     }
     /* Without points nothing has an image, however small the box is. */

@@ -18,6 +18,7 @@ typedef struct hs_scene {
     hs_scale   unscale;       /* the way back */
     hs_lattice lattice;
     double     cutoff;        /* scaled; the true one, or an upper bound when `extreme` */
+    double     cutoff_low;    /* at most the true one */
     double     radius;        /* candidates are sought up to here; cutoff, or a little more */
     bool       extreme;       /* scaling lost digits: pairs are decided on the originals */
     hs_metric  metric;        /* decides on X, or on the originals if there are any */
@@ -38,20 +39,6 @@ typedef struct hs_scene {
  */
 hs_status hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
                         const hs_options *options, hs_scene *scene, hs_failure *failure);
-
-/* t_k of X. */
-HS_ALWAYS_INLINE double
-hs_scene_coordinate(const hs_scene *scene, const double *x, int k)
-{
-    if (scene->lattice.aligned) {
-        return x[k];
-    }
-    double t = 0.0;
-    for (int c = 0; c < scene->ndim; c++) {
-        t += scene->lattice.normal[k][c] * x[c];
-    }
-    return t;
-}
 
 /* A length that the metric measured, in the caller's unit. */
 HS_ALWAYS_INLINE double

@@ -20,11 +20,19 @@ floor_divide(int64_t a, int64_t b)
     return quotient - (a % b != 0 && (a < 0) != (b < 0));
 }
 
+/* An hs_poll_fn: the caller's, counted. */
+static bool
+counted_poll(void *context, double fraction)
+{
+    hs_search *search = context;
+    search->n_polls++;
+    return search->callers_poll(search->callers_context, fraction);
+}
+
 hs_status
 hs_search_poll(hs_search *search)
 {
     search->work_since_poll = 0;
-    search->n_polls += search->options.poll != NULL;
     return hs_poll(&search->options, search->fraction);
 }
 
@@ -42,8 +50,11 @@ block_thresholds(const hs_search *search)
     }
     const double extent = hs_block_extent(&search->group, &search->block, scene->ndim);
     thresholds = hs_thresholds_of(scene->ndim, scene->cutoff, extent, search->filter_error);
-    if (scene->extreme) {
-        thresholds.in = -1.0f; /* the scaled cutoff is only an upper bound */
+    if (scene->extreme) { /* the scaled cutoff is only an upper bound */
+        thresholds.in = scene->cutoff_low > 0.0
+                            ? hs_thresholds_of(scene->ndim, scene->cutoff_low, extent,
+                                               search->filter_error).in
+                            : -1.0f;
     }
     return thresholds;
 }
@@ -101,6 +112,7 @@ scan_block(hs_search *search)
             status = search->visit(search->visit_context, search, search->group.first + t, n_hits);
         }
         if (status != HS_OK) {
+            search->failed_point = search->bins.order[search->group.first + t];
             return status;
         }
     }
@@ -247,6 +259,9 @@ hs_search_walk(hs_search *search, hs_visit_fn visit, void *context)
     int64_t        index[HS_MAX_DIM] = {0};
     search->visit = visit;
     search->visit_context = context;
+    if (!search->options.inclusive && search->options.cutoff == 0.0) {
+        return HS_OK; /* no distance is below zero */
+    }
     for (int64_t cell = 0; cell < grid->n_cells; cell += grid->shape[0]) {
         const int32_t *start = search->bins.start + cell;
         if (start[0] < start[grid->shape[0]]) {
@@ -271,7 +286,8 @@ hs_search_point(hs_search *search, int32_t si, hs_visit_fn visit, void *context)
         x[k] = search->bins.x[k][si];
     }
     for (int k = 0; k < search->scene.ndim; k++) {
-        index[k] = hs_grid_index(&search->grid, k, hs_scene_coordinate(&search->scene, x, k));
+        const double t = hs_lattice_coordinate(&search->scene.lattice, x, k);
+        index[k] = hs_grid_index(&search->grid, k, t);
     }
     search->visit = visit;
     search->visit_context = context;
@@ -285,6 +301,13 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
 {
     memset(search, 0, sizeof *search);
     search->options = *options;
+    if (options->poll != NULL) {
+        search->callers_poll = options->poll;
+        search->callers_context = options->poll_context;
+        search->options.poll = counted_poll;
+        search->options.poll_context = search;
+    }
+    options = &search->options;
     hs_account_init(&search->account, options);
     search->kernel = hs_kernel_select(options->kernel);
     if (search->kernel == NULL) {
@@ -301,7 +324,8 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
         status = hs_estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
-        status = hs_stencil_build(account, &search->scene, &search->grid, &search->stencil);
+        status = hs_stencil_build(account, options, &search->scene, &search->grid,
+                                  &search->stencil);
     }
     if (status == HS_OK) {
         search->links = hs_alloc(account, HS_FOR_STENCIL, search->stencil.n_rows, sizeof(hs_link));

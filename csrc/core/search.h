@@ -43,8 +43,11 @@ struct hs_search {
     double           filter_error; /* bound on each component before rounding to float32 */
     hs_visit_fn      visit;
     void            *visit_context;
+    int64_t          failed_point;   /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
     bool             block_is_first; /* of its group: candidate t is group point t */
     hs_stages        stages;
+    hs_poll_fn       callers_poll; /* behind options.poll, which counts the calls */
+    void            *callers_context;
     int64_t          n_groups, n_candidates, n_ambiguous, n_polls;
     int64_t          work_since_poll;
     double           fraction; /* of the walk that is done */

@@ -9,10 +9,15 @@
  */
 #include "stencil.h"
 
+#include "poll.h"
+
 #include <math.h>
 #include <string.h>
 
 #define DUALITY_DEFECT 1e-9 /* normals and directions further from dual than this are not used */
+#define FIRST_CAPACITY 1024 /* rows; doubled as needed: most of a wide block is out of reach */
+#define MOST_UNPRUNED 0x1p22 /* rows, in a box too flat to tell which of them are out of reach */
+#define POLL_ROWS (1 << 16)
 #define FRAME_SLACK 1e-6    /* relative; covers the defect in 8 dimensions many times */
 
 typedef struct frame {
@@ -92,7 +97,8 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
                 hs_stencil_row *row)
 {
     const double radius = scene->radius * (1.0 + FRAME_SLACK);
-    double       left = radius * radius; /* of the square, for the components still open */
+    const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
+    double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
     double       low = -grid->range[0], high = grid->range[0];
     if (axes->usable && grid->ndim > 1) {
         double t_low[HS_MAX_DIM], t_high[HS_MAX_DIM];
@@ -111,13 +117,13 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
                 most += fmax(a, b);
             }
             if (c > 0) {
-                const double gap = fmax(0.0, fmax(least, -most));
+                const double gap = fmax(0.0, fmax(least, -most)) / unit;
                 left -= gap * gap;
                 if (left < 0.0) {
                     return false;
                 }
             } else {
-                const double rest = sqrt(left);
+                const double rest = sqrt(left) * unit;
                 const double slack = slack_along(scene, grid, 0);
                 low = fmax(low, (-rest - most) / axes->lower[0][0] - slack);
                 high = fmin(high, (rest - least) / axes->lower[0][0] + slack);
@@ -154,17 +160,35 @@ hs_stencil_bound(const hs_grid *grid)
     return 0.5 * (rows + 1.0);
 }
 
+/* Twice the room; on failure the stencil is freed. */
+static bool
+grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
+{
+    hs_stencil_row *more =
+        hs_alloc(account, HS_FOR_STENCIL, 2 * *capacity, sizeof(hs_stencil_row));
+    if (more == NULL) {
+        hs_stencil_free(account, stencil);
+        return false;
+    }
+    memcpy(more, stencil->rows, (size_t)stencil->n_rows * sizeof(hs_stencil_row));
+    hs_free(account, stencil->rows);
+    stencil->rows = more;
+    *capacity *= 2;
+    return true;
+}
+
 hs_status
-hs_stencil_build(hs_account *account, const hs_scene *scene, const hs_grid *grid,
-                 hs_stencil *stencil)
+hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
+                 const hs_grid *grid, hs_stencil *stencil)
 {
     const double bound = hs_stencil_bound(grid);
     const frame  axes = triangular_frame(&scene->lattice);
     *stencil = (hs_stencil){0};
-    if (bound > (double)INT32_MAX) {
+    if (bound > (axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
         return HS_ERR_MEMORY;
     }
-    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, (int64_t)bound, sizeof(hs_stencil_row));
+    int64_t capacity = (int64_t)fmin(bound, FIRST_CAPACITY);
+    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
     if (stencil->rows == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -174,7 +198,14 @@ hs_stencil_build(hs_account *account, const hs_scene *scene, const hs_grid *grid
     row.last = row.last > 0 ? row.last : 0;
     stencil->rows[stencil->n_rows++] = row;
     /* From the zero offset on, counting up visits exactly the forward half. */
-    while (advance(grid, row.offset)) {
+    for (int64_t tried = 1; advance(grid, row.offset); tried++) {
+        if (tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
+            hs_stencil_free(account, stencil);
+            return HS_ERR_INTERRUPTED;
+        }
+        if (stencil->n_rows == capacity && !grow(account, &capacity, stencil)) {
+            return HS_ERR_MEMORY;
+        }
         if (reach_along_row(scene, grid, &axes, &row)) {
             stencil->rows[stencil->n_rows++] = row;
         }

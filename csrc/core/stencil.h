@@ -22,9 +22,9 @@ typedef struct hs_stencil {
     int64_t         n_rows;
 } hs_stencil;
 
-/* HS_ERR_MEMORY when the rows do not fit. */
-hs_status hs_stencil_build(hs_account *account, const hs_scene *scene, const hs_grid *grid,
-                           hs_stencil *stencil);
+/* Polls now and then. HS_ERR_MEMORY when the rows do not fit. */
+hs_status hs_stencil_build(hs_account *account, const hs_options *options,
+                           const hs_scene *scene, const hs_grid *grid, hs_stencil *stencil);
 
 /* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
 double hs_stencil_bound(const hs_grid *grid);

@@ -101,10 +101,7 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
             if (row < 0) {
                 continue;
             }
-            double t = 0.0;
-            for (int c = 0; c < lattice->ndim; c++) {
-                t += lattice->normal[k][c] * inside[c];
-            }
+            const double t = hs_lattice_coordinate(lattice, inside, k);
             const double n = rint(t / lattice->period[k]);
             if (!(fabs(n) + fabs((double)turns[row]) < HS_WRAP_LIMIT)) {
                 return false;

@@ -269,12 +269,14 @@ def _cosine(degrees: float) -> float:
 
 def _directions(angles: list[float]) -> list[list[float]]:
     """Unit vectors along a, b and c in the usual orientation."""
+    if not 2.0 * max(angles) < sum(angles) < 360.0:
+        raise ValueError(f"no cell has the angles {angles}")
     cos_alpha, cos_beta, cos_gamma = (_cosine(angle) for angle in angles)
-    sin_gamma = math.sqrt((1.0 - cos_gamma) * (1.0 + cos_gamma))
+    sin_gamma = math.sin(math.radians(angles[2]))
     c_y = (cos_alpha - cos_beta * cos_gamma) / sin_gamma
     square = 1.0 - cos_beta**2 - c_y**2
     if square <= 0.0:
-        raise ValueError(f"no cell has the angles {angles}")
+        raise ValueError(f"no cell in float64 has the angles {angles}: it is too flat")
     return [
         [1.0, 0.0, 0.0],
         [cos_gamma, sin_gamma, 0.0],

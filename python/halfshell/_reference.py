@@ -120,7 +120,9 @@ class _Lattice:
         """Yield (S, vector + S @ box), among them every one of squared length <= limit."""
         shift = [0] * self.ndim
 
-        def descend(k: int, vector: _Vector, left: Fraction):
+        def descend(
+            k: int, vector: _Vector, left: Fraction
+        ) -> Iterator[tuple[tuple[int, ...], _Vector]]:
             if k < 0:
                 yield tuple(shift), vector
                 return

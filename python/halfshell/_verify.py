@@ -120,12 +120,10 @@ def verify(
         cutoff,
         box=vectors,
         periodic=flags if vectors is not None else None,
-        quantities="ijS",
+        quantities="ij" if S is None else "ijS",
         inclusive=inclusive,
     )
     expected = np.column_stack(tuple(found)).astype(np.int64)
-    if S is None:
-        expected = expected[:, :2]
     if full:
         expected = np.concatenate([expected, _reversed(expected)])
     else:
@@ -171,6 +169,8 @@ def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
         raise ValueError(f"S must have shape ({len(columns[0])}, {ndim}), got {shifts.shape}")
     if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):
         raise TypeError("S must hold whole numbers")
+    if shifts.size and not (np.abs(shifts.astype(np.float64)) < 2.0**62).all():
+        raise OverflowError("S must hold whole numbers below 2**62")
     return np.column_stack([*columns, shifts.astype(np.int64)])
 
 

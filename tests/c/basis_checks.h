@@ -34,7 +34,7 @@ is_within_error(const hs_reduction *r, matrix a, int k, int c)
 }
 
 /* Determinants are taken modulo primes enough to tell 1 and -1 from every other value. */
-enum { N_PRIMES = 16 }; /* 2^(16 * 30.9) exceeds twice (sqrt(8) 2^52)^8 */
+enum { N_PRIMES = 18 }; /* 2^(18 * 30.9) exceeds twice (sqrt(8) 2^61)^8 */
 
 static inline uint64_t
 prime_number(int k)

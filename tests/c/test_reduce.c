@@ -17,7 +17,7 @@ reduce_and_check(int ndim, int n, matrix a)
     CHECK(r.n_rows == n);
     for (int k = 0; k < n; k++) {
         for (int l = 0; l < n; l++) {
-            CHECK(r.U[k][l] <= INT64_C(1) << 52 && r.U[k][l] >= -(INT64_C(1) << 52));
+            CHECK(r.U[k][l] <= INT64_C(1) << 61 && r.U[k][l] >= -(INT64_C(1) << 61));
             identity = identity && r.U[k][l] == (k == l);
         }
         CHECK(r.error[k] >= 0.0);
@@ -31,7 +31,7 @@ reduce_and_check(int ndim, int n, matrix a)
     return r;
 }
 
-/* ... and of every lattice that needs no coefficient beyond 2^52. */
+/* ... and of every lattice that needs no coefficient beyond 2^61. */
 static hs_reduction
 reduce_well(int ndim, int n, matrix a)
 {

@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_alloc.c: whichever allocation fails, nothing leaks and outputs stay as they were. */
+#include "../../csrc/core/memory.h"
+#include "harness.h"
+#include "pair_checks.h"
+#include "random_scenes.h"
+
+void test_alloc(void);
+
+enum { MOST_ALLOCATIONS = 300 }; /* of one call here; a search that never succeeds ends at this */
+
+static random_scene shared;
+static int          several_blocks; /* searches that filled more than one block of pairs */
+
+static brute_scene *
+scene_of(scene_kind kind, int n, double cutoff, int exponent)
+{
+    harness_random random = {60302};
+    make_scene(&random, kind, 3, n, 4.0, exponent, &shared);
+    shared.scene.cutoff = ldexp(cutoff, exponent);
+    return &shared.scene;
+}
+
+/* Lets allocation 1, 2, 3 ... of find and write fail. Returns how many there are. */
+static int
+fail_each_of_find(const brute_scene *scene, unsigned want, bool sorted)
+{
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    hs_status       status = HS_ERR_MEMORY;
+    int             nth = 0;
+    options.want = want;
+    options.sorted = sorted;
+    while (status != HS_OK && nth < MOST_ALLOCATIONS) {
+        const int64_t before = hs_test_live_blocks();
+        hs_pairs     *pairs = (hs_pairs *)&options;
+        hs_failure    failure;
+        hs_test_fail_allocation(++nth);
+        status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+        CHECK((status == HS_OK) == (pairs != NULL));
+        if (status == HS_OK) {
+            hs_pair_arrays arrays = {.index_bytes = 8};
+            several_blocks += hs_pairs_length(pairs) > 1024;
+            hs_test_fail_allocation(1);           /* writing allocates nothing */
+            CHECK(hs_pairs_write(pairs, &arrays) == HS_OK);
+            hs_test_fail_allocation(0);
+            hs_pairs_free(pairs);
+        } else {
+            CHECK(failure.row == -1 && failure.column == -1);
+        }
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(status == HS_OK);
+    return nth - 1;
+}
+
+static void
+find_fails_cleanly(void)
+{
+    const unsigned indices = HS_WANT_I | HS_WANT_J;
+    for (int kind = 0; kind < SCENE_KINDS; kind++) {
+        const brute_scene *scene = scene_of(kind, 150, 2.5, 0);
+        const int          least = fail_each_of_find(scene, 0, false);
+        const int          plain = fail_each_of_find(scene, indices, false);
+        const int          sorted = fail_each_of_find(scene, WANT_ALL, true);
+        CHECK(least > 8);
+        CHECK(plain > least);
+        CHECK(sorted > plain);
+    }
+    CHECK(several_blocks > 10);
+    for (int kind = 0; kind < SCENE_KINDS; kind++) /* many cells */
+        CHECK(fail_each_of_find(scene_of(kind, 400, 1.5, 0), WANT_ALL, true) > 20);
+}
+
+static void
+find_fails_cleanly_where_numbers_are_extreme(void)
+{
+    for (int kind = 0; kind < SCENE_KINDS; kind++) {
+        brute_scene *scene = scene_of(kind, 150, 2.5, 1010);
+        shared.x[0] = 0x1p-1070; /* a digit that scaling would lose: originals are kept */
+        CHECK(fail_each_of_find(scene, WANT_ALL, true) > 20);
+    }
+}
+
+static void
+count_fails_cleanly(void)
+{
+    for (int kind = 0; kind < SCENE_KINDS; kind++) {
+        const brute_scene *scene = scene_of(kind, 400, 1.2, 0);
+        const hs_points    points = points_of(scene);
+        const hs_options   options = options_of(scene);
+        hs_status          status = HS_ERR_MEMORY;
+        int                nth = 0;
+        while (status != HS_OK && nth < MOST_ALLOCATIONS) {
+            const int64_t before = hs_test_live_blocks();
+            int64_t       count = -7;
+            hs_test_fail_allocation(++nth);
+            status = hs_pairs_count(&points, scene->box, &options, &count, NULL);
+            hs_test_fail_allocation(0);
+            CHECK(status == HS_OK || (status == HS_ERR_MEMORY && count == -7));
+            CHECK(hs_test_live_blocks() == before);
+        }
+        CHECK(status == HS_OK && nth > 8);
+    }
+}
+
+static void
+plan_fails_cleanly(void)
+{
+    for (int kind = 0; kind < SCENE_KINDS; kind++) {
+        const brute_scene *scene = scene_of(kind, 200, 1.2, 0);
+        const hs_points    points = points_of(scene);
+        const hs_options   options = options_of(scene);
+        hs_status          status = HS_ERR_MEMORY;
+        int                nth = 0;
+        while (status != HS_OK && nth < MOST_ALLOCATIONS) {
+            const int64_t before = hs_test_live_blocks();
+            hs_plan       plan, untouched;
+            memset(&plan, 0x5a, sizeof plan);
+            memset(&untouched, 0x5a, sizeof untouched);
+            hs_test_fail_allocation(++nth);
+            status = hs_plan_make(&points, scene->box, &options, &plan, NULL);
+            hs_test_fail_allocation(0);
+            CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+            CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
+            CHECK(hs_test_live_blocks() == before);
+        }
+        CHECK(status == HS_OK && nth > 8);
+    }
+}
+
+static void
+wrap_fails_cleanly(void)
+{
+    const brute_scene *scene = scene_of(SCENE_TRICLINIC, 20, 1.0, 0);
+    const hs_points    points = points_of(scene);
+    hs_status          status = HS_ERR_MEMORY;
+    int                nth = 0;
+    while (status != HS_OK && nth < MOST_ALLOCATIONS) {
+        const int64_t before = hs_test_live_blocks();
+        double        wrapped[60];
+        int64_t       shift[60];
+        memset(wrapped, 0x5a, sizeof wrapped);
+        memset(shift, 0x5a, sizeof shift);
+        hs_test_fail_allocation(++nth);
+        status = hs_box_wrap(scene->box, &points, wrapped, shift, NULL);
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+        for (size_t b = 0; status != HS_OK && b < sizeof wrapped; b++)
+            CHECK(((unsigned char *)wrapped)[b] == 0x5a && ((unsigned char *)shift)[b] == 0x5a);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(status == HS_OK && nth > 1);
+}
+
+/* Every other way to fail must not leak either. */
+static void
+no_failure_leaks(void)
+{
+    static const double bad[] = {NAN, INFINITY, -1.0};
+    brute_scene        *scene = scene_of(SCENE_TRICLINIC, 20, 1.0, 0);
+    const hs_points     points = points_of(scene);
+    const int64_t       before = hs_test_live_blocks();
+    for (int trial = 0; trial < 6; trial++) {
+        hs_options options = options_of(scene);
+        hs_pairs  *pairs;
+        hs_plan    plan;
+        int64_t    count;
+        const double kept = shared.x[7], kept_row = shared.box.rows[1][1];
+        if (trial < 3)
+            options.cutoff = bad[trial];
+        else if (trial == 3)
+            shared.x[7] = NAN;
+        else if (trial == 4)
+            shared.box.rows[1][1] = INFINITY;
+        else
+            options.memory_limit = 3000.0;
+        CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) != HS_OK);
+        CHECK(pairs == NULL);
+        CHECK(hs_pairs_count(&points, scene->box, &options, &count, NULL) != HS_OK);
+        CHECK(hs_plan_make(&points, scene->box, &options, &plan, NULL) != HS_OK);
+        shared.x[7] = kept;
+        shared.box.rows[1][1] = kept_row;
+        CHECK(hs_test_live_blocks() == before);
+    }
+}
+
+void
+test_alloc(void)
+{
+    RUN(find_fails_cleanly);
+    RUN(find_fails_cleanly_where_numbers_are_extreme);
+    RUN(count_fails_cleanly);
+    RUN(plan_fails_cleanly);
+    RUN(wrap_fails_cleanly);
+    RUN(no_failure_leaks);
+}

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_bins.c: points in cell order: each once, in its own cell, in the caller's order within it. */
+#include "../../csrc/core/bins.h"
+#include "harness.h"
+#include "pair_checks.h"
+#include "random_scenes.h"
+
+void test_bins(void);
+
+static random_scene shared;
+
+/* Scene, grid and bins of the shared scene; false where the scene is refused. */
+static bool
+sort_scene(hs_account *account, const hs_options *options, hs_scene *scene, hs_grid *grid,
+           hs_bins *bins)
+{
+    const hs_points points = points_of(&shared.scene);
+    hs_failure      failure;
+    hs_account_init(account, options);
+    if (hs_scene_init(account, &points, shared.scene.box, options, scene, &failure) != HS_OK)
+        return false;
+    if (hs_grid_init(scene, grid, &failure) != HS_OK) {
+        hs_scene_free(account, scene);
+        return false;
+    }
+    return hs_bins_build(account, options, scene, grid, bins) == HS_OK;
+}
+
+static int64_t
+cell_of(const hs_scene *scene, const hs_grid *grid, const hs_bins *bins, int64_t si)
+{
+    double  x[HS_MAX_DIM];
+    int64_t cell = 0;
+    for (int k = 0; k < bins->ndim; k++)
+        x[k] = bins->x[k][si];
+    for (int k = 0; k < bins->ndim; k++) {
+        const double t = hs_lattice_coordinate(&scene->lattice, x, k);
+        cell += hs_grid_index(grid, k, t) * grid->stride[k];
+    }
+    return cell;
+}
+
+static void
+check_order(const hs_scene *scene, const hs_grid *grid, const hs_bins *bins)
+{
+    bool seen[SCENE_POINTS] = {false}, right = true;
+    CHECK(bins->start[0] == 0);
+    CHECK(bins->start[grid->n_cells] == bins->n);
+    for (int64_t c = 0; c < grid->n_cells; c++) {
+        right = right && bins->start[c] <= bins->start[c + 1];
+        for (int32_t si = bins->start[c]; si < bins->start[c + 1]; si++) {
+            const int32_t i = bins->order[si];
+            right = right && i >= 0 && i < bins->n && !seen[i];
+            seen[i] = true;
+            right = right && (si == bins->start[c] || bins->order[si - 1] < i);
+            right = right && cell_of(scene, grid, bins, si) == c;
+        }
+    }
+    CHECK(right);
+}
+
+static void
+every_point_is_once_in_its_own_cell(void)
+{
+    harness_random random = {16180};
+    int            sorted = 0, many_cells = 0;
+    for (int trial = 0; trial < 400; trial++) {
+        hs_account account;
+        hs_scene   scene;
+        hs_grid    grid;
+        hs_bins    bins;
+        make_scene(&random, trial % SCENE_KINDS, 1 + trial / SCENE_KINDS % HS_MAX_DIM,
+                   random_below(&random, SCENE_POINTS + 1), trial % 7 ? 4.0 : 1e6, 0, &shared);
+        shared.scene.cutoff = random_unit(&random);
+        const hs_options options = options_of(&shared.scene);
+        if (!sort_scene(&account, &options, &scene, &grid, &bins))
+            continue;
+        CHECK(bins.n == shared.scene.n);
+        check_order(&scene, &grid, &bins);
+        many_cells += grid.n_cells > 1;
+        sorted++;
+        hs_bins_free(&account, &bins);
+        CHECK(account.held == 0);
+    }
+    CHECK(sorted > 300);
+    CHECK(many_cells > 50);
+}
+
+/* X = r - w B is the point, moved by whole box vectors: exactly so in aligned boxes. */
+static void
+coordinates_and_turns_travel_with_their_point(void)
+{
+    harness_random random = {141421};
+    for (int trial = 0; trial < 120; trial++) {
+        hs_account account;
+        hs_scene   scene;
+        hs_grid    grid;
+        hs_bins    bins;
+        make_scene(&random, trial % 2 ? SCENE_ALIGNED : SCENE_TRICLINIC, 1 + trial % 4, 200, 40.0,
+                   0, &shared);
+        shared.scene.cutoff = 0.3;
+        hs_options options = options_of(&shared.scene);
+        options.want = WANT_ALL;
+        if (!sort_scene(&account, &options, &scene, &grid, &bins))
+            continue;
+        const int d = bins.ndim, m = bins.n_periodic;
+        bool      right = bins.turns != NULL;
+        for (int64_t si = 0; right && si < bins.n; si++) {
+            const double *r = shared.x + (int64_t)bins.order[si] * d;
+            for (int k = 0; k < d; k++) {
+                double moved = r[k];
+                for (int b = 0; b < m; b++)
+                    moved -= (double)bins.turns[si * m + b] * scene.lattice.rows[b][k];
+                right = right && fabs(moved - bins.x[k][si]) < 1e-9;
+                right = right && (bins.originals == NULL || bins.originals[si * d + k] == r[k]);
+            }
+        }
+        CHECK(right);
+        hs_bins_free(&account, &bins);
+    }
+}
+
+void
+test_bins(void)
+{
+    RUN(every_point_is_once_in_its_own_cell);
+    RUN(coordinates_and_turns_travel_with_their_point);
+}
