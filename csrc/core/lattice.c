@@ -305,15 +305,18 @@ hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice
 /*
  * The vector that meets given row l with product 1 and the other rows not at all: a combination of
  * the same vectors of the short basis, which are known well however skewed the box is. Scaled by
- * 2^*exponent to have an ordinary size.
+ * 2^*exponent to have an ordinary size. False where a height of the short basis has vanished.
  */
-static void
+static bool
 dual_of_given(const hs_lattice *reduced, int l, double *dual, int *exponent)
 {
     const int d = reduced->ndim;
     *exponent = -INT32_MAX / 4;
     for (int k = 0; k < d; k++) {
         const int r = reduced->row_of_axis[k];
+        if (r >= 0 && !(reduced->period[k] > 0.0)) {
+            return false;
+        }
         if (r >= 0 && reduced->U[r][l] != 0) {
             const int e = ilogb((double)reduced->U[r][l]) - ilogb(reduced->period[k]);
             *exponent = e > *exponent ? e : *exponent;
@@ -331,6 +334,7 @@ dual_of_given(const hs_lattice *reduced, int l, double *dual, int *exponent)
             }
         }
     }
+    return true;
 }
 
 void
@@ -344,9 +348,11 @@ hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice)
     for (int l = 0; l < lattice->n_periodic; l++) {
         const int k = lattice->vector_of_row[l];
         double   *normal = lattice->normal[k];
-        int       exponent;
-        dual_of_given(&reduced, l, normal, &exponent);
-        const double length = orthonormalise(lattice->ndim, 0, NULL, normal);
+        int       exponent = 0;
+        double    length = 0.0;
+        if (dual_of_given(&reduced, l, normal, &exponent)) {
+            length = orthonormalise(lattice->ndim, 0, NULL, normal);
+        }
         lattice->row_of_axis[k] = l;
         lattice->period[k] = length > 0.0 ? ldexp(1.0 / length, -exponent) : 0.0;
     }

@@ -65,6 +65,20 @@ heights_of_very_different_size_are_told(void)
     CHECK(fabs(volume - 1.0) < 1e-12);
 }
 
+/* Exactly independent, but flatter than any float64: heights may round to 0, and no more than that. */
+static void
+nearly_dependent_boxes_are_measured(void)
+{
+    const double long_x = -0x1.9999999999998p-4, long_y = -0x1.999999999999cp-4;
+    hs_box       box = {.ndim = 2, .periodic = {true, true}, .rows = {{long_x, long_y}}};
+    double       heights[2], volume;
+    box.rows[1][0] = box.rows[1][1] = -0x1p-1073;
+    CHECK(hs_box_measure(&box, heights, &volume, NULL) == HS_OK);
+    CHECK(heights[0] >= 0.0 && heights[0] <= 0x1p-53);
+    CHECK(heights[1] >= 0.0 && heights[1] <= 0x1p-1074);
+    CHECK(volume >= 0.0 && volume <= 0x1p-1074);
+}
+
 /* |wrapped - (point + shift * box)| against 1 ulp of the largest of all these, in big integers. */
 static bool
 wrapped_is_the_point_moved(const hs_box *box, const double *x, const double *wrapped,
@@ -312,6 +326,7 @@ test_box(void)
     RUN(upright_boxes_have_their_own_lengths);
     RUN(heights_are_inverse_duals);
     RUN(heights_of_very_different_size_are_told);
+    RUN(nearly_dependent_boxes_are_measured);
     RUN(wrapped_points_are_moved_by_their_shift);
     RUN(wrapped_coordinates_stay_below_the_length);
     RUN(a_point_too_far_to_wrap_leaves_the_outputs_alone);
