@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a correct answer is: every pair by exact rational arithmetic.
 
 This file is the definition that the fast search is held to. It is short, slow (every point

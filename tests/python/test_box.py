@@ -1,0 +1,265 @@
+"""Boxes: constructors, measures, and wrapping by whole vectors."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell._reference import exact_vector
+from oracles import BOX_KINDS, random_box, random_scene, same_arrays
+
+
+def exact_determinant(rows):
+    """Determinant in rational numbers, by permutations."""
+    total = Fraction(0)
+    for order in itertools.permutations(range(len(rows))):
+        sign = 1
+        for a, b in itertools.combinations(order, 2):
+            sign = -sign if a > b else sign
+        product = Fraction(sign)
+        for row, column in enumerate(order):
+            product *= Fraction(float(rows[row][column]))
+        total += product
+    return total
+
+
+def exact_wrapped(box, points, shifts, row):
+    """points[row] + shifts[row] @ box in rational numbers."""
+    origin = np.zeros((1, points.shape[1]))
+    both = np.concatenate([origin, points])
+    return exact_vector(both, 0, row + 1, shifts[row].tolist(), box)
+
+
+@pytest.mark.parametrize("ndim", range(1, 6))
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_volume_and_heights(kind, ndim, rng):
+    matrix = random_box(rng, kind, ndim)
+    box = hs.Box.from_matrix(matrix)
+    volume = abs(exact_determinant(matrix))
+    assert abs(Fraction(box.volume) / volume - 1) < Fraction(1, 10**12)
+    heights = box.perpendicular_heights
+    assert heights.shape == (ndim,)
+    for axis in range(ndim):
+        others = np.delete(matrix, axis, axis=0)
+        area = math.sqrt(abs(np.linalg.det(others @ others.T))) if ndim > 1 else 1.0
+        assert math.isclose(heights[axis], float(volume) / area, rel_tol=1e-9)
+
+
+def test_orthorhombic_measures_are_the_lengths():
+    box = hs.Box.orthorhombic(2.0, 3.0, 5.0)
+    assert box.volume == 30.0
+    assert box.perpendicular_heights.tolist() == [2.0, 3.0, 5.0]
+    assert np.array_equal(np.asarray(box), np.diag([2.0, 3.0, 5.0]))
+    assert same_arrays(np.asarray(hs.Box.orthorhombic([2.0, 3.0, 5.0])), np.asarray(box))
+
+
+def test_skewed_and_flat_boxes_keep_their_measures():
+    sheared = np.array([[1.0, 0.0, 0.0], [1e6, 1.0, 0.0], [-3e6, 2e6, 1.0]])
+    assert math.isclose(hs.Box.from_matrix(sheared).volume, 1.0, rel_tol=1e-9)
+    thin = np.diag([1e150, 1.0, 1e-150])
+    assert math.isclose(hs.Box.from_matrix(thin).volume, 1.0, rel_tol=1e-9)
+    assert np.allclose(hs.Box.from_matrix(thin).perpendicular_heights, [1e150, 1.0, 1e-150])
+
+
+@pytest.mark.parametrize(
+    "lengths, angles",
+    [
+        ((2.0, 3.0, 4.0), (90.0, 90.0, 90.0)),
+        ((3.0, 3.0, 5.0), (90.0, 90.0, 120.0)),
+        ((2.5, 2.5, 2.5), (60.0, 60.0, 60.0)),
+        ((4.0, 5.0, 6.0), (75.0, 98.0, 112.0)),
+        ((7.0, 2.0, 3.0), (101.0, 119.0, 89.0)),
+    ],
+)
+def test_lengths_and_angles_come_back(lengths, angles):
+    vectors = np.asarray(hs.Box.from_lengths_angles(lengths, angles))
+    assert np.allclose(np.linalg.norm(vectors, axis=1), lengths, rtol=1e-14)
+    for angle, (a, b) in zip(angles, ((1, 2), (0, 2), (0, 1))):
+        cosine = vectors[a] @ vectors[b] / lengths[a] / lengths[b]
+        assert math.isclose(math.degrees(math.acos(cosine)), angle, rel_tol=1e-12)
+    assert not np.triu(vectors, 1).any()
+    assert np.linalg.det(vectors) > 0
+
+
+def test_right_angles_are_exactly_right():
+    vectors = np.asarray(hs.Box.from_lengths_angles((2.0, 3.0, 4.0), (90.0, 90.0, 90.0)))
+    assert np.array_equal(vectors, np.diag([2.0, 3.0, 4.0]))
+    plane = np.asarray(hs.Box.from_lengths_angles((2.0, 3.0), (90.0,)))
+    assert np.array_equal(plane, np.diag([2.0, 3.0]))
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_a_box_object_is_its_matrix(kind, rng):
+    points, cutoff, matrix, _ = random_scene(rng, 40, kind=kind)
+    box = hs.Box.from_matrix(matrix)
+    for periodic in (None, [True, False, True]):
+        how = {"periodic": periodic, "quantities": "ijSdD"}
+        assert same_arrays(
+            hs.pairs(points, cutoff, box=box, **how), hs.pairs(points, cutoff, box=matrix, **how)
+        )
+    assert hs.count_pairs(points, cutoff, box=box) == hs.count_pairs(points, cutoff, box=matrix)
+
+
+def test_a_box_does_not_follow_changes_of_its_source(rng):
+    matrix = random_box(rng, "triclinic")
+    box = hs.Box.from_matrix(matrix)
+    before = np.asarray(box).copy()
+    matrix[:] = 0
+    assert np.array_equal(np.asarray(box), before)
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3, 5])
+@pytest.mark.parametrize("kind", BOX_KINDS)
+@pytest.mark.parametrize("spread", [1, 10, 10**6, 10**12])
+def test_wrapping_moves_by_whole_vectors_into_the_box(kind, ndim, spread, rng):
+    matrix = random_box(rng, kind, ndim)
+    points = rng.uniform(-spread, spread, (20, ndim)) @ matrix
+    before = points.copy()
+    wrapped, shifts = hs.Box.from_matrix(matrix).wrap(points)
+    assert wrapped.shape == shifts.shape == points.shape
+    assert wrapped.dtype == np.float64 and shifts.dtype == np.int64
+    assert np.array_equal(points, before)
+    inverse = np.linalg.inv(matrix)
+    for row in range(20):
+        exact = exact_wrapped(matrix, points, shifts, row)
+        # one rounding per component, in units of the largest term that was added
+        size = max(1.0, np.abs(points[row]).max(), np.abs(shifts[row, :, None] * matrix).max())
+        for got, true in zip(wrapped[row].tolist(), exact):
+            assert abs(Fraction(got) - true) <= Fraction(math.ulp(float(size)))
+        fractions = np.array([float(x) for x in exact]) @ inverse
+        slack = 1e-9
+        assert (fractions >= -slack).all() and (fractions < 1 + slack).all()
+
+
+@pytest.mark.parametrize("length", [1.0, 0.1, 1 / 3, math.pi, 1e-300, 1e300])
+def test_wrapped_coordinates_never_reach_the_length(length):
+    tiny = min(length, 1.0)
+    values = [-5e-324, -1e-17 * tiny, length, -length, 0.0, math.nextafter(length, 0)]
+    values += [math.nextafter(length, math.inf), -length * 2.0**-54, 7 * length, -7 * length]
+    points = np.array([x for x in values if math.isfinite(x)])[:, None]
+    wrapped, shifts = hs.Box.orthorhombic(length).wrap(points)
+    assert (wrapped >= 0).all() and (wrapped < length).all()
+    for row in range(len(points)):
+        (exact,) = exact_wrapped([length], points, shifts, row)
+        assert abs(Fraction(wrapped[row, 0]) - exact) <= Fraction(math.ulp(length))
+
+
+def test_wrapping_twice_changes_nothing(rng):
+    for kind in ("orthorhombic", "left-handed"):
+        box = hs.Box.from_matrix(np.diag([1.0, 2.0, 4.0])[:: 1 if kind == "orthorhombic" else -1])
+        wrapped, _ = box.wrap(rng.normal(size=(100, 3)) * 50)
+        again, shifts = box.wrap(wrapped)
+        assert not shifts.any()
+        assert np.array_equal(again, wrapped)
+
+
+def test_points_inside_stay_where_they_are(rng):
+    matrix = random_box(rng, "triclinic")
+    points = rng.uniform(0.01, 0.99, (50, 3)) @ matrix
+    wrapped, shifts = hs.Box.from_matrix(matrix).wrap(points)
+    assert not shifts.any()
+    assert np.array_equal(wrapped, points)  # to the last bit: nothing was added
+
+
+def test_open_axes_are_not_wrapped(rng):
+    box = hs.Box.orthorhombic(1.0, 2.0, 3.0)
+    points = rng.normal(size=(40, 3)) * 20
+    wrapped, shifts = box.wrap(points, periodic=[True, False, False])
+    assert not shifts[:, 1:].any()
+    assert np.array_equal(wrapped[:, 1:], points[:, 1:])
+    assert (wrapped[:, 0] >= 0).all() and (wrapped[:, 0] < 1).all()
+    wrapped, shifts = box.wrap(points, periodic=False)
+    assert np.array_equal(wrapped, points) and not shifts.any()
+
+
+def test_wrapping_accepts_what_searching_accepts(rng):
+    box = hs.Box.orthorhombic(1.0, 2.0)
+    points = rng.integers(-9, 9, (12, 2))
+    expected = box.wrap(points.astype(float))
+    for form in (points, points.tolist(), points.astype(np.float32), points.astype(">f8")):
+        assert same_arrays(box.wrap(form), expected)
+    wrapped, shifts = box.wrap(np.empty((0, 2)))
+    assert wrapped.shape == shifts.shape == (0, 2)
+
+
+def test_pairs_of_wrapped_points_are_the_same_up_to_the_shifts():
+    # On a dyadic grid wrapping is exact, so the search must not notice it.
+    rng = np.random.default_rng(8)
+    matrix = np.array([[2.0, 0.0, 0.0], [0.5, 1.5, 0.0], [-0.25, 0.5, 1.75]])
+    points = rng.integers(-900, 900, (40, 3)) / 64
+    wrapped, w = hs.Box.from_matrix(matrix).wrap(points)
+    i, j, S = hs.pairs(points, 0.75, box=matrix, quantities="ijS")
+    a, b, T = hs.pairs(wrapped, 0.75, box=matrix, quantities="ijS")
+    # r_j - r_i + S A = (r_j + w_j A) - (r_i + w_i A) + T A
+    one = set(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
+    other = set(zip(a.tolist(), b.tolist(), map(tuple, (T + w[b] - w[a]).tolist())))
+    assert one == other and len(one) > 20
+
+
+BAD = [
+    (lambda: hs.Box.from_matrix(np.ones((2, 3))), ValueError, "shape"),
+    (lambda: hs.Box.from_matrix(np.ones(3)), ValueError, "shape"),
+    (lambda: hs.Box.from_matrix(np.ones((3, 3))), ValueError, "box"),
+    (lambda: hs.Box.from_matrix(np.eye(9)), ValueError, "shape"),
+    (lambda: hs.Box.from_matrix([[1.0, math.nan], [0.0, 1.0]]), ValueError, "nan"),
+    (lambda: hs.Box.from_matrix([["a", "b"], ["c", "d"]]), TypeError, "box|matrix"),
+    (lambda: hs.Box.orthorhombic(1.0, 0.0, 1.0), ValueError, "box"),
+    (lambda: hs.Box.orthorhombic(1.0, math.inf), ValueError, "inf"),
+    (lambda: hs.Box.orthorhombic(), ValueError, "shape"),
+    (lambda: hs.Box.from_lengths_angles((1, 2), (90, 90, 90)), ValueError, "lengths and angles"),
+    (lambda: hs.Box.from_lengths_angles((1, 2, 0), (90, 90, 90)), ValueError, "lengths"),
+    (lambda: hs.Box.from_lengths_angles((1, 2, -3), (90, 90, 90)), ValueError, "lengths"),
+    (lambda: hs.Box.from_lengths_angles((1, 2, 3), (90, 90, 180)), ValueError, "angles"),
+    (lambda: hs.Box.from_lengths_angles((1, 2, 3), (90, math.nan, 90)), ValueError, "angles"),
+    (lambda: hs.Box.from_lengths_angles((1, 2, 3), (30, 30, 90)), ValueError, "angles"),
+    (lambda: hs.Box.from_lengths_angles("abc", (90, 90, 90)), TypeError, "lengths"),
+    (lambda: hs.Box.orthorhombic(1.0, 1.0).wrap(np.zeros((3, 3))), ValueError, "points"),
+    (lambda: hs.Box.orthorhombic(1.0).wrap([[math.nan]]), ValueError, "points.*nan|nan.*points"),
+    (lambda: hs.Box.orthorhombic(1.0).wrap([[1.0]], periodic="T"), TypeError, "periodic"),
+    (lambda: hs.Box.orthorhombic(1.0).wrap([[1e300]]), OverflowError, "point"),
+    (lambda: hs.pairs([[1.0]], 1.0, box=hs.Box.orthorhombic(1.0, 2.0)), ValueError, "box"),
+]
+
+
+@pytest.mark.parametrize("call, exception, fragment", BAD)
+def test_bad_boxes(call, exception, fragment):
+    with pytest.raises(exception, match=fragment):
+        call()
+
+
+def test_equal_boxes_have_equal_hashes():
+    plus, minus = hs.Box([[1.0, 0.0], [0.0, 2.0]]), hs.Box([[1.0, -0.0], [-0.0, 2.0]])
+    assert plus == minus == hs.Box.orthorhombic(1.0, 2.0)
+    assert len({plus, minus}) == 1
+    assert plus != hs.Box([1.0, 3.0]) and plus != "box"
+
+
+def test_copies_are_equal_and_read_only():
+    import copy
+    import pickle
+
+    box = hs.Box.from_lengths_angles((4.0, 5.0, 6.0), (75.0, 98.0, 112.0))
+    for twin in (copy.copy(box), copy.deepcopy(box), pickle.loads(pickle.dumps(box))):
+        assert type(twin) is hs.Box and twin == box and hash(twin) == hash(box)
+        assert twin.volume == box.volume
+        assert same_arrays(twin.perpendicular_heights, box.perpendicular_heights)
+        for array in (twin.vectors, twin.perpendicular_heights):
+            assert not array.flags.writeable
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0.0
+
+
+def test_vectors_cannot_be_replaced():
+    box = hs.Box([1.0, 2.0])
+    with pytest.raises(AttributeError):
+        box.vectors = np.eye(2)
+    assert box.vectors.tolist() == [[1.0, 0.0], [0.0, 2.0]]
+
+
+def test_orthorhombic_takes_lengths_only():
+    assert hs.Box.orthorhombic((1.0, 2.0)) == hs.Box.orthorhombic(1, 2)
+    with pytest.raises(ValueError, match=r"lengths.*shape"):
+        hs.Box.orthorhombic(np.eye(3))

@@ -1,0 +1,153 @@
+"""What `explain` says is what the search does."""
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from oracles import lattice, random_scene, rotation
+
+
+@pytest.fixture
+def scene(rng):
+    points, cutoff, box, _ = random_scene(rng, 5000, neighbours=20)
+    return points, cutoff, box
+
+
+def test_it_names_the_kernel_and_the_algorithm(scene, kernel):
+    points, cutoff, box = scene
+    plan = hs.explain(points, cutoff, box=box, kernel=kernel)
+    assert plan.kernel == kernel
+    assert plan.algorithm in ("all-pairs", "grid", "hash", "hierarchy")
+    assert plan.reason
+    assert plan.n == 5000 and plan.ndim == 3
+    for word in (kernel, plan.algorithm, "5000"):
+        assert word in str(plan)
+
+
+def test_the_default_kernel_is_the_first(scene):
+    points, cutoff, box = scene
+    assert hs.explain(points, cutoff, box=box).kernel == hs.kernels()[0]
+
+
+def test_shapes_have_one_entry_per_axis(rng):
+    for ndim in range(1, 9):
+        plan = hs.explain(rng.random((50, ndim)), 0.3, box=np.ones(ndim))
+        assert len(plan.shape) == len(plan.cell_sizes) == len(plan.images) == ndim
+        assert all(k >= 1 for k in plan.shape)
+        assert all(size > 0 for size in plan.cell_sizes)
+
+
+def test_expected_pairs_are_near_the_truth_for_even_points(rng):
+    for n, neighbours in ((500, 30), (5000, 20), (20_000, 5)):
+        for ndim in (2, 3):
+            points, cutoff, box, _ = random_scene(rng, n, ndim, neighbours=neighbours)
+            plan = hs.explain(points, cutoff, box=box)
+            found = hs.count_pairs(points, cutoff, box=box)
+            assert 0.5 * found < plan.expected_pairs < 2.0 * found
+            assert plan.expected_bytes == pytest.approx(16 * plan.expected_pairs)
+
+
+def test_bytes_follow_the_quantities(scene):
+    points, cutoff, box = scene
+    sizes = {"i": 8, "P": 16, "d": 8, "D": 24, "S": 12, "ijdDS": 60}
+    for quantities, size in sizes.items():
+        plan = hs.explain(points, cutoff, box=box, quantities=quantities)
+        assert plan.expected_bytes == pytest.approx(size * plan.expected_pairs)
+    plan = hs.explain(points, cutoff, box=box, index_dtype=np.int32)
+    assert plan.expected_bytes == pytest.approx(8 * plan.expected_pairs)
+
+
+def test_without_measuring_nothing_is_measured(scene):
+    points, cutoff, box = scene
+    assert not hs.explain(points, cutoff, box=box).measured
+    # 2e10 pairs would take minutes to find
+    assert hs.explain(np.zeros((200_000, 3)), 1.0).n == 200_000
+
+
+def test_measured_counters_add_up(scene, kernel):
+    points, cutoff, box = scene
+    measured = hs.explain(points, cutoff, box=box, kernel=kernel, measure=True).measured
+    assert measured["pairs"] == hs.count_pairs(points, cutoff, box=box)
+    assert measured["candidates"] >= measured["pairs"]
+    stages = (measured[k] for k in ("by_float64", "by_double_word", "by_integers"))
+    assert measured["ambiguous"] == sum(stages)
+    assert measured["ambiguous"] < 1e-3 * measured["pairs"]
+    assert measured["bytes_peak"] >= 16 * measured["pairs"] // 2
+    assert measured["bytes_peak"] <= sum(measured["bytes"].values())
+    assert "candidates" in str(hs.explain(points, cutoff, box=box, measure=True))
+
+
+def test_ties_reach_the_later_stages(rng):
+    points, box = lattice("fcc", (8, 8, 8))
+    shell = hs.count_pairs(points, 2.0, box=box) - hs.count_pairs(
+        points, 2.0, box=box, inclusive=False
+    )
+    measured = hs.explain(points, 2.0, box=box, measure=True).measured
+    assert measured["ambiguous"] >= shell > 0
+    turn = rotation(rng)
+    measured = hs.explain(points @ turn, 2.0, box=box @ turn, measure=True).measured
+    assert measured["ambiguous"] >= shell
+
+
+def test_counters_do_not_depend_on_the_kernel(scene):
+    points, cutoff, box = scene
+    names = ("pairs", "candidates", "groups")
+    results = [
+        [hs.explain(points, cutoff, box=box, kernel=k, measure=True).measured[n] for n in names]
+        for k in hs.kernels()
+    ]
+    assert all(result == results[0] for result in results)
+
+
+def test_what_is_not_asked_for_costs_no_byte(scene):
+    points, cutoff, box = scene
+    measured = hs.explain(points, cutoff, box=box, quantities="ij", measure=True).measured
+    for purpose in ("distances", "vectors", "shifts", "sorting"):
+        assert not measured["bytes"].get(purpose), purpose
+    more = hs.explain(
+        points, cutoff, box=box, quantities="ijdDS", sort=True, measure=True
+    ).measured["bytes"]
+    for purpose in ("distances", "vectors", "shifts", "sorting"):
+        assert more[purpose] > 0, purpose
+
+
+def test_it_says_what_is_left_out(rng):
+    flat = hs.explain(rng.random((50, 2)), 0.1)
+    text = " ".join(flat.leaves_out)
+    assert "z" in text and "images" in text and "distances" in text
+    everything = hs.explain(rng.random((50, 3)), 0.4, box=[1.0] * 3, quantities="ijdDS", sort=True)
+    text = " ".join(everything.leaves_out)
+    for word in ("distances", "vectors", "shifts", "sorting of pairs"):
+        assert word not in text
+
+
+def test_memory_of_the_search_grows_with_the_points_not_with_the_volume(rng):
+    points = rng.random((2000, 3))
+    peaks = []
+    for size in (1e2, 1e4, 1e8):
+        peaks.append(hs.explain(points * size, 1.0, measure=True).measured["bytes_peak"])
+        peaks.append(
+            hs.explain(points * size, 1.0, box=[size] * 3, measure=True).measured["bytes_peak"]
+        )
+    assert max(peaks) < 2_000_000
+
+
+def test_bad_input_is_refused_as_by_pairs():
+    points = np.zeros((3, 3))
+    for arguments, exception, word in (
+        ({"points": points, "cutoff": -1.0}, ValueError, "cutoff"),
+        ({"points": points * np.nan, "cutoff": 1.0}, ValueError, "points"),
+        ({"points": points, "cutoff": 1.0, "box": np.ones((3, 3))}, ValueError, "box"),
+        ({"points": points, "cutoff": 1.0, "kernel": "none"}, ValueError, "kernel"),
+        ({"points": points, "cutoff": 1.0, "quantities": "x"}, ValueError, "quantities"),
+        ({"points": points, "cutoff": 1.0, "periodic": True}, ValueError, "periodic"),
+    ):
+        with pytest.raises(exception, match=word):
+            hs.explain(**arguments)
+
+
+def test_small_and_empty_scenes():
+    for n in (0, 1, 2):
+        plan = hs.explain(np.zeros((n, 3)), 1.0, measure=True)
+        assert plan.n == n and plan.measured["pairs"] == n * (n - 1) // 2
+        assert str(plan)

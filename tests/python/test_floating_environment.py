@@ -1,0 +1,188 @@
+"""Rounding modes and flushing of subnormals, set by somebody else, change no answer; and the
+caller finds the environment as it was."""
+
+import ctypes
+import ctypes.util
+import platform
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from oracles import lattice, random_scene, rotation, same_arrays
+
+ARM = platform.machine().lower() in ("arm64", "aarch64")
+WINDOWS = sys.platform == "win32"
+C = ctypes.CDLL("ucrtbase" if WINDOWS else ctypes.util.find_library("m") or None)
+
+# Values of <fenv.h> ...
+MODES = {"nearest": 0, "down": 0x400, "up": 0x800, "zero": 0xC00}
+if ARM and not WINDOWS:
+    MODES = {"nearest": 0, "up": 0x400000, "down": 0x800000, "zero": 0xC00000}
+elif WINDOWS:
+    MODES = {"nearest": 0, "down": 0x100, "up": 0x200, "zero": 0x300}
+# ... and where fenv_t keeps the control word that can flush subnormals: (offset, size, bits).
+if ARM:
+    CONTROL = (8, 8, 1 << 24) if sys.platform == "darwin" else (0, 4, 1 << 24)
+else:
+    CONTROL = (4, 4, 0x8040) if sys.platform == "darwin" else (28, 4, 0x8040)
+
+
+class Environment:
+    """The floating-point environment of this thread, through the C library."""
+
+    def __init__(self):
+        self.saved = ctypes.create_string_buffer(64)
+        C.fegetenv(self.saved)
+
+    def control(self):
+        """The control bits: rounding, flushing and trap masks, without the sticky flags."""
+        if WINDOWS:
+            return C._controlfp(0, 0)
+        buffer = ctypes.create_string_buffer(64)
+        C.fegetenv(buffer)
+        offset, size, _ = CONTROL
+        word = int.from_bytes(buffer.raw[offset : offset + size], "little")
+        return word if ARM else word & ~0x3F
+
+    def flush_subnormals(self):
+        buffer = ctypes.create_string_buffer(64)
+        C.fegetenv(buffer)
+        offset, size, bits = CONTROL
+        word = int.from_bytes(buffer.raw[offset : offset + size], "little") | bits
+        ctypes.memmove(ctypes.addressof(buffer) + offset, word.to_bytes(size, "little"), size)
+        C.fesetenv(buffer)
+
+    def restore(self):
+        C.fesetenv(self.saved)
+
+
+@contextmanager
+def environment(mode="nearest", flush=False):
+    """Round and flush like this inside; check on the way out that it still is so."""
+    state = Environment()
+    try:
+        if WINDOWS:
+            C._controlfp(MODES[mode], 0x300)
+            C._controlfp(0x01000000 if flush else 0, 0x03000000)
+        else:
+            C.fesetround(MODES[mode])
+            if flush:
+                state.flush_subnormals()
+        before = state.control()
+        yield
+        after = state.control()
+    finally:
+        state.restore()
+        if WINDOWS:
+            C._controlfp(0, 0x03000300)
+    assert after == before
+
+
+def subnormals_are_flushed():
+    tiny = np.full(4, 5e-324)
+    return not (tiny + 0.0 * tiny).any() or not (tiny * np.full(4, 1.0)).any()
+
+
+SETTINGS = [
+    (mode, flush) for flush in (False, True) for mode in MODES if flush or mode != "nearest"
+]
+
+
+def scenes():
+    rng = np.random.default_rng(4)
+    points, box = lattice("fcc", (3, 3, 3))
+    turn = rotation(rng)
+    yield "ties", points, 2.0, box
+    yield "near ties", points @ turn, 2.0**0.5, box @ turn
+    yield "open near ties", points @ turn, 6.0**0.5, None
+    yield "random", *random_scene(rng, 200, 3, "sheared", 20, spread=3)[:3]
+    yield "far", points @ turn + 1e6 * (box @ turn)[0], 2.0**0.5, box @ turn
+    tiny = np.round(rng.random((30, 3)) * 40) * 5e-324
+    yield "subnormal", tiny, 5e-323, None
+    yield "subnormal box", tiny, 5e-323, np.eye(3) * 2e-322
+    yield "tiny", rng.random((30, 3)) * 1e-160, 3e-161, None
+    yield "mixed", rng.random((30, 3)) * [1.0, 1e-310, 1e-320], 0.3, np.ones(3)
+    yield "float32", (points @ turn).astype(np.float32), 2.0**0.5, None
+    yield "float32 subnormal", tiny.astype(np.float32) + np.float32(1e-44), 1e-44, None
+
+
+SCENES = {name: rest for name, *rest in scenes()}
+
+
+def test_the_test_can_change_the_environment():
+    third = np.array([1.0]) / np.array([3.0])
+    with environment("up"):
+        up = np.array([1.0]) / np.array([3.0])
+    with environment("down"):
+        down = np.array([1.0]) / np.array([3.0])
+    with environment(flush=True):
+        flushed = subnormals_are_flushed()
+    assert down[0] < up[0] and third[0] in (down[0], up[0])
+    assert flushed and not subnormals_are_flushed()
+
+
+@pytest.mark.parametrize("mode, flush", SETTINGS)
+@pytest.mark.parametrize("name", SCENES)
+def test_same_bytes_in_every_environment(name, mode, flush, kernel):
+    points, cutoff, box = SCENES[name]
+    how = {"box": box, "quantities": "ijSdD", "kernel": kernel}
+    expected = hs.pairs(points, cutoff, **how)
+    strict = hs.count_pairs(points, cutoff, box=box, inclusive=False, kernel=kernel)
+    with environment(mode, flush):
+        found = hs.pairs(points, cutoff, **how)
+        found_strict = hs.count_pairs(points, cutoff, box=box, inclusive=False, kernel=kernel)
+    assert same_arrays(found, expected)
+    assert found_strict == strict
+    assert len(expected[0])
+
+
+@pytest.mark.parametrize("mode, flush", SETTINGS)
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_rounded_rules_are_the_same_in_every_environment(mode, flush, precision):
+    for points, cutoff, box in SCENES.values():
+        how = {"box": box, "precision": precision}
+        expected = hs.pairs(points, cutoff, **how)
+        with environment(mode, flush):
+            found = hs.pairs(points, cutoff, **how)
+        assert same_arrays(found, expected)
+
+
+@pytest.mark.parametrize("mode, flush", SETTINGS)
+def test_the_environment_survives_a_refused_call(mode, flush):
+    points = np.full((3, 3), np.nan)
+    with environment(mode, flush):
+        try:
+            hs.pairs(points, 1.0)
+        except ValueError:
+            refused = True
+        try:
+            hs.pairs(np.zeros((100_000, 3)), 1.0, memory_limit=10**6)
+        except MemoryError:
+            refused_later = True
+    assert refused and refused_later
+
+
+@pytest.mark.parametrize("mode, flush", SETTINGS)
+def test_dependence_is_decided_alike_in_every_environment(mode, flush):
+    sheared = np.array([[0.1, 0.2, 0.3], [0.7, 0.1, 0.9], [0.2, 0.4, 0.6]])
+    tiny = np.diag([5e-324, 1e-323, 5e-324])
+    points = np.zeros((1, 3))
+    with environment(mode, flush):
+        try:
+            hs.pairs(points, 1.0, box=sheared)
+            refused = False
+        except ValueError:
+            refused = True
+        count = hs.count_pairs(points, 1e-323, box=tiny)
+    assert refused
+    assert count == hs.count_pairs(points, 1e-323, box=tiny) == 7
+
+
+def test_searching_raises_no_floating_point_warnings(rng):
+    for points, cutoff, box in SCENES.values():
+        with np.errstate(all="raise"):
+            hs.pairs(points, cutoff, box=box, quantities="ijSdD")
+            np.array([1.0]) / np.array([2.0])

@@ -1,0 +1,76 @@
+"""Ctrl-C stops a long search at once and leaves nothing behind."""
+
+import pytest
+
+from subprocesses import RESIDENT, run
+
+SEARCHES = {
+    "pairs": "hs.pairs(points, 0.16, memory_limit=1e13)",
+    "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS', memory_limit=1e13)",
+    "count": "hs.count_pairs(points, 0.5)",
+    "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
+    "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
+    "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
+    "count of exact ties": "hs.count_pairs(grid, 40.0, box=[60.0] * 3)",
+}
+
+
+@pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES)
+def test_an_interrupt_stops_the_search(search):
+    # The signal is raised by a second thread, which also shows that the lock is released.
+    result = run(
+        RESIDENT
+        + f"""
+import gc, json, signal, threading, time
+import numpy as np
+import halfshell as hs
+
+rng = np.random.default_rng(1)
+points = rng.random((400_000, 3))
+grid = np.stack(np.meshgrid(*[np.arange(60.0)] * 3), axis=-1).reshape(-1, 3)
+small = points[:500]
+expected = hs.count_pairs(small, 0.2)
+hs.count_pairs(points, 0.001)
+gc.collect()
+before = resident()
+sent = []
+
+def interrupt():
+    sent.append(time.perf_counter())
+    signal.raise_signal(signal.SIGINT)
+
+threading.Timer(0.4, interrupt).start()
+try:
+    {search}
+    outcome = "finished"
+except KeyboardInterrupt:
+    outcome = "interrupted"
+delay = time.perf_counter() - (sent or [0.0])[0]
+gc.collect()
+print(json.dumps([outcome, delay, resident() - before, hs.count_pairs(small, 0.2) == expected]))
+"""
+    )
+    outcome, delay, grown, right = result
+    assert outcome == "interrupted"
+    assert delay < 1.0
+    assert grown < 30_000_000
+    assert right
+
+
+def test_a_handler_that_does_not_raise_lets_the_search_finish():
+    calls, count = run(
+        """
+import json, signal, threading
+import numpy as np
+import halfshell as hs
+seen = []
+signal.signal(signal.SIGINT, lambda *_: seen.append(1))
+points = np.random.default_rng(1).random((30_000, 3))
+threading.Timer(0.1, signal.raise_signal, [signal.SIGINT]).start()
+count = 0
+while not seen:
+    count = hs.count_pairs(points, 2.0)
+print(json.dumps([len(seen), hs.count_pairs(points, 2.0)]))
+"""
+    )
+    assert calls == 1 and count == 30_000 * 29_999 // 2

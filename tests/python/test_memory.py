@@ -1,0 +1,131 @@
+"""Memory does not grow over thousands of calls, failing ones included, and stays modest."""
+
+import pytest
+
+from subprocesses import RESIDENT, run
+
+CALLS = {
+    "pairs": 'hs.pairs(points, 0.3, box=box, quantities="ijdDSP")',
+    "sorted pairs": 'hs.pairs(points, 0.3, box=box, quantities="PS", sort=True)',
+    "open pairs": "hs.pairs(points, 0.3)",
+    "float32 pairs": "hs.pairs(single, 0.3, box=box)",
+    "converted input": "hs.pairs(listed, 0.3, box=[1, 1, 1])",
+    "empty result": "hs.pairs(points, 0.0)",
+    "no points": "hs.pairs(points[:0], 1.0, box=box)",
+    "count": "hs.count_pairs(points, [0.1, 0.2], box=box)",
+    "nan": "fails(lambda: hs.pairs(broken, 0.3, box=box))",
+    "bad cutoff": "fails(lambda: hs.pairs(points, -1.0, box=box))",
+    "bad box": "fails(lambda: hs.pairs(points, 0.3, box=np.ones((3, 3))))",
+    "bad shape": "fails(lambda: hs.pairs(points[0], 0.3))",
+    "bad kind": 'fails(lambda: hs.pairs("points", 0.3))',
+    "bad quantities": 'fails(lambda: hs.pairs(points, 0.3, quantities="xyz"))',
+    "bad kernel": 'fails(lambda: hs.pairs(points, 0.3, kernel="none"))',
+    "memory limit": "fails(lambda: hs.pairs(points, 0.9, box=box, memory_limit=1))",
+    "shift overflow": 'fails(lambda: hs.pairs(far, 0.3, box=box, quantities="S"))',
+    "tiny box": "fails(lambda: hs.pairs(points, 0.3, box=[1e-9] * 3))",
+    "box": "hs.Box.from_matrix(box).wrap(points)",
+    "verify": "hs.verify(points, 0.1, *hs.pairs(points, 0.1))",
+    "explain": "str(hs.explain(points, 0.3, box=box))",
+}
+
+
+@pytest.fixture(scope="module")
+def growth():
+    """Bytes by which the process grew in 10^4 calls of each sort, after a warm-up.
+
+    The calls are made in three rounds and the smallest growth counts: a leak shows in each
+    round, an arena that the allocator takes now and then does not.
+    """
+    calls = "\n".join(f"    {name!r}: lambda: {call}," for name, call in CALLS.items())
+    return run(
+        RESIDENT
+        + f"""
+import gc, json
+import numpy as np
+import halfshell as hs
+
+rng = np.random.default_rng(1)
+points = rng.random((40, 3))
+single = points.astype(np.float32)
+listed = points.tolist()
+broken = points.copy()
+broken[30, 1] = np.nan
+far = points + np.array([1e10, 0, 0]) * (np.arange(40) % 2)[:, None]
+box = np.eye(3)
+
+def fails(call):
+    try:
+        call()
+    except (ValueError, TypeError, MemoryError, OverflowError):
+        return
+    raise AssertionError("accepted")
+
+calls = {{
+{calls}
+}}
+grown = {{}}
+for name, call in calls.items():
+    for _ in range(400):
+        call()
+    rounds = []
+    for _ in range(3):
+        gc.collect()
+        before = resident()
+        for _ in range(3200):
+            call()
+        gc.collect()
+        rounds.append(resident() - before)
+    grown[name] = min(rounds)
+print(json.dumps(grown))
+"""
+    )
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_memory_does_not_grow(growth, name):
+    # A leak of only 32 bytes per call would show as 100 kB.
+    assert growth[name] < 100_000
+
+
+def test_large_results_are_given_back():
+    grown = run(
+        RESIDENT
+        + """
+import gc, json
+import numpy as np
+import halfshell as hs
+points = np.random.default_rng(1).random((20_000, 3))
+def once():
+    found = hs.pairs(points, 0.1, quantities="ijdDS")
+    return sum(a.nbytes for a in found)
+size = once()
+gc.collect()
+before = resident()
+for _ in range(20):
+    once()
+gc.collect()
+print(json.dumps([resident() - before, size]))
+"""
+    )
+    assert grown[1] > 30_000_000
+    assert grown[0] < grown[1] / 2
+
+
+def test_memory_does_not_depend_on_the_volume():
+    # Two points at the ends of an enormous box and a tiny cutoff: no grid of empty cells.
+    grown = run(
+        RESIDENT
+        + """
+import json
+import numpy as np
+import halfshell as hs
+hs.pairs(np.random.default_rng(1).random((1000, 3)), 0.1)
+before = resident()
+for size in (1e3, 1e6, 1e9, 1e12, 1e15):
+    points = np.random.default_rng(1).random((1000, 3)) * size
+    assert len(hs.pairs(points, 1e-3)[0]) == 0
+    assert len(hs.pairs(points, 1e-3, box=[size] * 3)[0]) == 0
+print(json.dumps(resident() - before))
+"""
+    )
+    assert grown < 20_000_000

@@ -1,0 +1,183 @@
+"""Many Python threads at once; inputs that change during a search."""
+
+import threading
+
+import numpy as np
+
+import halfshell as hs
+from oracles import random_scene, same_arrays
+from subprocesses import run
+
+
+def in_threads(count, work):
+    """Call work(k) in `count` threads that start together; return results, or raise."""
+    results, errors = [None] * count, []
+    barrier = threading.Barrier(count)
+
+    def body(k):
+        barrier.wait()
+        try:
+            results[k] = work(k)
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=body, args=(k,)) for k in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    if errors:
+        raise errors[0]
+    return results
+
+
+def test_the_same_search_in_many_threads(rng):
+    points, cutoff, box, _ = random_scene(rng, 2000, neighbours=20)
+    expected = hs.pairs(points, cutoff, box=box, quantities="ijSdD")
+
+    def work(_):
+        return [hs.pairs(points, cutoff, box=box, quantities="ijSdD") for _ in range(4)]
+
+    for results in in_threads(16, work):
+        assert all(same_arrays(found, expected) for found in results)
+
+
+def test_different_searches_in_many_threads(rng):
+    scenes = [random_scene(rng, 20 + 60 * k, 1 + k % 4, neighbours=12) for k in range(12)]
+    names = hs.kernels()
+
+    def work(k):
+        points, cutoff, box, flags = scenes[k]
+        return [
+            hs.pairs(
+                points,
+                cutoff,
+                box=box,
+                periodic=flags,
+                quantities="ijSdDP",
+                kernel=names[k % len(names)],
+                sort=bool(k % 2),
+            )
+            for _ in range(5)
+        ]
+
+    alone = [work(k)[0] for k in range(len(scenes))]
+    for expected, results in zip(alone, in_threads(len(scenes), work)):
+        assert all(same_arrays(found, expected) for found in results)
+
+
+def test_failures_in_one_thread_do_not_disturb_the_others(rng):
+    points, cutoff, box, _ = random_scene(rng, 1000, neighbours=10)
+    expected = hs.count_pairs(points, cutoff, box=box)
+    broken = points.copy()
+    broken[500] = np.nan
+
+    def work(k):
+        if k % 2:
+            return [hs.count_pairs(points, cutoff, box=box) for _ in range(20)]
+        for _ in range(20):
+            try:
+                hs.count_pairs(broken, cutoff, box=box)
+            except ValueError as error:
+                assert "500" in str(error)
+            else:
+                raise AssertionError("NaN was accepted")
+        return [expected]
+
+    for counts in in_threads(8, work):
+        assert set(counts) == {expected}
+
+
+def test_searches_in_threads_overlap(rng):
+    # With the lock held, the ticking thread would stand still for the whole search.
+    points = rng.random((50_000, 3))
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.wait(0.002):
+            ticks.append(1)
+
+    ticking = threading.Thread(target=tick)
+    ticking.start()
+    before = len(ticks)
+    hs.count_pairs(points, 2.0)
+    during = len(ticks) - before
+    done.set()
+    ticking.join()
+    assert during >= 5
+
+
+def test_points_that_change_during_the_search_never_crash():
+    # Any answer is allowed, or an exception; the process must survive and work afterwards.
+    survived, changed = run(
+        """
+import json, threading, time
+import numpy as np
+import halfshell as hs
+
+rng = np.random.default_rng(1)
+start = rng.random((20_000, 3))
+points, box = start.copy(), np.eye(3)
+stop = False
+writes = 0
+
+def mutate():
+    global writes
+    junk = [np.nan, np.inf, -np.inf, 1e300, -1e300, 5e-324, 0.5, 1e17]
+    k = 0
+    while not stop:
+        k += 1
+        points[k * 7919 % 20_000] = junk[k % len(junk)]
+        box[k % 3, (k // 3) % 3] = junk[k % len(junk)]
+        if k % 50 == 0:
+            points[:] = start
+            box[:] = np.eye(3)
+        writes = k
+
+threads = [threading.Thread(target=mutate) for _ in range(2)]
+for thread in threads:
+    thread.start()
+end = time.perf_counter() + 2.0
+turn = 0
+while time.perf_counter() < end:
+    turn += 1
+    try:
+        if turn % 3:
+            hs.pairs(points, 0.02, box=box if turn % 2 else [1.0] * 3, quantities="ijdDS",
+                     sort=turn % 5 == 0, memory_limit=3e8)
+        else:
+            hs.pairs(points, 0.02, memory_limit=3e8)
+    except (ValueError, OverflowError, MemoryError):
+        pass
+stop = True
+for thread in threads:
+    thread.join()
+expected = hs.count_pairs(start, 0.02)
+assert expected == len(hs.pairs(start.copy(), 0.02)[0])
+print(json.dumps([True, writes]))
+"""
+    )
+    assert survived and changed > 1000
+
+
+def test_points_that_are_freed_during_the_search_are_kept_alive():
+    assert run(
+        """
+import gc, json, threading
+import numpy as np
+import halfshell as hs
+
+def work():
+    for k in range(60):
+        count = hs.count_pairs(np.random.default_rng(k).random((3000, 3)).astype(">f8")[::2], 0.1)
+        assert count > 0
+        gc.collect()
+
+threads = [threading.Thread(target=work) for _ in range(4)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print(json.dumps(True))
+"""
+    )
