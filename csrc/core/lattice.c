@@ -250,7 +250,7 @@ set_aligned_axes(hs_lattice *lattice, const int *column)
     }
 }
 
-/* The given rows, scaled; B is the same for now. */
+/* The given rows, scaled; B starts as these. */
 static void
 take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
 {

@@ -344,8 +344,6 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
     }
     search->filter_error = search->scene.x_error + search->grid.shift_error +
                            search->scene.formula_error;
-    search->lists_places =
-        (options->want & (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)) != 0;
     return HS_OK;
 }
 

@@ -39,7 +39,7 @@ struct hs_search {
     hs_link         *links;   /* owned; of the row being walked */
     int64_t          n_links;
     const hs_kernel *kernel;
-    bool             lists_places;
+    bool             lists_places; /* set before walking where the visitor wants places */
     double           filter_error; /* bound on each component before rounding to float32 */
     hs_visit_fn      visit;
     void            *visit_context;
