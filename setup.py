@@ -22,13 +22,14 @@ else:
         "-g0",
         "-ffp-contract=off",
         "-fvisibility=hidden",
+        "-pthread",
         "-Wall",
         "-Wextra",
         "-Wshadow",
         "-Wstrict-prototypes",
         "-Wmissing-prototypes",
     ]
-    link_args = []
+    link_args = ["-pthread"]
     if os.environ.get("HS_WERROR"):
         compile_args += ["-Werror"]
     if os.environ.get("HS_DEBUG"):

@@ -136,7 +136,7 @@ def is_pair(
     Returns whether it is within the cutoff, and by how much its distance passes the cutoff,
     as a fraction of the cutoff. Without `shift` the nearest image is meant.
     """
-    rows = scene.rows
+    rows = scene.rows_at(i)
     between = [Fraction(b) - Fraction(a) for a, b in zip(*scene.points[[i, j]], strict=True)]
     if rows is None:
         vectors = [between]

@@ -15,7 +15,7 @@ import importlib
 import importlib.metadata
 import os
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from agreement import Keys, half_keys
 from scenes import Scene
 
-__all__ = ["Call", "Contestant", "Floats", "Halfshell", "in_space", "pin_threads"]
+__all__ = ["Call", "Contestant", "Floats", "Halfshell", "Looped", "in_space", "pin_threads"]
 
 Call = Callable[[], Any]
 Floats = NDArray[np.float64]
@@ -115,6 +115,10 @@ class Contestant:
             return int(result)
         return len(self.indices(result)[0]) // (2 if self.full else 1)
 
+    def for_batch(self) -> Contestant:
+        """Return the contestant for scenes of many systems. Default: a loop over them."""
+        return Looped(self)
+
     def band(self, scene: Scene) -> float:
         """Return how far off the cutoff its rounding may misplace a pair, as a fraction."""
         if scene.n == 0 or scene.cutoff == 0.0:
@@ -137,6 +141,62 @@ def in_space(scene: Scene) -> tuple[Floats, Floats | None, list[bool]]:
     return points, slab, [*scene.periodic, False]
 
 
+class Looped(Contestant):
+    """A library that knows no batches: one call for each system, one after the other."""
+
+    def __init__(self, one: Contestant) -> None:
+        self.one = one
+        self.name = one.name  # type: ignore[misc]
+        self.inclusive = one.inclusive  # type: ignore[misc]
+
+    def version(self) -> str | None:
+        """Return the version of the library."""
+        return self.one.version()
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Say why the library cannot do one of the systems, or return None."""
+        if scene.has_images and not self.one.images:
+            return "several images of one pair"
+        return self.one.refuses(scene.systems()[0])
+
+    def prepare(self, scene: Scene) -> Call:
+        """Convert the input of each system beforehand."""
+        calls = [self.one.prepare(system) for system in scene.systems()]
+        return lambda: [call() for call in calls]
+
+    def keys(self, scene: Scene, result: Any) -> Keys:
+        """Number the points of all systems through, and join the lists."""
+        sizes = [system.n for system in scene.systems()]
+        starts = np.cumsum([0, *sizes[:-1]])
+        parts = [self.one.indices(part) for part in result]
+        i = np.concatenate([start + part[0] for start, part in zip(starts, parts)])
+        j = np.concatenate([start + part[1] for start, part in zip(starts, parts)])
+        shift = None
+        if scene.has_images:
+            shift = np.concatenate([self.one.shifts(part) for part in result])
+        return half_keys(scene, i, j, shift, self.one.full)
+
+    def count(self, scene: Scene, result: Any) -> int:
+        """Return the number of pairs in all systems."""
+        return sum(self.one.count(scene, part) for part in result)
+
+    def band(self, scene: Scene) -> float:
+        """Return what rounding may misplace, by the extent of all systems."""
+        return self.one.band(scene)
+
+
+@cache
+def _accepts(function: str, keyword: str, value: Any) -> bool:
+    """Whether the installed halfshell knows a keyword, found out by using it."""
+    hs = importlib.import_module("halfshell")
+    value = np.zeros(1, dtype=np.int64) if keyword == "batch" else value
+    try:
+        getattr(hs, function)(np.zeros((1, 3)), 1.0, **{keyword: value})
+    except TypeError:
+        return False
+    return True
+
+
 class Halfshell(Contestant):
     """Our own search; `options` are passed on to the call."""
 
@@ -149,13 +209,32 @@ class Halfshell(Contestant):
     def __init__(self, options: Mapping[str, Any] | None = None) -> None:
         self.options = dict(options or {})
 
+    def for_batch(self) -> Contestant:
+        """Return itself: a batch is one call."""
+        return self
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Refuse what the installed version does not have yet."""
+        function = "count_pairs" if scene.task == "count" else "pairs"
+        threads = self.options.get("threads", scene.threads)
+        if threads != 1 and not _accepts(function, "threads", threads):
+            return "no threads in this version"
+        if scene.batch is not None and not _accepts(function, "batch", None):
+            return "no batches in this version"
+        return None
+
     def prepare(self, scene: Scene) -> Call:
         """Return our call with the keywords of the scene."""
         hs = importlib.import_module("halfshell")
-        options = dict(self.options)
+        function = "count_pairs" if scene.task == "count" else "pairs"
+        options: dict[str, Any] = {}
+        if _accepts(function, "threads", scene.threads):
+            options["threads"] = scene.threads
         if scene.box is not None:
             options.update(box=scene.box, periodic=scene.periodic)
-        if scene.task == "count":
-            return partial(hs.count_pairs, scene.points, scene.cutoff, **options)
-        options.update(quantities=scene.quantities, index_dtype=np.dtype(scene.index_dtype))
-        return partial(hs.pairs, scene.points, scene.cutoff, **options)
+        if scene.batch is not None:
+            options["batch"] = scene.batch
+        if scene.task == "pairs":
+            options.update(quantities=scene.quantities, index_dtype=np.dtype(scene.index_dtype))
+        options.update(self.options)
+        return partial(getattr(hs, function), scene.points, scene.cutoff, **options)

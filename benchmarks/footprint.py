@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What halfshell costs besides time: import, size on disk, memory beyond the output.
 
-    python benchmarks/footprint.py [--wheel FILE] [--runs 21] [--scenes NAME ...]
+    python benchmarks/footprint.py [--wheel FILE] [--runs 21] [--scenes NAME[:QUANTITIES] ...]
 
 Each figure comes from new processes. Memory needs Linux (it is read from /proc).
 """
@@ -9,20 +9,23 @@ Each figure comes from new processes. Memory needs Linux (it is read from /proc)
 from __future__ import annotations
 
 import argparse
+import csv
 import importlib.metadata
 import json
 import subprocess
 import sys
 import zipfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
+from machine import available_bytes, facts
 from report import duration, render
 from scenes import SCENES, Scene, load
 
-__all__ = ["allowance", "main"]
+__all__ = ["COLUMNS", "allowance", "main", "parse_case"]
 
 _HERE = Path(__file__).resolve().parent
 
@@ -41,8 +44,10 @@ print(json.dumps([middle - start, end - middle, sorted(set(sys.modules) - before
 # imports count. Where that is not allowed the peak since the start is taken, which is more.
 _MEMORY = """
 import json, sys
+from dataclasses import replace
 sys.path.insert(0, {here!r})
 from contestant import Halfshell
+from measure import bytes_held
 from scenes import load
 
 def kilobytes(key):
@@ -50,7 +55,8 @@ def kilobytes(key):
         return next(int(line.split()[1]) for line in status if line.startswith(key))
 
 Halfshell().prepare(load("call-2"))()
-call = Halfshell().prepare(load({scene!r}))
+scene = load({scene!r})
+call = Halfshell().prepare(replace(scene, quantities={quantities!r} or scene.quantities))
 try:
     with open("/proc/self/clear_refs", "w") as file:
         file.write("5")
@@ -58,11 +64,21 @@ except OSError:
     pass
 before = kilobytes("VmRSS:")
 result = call()
-print(json.dumps([before, kilobytes("VmHWM:"), kilobytes("VmRSS:")]))
+peak, after = kilobytes("VmHWM:"), kilobytes("VmRSS:")
+print(json.dumps([before, peak, after, bytes_held(result)]))
 """
 
-DEFAULT = ("pairs-1e5-k52", "pairs-1e5-k52-int32", "vectors-1e5-k52", "triclinic-1e4-k52",
-           "plane-1e5-k20", "clusters-1e5", "fcc-shell", "count-1e5-k52")  # fmt: skip
+# A scene, or a scene and other quantities than its own.
+DEFAULT = (
+    "growth-1e4", "growth-1e5", "growth-1e6", "growth-1e7", "growth-1e4:ijdDS",
+    "growth-1e5:ijdDS", "growth-1e6:ijdDS", "triclinic-1e4-k52", "plane-1e5-k20", "clusters-1e5",
+    "two-clusters-open", "plummer-1e5", "fcc-shell", "count-1e5-k52", "count-1e5-k419",
+)  # fmt: skip
+
+COLUMNS = (
+    "date", "cpu", "kernel", "commit", "scene", "quantities", "n", "output", "peak", "kept",
+    "beyond", "allowed",
+)  # fmt: skip
 
 
 def allowance(scene: Scene) -> int:
@@ -105,37 +121,90 @@ def _report_size(wheel: Path | None) -> None:
         print(f"wheel                   {packed / 1e3:.0f} kB, unpacked {unpacked / 1e3:.0f} kB")
 
 
-def _report_memory(names: Sequence[str], plain: bool) -> None:
+def parse_case(text: str) -> tuple[str, str]:
+    """Split NAME or NAME:QUANTITIES; raise argparse.ArgumentTypeError for no such scene."""
+    name, _, quantities = text.partition(":")
+    if name not in SCENES:
+        raise argparse.ArgumentTypeError(f"no scene {name!r}")
+    return name, quantities
+
+
+def _measure_memory(name: str, quantities: str) -> dict[str, Any] | None:
+    """Return the bytes of one call, None where the machine has too little memory for it."""
+    scene = load(name)
+    if quantities:
+        scene = replace(scene, quantities=quantities)
+    # Points, result and search must fit, with room to spare.
+    if 2 * scene.bytes_of_output() + 200 * scene.n > available_bytes():
+        return None
+    before, peak, after, output = _python(
+        _MEMORY.format(here=str(_HERE), scene=name, quantities=quantities)
+    )
+    return {
+        "scene": name,
+        "quantities": "count" if scene.task == "count" else scene.quantities,
+        "n": scene.n,
+        "output": output,
+        "peak": (peak - before) * 1024,
+        "kept": (after - before) * 1024,
+        "beyond": (peak - before) * 1024 - output,
+        "allowed": allowance(scene),
+    }
+
+
+def _report_memory(cases: Sequence[tuple[str, str]], plain: bool, output: Path | None) -> None:
     if not Path("/proc/self/status").exists():
         print("memory is measured on Linux only")
         return
-    body = []
-    for name in names:
-        scene = load(name)
-        before, peak, after = _python(_MEMORY.format(here=str(_HERE), scene=name))
-        beyond = (peak - before) * 1024 - scene.bytes_of_output()
-        allowed = allowance(scene)
-        body.append([
-            name, f"{scene.bytes_of_output() / 1e6:.1f}", f"{(peak - before) * 1.024e-3:.1f}",
-            f"{(after - before) * 1.024e-3:.1f}", f"{beyond / 1e6:.1f}",
-            f"{beyond / scene.n:.0f}", f"{allowed / 1e6:.1f}",
-            "reached" if beyond <= allowed else "over",
-        ])  # fmt: skip
-    head = ["scene", "output", "peak", "kept", "beyond output", "bytes/point", "allowed", ""]
+    rows = []
+    for name, quantities in cases:
+        row = _measure_memory(name, quantities)
+        if row is None:
+            print(f"{name} {quantities}: left out, too little memory")
+        else:
+            rows.append(row)
+    body = [
+        [
+            row["scene"], row["quantities"],
+            *(f"{row[key] / 1e6:.1f}" for key in ("output", "peak", "kept", "beyond")),
+            f"{row['beyond'] / row['n']:.0f}", f"{row['allowed'] / 1e6:.1f}",
+            "reached" if row["beyond"] <= row["allowed"] else "over",
+        ]
+        for row in rows
+    ]  # fmt: skip
+    head = ["scene", "quantities", "output", "peak", "kept", "beyond output", "bytes/point",
+            "allowed", ""]  # fmt: skip
     render(("Memory of one call, megabytes", head, body), rich=not plain)
+    if output is not None:
+        _write(output, rows)
+
+
+def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    import halfshell as hs
+
+    about = {key: value for key, value in facts(simd=hs.kernels()[0]).items() if key in COLUMNS}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({**about, **row} for row in rows)
+    print(f"wrote {path}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--runs", type=int, default=21, help="processes that import (21)")
+    parser.add_argument("--runs", type=int, default=21, help="processes that import; 0: none (21)")
     parser.add_argument("--wheel", type=Path, help="a wheel to weigh")
-    parser.add_argument("--scenes", nargs="*", choices=SCENES, default=DEFAULT, metavar="NAME")
+    parser.add_argument("--scenes", nargs="*", type=parse_case, metavar="NAME[:QUANTITIES]",
+                        default=[parse_case(case) for case in DEFAULT])  # fmt: skip
+    parser.add_argument("--output", type=Path, metavar="CSV", help="write the memory to a file")
     parser.add_argument("--plain", action="store_true", help="tables without the rich package")
     options = parser.parse_args(arguments)
-    _report_import(options.runs)
+    if options.runs:
+        _report_import(options.runs)
     _report_size(options.wheel)
-    _report_memory(options.scenes, options.plain)
+    _report_memory(options.scenes, options.plain, options.output)
     return 0
 
 

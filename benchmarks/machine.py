@@ -6,25 +6,29 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-__all__ = ["available_bytes", "facts", "pin_to_core", "touch_memory"]
+__all__ = ["available_bytes", "facts", "pin_to_cores", "touch_memory", "usable_cores"]
 
 
-def pin_to_core(core: int | None = None) -> int | None:
-    """Keep this process on one core, by default the last that it may use.
-
-    Returns the core, or None where the system does not offer it.
-    """
+def pin_to_cores(cores: Sequence[int]) -> bool:
+    """Keep this process on these cores. Returns whether the system offers it."""
     if not hasattr(os, "sched_setaffinity"):
-        return None
-    core = max(os.sched_getaffinity(0)) if core is None else core
-    os.sched_setaffinity(0, {core})
-    return core
+        return False
+    os.sched_setaffinity(0, cores)
+    return True
+
+
+def usable_cores() -> list[int]:
+    """Return the cores that this process may use, the last one first."""
+    if not hasattr(os, "sched_getaffinity"):
+        return list(range(os.cpu_count() or 1))[::-1]
+    return sorted(os.sched_getaffinity(0), reverse=True)
 
 
 def available_bytes() -> int:
@@ -46,7 +50,7 @@ def touch_memory(n_bytes: int) -> None:
     del held
 
 
-def facts(label: str | None = None, simd: str = "") -> dict[str, Any]:
+def facts(label: str | None = None, simd: str = "", compiler: str = "") -> dict[str, Any]:
     """Return the columns that every row of a result file begins with."""
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -54,6 +58,7 @@ def facts(label: str | None = None, simd: str = "") -> dict[str, Any]:
         "cpu": _cpu_model(),
         "cores": os.cpu_count() or 1,
         "kernel": simd,
+        "compiler": compiler,
         "commit": _commit(),
         "os": platform.release().partition("-")[0],
         "python": platform.python_version(),

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from machine import touch_memory
+from machine import available_bytes, touch_memory
 
-__all__ = ["Timing", "Turn", "bytes_held", "plan_turn", "take_turns"]
+__all__ = ["Timing", "Turn", "bytes_held", "plan_turn", "single_calls", "take_turns"]
 
 # A turn of short calls lasts about this long; timers and interrupts then do not show.
 TURN_SECONDS = 0.01
@@ -89,7 +89,8 @@ def bytes_held(result: Any) -> int:
 
 
 def take_turns(turns: Mapping[str, Turn], keep: bool, budget: int = 1 << 30, seed: int = 1,
-               yields: tuple[str, ...] = ()) -> dict[str, Timing]:  # fmt: skip
+               yields: tuple[str, ...] = (),
+               dropped: Callable[[], None] = lambda: None) -> dict[str, Timing]:  # fmt: skip
     """Time calls against each other.
 
     Parameters
@@ -102,6 +103,8 @@ def take_turns(turns: Mapping[str, Turn], keep: bool, budget: int = 1 << 30, see
         `Timing` of their owner says so.
     yields : tuple of str
         Whose results are dropped last.
+    dropped : callable
+        Called after results were dropped, so that their memory is not used again.
 
     Returns
     -------
@@ -119,7 +122,7 @@ def take_turns(turns: Mapping[str, Turn], keep: bool, budget: int = 1 << 30, see
             if keep:
                 # A virtual machine hands pages that lie idle back to its host; the search and
                 # its result must find theirs in place.
-                touch_memory(3 * turns[name].n_bytes)
+                touch_memory(min(3 * turns[name].n_bytes, available_bytes() // 2))
             seconds, results = _time(turns[name], keep)
             timings[name].seconds.append(seconds)
             if not keep:
@@ -128,12 +131,53 @@ def take_turns(turns: Mapping[str, Turn], keep: bool, budget: int = 1 << 30, see
             held[name in last_resort].append((name, size, results))
             n_held += size
             del results
+            too_many = n_held > budget
             while n_held > budget and (held[False] or held[True]):
                 oldest = held[False] or held[True]
                 owner, size = oldest.popleft()[:2]
                 timings[owner].all_held = False
                 n_held -= size
+            if too_many:
+                dropped()
     return timings
+
+
+def single_calls(
+    calls: Mapping[str, Callable[[], Any]], samples: int = 2000, patience: float = 2.0,
+    seed: int = 1,
+) -> dict[str, tuple[float, float]]:  # fmt: skip
+    """Time short calls one by one, taking turns, each result dropped at once.
+
+    What the clock itself takes, some 50 ns, is part of each figure.
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Median and 99th percentile of the seconds of one call. Fewer than `samples` are taken
+        where `patience` seconds for each contestant do not suffice.
+    """
+    order = random.Random(seed)
+    names = list(calls)
+    seconds: dict[str, list[float]] = {name: [] for name in names}
+    clock = time.perf_counter
+    end = clock() + patience * len(names)
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(samples):
+            order.shuffle(names)
+            for name in names:
+                call = calls[name]
+                start = clock()
+                call()
+                seconds[name].append(clock() - start)
+            if clock() > end:
+                break
+    finally:
+        gc.enable()
+    return {
+        name: (median(taken), float(np.percentile(taken, 99))) for name, taken in seconds.items()
+    }
 
 
 def _time(turn: Turn, keep: bool) -> tuple[float, list[Any]]:

@@ -74,7 +74,10 @@ class CKDTree(Contestant):
 
 
 class NeighborlistRs(Contestant):
-    """neighborlist-rs: cells, half lists with shifts; strict; box vectors are columns."""
+    """neighborlist-rs: cells, half lists with shifts; strict; box vectors are columns.
+
+    Batches go through its own function for them.
+    """
 
     name = "neighborlist-rs"
     distribution = "neighborlist-rs"
@@ -84,14 +87,26 @@ class NeighborlistRs(Contestant):
     def refuses(self, scene: Scene) -> str | None:
         """Refuse sparse scenes too: its grid grows with the volume and aborts the process."""
         extent = np.ptp(scene.points, axis=0) / scene.cutoff if scene.cutoff > 0.0 else [np.inf]
-        if np.prod(extent) > 1e8:
+        if scene.batch is None and np.prod(extent) > 1e8:
             return "grid larger than the memory"
         return super().refuses(scene)
+
+    def for_batch(self) -> Contestant:
+        """Return itself: it knows batches."""
+        return self
 
     def prepare(self, scene: Scene) -> Call:
         """Make its box beforehand; without threads."""
         library = importlib.import_module("neighborlist_rs")
         library.set_num_threads(1)
+        if scene.batch is not None:
+            cells = None
+            if scene.rows is not None:
+                cells = np.ascontiguousarray(scene.rows.transpose(0, 2, 1))
+            return partial(
+                library.build_neighborlists_batch, scene.points, scene.batch.astype(np.int32),
+                cells, scene.cutoff, parallel=False,
+            )  # fmt: skip
         cell = None if scene.rows is None else library.PyCell(scene.rows.T.tolist())
         call = partial(
             library.build_neighborlists, cell, scene.points, scene.cutoff, parallel=False

@@ -22,6 +22,7 @@ __all__ = [
     "table_of_contestants",
     "table_of_limits",
     "table_of_ratios",
+    "table_of_single_calls",
     "write_csv",
 ]
 
@@ -51,6 +52,10 @@ class Measurement:
     all_held: bool
     complete: bool  # no pair is wrong beyond rounding
     agreement: str
+    threads: int = 1
+    systems: int = 1  # in one call
+    call_median: float | None = None  # seconds of single calls, where they were timed
+    call_p99: float | None = None
 
     @property
     def ns_per_pair(self) -> float:
@@ -91,8 +96,11 @@ class Ratio:
 
 
 _MACHINE = (
-    "date", "machine", "cpu", "cores", "kernel", "commit", "os", "python", "numpy",
-    "huge_pages", "governor", "load",
+    "date", "machine", "cpu", "cores", "kernel", "compiler", "commit", "os", "python",
+    "numpy", "huge_pages", "governor", "load",
+)  # fmt: skip
+_TIMES = (
+    "fresh_median", "fresh_min", "recycled_median", "recycled_min", "call_median", "call_p99",
 )  # fmt: skip
 _DERIVED = ("ns_per_pair", "ns_per_point", "ratio_fresh", "ratio_recycled", "want")
 COLUMNS: tuple[str, ...] = (*_MACHINE, *Measurement.__dataclass_fields__, *_DERIVED)
@@ -100,6 +108,9 @@ COLUMNS: tuple[str, ...] = (*_MACHINE, *Measurement.__dataclass_fields__, *_DERI
 
 def _ours(measured: Iterable[Measurement]) -> dict[str, Measurement]:
     return {one.scene: one for one in measured if one.contestant == OURS}
+
+
+LimitRow = tuple[str, str, float, float | None, str]
 
 
 def ratio_rows(measured: Sequence[Measurement], wanted: Mapping[str, float | None]) -> list[Ratio]:
@@ -123,11 +134,11 @@ def ratio_rows(measured: Sequence[Measurement], wanted: Mapping[str, float | Non
 
 def limit_rows(
     measured: Sequence[Measurement], limits: Mapping[str, Sequence[Limit]]
-) -> list[tuple[str, str, float, float, str]]:
+) -> list[LimitRow]:
     """Hold us against ourselves: (scene, label, value, at most, state) for each limit.
 
     The value is our time over the other's, both as a whole, per pair or per point as the
-    limit says; for ``"seconds"`` it is our time.
+    limit says; for ``"rewrite"`` both are of recycled results; for ``"seconds"`` it is our time.
     """
     others = {(one.scene, one.contestant): one for one in measured}
     rows = []
@@ -140,11 +151,15 @@ def limit_rows(
                 if other is None:
                     continue
                 value = ours.fresh_median / other.fresh_median
-                if limit.kind == "scene":
+                if limit.kind == "rewrite":
+                    value = ours.recycled_median / other.recycled_median
+                elif limit.kind == "scene":
                     value *= other.pairs / max(ours.pairs, 1)
                 elif limit.kind == "growth":
                     value *= other.n / max(ours.n, 1)
-            state = "reached" if value <= limit.at_most else "over"
+            state = ""
+            if limit.at_most is not None:
+                state = "reached" if value <= limit.at_most else "over"
             rows.append((scene, limit.label, value, limit.at_most, state))
     return rows
 
@@ -187,13 +202,24 @@ def table_of_ratios(rows: Sequence[Ratio]) -> Table:
     return "Time of the fastest peer over ours", head, body
 
 
-def table_of_limits(rows: Sequence[tuple[str, str, float, float, str]]) -> Table:
+def table_of_limits(rows: Sequence[LimitRow]) -> Table:
     """Lay out the limits on ourselves."""
     body = [
-        [scene, label, f"{value:.4g}", f"{at_most:g}", state]
+        [scene, label, f"{value:.4g}", "" if at_most is None else f"{at_most:.4g}", state]
         for scene, label, value, at_most, state in rows
     ]
     return "Our time over our own, or in seconds", ["scene", "against", "is", "at most", ""], body
+
+
+def table_of_single_calls(measured: Sequence[Measurement]) -> Table:
+    """Lay out what single calls take."""
+    body = [
+        [one.scene, one.contestant, str(one.n), duration(one.call_median), duration(one.call_p99)]
+        for one in measured
+        if one.call_median is not None and one.call_p99 is not None
+    ]
+    head = ["scene", "contestant", "points", "median", "99 %"]
+    return "Single calls, results dropped", head, body
 
 
 def duration(seconds: float) -> str:
@@ -212,13 +238,14 @@ def render(table: Table, rich: bool = True) -> None:
     if rich:
         try:
             from rich.console import Console
+            from rich.markup import escape
             from rich.table import Table as RichTable
         except ImportError:
             pass
         else:
             drawn = RichTable(*head, title=title, title_justify="left")
             for row in body:
-                drawn.add_row(*row)
+                drawn.add_row(*map(escape, row))
             console = Console()
             # A narrow terminal or a file would otherwise break every name in two.
             Console(width=max(console.width, 180) if not console.is_terminal else None).print(drawn)
@@ -239,6 +266,10 @@ def write_csv(
     """Append one row for each measurement; the first line of a new file names the columns."""
     ours = _ours(measured)
     new = not path.exists() or path.stat().st_size == 0
+    if not new:
+        with path.open(newline="", encoding="utf-8") as file:
+            if tuple(next(csv.reader(file))) != COLUMNS:
+                raise ValueError(f"{path} has other columns; choose a new file")
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
@@ -254,6 +285,6 @@ def write_csv(
                 row["ratio_recycled"] = f"{one.recycled_median / base.recycled_median:.4g}"
             want = wanted.get(one.scene)
             row["want"] = "" if want is None else want
-            for key in ("fresh_median", "fresh_min", "recycled_median", "recycled_min"):
-                row[key] = f"{row[key]:.6g}"
+            for key in _TIMES:
+                row[key] = "" if row[key] is None else f"{row[key]:.6g}"
             writer.writerow(row)

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * halfshell.h: the public C interface. Every pair of points within a cutoff, decided
- * exactly for the floating-point numbers that were given.
+ * halfshell.h: the public C interface. Every pair of points within a cutoff, decided exactly for
+ * the floating-point numbers that were given.
  *
  * Words: a point is a row of the input; the box is up to d row vectors, some of which repeat
- * (periodic); a cell is one bin of the search grid; a shift S is a row of integers, one per
- * box vector, zero where the box does not repeat; a pair is (i, j, S) with the vector
- * D = point[j] - point[i] + S * box.
+ * (periodic); a cell is one bin of the search grid; a shift S is a row of integers, one per box
+ * vector, zero where the box does not repeat; a pair is (i, j, S) with the vector D = point[j] -
+ * point[i] + S * box.
  *
- * Rules: nothing here prints, reads the environment or keeps state between calls. Every
- * function may be called from several threads at once. On failure outputs are untouched or
- * NULL, and `hs_failure` says what was wrong.
+ * Rules: nothing here prints, reads the environment or, but for hs_pool_*, keeps state between
+ * calls. Every function may be called from several threads at once. On failure outputs are
+ * untouched or NULL, and `hs_failure` says what was wrong.
  */
 #ifndef HALFSHELL_H
 #define HALFSHELL_H
@@ -37,6 +37,7 @@ typedef enum hs_status {
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_KERNEL,        /* no kernel of that name on this CPU */
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
+    HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
     HS_STATUS_END         /* number of codes, not a code */
 } hs_status;
 
@@ -47,8 +48,9 @@ const char *hs_status_text(hs_status status);
 typedef struct hs_failure {
     int64_t row;            /* point or box vector, -1 when it does not apply */
     int64_t column;         /* coordinate, -1 when it does not apply */
+    int64_t system;         /* of several that were searched at once, -1 when it does not apply */
     double  value;          /* the offending number */
-    double  expected_pairs; /* HS_ERR_MEMORY: pairs that were expected, or 0 */
+    double  expected_pairs; /* HS_ERR_MEMORY: pairs that were expected, or 0; HS_ERR_CAPACITY */
     double  expected_bytes; /* HS_ERR_MEMORY: bytes that they would need, or 0 */
     double  limit_bytes;    /* HS_ERR_MEMORY: bytes that were allowed, or 0 */
 } hs_failure;
@@ -127,6 +129,18 @@ typedef struct hs_counters {
  */
 typedef bool (*hs_poll_fn)(void *context, double fraction);
 
+/* One array for each quantity; NULL for those that are not there. */
+typedef struct hs_pair_arrays {
+    int64_t  capacity;     /* pairs that fit */
+    int      index_bytes;  /* 4 or 8: int32 or int64 elements of the next three */
+    void    *i;            /* m */
+    void    *j;            /* m */
+    void    *both;         /* m * 2: i and j side by side */
+    double  *distance;     /* m */
+    double  *vector;       /* m * ndim */
+    int32_t *shift;        /* m * ndim */
+} hs_pair_arrays;
+
 /* Called at most once per call, when the result may be large: bytes that may still be used. */
 typedef double (*hs_limit_fn)(void *context);
 
@@ -136,8 +150,10 @@ typedef struct hs_options {
     bool         sorted;       /* ascending (i, j, S) */
     hs_precision precision;
     unsigned     want;         /* HS_WANT_ bits */
-    int          index_bytes;  /* 4 or 8: width of the caller's i and j, for the memory check */
+    int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
+    const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
+    int          threads;      /* exactly so many; -n: at most n, and one for small scenes */
     double       memory_limit; /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;
@@ -171,27 +187,47 @@ hs_status hs_pairs_find(const hs_points *points, const hs_box *box, const hs_opt
 hs_status hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
                          int64_t *count, hs_failure *failure);
 
-/* Number of pairs. */
+/* Number of pairs: each array has one entry or row for each. */
 int64_t hs_pairs_length(const hs_pairs *pairs);
 
-/* Where hs_pairs_write puts the pairs. Each array is NULL, or caller-owned with room for
- * hs_pairs_length() pairs; only what was wanted can be written. */
-typedef struct hs_pair_arrays {
-    int      index_bytes;  /* 4 or 8: int32 or int64 elements of the next three */
-    void    *i;            /* m */
-    void    *j;            /* m */
-    void    *both;         /* m * 2: i and j side by side */
-    double  *distance;     /* m */
-    double  *vector;       /* m * ndim */
-    int32_t *shift;        /* m * ndim */
-} hs_pair_arrays;
+/* The array of one HS_WANT_ bit: borrowed from the result, in the types of hs_pair_arrays; NULL
+ * when it was not wanted, has been taken, or the caller's arrays were used. */
+const void *hs_pairs_array(const hs_pairs *pairs, unsigned which);
 
-/* Copy the pairs out, block by block, giving the search's own storage back as it goes. May be
- * called once. Returns HS_OK, or HS_ERR_INTERRUPTED when poll() says so. */
-hs_status hs_pairs_write(hs_pairs *pairs, const hs_pair_arrays *arrays);
+/* The same, but ownership goes to the caller: hs_array_free. Never NULL for a quantity that was
+ * wanted, unless it was taken before or the caller's arrays were used. */
+void *hs_pairs_take(hs_pairs *pairs, unsigned which);
+
+/* NULL-safe. */
+void hs_array_free(void *array);
 
 /* NULL-safe. */
 void hs_pairs_free(hs_pairs *pairs);
+
+/*
+ * Several systems, searched in one call: system s has points first[s] to first[s + 1] and no pair
+ * with another. All arrays are borrowed.
+ */
+typedef struct hs_systems {
+    int64_t        n;
+    const int64_t *first;   /* n + 1; from 0, not descending, to the number of points */
+    const hs_box  *box;     /* of all; NULL: open space */
+    const double  *rows;    /* n * ndim * ndim, in place of box->rows: of each; or NULL */
+    const double  *cutoffs; /* n, in place of options->cutoff; or NULL */
+} hs_systems;
+
+/*
+ * As hs_pairs_find for one system after the other: the result is that of so many calls, one behind
+ * the other, with numbers of all points as i and j. Threads share the systems out. A failure names
+ * the point among all, and the system where that says more. options->counters: bytes_peak is the
+ * sum of what each thread held at most.
+ */
+hs_status hs_systems_find(const hs_points *points, const hs_systems *systems,
+                          const hs_options *options, hs_pairs **pairs, hs_failure *failure);
+
+/* The same search, counting only; counts: n, unspecified on failure. */
+hs_status hs_systems_count(const hs_points *points, const hs_systems *systems,
+                           const hs_options *options, int64_t *counts, hs_failure *failure);
 
 /* What a search of this scene would do, without doing it. */
 typedef struct hs_plan {
@@ -207,6 +243,7 @@ typedef struct hs_plan {
     int64_t     images[HS_MAX_DIM];   /* periods that a pair can be apart; 0 on open axes */
     int64_t     stencil_rows;         /* neighbouring rows of cells, own row included */
     double      expected_pairs;       /* from the density; NaN where there is none */
+    int         threads;              /* that the walk would be shared by */
     const char *kernel;               /* static storage */
 } hs_plan;
 
@@ -226,6 +263,16 @@ hs_status hs_box_measure(const hs_box *box, double *heights, double *volume, hs_
  */
 hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped,
                       int64_t *shift, hs_failure *failure);
+
+/*
+ * Memory of results that are gone is kept for the next ones, up to a limit: the one thing that
+ * outlives a call. No answer depends on it. Bytes kept at most (256 MB at first; 0 keeps nothing),
+ * bytes kept now, and giving all of it back to the system.
+ */
+size_t hs_pool_limit(void);
+void   hs_pool_set_limit(size_t bytes);
+size_t hs_pool_held(void);
+void   hs_pool_clear(void);
 
 /* Names of the kernels that this CPU can run, best first; static storage. Writes at most
  * `capacity` of them and returns how many there are. */

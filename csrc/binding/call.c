@@ -4,14 +4,22 @@
 
 #include "available.h"
 #include "convert.h"
+#include "environment.h"
+#include "threads.h"
 
+#define MOST_THREADS 1024 /* an explicit wish, but not any */
 
-/* An hs_poll_fn: lets signals be handled and reports progress; false when either raised. */
+/* Points below which a search is expected to be over before another thread could take the GIL: it
+ * is kept until the first poll. */
+#define FEW_POINTS 256
+
+/* An hs_poll_fn: lets signals be handled and reports progress; false when either raised. From the
+ * first poll on the GIL is free: the search is not so small after all. */
 static bool
 poll_python(void *context, double fraction)
 {
     hs_call *call = context;
-    PyEval_RestoreThread(call->thread);
+    hs_call_acquire(call);
     bool go_on = PyErr_CheckSignals() == 0;
     if (go_on && call->progress != NULL) {
         PyObject *result = PyObject_CallFunction(call->progress, "d", fraction);
@@ -46,18 +54,48 @@ take_memory_limit(PyObject *object, hs_options *options)
     return true;
 }
 
+/* Fewer points are not worth asking for; the core would not use more than one thread for them. */
+#define POINTS_FOR_THREADS 4096
+
+static bool
+take_threads(PyObject *object, int64_t n_points, hs_options *options)
+{
+    if (object == Py_None) {
+        options->threads = n_points < POINTS_FOR_THREADS ? 1 : -hs_default_threads();
+        return true;
+    }
+    const long n = PyBool_Check(object) ? -1 : PyLong_AsLong(object);
+    if (n == -1 && PyErr_Occurred()) {
+        if (PyErr_ExceptionMatches(PyExc_TypeError)) {
+            PyErr_Format(PyExc_TypeError, "threads must be a whole number or None, got %s",
+                         Py_TYPE(object)->tp_name);
+        }
+        return false;
+    }
+    if (n < 1 || n > MOST_THREADS) {
+        PyErr_Format(PyBool_Check(object) ? PyExc_TypeError : PyExc_ValueError,
+                     "threads must be a whole number from 1 to %d or None, got %R", MOST_THREADS,
+                     object);
+        return false;
+    }
+    options->threads = (int)n;
+    return true;
+}
+
 bool
 hs_call_init(hs_call *call, PyObject *const *arguments)
 {
-    *call = (hs_call){.options = hs_options_default()};
+    call->options = hs_options_default();
+    call->thread = NULL;
     hs_options *options = &call->options;
     const int   inclusive = PyObject_IsTrue(arguments[4]);
     if (inclusive < 0 || !hs_points_of(arguments[0], &call->points) ||
         !hs_cutoff_of(arguments[1], &options->cutoff) ||
         !hs_box_of(arguments[2], arguments[3], call->points.ndim, &call->box, &call->has_box) ||
         !hs_precision_of(arguments[5], &options->precision) ||
-        !hs_name_of(arguments[6], "kernel", &options->kernel) ||
-        !take_memory_limit(arguments[7], options)) {
+        !hs_kernel_of(arguments[6], &options->kernel) ||
+        !take_memory_limit(arguments[7], options) ||
+        !take_threads(arguments[9], call->points.n, options)) {
         return false;
     }
     options->inclusive = inclusive != 0;
@@ -70,12 +108,16 @@ hs_call_init(hs_call *call, PyObject *const *arguments)
 void
 hs_call_release(hs_call *call)
 {
-    call->thread = PyEval_SaveThread();
+    if (call->points.n >= FEW_POINTS) {
+        call->thread = PyEval_SaveThread();
+    }
 }
 
 void
 hs_call_acquire(hs_call *call)
 {
-    PyEval_RestoreThread(call->thread);
-    call->thread = NULL;
+    if (call->thread != NULL) {
+        PyEval_RestoreThread(call->thread);
+        call->thread = NULL;
+    }
 }

@@ -15,18 +15,19 @@ typedef struct hs_call {
     bool           has_box;
     hs_options     options;
     PyObject      *progress; /* borrowed; called with the fraction done, or NULL */
-    PyThreadState *thread;   /* saved while the GIL is released */
+    PyThreadState *thread;   /* saved while the GIL is released, else NULL */
 } hs_call;
 
 /*
  * Positional arguments of every search, in this order: points, cutoff, box, periodic, inclusive,
- * precision, kernel, memory_limit (None: ask the machine), progress (None: no calls). Returns false
- * with an exception set.
+ * precision, kernel, memory_limit (None: ask the machine), progress (None: no calls), threads
+ * (None: as many as pay). Returns false with an exception set.
  */
-enum { HS_CALL_ARGUMENTS = 9 };
+enum { HS_CALL_ARGUMENTS = 10 };
 bool hs_call_init(hs_call *call, PyObject *const *arguments);
 
-/* Release and take the GIL around a call of the core; poll() takes it in between. */
+/* Release and take the GIL around a call of the core; poll() takes it in between. With few points
+ * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_call_release(hs_call *call);
 void hs_call_acquire(hs_call *call);
 

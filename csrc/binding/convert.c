@@ -52,16 +52,19 @@ hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *giv
     }
     PyArrayObject *array = (PyArrayObject *)object;
     if (!PyArray_Check(object) || PyArray_TYPE(array) != NPY_DOUBLE ||
-        !PyArray_ISCARRAY_RO(array) || PyArray_NDIM(array) != 2 ||
-        PyArray_DIM(array, 0) != ndim || PyArray_DIM(array, 1) != ndim) {
+        !PyArray_ISCARRAY_RO(array) || PyArray_NDIM(array) < 1 || PyArray_NDIM(array) > 2 ||
+        PyArray_DIM(array, 0) != ndim || PyArray_DIM(array, PyArray_NDIM(array) - 1) != ndim) {
         PyErr_Format(PyExc_ValueError, "box must be a float64 array of shape (%d, %d)", ndim, ndim);
         return false;
     }
     const double *entries = PyArray_DATA(array);
-    *box = (hs_box){.ndim = ndim};
+    const bool    has_rows = PyArray_NDIM(array) == 2;
+    box->ndim = ndim;
     for (int l = 0; l < ndim; l++) {
         box->periodic[l] = (bits >> l & 1) != 0;
-        memcpy(box->rows[l], entries + l * ndim, (size_t)ndim * sizeof(double));
+        for (int k = 0; k < ndim; k++) {
+            box->rows[l][k] = has_rows ? entries[l * ndim + k] : k == l ? entries[l] : 0.0;
+        }
     }
     return true;
 }

@@ -14,8 +14,8 @@
 bool hs_points_of(PyObject *object, hs_points *points);
 
 /*
- * box: None, or a C-contiguous float64 array (d, d). periodic: int, bit l set when box vector l
- * repeats. *given tells whether there is a box at all.
+ * box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). periodic: int, bit
+ * l set when box vector l repeats. *given tells whether there is a box at all.
  */
 bool hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given);
 

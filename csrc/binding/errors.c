@@ -2,6 +2,8 @@
 /* errors.c: see errors.h. Messages say what was wrong, the value, and what is allowed. */
 #include "errors.h"
 
+#include "environment.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -26,6 +28,47 @@ raise_at(const char *format, const hs_failure *failure)
                      (long long)failure->column, number);
         Py_DECREF(number);
     }
+    return NULL;
+}
+
+/* The same for entries of the box of one system out of many. */
+static PyObject *
+raise_box_of_system(const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError, "box must be finite, got box[%lld, %lld, %lld] = %R",
+                     (long long)failure->system, (long long)failure->row,
+                     (long long)failure->column, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_cutoff_of_system(const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError,
+                     "cutoff must be finite and not negative, got cutoff[%lld] = %R",
+                     (long long)failure->system, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_dependent(const hs_failure *failure)
+{
+    char name[32] = "box";
+    if (failure->system >= 0) {
+        snprintf(name, sizeof name, "box[%lld]", (long long)failure->system);
+    }
+    PyErr_Format(PyExc_ValueError,
+                 "the periodic vectors of %s must be linearly independent; these are exactly "
+                 "dependent",
+                 name);
     return NULL;
 }
 
@@ -74,9 +117,32 @@ raise_kernel(const hs_options *options)
         }
         PyTuple_SET_ITEM(known, k, name);
     }
-    PyErr_Format(PyExc_ValueError, "kernel must be one of %R on this CPU, got '%.100s'", known,
-                 options != NULL && options->kernel != NULL ? options->kernel : "");
+    const char *name = options != NULL && options->kernel != NULL ? options->kernel : "";
+    PyErr_Format(PyExc_ValueError, "kernel must be one of %R on this CPU, got '%.100s'%s", known,
+                 name, name == hs_environment_kernel() ? " from HALFSHELL_KERNEL" : "");
     Py_DECREF(known);
+    return NULL;
+}
+
+/* halfshell.CapacityError, which carries the number that was needed. */
+static PyObject *
+raise_capacity(const hs_failure *failure)
+{
+    const long long needed = (long long)failure->expected_pairs;
+    PyObject       *module = PyImport_ImportModule("halfshell._errors");
+    PyObject *type = module != NULL ? PyObject_GetAttrString(module, "CapacityError") : NULL;
+    PyObject *message = PyUnicode_FromFormat(
+        "out is too small: there are %lld pairs, and every array must have room for them", needed);
+    if (type != NULL && message != NULL) {
+        PyObject *error = PyObject_CallFunction(type, "OL", message, needed);
+        if (error != NULL) {
+            PyErr_SetObject(type, error);
+            Py_DECREF(error);
+        }
+    }
+    Py_XDECREF(module);
+    Py_XDECREF(type);
+    Py_XDECREF(message);
     return NULL;
 }
 
@@ -86,17 +152,19 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
     switch (status) {
     case HS_ERR_MEMORY: return raise_memory(failure);
     case HS_ERR_CUTOFF:
+        if (failure->system >= 0) {
+            return raise_cutoff_of_system(failure);
+        }
         return raise_with_number(PyExc_ValueError,
                                  "cutoff must be finite and not negative, got %R",
                                  failure->value);
     case HS_ERR_NOT_FINITE:
         return raise_at("points must be finite, got points[%lld, %lld] = %R", failure);
     case HS_ERR_BOX_FINITE:
-        return raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
-    case HS_ERR_BOX_DEPENDENT:
-        PyErr_SetString(PyExc_ValueError, "the periodic vectors of box must be linearly "
-                                          "independent; these are exactly dependent");
-        return NULL;
+        return failure->system >= 0
+                   ? raise_box_of_system(failure)
+                   : raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
+    case HS_ERR_BOX_DEPENDENT: return raise_dependent(failure);
     case HS_ERR_TOO_MANY:
         return raise_with_number(PyExc_OverflowError,
                                  "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
@@ -108,6 +176,7 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                      (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
+    case HS_ERR_CAPACITY: return raise_capacity(failure);
     case HS_ERR_INTERRUPTED:
         if (!PyErr_Occurred()) {
             PyErr_SetString(PyExc_SystemError, "interrupted without an exception");

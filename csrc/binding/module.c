@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* module.c: the extension module halfshell._core: method table, slots, init, and nothing else. */
 #define HS_IMPORTS_NUMPY
+#include "environment.h"
+#include "plain.h"
 #include "py_functions.h"
 
 #define FASTCALL(function) ((PyCFunction)(void (*)(void))(function))
@@ -8,11 +10,21 @@
 static PyMethodDef methods[] = {
     {"pairs", FASTCALL(hs_py_pairs), METH_FASTCALL, "See halfshell.pairs."},
     {"count_pairs", FASTCALL(hs_py_count_pairs), METH_FASTCALL, "See halfshell.count_pairs."},
+    {"plain_pairs", FASTCALL(hs_py_plain_pairs), METH_FASTCALL,
+     "pairs of plain arguments, or NotImplemented."},
+    {"plain_count", FASTCALL(hs_py_plain_count), METH_FASTCALL,
+     "count_pairs of plain arguments, or NotImplemented."},
+    {"batch_pairs", FASTCALL(hs_py_batch_pairs), METH_FASTCALL, "pairs of many systems."},
+    {"batch_count", FASTCALL(hs_py_batch_count), METH_FASTCALL, "count_pairs of many systems."},
     {"explain", FASTCALL(hs_py_explain), METH_FASTCALL, "See halfshell.explain."},
     {"kernels", hs_py_kernels, METH_NOARGS, "See halfshell.kernels."},
+    {"default_kernel", hs_py_default_kernel, METH_NOARGS, "The kernel where none is named."},
     {"build_info", hs_py_build_info, METH_NOARGS, "How this extension was built."},
     {"available_memory", hs_py_available_memory, METH_NOARGS,
      "Bytes that this process may still take."},
+    {"clear_cache", hs_py_clear_cache, METH_NOARGS, "See halfshell.clear_cache."},
+    {"set_cache_limit", hs_py_set_cache_limit, METH_O, "See halfshell.set_cache_limit."},
+    {"cache_held", hs_py_cache_held, METH_NOARGS, "Bytes that the cache holds."},
     {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, "See halfshell.Box."},
     {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, "See halfshell.Box.wrap."},
     {NULL, NULL, 0, NULL},
@@ -22,6 +34,7 @@ static int
 module_exec(PyObject *module)
 {
     (void)module;
+    hs_environment_read();
     return PyArray_ImportNumPyAPI();
 }
 

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_explain.c: _core.explain, kernels, build_info: what would be done, what was done, with
- * what. */
+/* py_explain.c: _core.explain: what would be done, and what was done. */
 #include "py_functions.h"
 
-#include "available.h"
 #include "call.h"
 #include "convert.h"
 #include "errors.h"
@@ -62,6 +60,7 @@ put_plan(PyObject *dict, const hs_plan *plan)
            put(dict, "images", tuple_of_integers(plan->images, plan->ndim)) &&
            put(dict, "stencil_rows", PyLong_FromLongLong(plan->stencil_rows)) &&
            put(dict, "expected_pairs", PyFloat_FromDouble(plan->expected_pairs)) &&
+           put(dict, "threads", PyLong_FromLong(plan->threads)) &&
            put(dict, "kernel", PyUnicode_FromString(plan->kernel));
 }
 
@@ -147,59 +146,4 @@ hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
         return NULL;
     }
     return dict;
-}
-
-PyObject *
-hs_py_kernels(PyObject *module, PyObject *ignored)
-{
-    const char *names[8];
-    const int   n = hs_kernel_names(names, 8);
-    PyObject   *tuple = PyTuple_New(n);
-    (void)module;
-    (void)ignored;
-    for (int k = 0; tuple != NULL && k < n; k++) {
-        PyObject *name = PyUnicode_FromString(names[k]);
-        if (name == NULL) {
-            Py_CLEAR(tuple);
-        } else {
-            PyTuple_SET_ITEM(tuple, k, name);
-        }
-    }
-    return tuple;
-}
-
-#if defined(__clang__)
-#define COMPILER "clang " __clang_version__
-#elif defined(__GNUC__)
-#define COMPILER "gcc " __VERSION__
-#elif defined(_MSC_VER)
-#define COMPILER "msvc"
-#else
-#define COMPILER "unknown"
-#endif
-
-PyObject *
-hs_py_build_info(PyObject *module, PyObject *ignored)
-{
-    PyObject *dict = PyDict_New();
-    if (dict != NULL &&
-        put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
-#ifdef NDEBUG
-        put(dict, "assertions", PyBool_FromLong(0)) &&
-#else
-        put(dict, "assertions", PyBool_FromLong(1)) &&
-#endif
-        put(dict, "kernels", hs_py_kernels(module, ignored))) {
-        return dict;
-    }
-    Py_XDECREF(dict);
-    return NULL;
-}
-
-PyObject *
-hs_py_available_memory(PyObject *module, PyObject *ignored)
-{
-    (void)module;
-    (void)ignored;
-    return PyFloat_FromDouble(hs_available_memory(NULL));
 }

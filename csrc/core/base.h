@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* base.h: compiler macros that every file of the core may use, and nothing else. */
+/* base.h: compiler macros, and arithmetic that C libraries make a call, for every file of the
+ * core. */
 #ifndef HS_BASE_H
 #define HS_BASE_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 /* Results must not depend on the compiler's mood: no fused multiply-add unless it is written. */
 #if defined(__clang__)
@@ -39,6 +41,42 @@
 __extension__ typedef __int128 hs_int128;
 __extension__ typedef unsigned __int128 hs_uint128;
 #endif
+
+/* The address sanitizer watches malloc: under it, memory comes from nowhere else. */
+#if defined(__SANITIZE_ADDRESS__)
+#define HS_ADDRESS_SANITIZER 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define HS_ADDRESS_SANITIZER 1
+#endif
+#endif
+#if !defined(HS_ADDRESS_SANITIZER)
+#define HS_ADDRESS_SANITIZER 0
+#endif
+
+/* As fmax and fmin, which most C libraries make a call, where `b` is no NaN: an `a` that is one is
+ * passed over. */
+HS_ALWAYS_INLINE double
+hs_larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+HS_ALWAYS_INLINE double
+hs_smaller(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+/* 2^exponent, a normal number: -1022 <= exponent <= 1023. */
+HS_ALWAYS_INLINE double
+hs_power_of_two(int exponent)
+{
+    const uint64_t bits = (uint64_t)(exponent + 1023) << 52;
+    double         power;
+    memcpy(&power, &bits, sizeof power);
+    return power;
+}
 
 /* States what the programmer guarantees, never what a user may get wrong. */
 #if defined(NDEBUG)

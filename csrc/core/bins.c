@@ -1,127 +1,232 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* bins.c: a stable counting sort, O(n + cells). See bins.h. */
+/*
+ * bins.c: a stable counting sort, O(n + cells). See bins.h.
+ *
+ * The point numbers are sorted first, then the columns are gathered in their order (columns.h).
+ * While the numbers are sorted the spare column holds the cell of every point.
+ *
+ * With a team the points are cut into strips, each with counts of its own. Cell after cell, the
+ * strips' points follow each other in the order of the strips, which is that of the points: the
+ * result is the same for any number of strips.
+ */
 #include "bins.h"
 
-#include "poll.h"
+#include "columns.h"
+#include "slabs.h"
+
+#include "../kernels/kernel.h"
 
 #include <string.h>
 
-/* The cell of every point, and in start[c + 1] how many points cell c has. */
-static hs_status
-count_points(const hs_scene *scene, const hs_grid *grid, const hs_options *options,
-             uint32_t *cells, int32_t *start)
+/* Points whose cells are found together: their coordinates stay in the nearest cache. */
+#define TILE 512
+/* Points for which a strip of its own pays. */
+#define STRIP_POINTS 16384
+
+typedef struct sorting {
+    const hs_grid    *grid;
+    const hs_lattice *lattice;
+    const hs_bins    *bins;
+    double *const    *x;
+    uint32_t         *cells;             /* cell of every point */
+    int               n_strips;
+    int32_t          *counts[HS_SLABS];  /* of each strip: points in each cell, then the place of
+                                          * its next point there */
+} sorting;
+
+/* id += the part of the cell id that axis k gives, as hs_grid_index finds it. Cell ids and strides
+ * are below 2^32, indices below 2^31. */
+static void
+add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
+          uint32_t *HS_RESTRICT id)
 {
-    for (int64_t i = 0; i < scene->n; i++) {
-        if (hs_poll_points(options, i + 1) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
+    const double   lower = grid->lower[k], cells_per_length = grid->cells_per_length[k];
+    const double   last = (double)(grid->shape[k] - 1);
+    const double   size = grid->cell_size[k];
+    const uint32_t stride = (uint32_t)grid->stride[k];
+    if (!grid->by_faces[k]) {
+        for (int64_t i = 0; i < n; i++) {
+            const double place = (t[i] - lower) * cells_per_length;
+            const double below = place < last ? place : last;
+            const double inside = below > 0.0 ? below : 0.0;
+            id[i] += (uint32_t)(int32_t)inside * stride;
         }
-        const double *x = scene->x + i * scene->ndim;
-        int64_t       cell = 0;
-        for (int k = 0; k < scene->ndim; k++) {
-            const double t = hs_lattice_coordinate(&scene->lattice, x, k);
-            cell += hs_grid_index(grid, k, t) * grid->stride[k];
+        return;
+    }
+    const double bias = HS_GRID_BIAS * (double)grid->shape[k];
+    for (int64_t i = 0; i < n; i++) {
+        const double place = (t[i] - lower) * cells_per_length + bias;
+        const double below = place < last ? place : last;
+        const double cell = (double)(int32_t)(below > 0.0 ? below : 0.0);
+        const double beyond = t[i] - (lower + cell * size);
+        uint64_t     bits;
+        memcpy(&bits, &beyond, sizeof bits);
+        id[i] += (uint32_t)((int32_t)cell - (int32_t)(bits >> 63)) * stride; /* its sign */
+    }
+}
+
+static hs_status
+count_strip(void *context, int strip, int64_t first, int64_t last)
+{
+    const sorting *sort = context;
+    int32_t       *counts = sort->counts[strip];
+    double         t[TILE];
+    for (int64_t begin = first; begin < last; begin += TILE) {
+        const int64_t n = last - begin < TILE ? last - begin : TILE;
+        uint32_t     *id = sort->cells + begin;
+        const double *from[HS_MAX_DIM];
+        for (int k = 0; k < sort->grid->ndim; k++) {
+            from[k] = sort->x[k] + begin;
         }
-        cells[i] = (uint32_t)cell;
-        start[cell + 1]++;
+        memset(id, 0, (size_t)n * sizeof *id);
+        for (int k = 0; k < sort->grid->ndim; k++) {
+            if (sort->grid->shape[k] == 1) {
+                continue;
+            }
+            if (sort->lattice->aligned) {
+                add_index(sort->grid, k, from[k], n, id);
+            } else {
+                hs_fold_coordinates(sort->lattice, k, from, n, t);
+                add_index(sort->grid, k, t, n, id);
+            }
+        }
+        for (int64_t i = 0; i < n; i++) {
+            counts[id[i]]++;
+        }
     }
     return HS_OK;
 }
 
-/* On entry start[c + 1] counts cell c; on return start[c] is where cell c begins. */
+/* From numbers of points to places: cell by cell, and in each cell strip by strip. */
 static void
-accumulate(int32_t *start, int64_t n_cells)
+accumulate(const sorting *sort)
 {
-    for (int64_t c = 0; c < n_cells; c++) {
-        start[c + 1] += start[c];
-    }
-}
-
-static hs_status
-allocate(hs_account *account, const hs_scene *scene, const hs_grid *grid, hs_bins *bins)
-{
-    const int64_t n = scene->n;
-    bool          complete = true;
-    for (int k = 0; k < scene->ndim; k++) {
-        bins->x[k] = hs_alloc(account, HS_FOR_POINTS, n, sizeof(double));
-        complete = complete && bins->x[k] != NULL;
-    }
-    bins->order = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int32_t));
-    bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof(int32_t));
-    complete = complete && bins->order != NULL && bins->start != NULL;
-    if (scene->originals != NULL) {
-        bins->originals =
-            hs_alloc(account, HS_FOR_ORIGINALS, n * scene->ndim, sizeof(double));
-        complete = complete && bins->originals != NULL;
-    }
-    if (scene->turns != NULL) {
-        bins->turns =
-            hs_alloc(account, HS_FOR_WRAPS, n * bins->n_periodic, sizeof(int64_t));
-        complete = complete && bins->turns != NULL;
-    }
-    return complete ? HS_OK : HS_ERR_MEMORY;
-}
-
-static void
-place_point(const hs_scene *scene, int64_t i, int64_t si, hs_bins *bins)
-{
-    const int d = scene->ndim, m = bins->n_periodic;
-    bins->order[si] = (int32_t)i;
-    for (int k = 0; k < d; k++) {
-        bins->x[k][si] = scene->x[i * d + k];
-    }
-    if (bins->originals != NULL) {
-        memcpy(bins->originals + si * d, scene->originals + i * d, (size_t)d * sizeof(double));
-    }
-    if (bins->turns != NULL) {
-        memcpy(bins->turns + si * m, scene->turns + i * m, (size_t)m * sizeof(int64_t));
-    }
-}
-
-static hs_status
-place_points(const hs_scene *scene, const uint32_t *cells, int64_t n_cells,
-             const hs_options *options, hs_bins *bins)
-{
-    int32_t *next = bins->start; /* while placing, start[c] runs ahead to the end of cell c */
-    for (int64_t i = 0; i < scene->n; i++) {
-        place_point(scene, i, next[cells[i]]++, bins);
-        if (hs_poll_points(options, i + 1) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
+    int32_t place = 0;
+    for (int64_t c = 0; c < sort->grid->n_cells; c++) {
+        for (int strip = 0; strip < sort->n_strips; strip++) {
+            const int32_t count = sort->counts[strip][c];
+            sort->counts[strip][c] = place;
+            place += count;
         }
     }
-    memmove(next + 1, next, (size_t)n_cells * sizeof(int32_t));
-    next[0] = 0;
+}
+
+static hs_status
+order_strip(void *context, int strip, int64_t first, int64_t last)
+{
+    const sorting            *sort = context;
+    int32_t *HS_RESTRICT      next = sort->counts[strip];
+    const uint32_t           *cells = sort->cells;
+    int32_t *HS_RESTRICT      order = sort->bins->order;
+    for (int64_t i = first; i < last; i++) {
+        order[next[cells[i]]++] = (int32_t)i;
+    }
     return HS_OK;
+}
+
+/* Strips for this team: each with points enough, and no more further counts than points. */
+static int
+choose_strips(const hs_team *team, int64_t n, int64_t n_cells)
+{
+    int n_strips = hs_team_size(team) < HS_SLABS ? hs_team_size(team) : HS_SLABS;
+    while (n_strips > 1 && (n < n_strips * STRIP_POINTS || (n_strips - 1) * n_cells > n)) {
+        n_strips--;
+    }
+    return n_strips;
+}
+
+/* Sorts the point numbers into bins->order, and fills bins->start. */
+static hs_status
+sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sorting *sort)
+{
+    const int64_t n_cells = sort->grid->n_cells, n = sort->bins->n;
+    int32_t      *start = sort->bins->start;
+    int32_t      *others = NULL;
+    sort->n_strips = choose_strips(team, n, n_cells);
+    if (sort->n_strips > 1) {
+        others = hs_alloc(account, HS_FOR_CELLS, (sort->n_strips - 1) * n_cells, sizeof *others);
+        sort->n_strips = others == NULL ? 1 : sort->n_strips;
+    }
+    memset(start, 0, (size_t)n_cells * sizeof *start);
+    sort->counts[0] = start;
+    for (int strip = 1; strip < sort->n_strips; strip++) {
+        sort->counts[strip] = others + (strip - 1) * n_cells;
+        memset(sort->counts[strip], 0, (size_t)n_cells * sizeof *others);
+    }
+    hs_status status = hs_walk_strips(team, options, n, sort->n_strips, count_strip, sort);
+    if (status == HS_OK) {
+        accumulate(sort);
+        status = hs_walk_strips(team, options, n, sort->n_strips, order_strip, sort);
+    }
+    /* The last strip's place in a cell has run ahead to where the next cell starts. */
+    memmove(start + 1, sort->counts[sort->n_strips - 1], (size_t)n_cells * sizeof *start);
+    start[0] = 0;
+    hs_free(account, others);
+    return status;
 }
 
 hs_status
-hs_bins_build(hs_account *account, const hs_options *options, hs_scene *scene,
-              const hs_grid *grid, hs_bins *bins)
+hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
+                const hs_scene *scene, hs_bins *bins)
+{
+    char           *end = NULL;
+    const hs_status status = hs_columns_gather(team, options, scene->x_is_beside, bins,
+                                               scene->cloud.spare, &end);
+    if (status == HS_OK) {
+        void *last = bins->beside != NULL ? bins->beside : bins->points;
+        hs_trim(account, last, (size_t)(end - (char *)last) + HS_COLUMN_PADDING);
+    }
+    return status;
+}
+
+static hs_status
+sort_points(hs_account *account, hs_team *team, const hs_options *options,
+            const hs_scene *scene, const hs_grid *grid, hs_bins *bins)
+{
+    sorting         sort = {.grid = grid,
+                            .lattice = &scene->lattice,
+                            .bins = bins,
+                            .x = bins->x,
+                            .cells = (uint32_t *)(void *)scene->cloud.spare};
+    const hs_status status = sort_numbers(account, team, options, &sort);
+    return status == HS_OK ? hs_bins_arrange(account, team, options, scene, bins) : status;
+}
+
+void
+hs_bins_take(hs_scene *scene, hs_bins *bins)
 {
     *bins = (hs_bins){.n = scene->n,
                       .ndim = scene->ndim,
                       .n_periodic = scene->lattice.n_periodic};
-    hs_status status = allocate(account, scene, grid, bins);
-    if (status == HS_OK && grid->n_cells == 1) {
+    bins->points = scene->cloud.block;
+    bins->beside = scene->beside;
+    bins->order = scene->cloud.order;
+    bins->turns = scene->turns;
+    bins->keeps_originals = scene->keeps_originals;
+    memcpy(bins->x, scene->cloud.x, sizeof bins->x);
+    memcpy(bins->originals, scene->originals, sizeof bins->originals);
+    scene->cloud.block = NULL;
+    scene->beside = NULL;
+}
+
+hs_status
+hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
+              const hs_grid *grid, hs_bins *bins)
+{
+    hs_status status = HS_OK;
+    hs_bins_take(scene, bins);
+    bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof(int32_t));
+    if (bins->start == NULL) {
+        status = HS_ERR_MEMORY;
+    } else if (grid->n_cells == 1) {
         bins->start[0] = 0;
         bins->start[1] = (int32_t)scene->n;
         for (int64_t i = 0; i < scene->n; i++) {
-            place_point(scene, i, i, bins);
+            bins->order[i] = (int32_t)i;
         }
-    } else if (status == HS_OK) {
-        uint32_t *cells = hs_alloc(account, HS_FOR_ORDER, scene->n, sizeof(uint32_t));
-        if (cells == NULL) {
-            status = HS_ERR_MEMORY;
-        } else {
-            memset(bins->start, 0, (size_t)(grid->n_cells + 1) * sizeof(int32_t));
-            status = count_points(scene, grid, options, cells, bins->start);
-            if (status == HS_OK) {
-                accumulate(bins->start, grid->n_cells);
-                status = place_points(scene, cells, grid->n_cells, options, bins);
-            }
-            hs_free(account, cells);
-        }
+    } else {
+        status = sort_points(account, team, options, scene, grid, bins);
     }
-    hs_scene_free(account, scene);
     if (status != HS_OK) {
         hs_bins_free(account, bins);
     }
@@ -131,16 +236,10 @@ hs_bins_build(hs_account *account, const hs_options *options, hs_scene *scene,
 void
 hs_bins_free(hs_account *account, hs_bins *bins)
 {
-    for (int k = 0; k < bins->ndim; k++) {
-        hs_free(account, bins->x[k]);
-        bins->x[k] = NULL;
-    }
-    hs_free(account, bins->order);
+    hs_free(account, bins->points);
+    hs_free(account, bins->beside);
     hs_free(account, bins->start);
-    hs_free(account, bins->originals);
-    hs_free(account, bins->turns);
-    bins->order = NULL;
+    bins->points = NULL;
+    bins->beside = NULL;
     bins->start = NULL;
-    bins->originals = NULL;
-    bins->turns = NULL;
 }

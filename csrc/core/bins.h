@@ -12,17 +12,31 @@ typedef struct hs_bins {
     int64_t  n;
     int      ndim;
     int      n_periodic;
-    double  *x[HS_MAX_DIM]; /* owned; X of each axis, n each */
-    int32_t *order;         /* owned; a permutation of 0 ... n - 1 */
+    double  *x[HS_MAX_DIM]; /* X of each axis, n each; HS_PADDING more can be read */
+    int32_t *order;         /* a permutation of 0 ... n - 1; the same */
     int32_t *start;         /* owned; n_cells + 1, nondecreasing, last is n */
-    double  *originals;     /* owned or NULL; n * ndim */
-    int64_t *turns;         /* owned or NULL; n * n_periodic */
+    bool     keeps_originals;
+    double  *originals[HS_MAX_DIM]; /* the points as given, n each, if they are kept */
+    hs_turns turns;
+    void    *points;        /* owned; the columns above lie in these two: the scene's blocks */
+    void    *beside;        /* owned or NULL */
 } hs_bins;
 
-/* Sorts, polling now and then; takes the scene's arrays over or frees them. On failure holds
- * nothing. */
-hs_status hs_bins_build(hs_account *account, const hs_options *options, hs_scene *scene,
-                        const hs_grid *grid, hs_bins *bins);
+/*
+ * Sorts, polling now and then; takes the scene's arrays over or frees them. On failure holds
+ * nothing. The result does not depend on the team.
+ */
+hs_status hs_bins_build(hs_account *account, hs_team *team, const hs_options *options,
+                        hs_scene *scene, const hs_grid *grid, hs_bins *bins);
+
+/* The parts of that, for other orders: the scene's arrays become those of the bins, in the caller's
+ * order as yet, and without `start`; the scene's spare column stays usable. */
+void hs_bins_take(hs_scene *scene, hs_bins *bins);
+
+/* Then, with bins->order filled: all columns into that order. Overwrites the spare column. HS_OK or
+ * HS_ERR_INTERRUPTED. */
+hs_status hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
+                          const hs_scene *scene, hs_bins *bins);
 
 void hs_bins_free(hs_account *account, hs_bins *bins);
 

@@ -5,6 +5,7 @@
 #include "fpenv.h"
 #include "lattice.h"
 #include "points.h"
+#include "poll.h"
 #include "wrap.h"
 
 #include <math.h>
@@ -32,7 +33,7 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
     hs_failure ignored;
     hs_lattice lattice;
     failure = failure != NULL ? failure : &ignored;
-    *failure = (hs_failure){.row = -1, .column = -1};
+    *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_status      status = hs_box_check(box, failure);
     if (status == HS_OK) {
@@ -125,7 +126,7 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
         double  x[HS_MAX_DIM], inside[HS_MAX_DIM];
         int64_t turns[HS_MAX_DIM], given[HS_MAX_DIM];
         for (int k = 0; k < d; k++) {
-            x[k] = hs_scale_apply(scale, cloud->x[i * d + k]);
+            x[k] = hs_scale_apply(scale, cloud->x[k][i]);
         }
         if (!wrap_row(lattice, x, inside, turns) || !hs_lattice_shift(lattice, turns, given)) {
             failure->row = i;
@@ -134,7 +135,7 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
         for (int k = 0; wrapped != NULL && k < d; k++) {
             const bool stays = inside[k] == x[k]; /* scaling may have lost its last digits */
             wrapped[i * d + k] =
-                stays ? cloud->x[i * d + k] : hs_scale_apply(back, inside[k]);
+                stays ? cloud->x[k][i] : hs_scale_apply(back, inside[k]);
         }
         if (shift != NULL) {
             memset(shift + i * d, 0, (size_t)d * sizeof(int64_t));
@@ -154,12 +155,12 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     hs_lattice lattice;
     hs_cloud   cloud;
     failure = failure != NULL ? failure : &ignored;
-    *failure = (hs_failure){.row = -1, .column = -1};
+    *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_status      status = hs_box_check(box, failure);
     if (status == HS_OK) {
         const hs_options options = hs_options_default();
-        status = hs_cloud_load(NULL, points, &options, &cloud, failure);
+        status = hs_cloud_load(NULL, NULL, points, &options, &cloud, failure);
     }
     if (status == HS_OK) {
         const hs_scale scale = scale_of_box(box);

@@ -2,99 +2,106 @@
 /* decide.c: see decide.h. */
 #include "decide.h"
 
-/* S = image + turns_i - turns_j over B, then over the rows as given. Without turns they are all
- * known to cancel or not to be needed. */
-static bool
-shift_as_given(const hs_search *search, int32_t si, int32_t sj, const int64_t *image,
-               int64_t *given)
+#include "exact_float.h"
+
+#include <string.h>
+
+/* Takes the first n of scan->unsure from the hits of points [first, next). */
+static void
+remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
 {
-    const int      m = search->bins.n_periodic;
-    const int64_t *turns = search->bins.turns;
-    int64_t        reduced[HS_MAX_DIM];
-    for (int r = 0; r < m; r++) {
-        reduced[r] = image[r];
-        if (turns != NULL) {
-            reduced[r] += turns[(int64_t)si * m + r] - turns[(int64_t)sj * m + r];
+    int32_t t = first, removed = 0;
+    for (int32_t r = 0; r < n; r++) {
+        for (; t < scan->unsure[r].t; t++) {
+            scan->end[t] -= removed;
         }
+        const int32_t from = scan->unsure[r].at + 1;
+        const int32_t to = r + 1 < n ? scan->unsure[r + 1].at : (int32_t)scan->n_hits;
+        memmove(scan->hits + from - removed - 1, scan->hits + from,
+                (size_t)(to - from) * sizeof *scan->hits);
+        removed++;
     }
-    return hs_lattice_shift(&search->scene.lattice, reduced, given);
+    for (; t < next; t++) {
+        scan->end[t] -= removed;
+    }
 }
 
-hs_status
-hs_trace(const hs_search *search, int32_t si, int32_t place, bool needs_given, hs_cursor *cursor,
-         hs_traced *pair)
+/* One pair of the batch, by all stages or by the last alone. */
+static bool
+decide_pair(hs_walker *walker, int32_t e, bool others_failed)
 {
-    const hs_bins *bins = &search->bins;
-    const int      d = bins->ndim;
-    while (cursor->run[1].at <= place) {
-        cursor->run++;
+    const hs_metric *metric = &walker->search->scene.metric;
+    double           p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t          of_pair[HS_MAX_DIM];
+    const int64_t   *shift = hs_trace_pair(&walker->trace, e, p, q, of_pair);
+    if (walker->options.precision == HS_DOUBLE) {
+        return hs_metric_within_double(metric, p, q, shift);
     }
-    const hs_run *run = cursor->run;
-    pair->sj = run->si + (place - run->at);
-    bool shifted = false;
-    for (int r = 0; r < bins->n_periodic; r++) {
-        pair->image[r] = run->image[r];
-        shifted = shifted || run->image[r] != 0;
+    return others_failed ? hs_metric_settle(metric, p, q, shift, &walker->stages)
+                         : hs_metric_within(metric, p, q, shift, &walker->stages);
+}
+
+/* Whether each pair of the batch is within the cutoff. */
+static void
+decide_batch(hs_walker *walker, uint8_t *within)
+{
+    const hs_trace *trace = &walker->trace;
+    const bool      by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
+    uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
+    if (by_batch) {
+        const hs_batch batch = hs_trace_batch(trace);
+        walker->search->kernel->judge(&walker->search->scene.metric, &batch, verdict,
+                                      &walker->stages);
     }
-    if (bins->originals != NULL) {
-        pair->p = bins->originals + (int64_t)si * d;
-        pair->q = bins->originals + (int64_t)pair->sj * d;
-        pair->metric_shift = bins->n_periodic > 0 ? pair->given : NULL;
-        needs_given = bins->n_periodic > 0;
-    } else {
-        for (int k = 0; k < d; k++) {
-            pair->buffer[0][k] = bins->x[k][si];
-            pair->buffer[1][k] = bins->x[k][pair->sj];
+    for (int32_t e = 0; e < trace->n; e++) {
+        within[e] = by_batch && verdict[e] != HS_UNDECIDED ? verdict[e] == HS_WITHIN
+                                                           : decide_pair(walker, e, by_batch);
+    }
+}
+
+/* Traces unsure hits from `u` on, as many as fit a batch; *next: the first that did not. */
+static hs_status
+trace_unsure(hs_walker *walker, const hs_scan *scan, int32_t u, int32_t *next)
+{
+    hs_trace *trace = &walker->trace;
+    hs_trace_clear(trace);
+    while (u < scan->n_unsure && trace->n < HS_BATCH) {
+        int32_t       places[HS_BATCH], n = 0;
+        const int32_t t = scan->unsure[u].t, si = walker->group.first + t;
+        for (; u + n < scan->n_unsure && n < HS_BATCH && scan->unsure[u + n].t == t; n++) {
+            places[n] = scan->unsure[u + n].place;
         }
-        pair->p = pair->buffer[0];
-        pair->q = pair->buffer[1];
-        pair->metric_shift = shifted ? pair->image : NULL;
+        const int32_t taken = hs_trace_add(trace, si, places, n);
+        if (taken < 0) {
+            walker->failed_point = walker->search->bins.order[si];
+            return HS_ERR_SHIFT_RANGE;
+        }
+        u += taken;
     }
-    if (needs_given && !shift_as_given(search, si, pair->sj, pair->image, pair->given)) {
-        return HS_ERR_SHIFT_RANGE;
-    }
+    *next = u;
     return HS_OK;
 }
 
-/* The float32 square that the filter is about; any rounding of it will do. */
-static float
-filter_square(const hs_search *search, const float *q, int32_t place)
-{
-    float s = 0.0f;
-    for (int k = 0; k < search->scene.ndim; k++) {
-        const float along = search->block.y[k][place] - q[k];
-        s += along * along;
-    }
-    return s;
-}
-
 hs_status
-hs_decide_hits(hs_search *search, int32_t t, hs_thresholds thresholds, int32_t *n_hits)
+hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next)
 {
-    const hs_metric *metric = &search->scene.metric;
-    const float     *q = search->group.q[t];
-    int32_t         *hits = search->block.hits;
-    hs_cursor        cursor = {search->block.runs};
-    int32_t          n_kept = 0;
-    for (int32_t h = 0; h < *n_hits; h++) {
-        const int32_t place = hits[h];
-        bool          within = filter_square(search, q, place) < thresholds.in;
-        if (!within) {
-            hs_traced       pair;
-            const hs_status status =
-                hs_trace(search, search->group.first + t, place, false, &cursor, &pair);
-            if (status != HS_OK) {
-                return status;
-            }
-            search->n_ambiguous++;
-            within = search->options.precision == HS_DOUBLE
-                         ? hs_metric_within_double(metric, pair.p, pair.q, pair.metric_shift)
-                         : hs_metric_within(metric, pair.p, pair.q, pair.metric_shift,
-                                            &search->stages);
+    int32_t n_beyond = 0;
+    uint8_t within[HS_BATCH];
+    for (int32_t u = 0, end; u < scan->n_unsure; u = end) {
+        const hs_status status = trace_unsure(walker, scan, u, &end);
+        if (status != HS_OK) {
+            return status;
         }
-        hits[n_kept] = place;
-        n_kept += within;
+        decide_batch(walker, within);
+        for (int32_t e = 0; e < end - u; e++) {
+            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather at the front */
+            n_beyond += !within[e];
+        }
     }
-    *n_hits = n_kept;
+    walker->n_ambiguous += scan->n_unsure;
+    if (walker->use != HS_BLOCK_COUNTS && n_beyond > 0) {
+        remove_hits(scan, n_beyond, first, next);
+    }
+    scan->n_hits -= n_beyond;
     return HS_OK;
 }

@@ -103,6 +103,23 @@ hs_dw_add(hs_dw x, hs_dw y)
 }
 
 /*
+ * x + y as hs_dw_add. *lost, not negative, grows unless the sum is exact: of the operations above
+ * only s.lo + t.hi and t.lo + r.lo are rounded, and here what they lose is computed too. Exact for
+ * any x and y, normalised or not, because each transformation is [K].
+ */
+HS_ALWAYS_INLINE hs_dw
+hs_dw_add_watched(hs_dw x, hs_dw y, double *lost)
+{
+    const hs_dw s = hs_two_sum(x.hi, y.hi);
+    const hs_dw t = hs_two_sum(x.lo, y.lo);
+    const hs_dw inner = hs_two_sum(s.lo, t.hi);
+    const hs_dw r = hs_two_sum(s.hi, inner.hi);
+    const hs_dw outer = hs_two_sum(t.lo, r.lo);
+    *lost += fabs(inner.lo) + fabs(outer.lo);
+    return hs_two_sum(r.hi, outer.hi);
+}
+
+/*
  * x * x with a relative error of at most 6 v^2. In units of v^2 x^2: 2 x.hi x.lo is at most 2 / v
  * and its rounding costs 2; the sum with the low word of x.hi^2 (1 / v) costs 3; x.lo^2, which is
  * left out, is 1.

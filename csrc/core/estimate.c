@@ -2,6 +2,8 @@
 /* estimate.c: see estimate.h. */
 #include "estimate.h"
 
+#include "walk.h"
+
 #include <math.h>
 
 #define SAMPLES 64         /* points that are counted: an error of some per cent */
@@ -41,7 +43,8 @@ hs_bytes_per_pair(const hs_options *options, int ndim)
                             (want & HS_WANT_VECTOR ? sizeof(double) * ndim : 0.0) +
                             (want & HS_WANT_SHIFT ? sizeof(int32_t) * ndim : 0.0);
     /* Sorting holds the merged pairs and their order while it writes. */
-    return returned + measures + (options->sorted ? stored + measures + sizeof(int64_t) : 0.0);
+    const double sorting = options->sorted ? stored + measures + sizeof(int64_t) : 0.0;
+    return options->out != NULL ? sorting : returned + measures + sorting;
 }
 
 static hs_status
@@ -70,8 +73,12 @@ least_pairs(const hs_search *search)
         }
         diameter += sqrt(square);
     }
-    const double covered = fmax(0.0, 1.0 - diameter / scene->cutoff);
-    return search->grid.expected_pairs * pow(covered, scene->ndim) - 0.5 * n;
+    const double covered = hs_larger(1.0 - diameter / scene->cutoff, 0.0);
+    double       least = search->grid.expected_pairs;
+    for (int k = 0; k < scene->ndim; k++) {
+        least *= covered;
+    }
+    return least - 0.5 * n;
 }
 
 hs_status
@@ -92,22 +99,38 @@ hs_estimate_by_density(hs_search *search, hs_failure *failure)
     return refuse(search, search->grid.expected_pairs, bytes_per_pair, failure);
 }
 
-/* What a sampled point has found; `budget` is the candidate count at which it stops. */
+/* What a few points have found: the sum of their counts, of the squares, and how many. */
 typedef struct sample {
-    double  hits;
-    int64_t budget;
+    double  sum, squares;
+    int64_t taken;
 } sample;
 
-/* An early stop leaves the hits too few: an estimate from below, which is the safe side here. */
-#define SAMPLE_STOPPED HS_STATUS_END
-
+/*
+ * Points are sampled evenly over the cells; each counts its forward half, so the mean over points
+ * times n estimates the pairs without bias. Stopping early leaves a count too small: an estimate
+ * from below, which is the safe side here.
+ */
 static hs_status
-add_hits(void *context, hs_search *search, int32_t si, int32_t n_hits)
+take_sample(hs_walker *walker, int64_t n, sample *taken)
 {
-    sample *one = context;
-    (void)si;
-    one->hits += n_hits;
-    return search->n_candidates > one->budget ? SAMPLE_STOPPED : HS_OK;
+    const int64_t samples = n < SAMPLES ? n : SAMPLES;
+    const double  row_work = 8.0 * (double)walker->search->stencil.n_rows;
+    double        work = 0.0;
+    *taken = (sample){0.0, 0.0, 0};
+    for (; taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
+        const int64_t si = (2 * taken->taken + 1) * n / (2 * samples);
+        const int64_t before = walker->n_candidates;
+        walker->n_found = 0;
+        walker->candidate_limit = before + (int64_t)SAMPLE_WORK;
+        const hs_status status = hs_walk_point(walker, (int32_t)si);
+        if (status != HS_OK && status != HS_STATUS_END) {
+            return status;
+        }
+        taken->sum += (double)walker->n_found;
+        taken->squares += (double)walker->n_found * (double)walker->n_found;
+        work += (double)(walker->n_candidates - before) + row_work;
+    }
+    return HS_OK;
 }
 
 hs_status
@@ -115,30 +138,27 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
     const double  bytes_per_pair = hs_bytes_per_pair(&search->options, search->scene.ndim);
     const int64_t n = search->bins.n;
-    const double  bound = bound_pairs(search);
-    if (n == 0 || hs_account_allows(&search->account, bound * bytes_per_pair)) {
+    hs_walker     walker;
+    sample        taken;
+    if (n == 0 ||
+        hs_account_allows(&search->account, bound_pairs(search) * bytes_per_pair)) {
         return HS_OK;
     }
-    /* Points are sampled evenly over the cells; each counts its forward half, so the mean over
-     * points times n estimates the pairs without bias. */
-    int64_t samples = n < SAMPLES ? n : SAMPLES;
-    double  sum = 0.0, squares = 0.0, work = 0.0;
-    int64_t taken = 0;
-    for (; taken < samples && work < SAMPLE_WORK; taken++) {
-        const int64_t si = (2 * taken + 1) * n / (2 * samples);
-        const int64_t before = search->n_candidates;
-        sample        one = {0.0, before + (int64_t)SAMPLE_WORK};
-        const hs_status status = hs_search_point(search, (int32_t)si, add_hits, &one);
-        if (status != HS_OK && status != SAMPLE_STOPPED) {
-            return status;
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    if (status == HS_OK) {
+        status = take_sample(&walker, n, &taken);
+        if (status == HS_ERR_SHIFT_RANGE) {
+            failure->row = walker.failed_point;
         }
-        sum += one.hits;
-        squares += one.hits * one.hits;
-        work += (double)(search->n_candidates - before) + 8.0 * (double)search->stencil.n_rows;
+        hs_walker_close(search, &walker);
     }
-    const double mean = sum / (double)taken;
-    const double variance = fmax(0.0, squares / (double)taken - mean * mean);
-    const double error = taken < n ? sqrt(variance / (double)taken) : 0.0;
+    if (status != HS_OK) {
+        return status;
+    }
+    const double many = (double)taken.taken;
+    const double mean = taken.sum / many;
+    const double variance = fmax(0.0, taken.squares / many - mean * mean);
+    const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
     const double least = (mean - SURE_ERRORS * error) * (double)n;
     if (hs_account_allows(&search->account, least * bytes_per_pair)) {
         return HS_OK;

@@ -2,8 +2,6 @@
 /* exact.c: whether a pair is within the cutoff, by the cheapest stage that can tell. */
 #include "exact.h"
 
-#include <string.h>
-
 #include "exact_float.h"
 #include "exact_integer.h"
 #include "rounding.h"
@@ -34,7 +32,6 @@ hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_M
 {
     HS_ASSERT(ndim >= 1 && ndim <= HS_MAX_DIM && n_rows >= 0 && n_rows <= HS_MAX_DIM);
     HS_ASSERT(cutoff >= 0.0);
-    memset(metric, 0, sizeof *metric);
     metric->ndim = ndim;
     metric->n_rows = n_rows;
     metric->inclusive = inclusive;
@@ -47,6 +44,7 @@ hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_M
                 metric->floats_usable = false;
         }
     }
+    metric->square_hi = metric->square_lo = metric->sure_in = metric->sure_out = 0.0;
     if (!metric->floats_usable)
         return;
 
@@ -68,7 +66,7 @@ judge_in_floats(const hs_metric *metric, const double *p, const double *q, const
     hs_verdict    verdict;
     if (shift == NULL)
         hs_difference_plain(&difference, p, q, ndim);
-    else if (!hs_difference_shifted(&difference, metric, p, q, shift, ndim))
+    else if (!hs_difference_shifted(&difference, metric, p, q, shift, ndim, false))
         return HS_UNDECIDED;
 
     const double square = hs_float64_square(&difference, ndim);
@@ -77,9 +75,8 @@ judge_in_floats(const hs_metric *metric, const double *p, const double *q, const
         stages->by_float64++;
         return verdict;
     }
-    /* Most likely a tie, which only integers can confirm: perfect crystals are full of them. */
-    if (square == metric->square_hi)
-        return HS_UNDECIDED;
+    if (shift != NULL)
+        (void)hs_difference_shifted(&difference, metric, p, q, shift, ndim, true);
     verdict = hs_double_word_verdict(metric, &difference, ndim);
     stages->by_double_word += verdict != HS_UNDECIDED;
     return verdict;
@@ -116,6 +113,13 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
         if (verdict != HS_UNDECIDED)
             return verdict == HS_WITHIN;
     }
+    return hs_metric_settle(metric, p, q, shift, stages);
+}
+
+bool
+hs_metric_settle(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                 hs_stages *stages)
+{
     stages->by_integers++;
     const int sign = hs_integer_compare(metric, p, q, shift);
     return sign < 0 || (sign == 0 && metric->inclusive);

@@ -44,6 +44,10 @@ void hs_metric_init(hs_metric *metric, int ndim, int n_rows,
 bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 
+/* The same by the last stage alone, for pairs that the others have left undecided. */
+bool hs_metric_settle(const hs_metric *metric, const double *p, const double *q,
+                      const int64_t *shift, hs_stages *stages);
+
 /*
  * D = q - p + shift * rows and |D|. vector: ndim doubles, each within 1 ulp of |D|, or NULL.
  * Returns |D| within 1 ulp; rounding may lift it onto the cutoff or beyond: see hs_keep_within.

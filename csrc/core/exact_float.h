@@ -20,6 +20,7 @@ typedef enum hs_verdict { HS_UNDECIDED, HS_WITHIN, HS_BEYOND } hs_verdict;
 typedef struct hs_difference {
     hs_dw  component[HS_MAX_DIM];
     double error;
+    double lost; /* if watched: 0 only if the computed D is D */
 } hs_difference;
 
 /* q - p: exact as double-words. An overflow leaves infinity or NaN in a component. */
@@ -31,17 +32,18 @@ hs_difference_plain(hs_difference *difference, const double *p, const double *q,
         difference->component[k] = hs_two_difference(q[k], p[k]);
     while (++k < ndim);
     difference->error = 0.0;
+    difference->lost = 0.0;
 }
 
-/* q - p + shift * rows. False where the bound would not hold: a shift that float64 cannot hold, or
- * terms too large. Needs metric->floats_usable. */
+/* q - p + shift * rows; `watched`: find `lost` too. False where the bound would not hold: a shift
+ * that float64 cannot hold, or terms too large. Needs metric->floats_usable. */
 HS_ALWAYS_INLINE bool
 hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const double *p,
-                      const double *q, const int64_t *shift, int ndim)
+                      const double *q, const int64_t *shift, int ndim, bool watched)
 {
     const int64_t shift_end = INT64_C(1) << 53; /* every integer up to here is a float64 */
     double        times[HS_MAX_DIM];
-    double        magnitude = 0.0, weighted = 0.0;
+    double        magnitude = 0.0, weighted = 0.0, lost = 0.0;
 
     for (int l = 0; l < metric->n_rows; l++) {
         if (shift[l] > shift_end || shift[l] < -shift_end)
@@ -58,7 +60,7 @@ hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const 
             if (times[l] == 0.0 || entry == 0.0)
                 continue;
             const hs_dw product = hs_two_product(times[l], entry);
-            sum = hs_dw_add(sum, product);
+            sum = watched ? hs_dw_add_watched(sum, product, &lost) : hs_dw_add(sum, product);
             size += fabs(product.hi);
             sums += 1.0;
         }
@@ -67,6 +69,7 @@ hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const 
         weighted += sums * size;
     } while (++k < ndim);
     difference->error = HS_DW_ADD_ERROR * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT) * weighted;
+    difference->lost = lost;
     return magnitude <= ldexp(1.0, HS_SAFE_EXPONENT); /* also false for NaN */
 }
 
@@ -115,15 +118,39 @@ hs_double_word_error(double square, double error, int ndim)
            error * (2.0 * sqrt(square) + error);
 }
 
-/* Second stage. The difference to R^2 has itself a tiny relative error, so its sign is right. */
+/*
+ * hs_double_word_square of a watched difference. *exact: it is |D|^2, because D is one double per
+ * component and nothing was lost in any sum. Squares are exact if they are not too small.
+ */
+HS_ALWAYS_INLINE hs_dw
+hs_double_word_square_watched(const hs_difference *difference, int ndim, bool *exact)
+{
+    hs_dw  square = {0.0, 0.0};
+    double lost = difference->lost;
+    for (int k = 0; k < ndim; k++) {
+        const hs_dw  component = difference->component[k];
+        const double size = fabs(component.hi);
+        const hs_dw  term = hs_dw_square(component);
+        lost += fabs(component.lo) + (size < ldexp(1.0, -HS_SAFE_EXPONENT) ? size : 0.0);
+        square = k == 0 ? term : hs_dw_add_watched(square, term, &lost);
+    }
+    *exact = lost == 0.0;
+    return square;
+}
+
+/*
+ * Second stage, from a watched difference. The difference to R^2 has itself a tiny relative error,
+ * so its sign is right. If |D|^2 is exact, that sign decides, zero included: a tie.
+ */
 HS_ALWAYS_INLINE hs_verdict
 hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference, int ndim)
 {
-    const hs_dw  square = hs_double_word_square(difference, ndim);
+    bool         exact;
+    const hs_dw  square = hs_double_word_square_watched(difference, ndim, &exact);
     const hs_dw  excess = hs_dw_add(square, (hs_dw){-metric->square_hi, -metric->square_lo});
     const double bound = hs_double_word_error(square.hi, difference->error, ndim);
-    if (fabs(excess.hi) > bound)
-        return excess.hi < 0.0 ? HS_WITHIN : HS_BEYOND;
+    if (fabs(excess.hi) > bound || exact)
+        return excess.hi < 0.0 || (excess.hi == 0.0 && metric->inclusive) ? HS_WITHIN : HS_BEYOND;
     return HS_UNDECIDED;
 }
 

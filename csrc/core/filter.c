@@ -92,3 +92,53 @@ hs_thresholds_of(int ndim, double cutoff, double extent, double error)
     hs_threshold_bounds(ndim, cutoff, extent, error, HS_FILTER_UNIT, HS_FILTER_TINY, &in, &out);
     return (hs_thresholds){float_below(in), float_above(out)};
 }
+
+/* |s + |q|^2 - |y - q|^2| of the expanded form, before s is rounded the last time. */
+static double
+expanded_error(int ndim, double extent, double unit, double tiny)
+{
+    const double axes = ndim, largest = 0.5 * extent; /* of the components */
+    /* No term is rounded more than 2 d - 1 times. That leaves 2 u of this bound, which pays for the
+     * float64 roundings of the threshold. */
+    const double chain = multiply_up(2.0 * axes, unit);
+    if (!(chain < 0.5)) {
+        return HUGE_VAL;
+    }
+    const double growth = hs_next_up(1.0 / hs_next_down(1.0 - chain));
+    const double rounded = multiply_up(multiply_up(HS_EXPANDED_ROUNDINGS * axes * axes, unit),
+                                       multiply_up(largest, largest));
+    const double lost = multiply_up(HS_EXPANDED_FLUSHES * axes, tiny);
+    return multiply_up(growth, add_up(rounded, lost));
+}
+
+void
+hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit, double tiny,
+                   double *in, double *out)
+{
+    const double a = input_error(ndim, extent, error, unit, tiny);
+    const double moved = expanded_error(ndim, extent, unit, tiny);
+    *in = -HUGE_VAL;
+    *out = HUGE_VAL;
+    if (!(a <= DBL_MAX) || !(moved <= DBL_MAX)) { /* not for infinity and NaN either */
+        return;
+    }
+    const double far_root = add_up(cutoff, a);
+    *out = add_up(multiply_up(far_root, far_root), moved);
+    if (cutoff > a) {
+        const double near_root = hs_next_down(cutoff - a);
+        *in = hs_next_down(multiply_down(near_root, near_root) - moved);
+    }
+}
+
+hs_expanded
+hs_expanded_of(int ndim, double cutoff, double extent, double error)
+{
+    hs_expanded bounds;
+    hs_expanded_bounds(ndim, cutoff, extent, error, HS_FILTER_UNIT, HS_FILTER_TINY, &bounds.in,
+                       &bounds.out);
+    /* Neither a partial sum, at most 3/4 of this square, nor a threshold may leave float32. */
+    if (!((double)ndim * extent * extent + bounds.out <= FLT_MAX)) {
+        bounds = (hs_expanded){-INFINITY, INFINITY};
+    }
+    return bounds;
+}

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * filter.h: the two float32 thresholds of a gathered neighbourhood. A kernel computes, in
- * float32, s = sum_k fl(y_k - q_k)^2 of candidates y and points q given relative to a common
- * centre. With s > out the pair is surely beyond the cutoff, with s < in surely within it; what
- * lies between is settled by exact.h. docs/exactness.md derives the bounds.
+ * filter.h: the two thresholds of a gathered neighbourhood. A kernel computes, in float32, an s of
+ * candidates y and points q given relative to a common centre: the direct form
+ * s = sum_k fl(y_k - q_k)^2, or the expanded form s = |y|^2 - 2 q y, which is |q|^2 less. With
+ * s > out the pair is surely beyond the cutoff, with s < in surely within it; what lies between is
+ * settled by exact.h. docs/exactness.md derives the bounds.
  */
 #ifndef HS_FILTER_H
 #define HS_FILTER_H
@@ -14,6 +15,13 @@ typedef struct hs_thresholds {
     float in;  /* rounded down; -1 when nothing is sure */
     float out; /* rounded up; +infinity when nothing is sure */
 } hs_thresholds;
+
+/* The same for the expanded form. A kernel compares with (float)(in - |q|^2) and
+ * (float)(out - |q|^2), where |q|^2 is summed in float64. */
+typedef struct hs_expanded {
+    double in;  /* -infinity when nothing is sure */
+    double out; /* +infinity when nothing is sure */
+} hs_expanded;
 
 /*
  * ndim     number of squares in the sum
@@ -31,5 +39,18 @@ hs_thresholds hs_thresholds_of(int ndim, double cutoff, double extent, double er
  * number of a tiny floating-point system. */
 void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
                          double tiny, double *in, double *out);
+
+/* The same for the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
+hs_expanded hs_expanded_of(int ndim, double cutoff, double extent, double error);
+void hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,
+                        double tiny, double *in, double *out);
+
+/* Errors of the expanded form grow with extent^2, those of the direct form with extent * cutoff:
+ * worth it where this holds, which is wherever cells have the size that the cutoff asks for. */
+HS_ALWAYS_INLINE bool
+hs_expanded_pays(double cutoff, double extent)
+{
+    return extent <= 16.0 * cutoff;
+}
 
 #endif

@@ -2,128 +2,131 @@
 /* gather.c: see gather.h. */
 #include "gather.h"
 
-#include <math.h>
 #include <string.h>
 
+/* Hits held at a time, as a multiple of the candidates: those of a few points at least. */
+#define HITS_PER_CANDIDATE 2
+
+/* Every array begins on a cache line. */
+#define FLOATS_PER_LINE (HS_ALIGNMENT / (int64_t)sizeof(float))
+
 hs_status
-hs_block_init(hs_account *account, int ndim, hs_block *block)
+hs_block_init(hs_account *account, int ndim, hs_block_use use, double most, hs_block *block)
 {
-    const int64_t capacity = HS_BLOCK_CANDIDATES + HS_SCAN_PADDING;
-    bool          complete = true;
     *block = (hs_block){0};
-    for (int k = 0; k < ndim; k++) {
-        block->y[k] = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(float));
-        complete = complete && block->y[k] != NULL;
+    block->capacity =
+        most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
+    block->most_hits = HITS_PER_CANDIDATE * block->capacity;
+    block->most_runs = block->capacity < HS_BLOCK_RUNS ? block->capacity : HS_BLOCK_RUNS;
+    const int64_t capacity = block->capacity + HS_PADDING;
+    const int64_t room = (capacity + FLOATS_PER_LINE - 1) / FLOATS_PER_LINE * FLOATS_PER_LINE;
+    block->y[0] = hs_alloc(account, HS_FOR_CANDIDATES, room * (ndim + 1), sizeof(float));
+    bool complete = block->y[0] != NULL;
+    for (int k = 1; k < ndim && complete; k++) {
+        block->y[k] = block->y[0] + k * room;
     }
+    block->norm = complete ? block->y[0] + ndim * room : NULL;
     block->id = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
-    block->place = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
-    block->hits = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
-    block->runs = hs_alloc(account, HS_FOR_CANDIDATES, HS_BLOCK_RUNS + 1, sizeof(hs_run));
-    complete = complete && block->id && block->place && block->hits && block->runs;
+    block->unsure = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(hs_unsure));
+    block->runs = hs_alloc(account, HS_FOR_CANDIDATES, block->most_runs + 1, sizeof(hs_run));
+    complete = complete && block->id != NULL && block->unsure != NULL && block->runs != NULL;
+    if (use != HS_BLOCK_COUNTS) {
+        block->hits = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING,
+                               sizeof(int32_t));
+        complete = complete && block->hits != NULL;
+    }
+    if (use == HS_BLOCK_LISTS_PLACES) {
+        block->place = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
+        complete = complete && block->place != NULL;
+    }
     if (!complete) {
-        hs_block_free(account, ndim, block);
+        hs_block_free(account, block);
         return HS_ERR_MEMORY;
     }
-    for (int32_t c = 0; c < capacity; c++) {
+    for (int32_t c = 0; block->place != NULL && c < capacity; c++) {
         block->place[c] = c;
-        block->id[c] = 0;
-    }
-    for (int k = 0; k < ndim; k++) {
-        memset(block->y[k], 0, (size_t)capacity * sizeof(float));
     }
     return HS_OK;
 }
 
 void
-hs_block_free(hs_account *account, int ndim, hs_block *block)
+hs_block_free(hs_account *account, hs_block *block)
 {
-    for (int k = 0; k < ndim; k++) {
-        hs_free(account, block->y[k]);
-    }
+    hs_free(account, block->y[0]);
     hs_free(account, block->id);
     hs_free(account, block->place);
     hs_free(account, block->hits);
+    hs_free(account, block->unsure);
     hs_free(account, block->runs);
     *block = (hs_block){0};
 }
 
-/* |x| as an integer that orders like the number; infinity and NaN are largest. */
-HS_ALWAYS_INLINE int32_t
-magnitude_of(float x)
-{
-    int32_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits & INT32_C(0x7fffffff);
-}
-
-static float
-float_of_magnitude(int32_t bits)
-{
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
-}
-
 void
-hs_group_set(const hs_bins *bins, int32_t first, int32_t last, hs_group *group)
+hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group)
 {
-    int32_t largest = 0;
     group->first = first;
     group->last = last;
+    group->largest = 0;
+    /* Any double will do as a centre; one of the points is near all of them. */
+    const int32_t middle = first + (last - first) / 2;
     for (int k = 0; k < bins->ndim; k++) {
-        const double *x = bins->x[k];
-        double        low = x[first], high = x[first];
-        for (int32_t si = first + 1; si < last; si++) {
-            low = x[si] < low ? x[si] : low;
-            high = x[si] > high ? x[si] : high;
-        }
-        /* Any double will do as a centre; the middle makes the float32 numbers smallest. */
-        group->centre[k] = 0.5 * low + 0.5 * high;
-        for (int32_t si = first; si < last; si++) {
-            const float   q = (float)(x[si] - group->centre[k]);
-            const int32_t magnitude = magnitude_of(q);
-            group->q[si - first][k] = q;
-            largest = magnitude > largest ? magnitude : largest;
-        }
+        group->centre[k] = bins->x[k][middle];
     }
-    group->extent = float_of_magnitude(largest);
 }
 
 int32_t
-hs_block_append(const hs_bins *bins, const hs_group *group, int32_t si, int32_t end,
-                const double *shift, const int32_t *image, hs_block *block)
+hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
+                const int32_t *image, const hs_group *group)
 {
-    const int32_t room = HS_BLOCK_CANDIDATES - block->n;
+    const int32_t room = block->capacity - block->n;
     const int32_t n = end - si < room ? end - si : room;
-    const int32_t at = block->n;
-    for (int k = 0; k < bins->ndim; k++) {
-        const double *HS_RESTRICT x = bins->x[k] + si;
-        float *HS_RESTRICT        y = block->y[k] + at;
-        /* One rounding each here: hs_grid.shift_error bounds the first, filter.h the second. */
-        const double moved = shift[k] - group->centre[k];
-        for (int32_t c = 0; c < n; c++) {
-            y[c] = (float)(x[c] + moved);
-        }
-    }
-    memcpy(block->id + at, bins->order + si, (size_t)n * sizeof(int32_t));
-    hs_run *run = &block->runs[block->n_runs++];
-    run->at = at;
+    hs_run       *run = &block->runs[block->n_runs++];
+    run->at = block->n;
     run->si = si;
     memcpy(run->image, image, sizeof run->image);
+    for (int k = 0; k < ndim; k++) {
+        /* One rounding here and one for the sum: hs_grid.shift_error bounds the first, filter.h
+         * counts on the second. */
+        run->moved[k] = shift[k] - group->centre[k];
+    }
     block->n += n;
     return n;
 }
 
-double
-hs_block_extent(const hs_group *group, const hs_block *block, int ndim)
+void
+hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_block *block,
+                hs_group *group)
 {
-    int32_t largest = 0;
-    for (int k = 0; k < ndim; k++) {
-        const float *y = block->y[k];
-        for (int32_t c = 0; c < block->n; c++) {
-            const int32_t magnitude = magnitude_of(y[c]);
-            largest = magnitude > largest ? magnitude : largest;
+    hs_gather gather;
+    gather.ndim = bins->ndim;
+    for (int k = 0; k < bins->ndim; k++) {
+        gather.x[k] = bins->x[k];
+        gather.y[k] = block->y[k];
+    }
+    gather.order = bins->order;
+    gather.norm = block->norm;
+    gather.id = block->id;
+    gather.largest = group->largest;
+    block->runs[block->n_runs].at = block->n;
+    kernel->gather(&gather, block->runs, block->n_runs);
+    group->largest = gather.largest;
+    if (is_first) {
+        HS_ASSERT(block->runs[0].si == group->first && block->n >= group->last - group->first);
+        const size_t bytes = (size_t)(group->last - group->first) * sizeof(float);
+        for (int k = 0; k < bins->ndim; k++) {
+            memcpy(group->q[k], block->y[k], bytes);
         }
     }
-    return (double)float_of_magnitude(largest) + (double)group->extent;
+}
+
+double
+hs_group_extent(const hs_group *group)
+{
+    /* The top five bits of the mantissa, rounded up: at most 1/32 more. */
+    const uint32_t low = (UINT32_C(1) << 18) - 1;
+    const uint32_t bits = group->largest < UINT32_C(0x7f800000) ? (group->largest + low) & ~low
+                                                                 : group->largest;
+    float largest;
+    memcpy(&largest, &bits, sizeof largest);
+    return 2.0 * (double)largest;
 }

@@ -9,61 +9,73 @@
 #define HS_GATHER_H
 
 #include "bins.h"
-#include "filter.h"
 
 #include "../kernels/kernel.h"
 
-#define HS_GROUP_POINTS 64         /* points tested against one neighbourhood, at most */
-#define HS_BLOCK_CANDIDATES 4096   /* candidates held at a time: 64 kB in three dimensions */
-#define HS_BLOCK_RUNS 1024         /* runs held at a time */
+#define HS_BLOCK_RUNS 1024 /* runs held at a time, at most */
 
-/* Consecutive candidates that are consecutive points in cell order, in one image. */
-typedef struct hs_run {
-    int32_t at;                 /* place of the first in the block */
-    int32_t si;                 /* its number in cell order */
-    int32_t image[HS_MAX_DIM];  /* shift over the rows of B */
-} hs_run;
-
-/* The buffers; one block of candidates at a time. */
+/* One block of candidates at a time, and what scans say about it. The arrays have capacity +
+ * HS_PADDING entries where nothing else is said, and are owned: y and norm as one block, by
+ * y[0]. */
 typedef struct hs_block {
-    float   *y[HS_MAX_DIM];  /* owned; HS_BLOCK_CANDIDATES + padding each */
-    int32_t *id;             /* owned; point numbers of the candidates */
-    int32_t *place;          /* owned; 0, 1, 2, ... */
-    int32_t *hits;           /* owned; what a scan lists */
-    hs_run  *runs;           /* owned; runs[n_runs].at is the number of candidates */
-    int32_t  n;              /* candidates */
-    int32_t  n_runs;
+    float     *y[HS_MAX_DIM];
+    float     *norm;   /* sum of y_k^2 */
+    int32_t   *id;     /* point numbers of the candidates */
+    int32_t   *place;  /* 0, 1, 2, ...; NULL unless asked for */
+    int32_t   *hits;   /* most_hits + HS_PADDING; NULL when only counting */
+    hs_unsure *unsure; /* capacity */
+    hs_run    *runs;   /* most_runs + 1; runs[n_runs].at is the number of candidates */
+    int32_t    capacity, most_hits, most_runs;
+    int32_t    n_runs;
+    int32_t    n; /* candidates, of all runs */
 } hs_block;
+
+/* What a block has room for. */
+typedef enum hs_block_use {
+    HS_BLOCK_COUNTS,
+    HS_BLOCK_LISTS_IDS,
+    HS_BLOCK_LISTS_PLACES
+} hs_block_use;
 
 /* The points whose neighbourhood it is: [first, last) in cell order. */
 typedef struct hs_group {
-    int32_t first, last;
-    double  centre[HS_MAX_DIM];
-    float   q[HS_GROUP_POINTS][HS_MAX_DIM]; /* relative to the centre */
-    float   extent;                          /* largest |q_k|; NaN if one is */
+    int32_t  first, last;
+    double   centre[HS_MAX_DIM];
+    float    q[HS_MAX_DIM][HS_GROUP_POINTS]; /* relative to the centre */
+    uint32_t largest; /* bits of the largest |q| or |y| gathered for it so far */
 } hs_group;
 
-hs_status hs_block_init(hs_account *account, int ndim, hs_block *block);
-void      hs_block_free(hs_account *account, int ndim, hs_block *block);
+/* most: a bound on the candidates of any group, or more than HS_BLOCK_CANDIDATES: a small scene
+ * gets a small block. */
+hs_status hs_block_init(hs_account *account, int ndim, hs_block_use use, double most,
+                        hs_block *block);
+void      hs_block_free(hs_account *account, hs_block *block);
 
-/* Chooses the centre and converts the points of the group. */
-void hs_group_set(const hs_bins *bins, int32_t first, int32_t last, hs_group *group);
+/* Chooses the centre. */
+void hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group);
 
 /*
  * Appends points [si, end) of one image to the block, as many as there is room for; returns how
- * many. shift: the image's displacement, ndim doubles; image: the same in rows of B. A run of
- * candidates of the image 0 that starts at the group's first point must come first.
+ * many. shift: the image's displacement, ndim doubles; image: the same in rows of B.
  */
-int32_t hs_block_append(const hs_bins *bins, const hs_group *group, int32_t si, int32_t end,
-                        const double *shift, const int32_t *image, hs_block *block);
+int32_t hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
+                        const int32_t *image, const hs_group *group);
 
-/* Largest |y_k| of the block plus largest |q_k| of the group; NaN or infinite if one is. */
-double hs_block_extent(const hs_group *group, const hs_block *block, int ndim);
+/*
+ * Copies what was appended. The first block of a group must begin with the group's own points, in
+ * the image 0: they are kept as its q.
+ */
+void hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_block *block,
+                     hs_group *group);
+
+/* A bound on |y_k| of the block plus |q_k| of the group: twice the largest so far, a little rounded
+ * up, so that few different thresholds are needed; NaN or infinite if one is. */
+double hs_group_extent(const hs_group *group);
 
 HS_ALWAYS_INLINE bool
 hs_block_is_full(const hs_block *block)
 {
-    return block->n == HS_BLOCK_CANDIDATES || block->n_runs == HS_BLOCK_RUNS;
+    return block->n == block->capacity || block->n_runs == block->most_runs;
 }
 
 #endif

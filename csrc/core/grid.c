@@ -8,7 +8,11 @@
  */
 #include "grid.h"
 
+#include "doubleword.h"
+#include "rounding.h"
+
 #include <math.h>
+#include <string.h>
 
 #define UNIT 0x1p-53
 /* Relative room for the few roundings between a bound and its use. */
@@ -16,16 +20,18 @@
 /* Cells per axis that int32 windows and doubles tell apart, and in all: cell ids are uint32. */
 #define MOST_CELLS_PER_AXIS 0x1p31
 #define MOST_CELLS 4294967295.0
-/* Points that a cell along the first axis should hold: enough to pay for gathering its
- * neighbourhood, few enough that the neighbourhood is not much larger than the cutoff. */
+/* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
+ * more; walks put cells together where these are fewer. */
 #define POINTS_PER_CELL 12.0
+/* Of sorting a point into its cell, in candidates. */
+#define SORTING_COST 40.0
 
 static double
 largest_entry(const double *row, int ndim)
 {
     double largest = 0.0;
     for (int k = 0; k < ndim; k++) {
-        largest = fmax(largest, fabs(row[k]));
+        largest = hs_larger(fabs(row[k]), largest);
     }
     return largest;
 }
@@ -45,16 +51,15 @@ bound_images(const hs_scene *scene, const double *drift, double *images)
 }
 
 /*
- * How far adding lattice vectors can move t_k beyond whole periods, because normals are rounded:
- * measured, not assumed. Zero in aligned boxes.
+ * How far adding one row of B can move t_k beyond whole periods, because normals are rounded:
+ * measured, not assumed.
  */
 static void
-bound_drift(const hs_scene *scene, const double *images, double *drift)
+measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
 {
     const hs_lattice *lattice = &scene->lattice;
     for (int k = 0; k < scene->ndim; k++) {
-        drift[k] = 0.0;
-        for (int r = 0; r < lattice->n_periodic && !lattice->aligned; r++) {
+        for (int r = 0; r < lattice->n_periodic; r++) {
             double along = 0.0;
             for (int c = 0; c < scene->ndim; c++) {
                 along += lattice->normal[k][c] * lattice->rows[r][c];
@@ -65,8 +70,33 @@ bound_drift(const hs_scene *scene, const double *images, double *drift)
             const double rounding = (scene->ndim + 2) * scene->ndim * UNIT *
                                         largest_entry(lattice->rows[r], scene->ndim) +
                                     scene->ndim * lattice->row_error[r];
-            drift[k] += images[r] * (fabs(along) + rounding);
+            drift_of_row[k][r] = fabs(along) + rounding;
         }
+    }
+}
+
+/* The same for as many images as a pair can be apart, which in turn depend on it. */
+static void
+bound_drift(const hs_scene *scene, double *images, double *drift)
+{
+    double drift_of_row[HS_MAX_DIM][HS_MAX_DIM];
+    memset(drift, 0, (size_t)scene->ndim * sizeof(double));
+    bound_images(scene, drift, images);
+    if (scene->lattice.aligned) {
+        return;
+    }
+    measure_drift(scene, drift_of_row);
+    for (int pass = 0;; pass++) {
+        for (int k = 0; k < scene->ndim; k++) {
+            drift[k] = 0.0;
+            for (int r = 0; r < scene->lattice.n_periodic; r++) {
+                drift[k] += images[r] * drift_of_row[k][r];
+            }
+        }
+        if (pass == 2) {
+            return;
+        }
+        bound_images(scene, drift, images);
     }
 }
 
@@ -83,38 +113,41 @@ bound_shift_error(const hs_scene *scene, const double *images)
             row_errors += images[r] * lattice->row_error[r];
         }
         if (moved > 0.0) {
-            error = fmax(error, (2 * lattice->n_periodic + 3) * UNIT *
-                                        (moved + 2.0 * scene->x_largest[c]) + row_errors);
+            error = hs_larger((2 * lattice->n_periodic + 3) * UNIT *
+                                      (moved + 2.0 * scene->x_largest[c]) + row_errors,
+                              error);
         }
     }
     return error;
 }
 
-/* Volume of the unit ball in ndim dimensions. */
+/* Volume of a ball in ndim dimensions. */
 static double
-unit_ball(int ndim)
+ball_volume(int ndim, double radius)
 {
-    double volume = ndim % 2 == 0 ? 1.0 : 2.0;
+    double volume = ndim % 2 == 0 ? 1.0 : 2.0 * radius;
     for (int k = 2 + ndim % 2; k <= ndim; k += 2) {
-        volume *= 6.283185307179586 / k;
+        volume *= 6.283185307179586 / k * radius * radius;
     }
     return volume;
 }
 
 /* Cells along each axis for a pitch of radius / finer, and for about POINTS_PER_CELL along the
- * first. */
+ * first. parts: cells that shall reach as far as the range. */
 static void
 choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
-              double *counts)
+              double *counts, double *parts)
 {
     double area = 1.0; /* of one row's cross-section */
     for (int k = scene->ndim - 1; k >= 0; k--) {
         const double extent = scene->upper[k] - scene->lower[k];
-        double       pitch = grid->range[k] * (1.0 + 0x1p-20) / finer;
+        parts[k] = finer;
         if (k == 0 && scene->ndim > 1) {
-            const double wanted = POINTS_PER_CELL / (density * area);
-            pitch = fmin(fmax(wanted, 0.25 * grid->range[0]), 4.0 * grid->range[0]);
+            /* A whole fraction of the range: otherwise windows are longer than need be. */
+            const double points = density * area * grid->range[0];
+            parts[k] = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
         }
+        const double pitch = grid->range[k] * (1.0 + 0x1p-20) / parts[k];
         counts[k] = 1.0;
         if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
             counts[k] = floor(fmin(extent / pitch, MOST_CELLS_PER_AXIS));
@@ -123,11 +156,12 @@ choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double dens
     }
 }
 
-/* Fewer cells, evenly over the axes, until their number is in proportion to the points. */
-static void
+/* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
+ * whether it had to. */
+static bool
 cap_counts(int ndim, double cap, double *counts)
 {
-    for (;;) {
+    for (bool capped = false;;) {
         double product = 1.0;
         int    divided = 0;
         for (int k = 0; k < ndim; k++) {
@@ -135,8 +169,9 @@ cap_counts(int ndim, double cap, double *counts)
             divided += counts[k] > 1.0;
         }
         if (product <= cap) {
-            return;
+            return capped;
         }
+        capped = true;
         const double factor = pow(cap / product, 1.0 / divided);
         for (int k = 0; k < ndim; k++) {
             /* Always at least one less, so that this ends. */
@@ -145,29 +180,112 @@ cap_counts(int ndim, double cap, double *counts)
     }
 }
 
+hs_status
+hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
+{
+    const double extent = scene->upper[k] - scene->lower[k];
+    const bool   open = scene->lattice.row_of_axis[k] < 0;
+    grid->shape[k] = (int64_t)count;
+    grid->by_faces[k] = false;
+    grid->lower[k] = scene->lower[k];
+    grid->cell_size[k] = extent / count;
+    /* One cell needs no place in it, and a subnormal extent no infinite scale. */
+    grid->cells_per_length[k] = count > 1.0 || !open ? count / extent : 0.0;
+    const double cells =
+        grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) + 0x1p-50 * count;
+    if (open && !(cells < count - 1.0)) {
+        grid->reach[k] = grid->shape[k] - 1;
+    } else if (cells < MOST_CELLS_PER_AXIS - 2.0) { /* windows of cells are int32 */
+        grid->reach[k] = (int64_t)cells + 1;
+    } else {
+        return HS_ERR_MEMORY;
+    }
+    return HS_OK;
+}
+
+/* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
+static bool
+faces_hold(const hs_scene *scene, const hs_grid *grid, int k, double least)
+{
+    double from = hs_grid_face(grid, k, 0.0);
+    if (from != scene->lower[k]) {
+        return false;
+    }
+    for (int64_t cell = 0; cell < grid->shape[k]; cell++) {
+        const double to = cell + 1 < grid->shape[k] ? hs_grid_face(grid, k, (double)(cell + 1))
+                                                     : scene->upper[k];
+        const hs_dw  width = hs_two_difference(to, from);
+        if (!(width.hi > least || (width.hi == least && width.lo >= 0.0))) {
+            return false;
+        }
+        from = to;
+    }
+    return true;
+}
+
+/* Does a point lie on the far face? There the last cell is closed, not half open. */
+static bool
+touches_end(const hs_scene *scene, int k)
+{
+    const double *x = scene->cloud.x[k], end = scene->upper[k];
+    int           any = 0;
+    for (int64_t i = 0; i < scene->n; i++) {
+        any |= x[i] >= end;
+    }
+    return any != 0;
+}
+
+/*
+ * Tries one cell more along each axis, each a whole part of the radius wide and no wider: boxes are
+ * often whole multiples of the cutoff. There is no room for rounding then, so points are told apart
+ * by the faces between cells, which are numbers: two points with `part` whole cells between their
+ * cells are more than the radius apart, also across a periodic face unless one lies on it.
+ */
+static void
+cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid)
+{
+    double cells = (double)grid->n_cells;
+    for (int k = 0; k < scene->ndim; k++) {
+        const double extent = scene->upper[k] - scene->lower[k];
+        const double part = scene->radius / parts[k]; /* exact but for thirds */
+        const double least = parts[k] == 3.0 ? hs_next_up(part) : part;
+        const double count = (double)grid->shape[k] + 1.0;
+        const double reach = hs_larger(fabs(scene->lower[k]), fabs(scene->upper[k]));
+        if (scene->t_error[k] != 0.0 || reach > 16.0 * extent || count < 4.0 || !(least > 0.0) ||
+            !(least * count <= extent * (1.0 + SLACK)) || count > MOST_CELLS_PER_AXIS) {
+            continue;
+        }
+        const double  more = cells / (count - 1.0) * count;
+        const hs_grid before = *grid;
+        grid->shape[k] = (int64_t)count;
+        grid->cell_size[k] = extent / count;
+        grid->cells_per_length[k] = count / extent;
+        grid->reach[k] = (int64_t)parts[k];
+        grid->by_faces[k] = more <= cap && faces_hold(scene, grid, k, least) &&
+                            (scene->lattice.row_of_axis[k] < 0 || !touches_end(scene, k));
+        if (grid->by_faces[k]) {
+            cells = more;
+        } else {
+            *grid = before;
+        }
+    }
+    grid->n_cells = 1;
+    for (int k = 0; k < scene->ndim; k++) {
+        grid->stride[k] = grid->n_cells;
+        grid->n_cells *= grid->shape[k];
+    }
+}
+
 static hs_status
 set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
 {
     grid->n_cells = 1;
     for (int k = 0; k < scene->ndim; k++) {
-        const double extent = scene->upper[k] - scene->lower[k];
-        const bool   open = scene->lattice.row_of_axis[k] < 0;
-        grid->shape[k] = (int64_t)counts[k];
-        grid->stride[k] = grid->n_cells;
-        grid->n_cells *= grid->shape[k];
-        grid->lower[k] = scene->lower[k];
-        grid->cell_size[k] = extent / counts[k];
-        /* One cell needs no place in it, and a subnormal extent no infinite scale. */
-        grid->cells_per_length[k] = counts[k] > 1.0 || !open ? counts[k] / extent : 0.0;
-        const double cells = grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) +
-                             0x1p-50 * counts[k];
-        if (open && !(cells < counts[k] - 1.0)) {
-            grid->reach[k] = grid->shape[k] - 1;
-        } else if (cells < MOST_CELLS_PER_AXIS - 2.0) { /* windows of cells are int32 */
-            grid->reach[k] = (int64_t)cells + 1;
-        } else {
+        if (hs_grid_set_axis(scene, k, counts[k], grid) != HS_OK) {
             return HS_ERR_MEMORY;
         }
+        grid->stride[k] = grid->n_cells;
+        grid->n_cells *= grid->shape[k];
     }
     return HS_OK;
 }
@@ -184,57 +302,44 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     for (int k = 0; k < scene->ndim; k++) {
         double cells = 2.0 * (double)grid->reach[k] + 1.0;
         if (scene->lattice.row_of_axis[k] < 0) {
-            cells = fmin(cells, (double)grid->shape[k]);
+            cells = hs_smaller(cells, (double)grid->shape[k]);
         }
         candidates *= cells / (double)grid->shape[k];
         rows *= k > 0 ? cells : 1.0;
     }
-    const double group = fmin(fmax((double)scene->n / (double)grid->n_cells, 1.0), 64.0);
-    return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? 40.0 : 0.0);
+    const double group =
+        hs_smaller(hs_larger((double)scene->n / (double)grid->n_cells, 1.0), 64.0);
+    return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
-hs_status
-hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+/* One cell, or a grid of cells where that is cheaper. */
+static hs_status
+choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid,
+             hs_failure *failure)
 {
-    double images[HS_MAX_DIM] = {0}, drift[HS_MAX_DIM] = {0}, counts[HS_MAX_DIM];
-    /* Of the periodic part, times the open extents. */
-    double volume = hs_lattice_volume(&scene->lattice, 0);
-    *grid = (hs_grid){.ndim = scene->ndim};
-    for (int pass = 0; pass < 3; pass++) {
-        bound_images(scene, drift, images);
-        bound_drift(scene, images, drift);
-    }
-    for (int k = 0; k < scene->ndim; k++) {
-        const int r = scene->lattice.row_of_axis[k];
-        grid->range[k] = (scene->radius + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
-        if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
-            failure->expected_pairs = failure->expected_bytes = INFINITY;
-            return HS_ERR_MEMORY;
-        }
-        volume *= r >= 0 ? 1.0 : fmax(scene->upper[k] - scene->lower[k], grid->range[k]);
-    }
-    grid->shift_error = bound_shift_error(scene, images);
-
-    const double density = (double)scene->n / volume;
-    const double ball = unit_ball(scene->ndim) * pow(scene->cutoff, scene->ndim);
-    grid->expected_pairs = 0.5 * (double)scene->n * density * ball;
-    if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
-        grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
-    }
-    const double neighbours = density * ball;
-    /* Narrower rows test fewer pairs that are too far apart, and cost more rows to visit. */
-    const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;
-    choose_counts(scene, grid, finer, density, counts);
-    cap_counts(scene->ndim, fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS), counts);
-    hs_status    status = set_shape(scene, counts, grid);
-    const double cost = status == HS_OK ? cost_per_point(scene, grid) : INFINITY;
-
-    hs_grid single = *grid;
+    double counts[HS_MAX_DIM], parts[HS_MAX_DIM];
+    double single_cost = INFINITY;
     for (int k = 0; k < scene->ndim; k++) {
         counts[k] = 1.0;
     }
-    if (set_shape(scene, counts, &single) == HS_OK &&
-        (status != HS_OK || cost_per_point(scene, &single) <= cost)) {
+    if (set_shape(scene, counts, grid) == HS_OK) {
+        single_cost = cost_per_point(scene, grid);
+    }
+    if (single_cost <= SORTING_COST) { /* no grid costs less */
+        return HS_OK;
+    }
+    const hs_grid single = *grid;
+    /* Narrower rows test fewer pairs that are too far apart, and cost more rows to visit. */
+    const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;
+    const double cap = fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
+    choose_counts(scene, grid, finer, density, counts, parts);
+    const bool capped = cap_counts(scene->ndim, cap, counts);
+    hs_status  status = set_shape(scene, counts, grid);
+    if (status == HS_OK && scene->lattice.aligned && !capped) {
+        cut_by_faces(scene, parts, cap, grid);
+    }
+    if (single_cost < INFINITY &&
+        (status != HS_OK || single_cost <= cost_per_point(scene, grid))) {
         *grid = single;
         status = HS_OK;
     }
@@ -242,4 +347,32 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
         failure->expected_pairs = failure->expected_bytes = INFINITY;
     }
     return status;
+}
+
+hs_status
+hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+{
+    double images[HS_MAX_DIM], drift[HS_MAX_DIM];
+    /* Of the periodic part, times the open extents. */
+    double volume = hs_lattice_volume(&scene->lattice, 0);
+    *grid = (hs_grid){.ndim = scene->ndim};
+    bound_drift(scene, images, drift);
+    for (int k = 0; k < scene->ndim; k++) {
+        const int r = scene->lattice.row_of_axis[k];
+        grid->range[k] = (scene->radius + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
+        if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
+            failure->expected_pairs = failure->expected_bytes = INFINITY;
+            return HS_ERR_MEMORY;
+        }
+        volume *= r >= 0 ? 1.0 : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
+    }
+    grid->shift_error = bound_shift_error(scene, images);
+
+    const double density = (double)scene->n / volume;
+    const double ball = ball_volume(scene->ndim, scene->cutoff);
+    grid->expected_pairs = 0.5 * (double)scene->n * density * ball;
+    if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
+        grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
+    }
+    return choose_shape(scene, density, density * ball, grid, failure);
 }

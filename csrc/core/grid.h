@@ -13,9 +13,11 @@ typedef struct hs_grid {
     int64_t  n_cells;             /* product of shape, at most 2 n + HS_GRID_SPARE_CELLS */
     int64_t  shape[HS_MAX_DIM];   /* cells along each axis, at least 1 */
     int64_t  stride[HS_MAX_DIM];  /* cell id = sum of index * stride; the first axis is fastest */
-    double   lower[HS_MAX_DIM];   /* t of the first face */
+    double   lower[HS_MAX_DIM];   /* t of the first face; of place 0 in a sparse grid */
+    int64_t  skipped[HS_MAX_DIM]; /* sparse grids: cells before the first that holds points */
     double   cell_size[HS_MAX_DIM];
     double   cells_per_length[HS_MAX_DIM];
+    bool     by_faces[HS_MAX_DIM]; /* cells begin at the numbers hs_grid_face() gives, exactly */
     double   range[HS_MAX_DIM];   /* largest |difference of computed t_k| of a pair */
     int64_t  reach[HS_MAX_DIM];   /* the same in cells, images counted on */
     double   shift_error;         /* bound on the error of a shifted coordinate minus a centre */
@@ -27,16 +29,33 @@ typedef struct hs_grid {
 /* HS_ERR_MEMORY when a cutoff spans more than 2^31 images. */
 hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
 
+/* `count` cells of equal width along axis k: sets all but the stride, from the scene's range there
+ * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
+hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
+
+/* Added to places, times the number of cells, where axes are cut by faces: more than their
+ * rounding, so that the cell found is the right one or the next. */
+#define HS_GRID_BIAS 0x1p-44
+
+/* Where cell number `cell` begins, where axes are cut by faces. */
+HS_ALWAYS_INLINE double
+hs_grid_face(const hs_grid *grid, int k, double cell)
+{
+    return grid->lower[k] + cell * grid->cell_size[k];
+}
+
 /* Cell index along axis k of a point with coordinate t; points beyond a face count as on it. */
 HS_ALWAYS_INLINE int64_t
 hs_grid_index(const hs_grid *grid, int k, double t)
 {
-    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k];
+    const bool    by_faces = grid->by_faces[k];
+    const double  bias = by_faces ? HS_GRID_BIAS * (double)grid->shape[k] : 0.0;
+    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k] + bias;
     const int64_t last = grid->shape[k] - 1;
-    if (!(place < (double)last)) { /* compared first: it may be beyond any integer */
-        return last;
-    }
-    return place > 0.0 ? (int64_t)place : 0;
+    /* Compared first: it may be beyond any integer. */
+    int64_t cell = !(place < (double)last) ? last : place > 0.0 ? (int64_t)place : 0;
+    cell -= by_faces && cell > 0 && t < hs_grid_face(grid, k, (double)cell);
+    return cell;
 }
 
 #endif

@@ -17,8 +17,11 @@
 hs_scale
 hs_scale_of(int exponent)
 {
+    if (exponent == 0) { /* as it nearly always is */
+        return (hs_scale){0, 1.0, 1.0};
+    }
     const int half = exponent / 2;
-    return (hs_scale){exponent, ldexp(1.0, -half), ldexp(1.0, half - exponent)};
+    return (hs_scale){exponent, hs_power_of_two(-half), hs_power_of_two(half - exponent)};
 }
 
 static int
@@ -27,33 +30,11 @@ collect_periodic_rows(const hs_box *box, double rows[][HS_MAX_DIM], int *vector_
     int n_periodic = 0;
     for (int l = 0; l < box->ndim; l++) {
         if (box->periodic[l]) {
-            memcpy(rows[n_periodic], box->rows[l], sizeof box->rows[l]);
+            memcpy(rows[n_periodic], box->rows[l], (size_t)box->ndim * sizeof(double));
             vector_of_row[n_periodic++] = l;
         }
     }
     return n_periodic;
-}
-
-hs_status
-hs_box_check(const hs_box *box, hs_failure *failure)
-{
-    double rows[HS_MAX_DIM][HS_MAX_DIM];
-    int    vector_of_row[HS_MAX_DIM];
-    if (box == NULL) {
-        return HS_OK;
-    }
-    const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
-    for (int r = 0; r < n_periodic; r++) {
-        for (int k = 0; k < box->ndim; k++) {
-            if (!isfinite(rows[r][k])) {
-                failure->row = vector_of_row[r];
-                failure->column = k;
-                failure->value = rows[r][k];
-                return HS_ERR_BOX_FINITE;
-            }
-        }
-    }
-    return hs_rows_independent(box->ndim, n_periodic, rows) ? HS_OK : HS_ERR_BOX_DEPENDENT;
 }
 
 /* If every row has one nonzero entry, in its own column: column[r] says where. */
@@ -79,6 +60,31 @@ rows_are_aligned(int ndim, int n_rows, const double rows[][HS_MAX_DIM], int *col
     return true;
 }
 
+hs_status
+hs_box_check(const hs_box *box, hs_failure *failure)
+{
+    double rows[HS_MAX_DIM][HS_MAX_DIM];
+    int    vector_of_row[HS_MAX_DIM], column[HS_MAX_DIM];
+    if (box == NULL) {
+        return HS_OK;
+    }
+    const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
+    for (int r = 0; r < n_periodic; r++) {
+        for (int k = 0; k < box->ndim; k++) {
+            if (!isfinite(rows[r][k])) {
+                failure->row = vector_of_row[r];
+                failure->column = k;
+                failure->value = rows[r][k];
+                return HS_ERR_BOX_FINITE;
+            }
+        }
+    }
+    return rows_are_aligned(box->ndim, n_periodic, rows, column) ||
+                   hs_rows_independent(box->ndim, n_periodic, rows)
+               ? HS_OK
+               : HS_ERR_BOX_DEPENDENT;
+}
+
 static double
 dot(int ndim, const double *a, const double *b)
 {
@@ -97,11 +103,12 @@ copy_of_unit_size(int ndim, const double *row, double *copy)
     double largest = 0.0;
     int    exponent;
     for (int k = 0; k < ndim; k++) {
-        largest = fmax(largest, fabs(row[k]));
+        largest = hs_larger(fabs(row[k]), largest);
     }
     (void)frexp(largest, &exponent);
+    const hs_scale scale = hs_scale_of(exponent);
     for (int k = 0; k < ndim; k++) {
-        copy[k] = ldexp(row[k], -exponent);
+        copy[k] = hs_scale_apply(scale, row[k]);
     }
     return exponent;
 }
@@ -145,8 +152,8 @@ multiply_volume(hs_lattice *lattice, double length, int exponent)
 double
 hs_lattice_volume(const hs_lattice *lattice, int exponent)
 {
-    return ldexp(lattice->volume_mantissa,
-                 lattice->volume_exponent + lattice->n_periodic * exponent);
+    const int power = lattice->volume_exponent + lattice->n_periodic * exponent;
+    return power == 0 ? lattice->volume_mantissa : ldexp(lattice->volume_mantissa, power);
 }
 
 /* The unit vector that meets row r of B only. */
@@ -245,24 +252,29 @@ set_aligned_axes(hs_lattice *lattice, const int *column)
         multiply_volume(lattice, lattice->rows[r][c], 0);
     }
     for (int k = 0; k < lattice->ndim; k++) {
-        lattice->normal[k][k] = 1.0;
-        lattice->direction[k][k] = 1.0;
+        for (int c = 0; c < lattice->ndim; c++) {
+            lattice->normal[k][c] = lattice->direction[k][c] = k == c ? 1.0 : 0.0;
+        }
     }
 }
 
-/* The given rows, scaled; B starts as these. */
+/* The given rows, scaled; B starts as these. The axes are open yet. */
 static void
 take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
 {
-    *lattice = (hs_lattice){.ndim = ndim};
+    lattice->ndim = ndim;
+    lattice->n_periodic =
+        box == NULL ? 0 : collect_periodic_rows(box, lattice->given, lattice->vector_of_row);
+    lattice->aligned = lattice->reduced = false;
     for (int k = 0; k < ndim; k++) {
         lattice->row_of_axis[k] = -1;
-    }
-    if (box != NULL) {
-        lattice->n_periodic = collect_periodic_rows(box, lattice->given, lattice->vector_of_row);
+        lattice->period[k] = 0.0;
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
-        lattice->U[r][r] = 1;
+        lattice->row_error[r] = 0.0;
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            lattice->U[r][l] = r == l;
+        }
         for (int k = 0; k < ndim; k++) {
             lattice->scaled[r][k] = hs_scale_apply(scale, lattice->given[r][k]);
             lattice->rows[r][k] = lattice->scaled[r][k];
@@ -279,10 +291,10 @@ reduce_rows(hs_lattice *lattice, int *column)
     bool         exact = true;
     hs_reduce(lattice->ndim, lattice->n_periodic, lattice->scaled, &reduction);
     lattice->reduced = reduction.changed;
-    memcpy(lattice->U, reduction.U, sizeof lattice->U);
-    memcpy(lattice->rows, reduction.rows, sizeof lattice->rows);
-    memcpy(lattice->row_error, reduction.error, sizeof lattice->row_error);
     for (int r = 0; r < lattice->n_periodic; r++) {
+        memcpy(lattice->U[r], reduction.U[r], (size_t)lattice->n_periodic * sizeof(int64_t));
+        memcpy(lattice->rows[r], reduction.rows[r], (size_t)lattice->ndim * sizeof(double));
+        lattice->row_error[r] = reduction.error[r];
         exact = exact && reduction.error[r] == 0.0;
     }
     return exact && rows_are_aligned(lattice->ndim, lattice->n_periodic, lattice->rows, column);
@@ -312,6 +324,7 @@ dual_of_given(const hs_lattice *reduced, int l, double *dual, int *exponent)
 {
     const int d = reduced->ndim;
     *exponent = -INT32_MAX / 4;
+    memset(dual, 0, (size_t)d * sizeof(double));
     for (int k = 0; k < d; k++) {
         const int r = reduced->row_of_axis[k];
         if (r >= 0 && !(reduced->period[k] > 0.0)) {
@@ -323,7 +336,6 @@ dual_of_given(const hs_lattice *reduced, int l, double *dual, int *exponent)
         }
     }
     for (int c = 0; c < d; c++) {
-        dual[c] = 0.0;
         for (int k = 0; k < d; k++) {
             const int r = reduced->row_of_axis[k];
             if (r >= 0 && reduced->U[r][l] != 0) {

@@ -26,7 +26,8 @@ hs_scale_apply(hs_scale scale, double value)
 
 /*
  * r counts periodic box vectors (0 ... n_periodic - 1), k counts grid axes (0 ... ndim - 1).
- * Lengths are scaled. A point X has the grid coordinate t_k = normal[k] . X.
+ * Lengths are scaled. A point X has the grid coordinate t_k = normal[k] . X. Matrices are set as
+ * far as ndim and n_periodic go: what lies beyond is neither cleared nor read.
  */
 typedef struct hs_lattice {
     int     ndim;

@@ -26,7 +26,7 @@ measure_in_floats(const hs_metric *metric, const double *p, const double *q, con
     if (shift == NULL || metric->n_rows == 0)
         hs_difference_plain(&difference, p, q, ndim);
     else if (!metric->floats_usable ||
-             !hs_difference_shifted(&difference, metric, p, q, shift, ndim))
+             !hs_difference_shifted(&difference, metric, p, q, shift, ndim, false))
         return false;
 
     double largest = 0.0;

@@ -3,6 +3,7 @@
 #include "../halfshell.h"
 
 #include "fpenv.h"
+#include "poll.h"
 #include "search.h"
 
 #include <math.h>
@@ -17,10 +18,11 @@ fill_plan(const hs_search *search, hs_plan *plan)
                       .n_periodic = scene->lattice.n_periodic,
                       .aligned = scene->lattice.aligned,
                       .reduced = scene->lattice.reduced,
-                      .keeps_originals = search->bins.originals != NULL,
+                      .keeps_originals = search->bins.keeps_originals,
                       .all_pairs = grid->n_cells == 1,
                       .stencil_rows = search->stencil.n_rows,
                       .expected_pairs = grid->expected_pairs,
+                      .threads = hs_team_size(search->team),
                       .kernel = search->kernel->name};
     for (int k = 0; k < scene->ndim; k++) {
         plan->shape[k] = grid->shape[k];
@@ -39,13 +41,14 @@ hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *optio
     hs_failure ignored;
     hs_search  search;
     failure = failure != NULL ? failure : &ignored;
-    *failure = (hs_failure){.row = -1, .column = -1};
+    *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_status      status = hs_search_open(points, box, options, &search, failure);
     if (status == HS_OK) {
         fill_plan(&search, plan);
         hs_search_close(&search);
     }
+    hs_account_close(&search.account);
     hs_fpenv_leave(saved);
     return status;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * points_template.h: the loading loop, once per type of coordinate.
+ * points_template.h: the loading loops, once per type of coordinate.
  *
  *   REAL     float or double
  *   NAME(x)  x with the suffix of the type
@@ -11,24 +11,37 @@
 #error "define REAL and NAME before including points_template.h"
 #endif
 
-/* Copies n rows; returns the bits of the largest |x|, where infinity and NaN are largest of all. */
-static uint64_t
-NAME(load_rows)(const hs_points *points, double *x)
+/* Copies rows [first, last). Inlined with constants for ndim and column_stride. */
+HS_ALWAYS_INLINE void
+NAME(copy_rows)(const hs_points *points, int ndim, ptrdiff_t column_stride, int64_t first,
+                int64_t last, double *const *x)
 {
-    const char *row = (const char *)points->data;
-    uint64_t    largest = 0;
-    for (int64_t i = 0; i < points->n; i++, row += points->row_stride) {
-        const char *entry = row;
-        for (int k = 0; k < points->ndim; k++, entry += points->column_stride) {
+    const char *row = (const char *)points->data + first * points->row_stride;
+    double     *to[HS_MAX_DIM];
+    for (int k = 0; k < ndim; k++) {
+        to[k] = x[k];
+    }
+    for (int64_t i = first; i < last; i++, row += points->row_stride) {
+        for (int k = 0; k < ndim; k++) {
             REAL given;
-            memcpy(&given, entry, sizeof given);
-            const double   value = (double)given;
-            const uint64_t magnitude = double_bits(value) & MAGNITUDE_BITS;
-            largest = magnitude > largest ? magnitude : largest;
-            *x++ = value;
+            memcpy(&given, row + k * column_stride, sizeof given);
+            to[k][i] = (double)given;
         }
     }
-    return largest;
+}
+
+/* The common shapes apart, so that their loops have no inner loop. */
+static void
+NAME(load_rows)(const hs_points *points, int64_t first, int64_t last, double *const *x)
+{
+    const ptrdiff_t size = (ptrdiff_t)sizeof(REAL);
+    if (points->ndim == 3 && points->column_stride == size) {
+        NAME(copy_rows)(points, 3, size, first, last, x);
+    } else if (points->ndim == 2 && points->column_stride == size) {
+        NAME(copy_rows)(points, 2, size, first, last, x);
+    } else {
+        NAME(copy_rows)(points, points->ndim, points->column_stride, first, last, x);
+    }
 }
 
 #undef REAL

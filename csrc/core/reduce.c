@@ -18,7 +18,6 @@
 #include "reduce.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "doubleword.h"
 
@@ -77,7 +76,7 @@ set_row(int ndim, const double x[], int exponent, scaled_row *row)
         return false;
     }
     (void)frexp(largest, &shift);
-    double first = ldexp(1.0, -(shift / 2)), second = ldexp(1.0, shift / 2 - shift);
+    double first = hs_power_of_two(-(shift / 2)), second = hs_power_of_two(shift / 2 - shift);
     for (int c = 0; c < ndim; c++) {
         row->x[c] = x[c] * first * second; /* 2^1073 is not a double */
     }
@@ -339,13 +338,14 @@ is_shorter(const basis *a, const basis *b)
 static bool
 begin(basis *b, int ndim, int n_rows, const double rows[][HS_MAX_DIM])
 {
-    memset(b, 0, sizeof *b);
     b->ndim = ndim;
     b->n_rows = n_rows;
     b->given = rows;
     bool orthogonal = true, usable = true;
     for (int k = 0; k < n_rows; k++) {
-        b->U[k][k] = 1;
+        for (int l = 0; l < n_rows; l++) {
+            b->U[k][l] = k == l;
+        }
         usable = set_row(ndim, rows[k], 0, &b->row[k]) && usable;
         for (int j = 0; j < k; j++) {
             orthogonal = dot(ndim, b->row[k].x, b->row[j].x) == 0.0 && orthogonal;
@@ -357,19 +357,20 @@ begin(basis *b, int ndim, int n_rows, const double rows[][HS_MAX_DIM])
 static void
 report(const basis *b, hs_reduction *reduction)
 {
-    memset(reduction, 0, sizeof *reduction);
     reduction->n_rows = b->n_rows;
-    memcpy(reduction->U, b->U, sizeof b->U);
+    reduction->changed = false;
     for (int k = 0; k < b->n_rows; k++) {
         bool same = true;
         for (int l = 0; l < b->n_rows; l++) {
+            reduction->U[k][l] = b->U[k][l];
             same = same && b->U[k][l] == (k == l);
         }
         reduction->changed = reduction->changed || !same;
+        reduction->error[k] = 0.0;
         for (int c = 0; c < b->ndim; c++) {
             double error = 0.0;
             reduction->rows[k][c] = same ? b->given[k][c] : combine(b, b->U[k], c, &error);
-            reduction->error[k] = fmax(reduction->error[k], error);
+            reduction->error[k] = hs_larger(error, reduction->error[k]);
         }
     }
 }

@@ -2,8 +2,7 @@
 /* scene.c: see scene.h. */
 #include "scene.h"
 
-#include "poll.h"
-#include "wrap.h"
+#include "slabs.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -39,11 +38,13 @@ box_magnitudes(const hs_box *box)
         double row_largest = 0.0;
         for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
             const double size = fabs(box->rows[l][k]);
-            row_largest = fmax(row_largest, size);
-            found.smallest = size > 0.0 ? fmin(found.smallest, size) : found.smallest;
+            row_largest = hs_larger(size, row_largest);
+            found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
         }
-        found.largest = fmax(found.largest, row_largest);
-        found.short_row = box->periodic[l] ? fmin(found.short_row, row_largest) : found.short_row;
+        found.largest = hs_larger(row_largest, found.largest);
+        if (box->periodic[l]) {
+            found.short_row = hs_smaller(row_largest, found.short_row);
+        }
     }
     return found;
 }
@@ -61,7 +62,7 @@ choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *e
     if (unit == 0.0 || abs(exponent) <= ORDINARY_EXPONENT) {
         exponent = 0;
     }
-    const int largest = exponent_of(fmax(found.largest, cloud->largest));
+    const int largest = exponent_of(hs_larger(found.largest, cloud->largest));
     if (largest - exponent > LARGEST_EXPONENT) {
         exponent = largest - LARGEST_EXPONENT;
     }
@@ -74,84 +75,19 @@ choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *e
     return exponent;
 }
 
-static hs_status
-wrap_aligned(hs_scene *scene, const hs_options *options, hs_failure *failure)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    for (int64_t i = 0; i < scene->n; i++) {
-        double *x = scene->x + i * scene->ndim;
-        for (int k = 0; k < scene->ndim; k++) {
-            const int row = lattice->row_of_axis[k];
-            if (row >= 0) {
-                int64_t turns;
-                x[k] = hs_wrap_axis(x[k], lattice->period[k], &turns);
-                if (scene->turns != NULL) {
-                    if (turns == HS_WRAP_UNKNOWN) {
-                        failure->row = i;
-                        return HS_ERR_SHIFT_RANGE;
-                    }
-                    scene->turns[i * lattice->n_periodic + row] = turns;
-                }
-            }
-            scene->x_largest[k] = fmax(scene->x_largest[k], fabs(x[k]));
-        }
-        if (hs_poll_points(options, i + 1) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
-    }
-    return HS_OK;
-}
-
-static hs_status
-wrap_general(hs_scene *scene, const hs_options *options, double *magnitude, hs_failure *failure)
-{
-    const int m = scene->lattice.n_periodic;
-    for (int64_t i = 0; i < scene->n; i++) {
-        double *x = scene->x + i * scene->ndim;
-        double  inside[HS_MAX_DIM];
-        if (!hs_wrap_point(&scene->lattice, x, inside, scene->turns + i * m, magnitude)) {
-            failure->row = i;
-            return HS_ERR_SHIFT_RANGE;
-        }
-        for (int k = 0; k < scene->ndim; k++) {
-            x[k] = inside[k];
-            scene->x_largest[k] = fmax(scene->x_largest[k], fabs(x[k]));
-        }
-        if (hs_poll_points(options, i + 1) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
-    }
-    return HS_OK;
-}
-
 /* Range of the grid coordinates: the points' own where open, one period where periodic. */
 static void
-find_ranges(hs_scene *scene)
+settle_ranges(hs_scene *scene)
 {
     for (int k = 0; k < scene->ndim; k++) {
-        double lower = INFINITY, upper = -INFINITY;
-        if (scene->lattice.aligned && scene->lattice.row_of_axis[k] >= 0) {
-            lower = upper = 0.0;
-        } else {
-            for (int64_t i = 0; i < scene->n; i++) {
-                const double *x = scene->x + i * scene->ndim;
-                const double  t = hs_lattice_coordinate(&scene->lattice, x, k);
-                lower = t < lower ? t : lower;
-                upper = t > upper ? t : upper;
-            }
-        }
-        if (scene->n == 0) {
-            lower = upper = 0.0;
-        }
         if (scene->lattice.row_of_axis[k] >= 0) {
             const double half = 0.5 * scene->lattice.period[k];
             /* Points that rounding left outside are binned on the face: an error of t. */
-            scene->t_error[k] += fmax(0.0, fmax(upper - half, -half - lower));
-            lower = -half;
-            upper = half;
+            scene->t_error[k] += hs_larger(
+                hs_larger(scene->upper[k] - half, -half - scene->lower[k]), 0.0);
+            scene->lower[k] = -half;
+            scene->upper[k] = half;
         }
-        scene->lower[k] = lower;
-        scene->upper[k] = upper;
     }
 }
 
@@ -161,7 +97,7 @@ bound_errors(hs_scene *scene, double magnitude)
     const hs_lattice *lattice = &scene->lattice;
     double            largest = 0.0;
     for (int k = 0; k < scene->ndim; k++) {
-        largest = fmax(largest, scene->x_largest[k]);
+        largest = hs_larger(scene->x_largest[k], largest);
     }
     scene->x_error = scene->extreme ? SCALING_LOSS : 0.0;
     if (!lattice->aligned) {
@@ -183,10 +119,10 @@ bound_errors(hs_scene *scene, double magnitude)
  * out.
  */
 static double
-bound_formula(const hs_scene *scene, const hs_cloud *cloud)
+bound_formula(const hs_scene *scene)
 {
     const hs_lattice *lattice = &scene->lattice;
-    double            total = 2.0 * hs_scale_apply(scene->scale, cloud->largest);
+    double            total = 2.0 * hs_scale_apply(scene->scale, scene->cloud.largest);
     if (lattice->n_periodic == 0) {
         /* Differences of floats have a relative error only. */
         return 4.0 * UNIT * scene->cutoff * scene->ndim;
@@ -221,45 +157,101 @@ init_metric(hs_scene *scene, const hs_options *options)
     if (scene->extreme) {
         rows = (const double(*)[HS_MAX_DIM])lattice->given;
         cutoff = options->cutoff;
-    } else if (scene->originals != NULL) {
+    } else if (scene->keeps_originals) {
         rows = (const double(*)[HS_MAX_DIM])lattice->scaled;
     }
     hs_metric_init(&scene->metric, scene->ndim, lattice->n_periodic, rows, cutoff,
                    options->inclusive);
 }
 
-/* The search's copy takes over the loaded one; the originals are kept beside it only if needed. */
-static hs_status
-take_points(hs_account *account, hs_cloud *cloud, const hs_options *options, hs_scene *scene)
+/* Columns for the originals and the turns, as far as these are kept, in this order. */
+static bool
+allocate_beside(hs_account *account, hs_scene *scene)
 {
-    const int     m = scene->lattice.n_periodic;
-    const int64_t n_entries = cloud->n * cloud->ndim;
-    const bool    keeps_originals =
-        scene->extreme ||
-        (m > 0 && (!scene->lattice.aligned || options->precision == HS_DOUBLE));
-    const size_t n_bytes = (size_t)n_entries * sizeof(double);
-    scene->x = cloud->x;
-    cloud->x = NULL;
-    if (keeps_originals) {
-        scene->originals = hs_alloc(account, HS_FOR_ORIGINALS, n_entries, sizeof(double));
-        if (scene->originals == NULL) {
-            return HS_ERR_MEMORY;
-        }
-        memcpy(scene->originals, scene->x, n_bytes);
+    const int     m = scene->turns.known ? scene->lattice.n_periodic : 0;
+    const int     d = scene->keeps_originals ? scene->ndim : 0;
+    const bool    narrow = hs_fold_turns(&scene->lattice, scene->cloud.largest) < INT32_MAX;
+    const int64_t pitch = hs_column_pitch(scene->n, sizeof(double)) * (int64_t)sizeof(double);
+    const int64_t turns_pitch =
+        narrow ? hs_column_pitch(scene->n, sizeof(int32_t)) * (int64_t)sizeof(int32_t) : pitch;
+    if (d + m == 0) {
+        return true;
     }
-    if (scene->scale.exponent != 0) {
-        for (int64_t e = 0; e < n_entries; e++) {
-            scene->x[e] = hs_scale_apply(scene->scale, scene->x[e]);
+    scene->beside = hs_alloc(account, HS_FOR_ORIGINALS,
+                             d * pitch + m * turns_pitch + HS_COLUMN_PADDING, 1);
+    if (scene->beside == NULL) {
+        return false;
+    }
+    hs_account_reassign(account, HS_FOR_ORIGINALS, HS_FOR_WRAPS,
+                        m * turns_pitch + (d == 0 ? HS_COLUMN_PADDING : 0));
+    char *column = scene->beside;
+    for (int k = 0; k < d; k++, column += pitch) {
+        scene->originals[k] = (double *)(void *)column;
+    }
+    for (int r = 0; r < m; r++, column += turns_pitch) {
+        scene->turns.narrow[r] = narrow ? (int32_t *)(void *)column : NULL;
+        scene->turns.wide[r] = narrow ? NULL : (int64_t *)(void *)column;
+    }
+    return true;
+}
+
+typedef struct scaling {
+    hs_scene *scene;
+    bool      copies;        /* to the originals ... */
+    bool      copies_scaled; /* ... what has been scaled already */
+} scaling;
+
+/* Scales points [first, last), and copies them before or after that. */
+static hs_status
+scale_slab(void *context, int slab, int64_t first, int64_t last)
+{
+    const scaling *doing = context;
+    hs_scene      *scene = doing->scene;
+    const size_t   n_bytes = (size_t)(last - first) * sizeof(double);
+    (void)slab;
+    for (int k = 0; k < scene->ndim; k++) {
+        double *x = scene->cloud.x[k];
+        if (doing->copies && !doing->copies_scaled) {
+            memcpy(scene->originals[k] + first, x + first, n_bytes);
         }
-        if (keeps_originals && !scene->extreme) {
-            memcpy(scene->originals, scene->x, n_bytes);
+        for (int64_t i = first; scene->scale.exponent != 0 && i < last; i++) {
+            x[i] = hs_scale_apply(scene->scale, x[i]);
+        }
+        if (doing->copies && doing->copies_scaled) {
+            memcpy(scene->originals[k] + first, x + first, n_bytes);
         }
     }
-    if (m > 0 && (keeps_originals || (options->want & HS_WANT_SHIFT))) {
-        scene->turns = hs_alloc(account, HS_FOR_WRAPS, cloud->n * m, sizeof(int64_t));
-        if (scene->turns == NULL) {
-            return HS_ERR_MEMORY;
-        }
+    return HS_OK;
+}
+
+/* The originals are kept beside the search's copy only if needed. */
+static hs_status
+prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene)
+{
+    const int m = scene->lattice.n_periodic;
+    hs_cloud *cloud = &scene->cloud;
+    scene->keeps_originals =
+        scene->extreme || (m > 0 && (!scene->lattice.aligned || options->precision == HS_DOUBLE));
+    scene->turns.known = m > 0 && (scene->keeps_originals || (options->want & HS_WANT_SHIFT));
+    for (int k = 0; k < scene->ndim; k++) {
+        cloud->lower[k] = hs_scale_apply(scene->scale, cloud->lower[k]);
+        cloud->upper[k] = hs_scale_apply(scene->scale, cloud->upper[k]);
+    }
+    cloud->largest = hs_scale_apply(scene->scale, cloud->largest);
+    if (!allocate_beside(account, scene)) {
+        return HS_ERR_MEMORY;
+    }
+    scene->x_is_beside = scene->keeps_originals && !scene->extreme && !scene->lattice.aligned;
+    const bool copies = scene->keeps_originals && !scene->x_is_beside;
+    if (copies || scene->scale.exponent != 0) {
+        scaling          doing = {scene, copies, !scene->extreme};
+        const hs_options silent = {.poll = NULL}; /* a copy of what was asked about already */
+        (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, &doing);
+    }
+    for (int k = 0; scene->x_is_beside && k < scene->ndim; k++) {
+        double *beside = scene->originals[k]; /* wrapping moves the points there */
+        scene->originals[k] = cloud->x[k];
+        cloud->x[k] = beside;
     }
     return HS_OK;
 }
@@ -277,7 +269,7 @@ box_is_vanishing(const hs_lattice *lattice)
 }
 
 static hs_status
-fill_scene(hs_account *account, hs_cloud *cloud, const hs_options *options, hs_scene *scene,
+fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
            hs_failure *failure)
 {
     double magnitude = 0.0;
@@ -285,38 +277,50 @@ fill_scene(hs_account *account, hs_cloud *cloud, const hs_options *options, hs_s
         failure->expected_pairs = failure->expected_bytes = INFINITY;
         return HS_ERR_MEMORY;
     }
-    hs_status status = take_points(account, cloud, options, scene);
+    hs_status status = prepare_points(account, team, options, scene);
     if (status == HS_OK) {
-        status = scene->lattice.aligned ? wrap_aligned(scene, options, failure)
-                                        : wrap_general(scene, options, &magnitude, failure);
+        status = hs_scene_wrap(scene, team, options, &magnitude, failure);
     }
     if (status != HS_OK) {
         return status;
     }
     bound_errors(scene, magnitude);
-    find_ranges(scene);
+    settle_ranges(scene);
     init_metric(scene, options);
     return HS_OK;
 }
 
+/* Clears what is added to or freed. The rest is large, and set before it is read. */
+static void
+start_scene(const hs_points *points, hs_scene *scene)
+{
+    scene->ndim = points->ndim;
+    scene->n = points->n;
+    scene->keeps_originals = scene->x_is_beside = false;
+    scene->cloud.block = scene->beside = NULL;
+    scene->turns = (hs_turns){.known = false};
+    memset(scene->x_largest, 0, sizeof scene->x_largest);
+}
+
 hs_status
-hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
+hs_scene_init(hs_account *account, hs_team *team, const hs_points *points, const hs_box *box,
               const hs_options *options, hs_scene *scene, hs_failure *failure)
 {
-    hs_cloud cloud;
-    *scene = (hs_scene){.ndim = points->ndim, .n = points->n};
+    start_scene(points, scene);
     if (!(options->cutoff >= 0.0) || !isfinite(options->cutoff)) {
         failure->value = options->cutoff;
         return HS_ERR_CUTOFF;
     }
     hs_status status = hs_box_check(box, failure);
     if (status == HS_OK) {
-        status = hs_cloud_load(account, points, options, &cloud, failure);
+        status = hs_cloud_load(account, team, points, options, &scene->cloud, failure);
     }
     if (status != HS_OK) {
         return status;
     }
-    scene->scale = hs_scale_of(choose_exponent(&cloud, box, options->cutoff, &scene->extreme));
+    const int exponent =
+        choose_exponent(&scene->cloud, box, options->cutoff, &scene->extreme);
+    scene->scale = hs_scale_of(exponent);
     scene->unscale = hs_scale_of(-scene->scale.exponent);
     scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
     scene->cutoff_low = scene->cutoff;
@@ -328,10 +332,9 @@ hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
     /* Without points nothing has an image, however small the box is. */
     hs_lattice_init(points->n > 0 ? box : NULL, points->ndim, scene->scale, &scene->lattice);
     scene->formula_error =
-        options->precision == HS_DOUBLE ? bound_formula(scene, &cloud) : 0.0;
+        options->precision == HS_DOUBLE ? bound_formula(scene) : 0.0;
     scene->radius = scene->cutoff + scene->formula_error;
-    status = fill_scene(account, &cloud, options, scene, failure);
-    hs_cloud_free(account, &cloud);
+    status = fill_scene(account, team, options, scene, failure);
     if (status != HS_OK) {
         hs_scene_free(account, scene);
     }
@@ -341,10 +344,7 @@ hs_scene_init(hs_account *account, const hs_points *points, const hs_box *box,
 void
 hs_scene_free(hs_account *account, hs_scene *scene)
 {
-    hs_free(account, scene->x);
-    hs_free(account, scene->originals);
-    hs_free(account, scene->turns);
-    scene->x = NULL;
-    scene->originals = NULL;
-    scene->turns = NULL;
+    hs_cloud_free(account, &scene->cloud);
+    hs_free(account, scene->beside);
+    scene->beside = NULL;
 }

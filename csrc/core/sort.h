@@ -3,15 +3,16 @@
 #ifndef HS_SORT_H
 #define HS_SORT_H
 
+#include "output.h"
 #include "search.h"
-#include "store.h"
+
+/* What must be found, so that it can be put in order and has all that is wanted. */
+unsigned hs_sort_columns(const hs_search *search);
 
 /*
- * *order: receives n_pairs places in the store's only block, ascending by (i, j, S); to be freed by
- * the caller. The store must be merged and hold i and j; S counts if it is stored. n_points: i and
- * j are below it. `search` is polled; HS_ERR_INTERRUPTED when it says so.
+ * Writes `found`, which has these columns with int32 indices, to `sorted`, ascending by (i, j, S).
+ * The account is charged for what `sorted` takes, and the poll asked now and then.
  */
-hs_status hs_sort_pairs(hs_search *search, const hs_store *store, int64_t n_points,
-                        int64_t **order);
+hs_status hs_sort_pairs(hs_search *search, const hs_output *found, hs_output *sorted);
 
 #endif

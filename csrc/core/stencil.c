@@ -22,6 +22,7 @@
 
 typedef struct frame {
     bool   usable;
+    bool   diagonal; /* no entry but lower[k][k] differs from zero */
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
 
@@ -43,15 +44,29 @@ axes_are_dual(const hs_lattice *lattice)
     return true;
 }
 
-/* Gram-Schmidt on the directions, first axis first; checked, not trusted. */
-static frame
-triangular_frame(const hs_lattice *lattice)
+/* The frame of an aligned lattice: its directions are the coordinate axes. */
+static void
+set_unit_frame(int ndim, frame *axes)
 {
-    frame     result = {.usable = axes_are_dual(lattice)};
+    axes->usable = axes->diagonal = true;
+    for (int k = 0; k < ndim; k++) {
+        for (int c = 0; c <= k; c++) {
+            axes->lower[k][c] = k == c ? 1.0 : 0.0;
+        }
+    }
+}
+
+/* Gram-Schmidt on the directions, first axis first; checked, not trusted. */
+static void
+set_triangular_frame(const hs_lattice *lattice, frame *axes)
+{
     double    q[HS_MAX_DIM][HS_MAX_DIM];
     const int d = lattice->ndim;
+    axes->usable = axes_are_dual(lattice);
+    axes->diagonal = false;
     for (int k = 0; k < d; k++) {
         memcpy(q[k], lattice->direction[k], sizeof q[k]);
+        memset(axes->lower[k], 0, (size_t)d * sizeof(double));
         for (int pass = 0; pass < 2; pass++) {
             for (int c = 0; c < k; c++) {
                 double along = 0.0;
@@ -61,23 +76,22 @@ triangular_frame(const hs_lattice *lattice)
                 for (int a = 0; a < d; a++) {
                     q[k][a] -= along * q[c][a];
                 }
-                result.lower[k][c] += along;
+                axes->lower[k][c] += along;
             }
         }
         double square = 0.0;
         for (int a = 0; a < d; a++) {
             square += q[k][a] * q[k][a];
         }
-        result.lower[k][k] = sqrt(square);
-        if (!(result.lower[k][k] > 1e-3)) {
-            result.usable = false; /* nearly flat: the frame would be all rounding */
-            return result;
+        axes->lower[k][k] = sqrt(square);
+        if (!(axes->lower[k][k] > 1e-3)) {
+            axes->usable = false; /* nearly flat: the frame would be all rounding */
+            return;
         }
         for (int a = 0; a < d; a++) {
-            q[k][a] /= result.lower[k][k];
+            q[k][a] /= axes->lower[k][k];
         }
     }
-    return result;
 }
 
 /* How far the difference of two cell indices, as a length, can be from that of the true t. */
@@ -105,19 +119,22 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
         for (int k = grid->ndim - 1; k >= 1; k--) {
             /* Differences of t that points of these two cells can have, rounding included. */
             const double slack = slack_along(scene, grid, k);
-            t_low[k] = fmax((row->offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
-            t_high[k] = fmin((row->offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
+            t_low[k] =
+                hs_larger((row->offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
+            t_high[k] =
+                hs_smaller((row->offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
         }
         for (int c = grid->ndim - 1; c >= 0; c--) {
             /* Range of the component; of the first one, what the later axes add to it. */
-            double least = 0.0, most = 0.0;
-            for (int k = c > 0 ? c : 1; k < grid->ndim; k++) {
+            const int last = axes->diagonal ? c : grid->ndim - 1;
+            double    least = 0.0, most = 0.0;
+            for (int k = c > 0 ? c : 1; k <= last; k++) {
                 const double a = axes->lower[k][c] * t_low[k], b = axes->lower[k][c] * t_high[k];
-                least += fmin(a, b);
-                most += fmax(a, b);
+                least += hs_smaller(a, b);
+                most += hs_larger(a, b);
             }
             if (c > 0) {
-                const double gap = fmax(0.0, fmax(least, -most)) / unit;
+                const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
                 left -= gap * gap;
                 if (left < 0.0) {
                     return false;
@@ -125,14 +142,15 @@ reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
             } else {
                 const double rest = sqrt(left) * unit;
                 const double slack = slack_along(scene, grid, 0);
-                low = fmax(low, (-rest - most) / axes->lower[0][0] - slack);
-                high = fmin(high, (rest - least) / axes->lower[0][0] + slack);
+                low = hs_larger((-rest - most) / axes->lower[0][0] - slack, low);
+                high = hs_smaller((rest - least) / axes->lower[0][0] + slack, high);
             }
         }
     }
     const double cells = grid->cells_per_length[0];
-    row->first = (int32_t)fmax(ceil(low * cells - 1.0 - 1e-5), -(double)grid->reach[0]);
-    row->last = (int32_t)fmin(floor(high * cells + 1.0 + 1e-5), (double)grid->reach[0]);
+    const double reach = (double)grid->reach[0];
+    row->first = (int32_t)hs_larger(ceil(low * cells - 1.0 - 1e-5), -reach);
+    row->last = (int32_t)hs_smaller(floor(high * cells + 1.0 + 1e-5), reach);
     return row->first <= row->last;
 }
 
@@ -182,12 +200,18 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
                  const hs_grid *grid, hs_stencil *stencil)
 {
     const double bound = hs_stencil_bound(grid);
-    const frame  axes = triangular_frame(&scene->lattice);
+    frame        axes; /* which the own row alone does not need */
+    axes.usable = false;
     *stencil = (hs_stencil){0};
+    if (bound > 1.0 && scene->lattice.aligned) {
+        set_unit_frame(grid->ndim, &axes);
+    } else if (bound > 1.0) {
+        set_triangular_frame(&scene->lattice, &axes);
+    }
     if (bound > (axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
         return HS_ERR_MEMORY;
     }
-    int64_t capacity = (int64_t)fmin(bound, FIRST_CAPACITY);
+    int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
     stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
     if (stencil->rows == NULL) {
         return HS_ERR_MEMORY;

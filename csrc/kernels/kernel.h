@@ -1,12 +1,22 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * kernel.h: the contract of the scan kernels, and the table of them.
+ * kernel.h: the contract of the kernels, the four inner loops of a search, and the table of them.
  *
- * A scan compares one point with a run of gathered candidates in float32 and lists those that are
- * not surely beyond the cutoff. All kernels list the same candidates in the same order, except that
- * they may differ on those between the two thresholds of filter.h; every such hit is decided again
- * by the caller, so results do not depend on the kernel. A kernel may fuse and reorder
- * the sum of squares unless it is asked not to (`unfused`).
+ *   gather   copies a run of points to float32, relative to a centre
+ *   list     compares the points of a group with gathered candidates in float32 and lists those
+ *            that are not surely beyond the cutoff
+ *   count    the same, but only counts them
+ *   emit     writes listed hits as pairs, i < j, int32 or int64
+ *
+ * All kernels list the same candidates in the same order, except that they may differ on those
+ * between the two thresholds of filter.h; every such hit is decided again by the caller, so results
+ * do not depend on the kernel.
+ *
+ * Scans come in two forms. With c_k = -2 q_k,
+ *
+ *   expanded   s = (...((norm[c] + c_0 y_0) + c_1 y_1) + ...), |y - q|^2 less |q|^2: one fused
+ *              multiply-add an axis where there is one, but errors go with the size of the block
+ *   direct     s = (...((y_0 - q_0)^2 + (y_1 - q_1)^2) + ...), each operation rounded once
  */
 #ifndef HS_KERNEL_H
 #define HS_KERNEL_H
@@ -14,58 +24,120 @@
 #include "../core/base.h"
 #include "../core/filter.h"
 #include "../halfshell.h"
+#include "batch.h"
 
-/* A scan may read, and write to hits, this many entries past the last candidate. */
-#define HS_SCAN_PADDING 32
+/* Kernels may read this many entries past the last one of their inputs, and write as many past the
+ * last one of their outputs: twice the widest vector. */
+#define HS_PADDING 32
 
-/* Borrowed arrays of the gathered candidates, each n + HS_SCAN_PADDING entries that may be read. */
-typedef struct hs_candidates {
-    const float   *y[HS_MAX_DIM];  /* coordinates, one array per axis */
-    const int32_t *label; /* what a hit is listed as: point number, or place in the buffer */
-} hs_candidates;
+#define HS_GROUP_POINTS 64       /* points tested against one neighbourhood, at most */
+#define HS_BLOCK_CANDIDATES 4096 /* candidates held at a time, at most: 80 kB in 3-D */
+
+/* The thresholds of one point in the expanded form. */
+HS_ALWAYS_INLINE hs_thresholds
+hs_expanded_thresholds(hs_expanded expanded, const float *centre, const int ndim)
+{
+    double norm = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        norm += (double)centre[k] * (double)centre[k];
+    }
+    return (hs_thresholds){(float)(expanded.in - norm), (float)(expanded.out - norm)};
+}
+
+/* A hit between the thresholds. */
+typedef struct hs_unsure {
+    int32_t t;     /* point of the group */
+    int32_t place; /* candidate */
+    int32_t at;    /* its entry of hits; of no meaning when counting */
+} hs_unsure;
+
+/* Points of a group against a block of candidates; all arrays borrowed. */
+typedef struct hs_scan {
+    int            ndim;
+    const float   *y[HS_MAX_DIM]; /* candidates, n + HS_PADDING each, those past n of any value */
+    const float   *norm;          /* sum of y_k^2, the same */
+    const int32_t *label;         /* what a hit is listed as; n + HS_PADDING */
+    int32_t        n;             /* candidates */
+    const float   *q[HS_MAX_DIM]; /* points, n_points each */
+    int32_t        n_points;      /* at most HS_GROUP_POINTS */
+    bool           triangular;    /* point t meets only the candidates after place t */
+    hs_thresholds  direct;        /* thresholds of the direct form */
+    hs_expanded    expanded;      /* and of the expanded one */
+    int32_t       *hits;          /* receives labels; most_hits + HS_PADDING */
+    int32_t       *end;           /* receives, for each point, where its hits end; n_points */
+    hs_unsure     *unsure;        /* receives hits with !(s < in); most_unsure */
+    int32_t        most_hits;     /* at least n */
+    int32_t        most_unsure;   /* at least n */
+    int32_t        n_unsure;      /* set by the scan */
+    int64_t        n_hits;        /* set by the scan: their number, unsure ones included */
+} hs_scan;
 
 /*
- * Lists label[c] for every c in [first, last) with !(s > thresholds.out), ascending, where
- * s = sum_k fl(y_k[c] - q_k)^2, accumulated from axis 0 on.
- *
- * q           ndim floats
- * hits        receives the labels; room for last - first + HS_SCAN_PADDING
- * ambiguous   set to true if any listed c has !(s < thresholds.in); never set to false
- *
- * Returns the number of hits. NaN counts as listed and ambiguous.
+ * Scans points t = first, first + 1, ... and returns the point to go on with: n_points, or the
+ * first for which the hits or unsure ones might not have fitted. For each point, lists
+ * label[c] for every candidate c with !(s > out), ascending. hits begin at entry 0 with those
+ * of point `first`; unsure ones, with !(s < in), are ascending too. NaN counts as a hit and unsure.
+ * Counting leaves hits and end alone.
  */
-typedef int32_t (*hs_scan_fn)(const hs_candidates *candidates, int32_t first, int32_t last,
-                              const float *q, hs_thresholds thresholds, int ndim,
-                              int32_t *hits, bool *ambiguous);
+typedef int32_t (*hs_scan_fn)(hs_scan *scan, int32_t first);
+
+/* Consecutive candidates that are consecutive points in cell order, in one image. */
+typedef struct hs_run {
+    int32_t at;                /* place of the first in the block; it ends where the next begins */
+    int32_t si;                /* its number in cell order */
+    int32_t image[HS_MAX_DIM]; /* shift over the rows of B */
+    double  moved[HS_MAX_DIM]; /* what is added to its coordinates */
+} hs_run;
+
+/* Where gathered candidates come from and go to; all arrays borrowed. */
+typedef struct hs_gather {
+    int            ndim;
+    const double  *x[HS_MAX_DIM]; /* points in cell order; HS_PADDING more may be read */
+    const int32_t *order;         /* their numbers; the same */
+    float         *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
+    float         *norm;          /* the same */
+    int32_t       *id;            /* the same */
+    uint32_t       largest;       /* bits of the largest |y| so far; infinity and NaN are largest */
+} hs_gather;
+
+/* Copies n runs, and runs[n].at candidates in all: y_k = (float)(x_k + moved_k), each operation
+ * rounded once, norm = sum of y_k^2, fused or not, and id = order. Entries past the last may be
+ * overwritten. */
+typedef void (*hs_gather_fn)(hs_gather *gather, const hs_run *runs, int32_t n);
+
+/* The hits of some points, as point numbers; all arrays borrowed. */
+typedef struct hs_rows {
+    int32_t        n;     /* points */
+    const int32_t *point; /* their numbers */
+    const int32_t *end;   /* where their hits end; the first one's begin at 0 */
+    const int32_t *hits;  /* HS_PADDING more may be read */
+} hs_rows;
+
+/* For each hit the lower of the two point numbers to i and the higher to j. Either may be NULL;
+ * each has room for all hits and HS_PADDING more, which may be overwritten. */
+typedef void (*hs_emit_fn)(const hs_rows *rows, void *i, void *j);
 
 typedef struct hs_kernel {
     const char *name;
     bool (*supported)(void);
-    hs_scan_fn scan;    /* may fuse */
-    hs_scan_fn unfused; /* s as plain rounded float32 operations, in the order given above */
+    hs_gather_fn  gather;
+    hs_scan_fn    list; /* expanded */
+    hs_scan_fn    count;
+    hs_scan_fn    list_direct;
+    hs_scan_fn    count_direct;
+    hs_emit_fn    emit_int32;
+    hs_emit_fn    emit_int64;
+    hs_judge_fn   judge; /* batch.h */
+    hs_measure_fn measure;
 } hs_kernel;
+
+extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
+extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */
+extern const hs_kernel hs_kernel_avx512; /* x86-64 only */
+extern const hs_kernel hs_kernel_neon;   /* AArch64 only */
 
 /* The best kernel of this CPU, or the one of that name; NULL if it is unknown or cannot run
  * here. */
 const hs_kernel *hs_kernel_select(const char *name);
-
-/* scan_scalar.c: plain C, any CPU; the specification of the others. */
-int32_t hs_scan_scalar(const hs_candidates *candidates, int32_t first, int32_t last,
-                       const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
-                       bool *ambiguous);
-
-/* scan_avx2.c, scan_avx512.c: x86-64 only. */
-int32_t hs_scan_avx2(const hs_candidates *candidates, int32_t first, int32_t last,
-                     const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
-                     bool *ambiguous);
-int32_t hs_scan_avx2_unfused(const hs_candidates *candidates, int32_t first, int32_t last,
-                             const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
-                             bool *ambiguous);
-int32_t hs_scan_avx512(const hs_candidates *candidates, int32_t first, int32_t last,
-                       const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
-                       bool *ambiguous);
-int32_t hs_scan_avx512_unfused(const hs_candidates *candidates, int32_t first, int32_t last,
-                               const float *q, hs_thresholds thresholds, int ndim, int32_t *hits,
-                               bool *ambiguous);
 
 #endif

@@ -1,80 +1,143 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * scan_template.h: the vector scan, once for each instruction set. Include it after a vocabulary
- * (simd_<isa>.h), inside that instruction set's target region.
- *
- *   NAME      name of the scan that may fuse, an hs_scan_fn (kernel.h)
- *   UNFUSED   name of the scan that may not
- *
- * Each has one loop for every number of axes, made by inlining scan_loop with constants. The
- * vocabulary: floats, mask, LANES, broadcast, load, subtract, square, square_add, add,
- * not_greater, not_less, first_lanes, append. Undefines both parameters at its end.
+ * scan_template.h: the vector scans, once for each instruction set. Include it after a vocabulary
+ * (simd_<isa>.h), inside that instruction set's target region. Defines list, count, list_direct and
+ * count_direct (hs_scan_fn), each with one loop for 1, 2, 3 and any number of axes, made by
+ * inlining scan_points with constants.
  */
-#if !defined(NAME) || !defined(UNFUSED)
-#error "define NAME and UNFUSED before including scan_template.h"
-#endif
+
+/* Notes the lanes of m, all of them hits that are listed from entry `at` on. Rare, or in crystals
+ * common: a bit at a time. */
+static HS_NO_INLINE void
+note_unsure(hs_scan *scan, int32_t t, int32_t c, unsigned near, unsigned m, int32_t at)
+{
+    for (; m != 0; m &= m - 1) {
+        const unsigned below = (m & (0u - m)) - 1;
+        scan->unsure[scan->n_unsure++] =
+            (hs_unsure){t, c + (int32_t)popcount(below), at + (int32_t)popcount(near & below)};
+    }
+}
+
+/* What scan_points keeps in registers. */
+typedef struct vector_scan {
+    const float *y[HS_MAX_DIM];
+    const float *norm;
+    floats       centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
+    floats       in, out;
+} vector_scan;
+
+/* Sets what depends on the point. */
+HS_ALWAYS_INLINE void
+set_point(const hs_scan *scan, int32_t t, const int ndim, const bool expanded, vector_scan *v)
+{
+    float         centre[HS_MAX_DIM];
+    hs_thresholds thresholds = scan->direct;
+    for (int k = 0; k < ndim; k++) {
+        centre[k] = scan->q[k][t];
+        v->centre[k] = broadcast(expanded ? -2.0f * centre[k] : centre[k]);
+    }
+    if (expanded) {
+        thresholds = hs_expanded_thresholds(scan->expanded, centre, ndim);
+    }
+    v->in = broadcast(thresholds.in);
+    v->out = broadcast(thresholds.out);
+}
+
+/* s of LANES candidates from c on. */
+HS_ALWAYS_INLINE floats
+squares(const vector_scan *v, int32_t c, const int ndim, const bool expanded)
+{
+    if (expanded) {
+        floats s = load(v->norm + c);
+        for (int k = 0; k < ndim; k++) {
+            s = multiply_add(v->centre[k], load(v->y[k] + c), s);
+        }
+        return s;
+    }
+    const floats first = subtract(load(v->y[0] + c), v->centre[0]);
+    floats       s = multiply(first, first);
+    for (int k = 1; k < ndim; k++) {
+        const floats along = subtract(load(v->y[k] + c), v->centre[k]);
+        s = add(s, multiply(along, along));
+    }
+    return s;
+}
 
 HS_ALWAYS_INLINE int32_t
-scan_loop(const hs_candidates *candidates, int32_t first, int32_t last, const float *q,
-          hs_thresholds thresholds, const int ndim, const bool fused, int32_t *hits,
-          bool *ambiguous)
+scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, const bool lists)
 {
-    const floats   out = broadcast(thresholds.out);
-    const floats   in = broadcast(thresholds.in);
-    const int32_t *label = candidates->label;
-    const float   *y[HS_MAX_DIM];
-    floats         centre[HS_MAX_DIM];
-    mask           unsure = 0;
-    int32_t       *hit = hits;
+    const int32_t *label = scan->label;
+    const int32_t  n = scan->n;
+    int32_t       *hit = scan->hits;
+    int64_t        count = 0;
+    int32_t        t = first;
+    vector_scan    v;
+    v.norm = scan->norm;
     for (int k = 0; k < ndim; k++) {
-        y[k] = candidates->y[k];
-        centre[k] = broadcast(q[k]);
+        v.y[k] = scan->y[k];
     }
-    for (int32_t c = first; c < last; c += LANES) {
-        floats along = subtract(load(y[0] + c), centre[0]);
-        floats s = square(along);
-        for (int k = 1; k < ndim; k++) {
-            along = subtract(load(y[k] + c), centre[k]);
-            s = fused ? square_add(along, s) : add(s, square(along));
+    scan->n_unsure = 0;
+    for (; t < scan->n_points; t++) {
+        if ((lists && hit - scan->hits + n > scan->most_hits) ||
+            scan->n_unsure + n > scan->most_unsure) {
+            break;
         }
-        mask near = not_greater(s, out);
-        if (HS_UNLIKELY(last - c < LANES)) {
-            near &= first_lanes(last - c);
+        set_point(scan, t, ndim, expanded, &v);
+        for (int32_t c = scan->triangular ? t + 1 : 0; c < n; c += LANES) {
+            const floats s = squares(&v, c, ndim, expanded);
+            mask         near = not_greater(s, v.out);
+            if (HS_UNLIKELY(n - c < LANES)) {
+                near = (mask)(near & first_lanes(n - c));
+            }
+            const mask maybe = and_not_less(near, s, v.in);
+            if (HS_UNLIKELY(maybe != 0)) {
+                note_unsure(scan, t, c, near, maybe, (int32_t)(hit - scan->hits));
+            }
+            if (lists) {
+                hit += append(hit, label + c, near);
+            } else {
+                count += popcount(near);
+            }
         }
-        unsure |= near & not_less(s, in);
-        hit += append(hit, label + c, near);
+        if (lists) {
+            scan->end[t] = (int32_t)(hit - scan->hits);
+        }
     }
-    *ambiguous = *ambiguous || unsure != 0;
-    return (int32_t)(hit - hits);
+    scan->n_hits = lists ? hit - scan->hits : count;
+    return t;
 }
 
-#define SCAN(ndim, fused) \
-    scan_loop(candidates, first, last, q, thresholds, ndim, fused, hits, ambiguous)
-
-int32_t
-NAME(const hs_candidates *candidates, int32_t first, int32_t last, const float *q,
-     hs_thresholds thresholds, int ndim, int32_t *hits, bool *ambiguous)
+HS_ALWAYS_INLINE int32_t
+scan_dimensions(hs_scan *scan, int32_t first, const bool expanded, const bool lists)
 {
-    switch (ndim) {
-    case 1: return SCAN(1, true);
-    case 2: return SCAN(2, true);
-    case 3: return SCAN(3, true);
-    default: return SCAN(ndim, true);
+    switch (scan->ndim) {
+    case 1: return scan_points(scan, first, 1, expanded, lists);
+    case 2: return scan_points(scan, first, 2, expanded, lists);
+    case 3: return scan_points(scan, first, 3, expanded, lists);
+    default: return scan_points(scan, first, scan->ndim, expanded, lists);
     }
 }
 
-int32_t
-UNFUSED(const hs_candidates *candidates, int32_t first, int32_t last, const float *q,
-        hs_thresholds thresholds, int ndim, int32_t *hits, bool *ambiguous)
+static int32_t
+list(hs_scan *scan, int32_t first)
 {
-    switch (ndim) {
-    case 1: return SCAN(1, false);
-    case 2: return SCAN(2, false);
-    case 3: return SCAN(3, false);
-    default: return SCAN(ndim, false);
-    }
+    return scan_dimensions(scan, first, true, true);
 }
 
-#undef SCAN
-#undef NAME
-#undef UNFUSED
+static int32_t
+count(hs_scan *scan, int32_t first)
+{
+    return scan_dimensions(scan, first, true, false);
+}
+
+static int32_t
+list_direct(hs_scan *scan, int32_t first)
+{
+    return scan_dimensions(scan, first, false, true);
+}
+
+static int32_t
+count_direct(hs_scan *scan, int32_t first)
+{
+    return scan_dimensions(scan, first, false, false);
+}

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* simd_avx2.h: the vocabulary of scan_template.h for AVX2 with FMA: 8 lanes. */
+/* simd_avx2.h: the vocabulary of the templates for AVX2 with FMA: 8 lanes. */
 #ifndef HS_SIMD_AVX2_H
 #define HS_SIMD_AVX2_H
 
@@ -7,26 +7,31 @@
 
 enum { LANES = 8 };
 typedef __m256   floats;
+typedef __m256i  integers; /* int32 */
 typedef unsigned mask; /* one bit a lane */
 
 HS_ALWAYS_INLINE floats broadcast(float x) { return _mm256_set1_ps(x); }
 HS_ALWAYS_INLINE floats load(const float *p) { return _mm256_loadu_ps(p); }
 HS_ALWAYS_INLINE floats add(floats a, floats b) { return _mm256_add_ps(a, b); }
 HS_ALWAYS_INLINE floats subtract(floats a, floats b) { return _mm256_sub_ps(a, b); }
-HS_ALWAYS_INLINE floats square(floats a) { return _mm256_mul_ps(a, a); }
-/* a * a + b, rounded once. */
-HS_ALWAYS_INLINE floats square_add(floats a, floats b) { return _mm256_fmadd_ps(a, a, b); }
+HS_ALWAYS_INLINE floats multiply(floats a, floats b) { return _mm256_mul_ps(a, b); }
+/* a * b + c, rounded once. */
+HS_ALWAYS_INLINE floats
+multiply_add(floats a, floats b, floats c)
+{
+    return _mm256_fmadd_ps(a, b, c);
+}
 /* Lanes with !(a > b), set for NaN. */
 HS_ALWAYS_INLINE mask
 not_greater(floats a, floats b)
 {
     return (mask)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_NGT_UQ));
 }
-/* Lanes with !(a < b), set for NaN. */
+/* Lanes of m with !(a < b), set for NaN. */
 HS_ALWAYS_INLINE mask
-not_less(floats a, floats b)
+and_not_less(mask m, floats a, floats b)
 {
-    return (mask)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_NLT_UQ));
+    return m & (mask)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_NLT_UQ));
 }
 /* The first n of them, 1 <= n < LANES. */
 HS_ALWAYS_INLINE mask first_lanes(int32_t n) { return (1u << n) - 1; }
@@ -62,6 +67,60 @@ append(int32_t *dst, const int32_t *label, mask m)
     _mm256_storeu_si256((__m256i *)dst,
                         _mm256_permutevar8x32_epi32(all, _mm256_cvtepu8_epi32(bytes)));
     return (int32_t)_mm_popcnt_u32(m);
+}
+
+HS_ALWAYS_INLINE unsigned popcount(mask m) { return (unsigned)_mm_popcnt_u32(m); }
+
+HS_ALWAYS_INLINE void store(float *p, floats a) { _mm256_storeu_ps(p, a); }
+HS_ALWAYS_INLINE integers broadcast_integer(int32_t a) { return _mm256_set1_epi32(a); }
+HS_ALWAYS_INLINE integers
+load_integers(const int32_t *p)
+{
+    return _mm256_loadu_si256((const __m256i *)p);
+}
+HS_ALWAYS_INLINE void
+store_integers(int32_t *p, integers a)
+{
+    _mm256_storeu_si256((__m256i *)p, a);
+}
+/* As int64. */
+HS_ALWAYS_INLINE void
+store_wide(int64_t *p, integers a)
+{
+    _mm256_storeu_si256((__m256i *)p, _mm256_cvtepi32_epi64(_mm256_castsi256_si128(a)));
+    _mm256_storeu_si256((__m256i *)(p + 4), _mm256_cvtepi32_epi64(_mm256_extracti128_si256(a, 1)));
+}
+HS_ALWAYS_INLINE integers smaller(integers a, integers b) { return _mm256_min_epi32(a, b); }
+HS_ALWAYS_INLINE integers larger(integers a, integers b) { return _mm256_max_epi32(a, b); }
+/* (float)(p[lane] + moved). */
+HS_ALWAYS_INLINE floats
+load_moved(const double *p, double moved)
+{
+    const __m256d by = _mm256_set1_pd(moved);
+    const __m128  low = _mm256_cvtpd_ps(_mm256_add_pd(_mm256_loadu_pd(p), by));
+    const __m128  high = _mm256_cvtpd_ps(_mm256_add_pd(_mm256_loadu_pd(p + 4), by));
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
+}
+/* |a| as integers that order like the numbers. */
+HS_ALWAYS_INLINE integers
+magnitudes(floats a)
+{
+    return _mm256_and_si256(_mm256_castps_si256(a), _mm256_set1_epi32(0x7fffffff));
+}
+/* The first n, 1 <= n < LANES; zero elsewhere. */
+HS_ALWAYS_INLINE integers
+keep_lanes(integers a, int32_t n)
+{
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    return _mm256_and_si256(a, _mm256_cmpgt_epi32(_mm256_set1_epi32(n), lane));
+}
+HS_ALWAYS_INLINE int32_t
+largest_lane(integers a)
+{
+    __m128i b = _mm_max_epi32(_mm256_castsi256_si128(a), _mm256_extracti128_si256(a, 1));
+    b = _mm_max_epi32(b, _mm_shuffle_epi32(b, 0x4e));
+    b = _mm_max_epi32(b, _mm_shuffle_epi32(b, 0xb1));
+    return _mm_cvtsi128_si32(b);
 }
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* simd_avx512.h: the vocabulary of scan_template.h for AVX-512 (F, BW, DQ, VL): 16 lanes. */
+/* simd_avx512.h: the vocabulary of the templates for AVX-512 (F, BW, DQ, VL): 16 lanes. */
 #ifndef HS_SIMD_AVX512_H
 #define HS_SIMD_AVX512_H
 
@@ -7,29 +7,34 @@
 
 enum { LANES = 16 };
 typedef __m512   floats;
-typedef unsigned mask; /* one bit a lane */
+typedef __m512i  integers; /* int32 */
+typedef __mmask16 mask; /* one bit a lane */
 
 HS_ALWAYS_INLINE floats broadcast(float x) { return _mm512_set1_ps(x); }
 HS_ALWAYS_INLINE floats load(const float *p) { return _mm512_loadu_ps(p); }
 HS_ALWAYS_INLINE floats add(floats a, floats b) { return _mm512_add_ps(a, b); }
 HS_ALWAYS_INLINE floats subtract(floats a, floats b) { return _mm512_sub_ps(a, b); }
-HS_ALWAYS_INLINE floats square(floats a) { return _mm512_mul_ps(a, a); }
-/* a * a + b, rounded once. */
-HS_ALWAYS_INLINE floats square_add(floats a, floats b) { return _mm512_fmadd_ps(a, a, b); }
+HS_ALWAYS_INLINE floats multiply(floats a, floats b) { return _mm512_mul_ps(a, b); }
+/* a * b + c, rounded once. */
+HS_ALWAYS_INLINE floats
+multiply_add(floats a, floats b, floats c)
+{
+    return _mm512_fmadd_ps(a, b, c);
+}
 /* Lanes with !(a > b), set for NaN. */
 HS_ALWAYS_INLINE mask
 not_greater(floats a, floats b)
 {
     return _mm512_cmp_ps_mask(a, b, _CMP_NGT_UQ);
 }
-/* Lanes with !(a < b), set for NaN. */
+/* Lanes of m with !(a < b), set for NaN. */
 HS_ALWAYS_INLINE mask
-not_less(floats a, floats b)
+and_not_less(mask m, floats a, floats b)
 {
-    return _mm512_cmp_ps_mask(a, b, _CMP_NLT_UQ);
+    return _mm512_mask_cmp_ps_mask(m, a, b, _CMP_NLT_UQ);
 }
 /* The first n of them, 1 <= n < LANES. */
-HS_ALWAYS_INLINE mask first_lanes(int32_t n) { return (1u << n) - 1; }
+HS_ALWAYS_INLINE mask first_lanes(int32_t n) { return (mask)((1u << n) - 1); }
 /*
  * Packs the labels of the lanes in m to dst, writing LANES entries; returns how many count. In a
  * register and then stored: compressing straight to memory takes ten times as long on Zen 4, and
@@ -39,8 +44,46 @@ HS_ALWAYS_INLINE int32_t
 append(int32_t *dst, const int32_t *label, mask m)
 {
     const __m512i all = _mm512_loadu_si512(label);
-    _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(all, (__mmask16)m, all));
+    _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(all, m, all));
     return (int32_t)_mm_popcnt_u32(m);
 }
+
+HS_ALWAYS_INLINE unsigned popcount(mask m) { return (unsigned)_mm_popcnt_u32(m); }
+
+HS_ALWAYS_INLINE void store(float *p, floats a) { _mm512_storeu_ps(p, a); }
+HS_ALWAYS_INLINE integers broadcast_integer(int32_t a) { return _mm512_set1_epi32(a); }
+HS_ALWAYS_INLINE integers load_integers(const int32_t *p) { return _mm512_loadu_si512(p); }
+HS_ALWAYS_INLINE void store_integers(int32_t *p, integers a) { _mm512_storeu_si512(p, a); }
+/* As int64. */
+HS_ALWAYS_INLINE void
+store_wide(int64_t *p, integers a)
+{
+    _mm512_storeu_si512(p, _mm512_cvtepi32_epi64(_mm512_castsi512_si256(a)));
+    _mm512_storeu_si512(p + 8, _mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(a, 1)));
+}
+HS_ALWAYS_INLINE integers smaller(integers a, integers b) { return _mm512_min_epi32(a, b); }
+HS_ALWAYS_INLINE integers larger(integers a, integers b) { return _mm512_max_epi32(a, b); }
+/* (float)(p[lane] + moved). */
+HS_ALWAYS_INLINE floats
+load_moved(const double *p, double moved)
+{
+    const __m512d by = _mm512_set1_pd(moved);
+    const __m256  low = _mm512_cvtpd_ps(_mm512_add_pd(_mm512_loadu_pd(p), by));
+    const __m256  high = _mm512_cvtpd_ps(_mm512_add_pd(_mm512_loadu_pd(p + 8), by));
+    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+}
+/* |a| as integers that order like the numbers. */
+HS_ALWAYS_INLINE integers
+magnitudes(floats a)
+{
+    return _mm512_and_si512(_mm512_castps_si512(a), _mm512_set1_epi32(0x7fffffff));
+}
+/* The first n, 1 <= n < LANES; zero elsewhere. */
+HS_ALWAYS_INLINE integers
+keep_lanes(integers a, int32_t n)
+{
+    return _mm512_maskz_mov_epi32(first_lanes(n), a);
+}
+HS_ALWAYS_INLINE int32_t largest_lane(integers a) { return _mm512_reduce_max_epi32(a); }
 
 #endif

@@ -13,6 +13,13 @@
 #define HS_X86_64 0
 #endif
 
+/* Little-endian only: simd_neon.h numbers bytes within lanes. */
+#if (defined(__aarch64__) && defined(__AARCH64EL__)) || defined(_M_ARM64)
+#define HS_AARCH64 1
+#else
+#define HS_AARCH64 0
+#endif
+
 #define HS_PRAGMA(text) _Pragma(#text)
 #if defined(__clang__)
 #define HS_TARGET_BEGIN(features) \

@@ -3,6 +3,8 @@
 
 from halfshell._api import count_pairs, kernels, pairs
 from halfshell._box import Box
+from halfshell._cache import clear_cache, set_cache_limit
+from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
 from halfshell._verify import Verdict, verify
 
@@ -10,11 +12,14 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Box",
+    "CapacityError",
     "Explanation",
     "Verdict",
+    "clear_cache",
     "count_pairs",
     "explain",
     "kernels",
     "pairs",
+    "set_cache_limit",
     "verify",
 ]

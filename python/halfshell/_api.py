@@ -4,51 +4,62 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, TypedDict, Unpack, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core, _inputs
+from halfshell import _batch, _core, _inputs
+from halfshell._box import Box
 
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 Letter = Literal["i", "j", "d", "D", "S", "P"]
 Precision = Literal["exact", "double", "single"]
 
 
-class _CountOptions(TypedDict, total=False):
-    """For type checkers: the keywords of `count_pairs`."""
+class _SearchOptions(TypedDict, total=False):
+    """For type checkers: the keywords that all searches share."""
 
     box: Any
     periodic: Any
     inclusive: bool
     precision: Precision
     kernel: str | None
+    threads: int | None
     memory_limit: float | None
 
 
-class _PairOptions(_CountOptions, total=False):
+class _CountOptions(_SearchOptions, total=False):
+    """The keywords of `count_pairs`, as far as its type does not depend on them."""
+
+    batch: None
+
+
+class _PairOptions(_SearchOptions, total=False):
     """The keywords of `pairs`, without `quantities`, on which the type of the result depends."""
+
+    batch: npt.ArrayLike | None
 
     sort: bool
     index_dtype: npt.DTypeLike
+    out: Any
 
 
 @overload
 def pairs(
-    points: Any, cutoff: float, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
+    points: Any, cutoff: Any, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def pairs(
-    points: Any, cutoff: float, *, quantities: Letter, **options: Unpack[_PairOptions]
+    points: Any, cutoff: Any, *, quantities: Letter, **options: Unpack[_PairOptions]
 ) -> npt.NDArray[Any]: ...
 @overload
 def pairs(
-    points: Any, cutoff: float, *, quantities: str, **options: Unpack[_PairOptions]
+    points: Any, cutoff: Any, *, quantities: str, **options: Unpack[_PairOptions]
 ) -> Arrays: ...
 def pairs(
     points: Any,
-    cutoff: float,
+    cutoff: Any,
     *,
     box: Any = None,
     periodic: Any = None,
@@ -56,9 +67,12 @@ def pairs(
     inclusive: bool = True,
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
+    out: Any = None,
     precision: Precision = "exact",
     kernel: str | None = None,
+    threads: int | None = None,
     memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
 ) -> Arrays:
     """Find every pair of points within a cutoff, each once.
 
@@ -87,6 +101,10 @@ def pairs(
         Ascending (i, j, S). Otherwise the order is fixed by the scene but not specified.
     index_dtype : numpy.int64 or numpy.int32, default numpy.int64
         Type of i, j and P.
+    out : ndarray or tuple of ndarray, optional
+        Where to write: one array for each letter of `quantities`, of the type and, but for its
+        length, the shape of the result, C-contiguous and not overlapping. They may be longer than
+        the result; what lies beyond it keeps its values.
     precision : {"exact", "double", "single"}, default "exact"
         "exact" decides by the real numbers that the inputs are. The others decide by one rounded
         comparison, as most libraries do, and exist to be compared with: "double" by a fixed
@@ -94,15 +112,29 @@ def pairs(
         points, so that its answer near the cutoff also depends on the other points and their
         order.
     kernel : str, optional
-        One of ``kernels()``; for tests and timing. All give identical arrays.
+        One of ``kernels()``; for tests and timing. All give identical arrays. Default: what the
+        environment variable HALFSHELL_KERNEL said when halfshell was imported, otherwise the best.
+    threads : int, optional
+        Threads to use. Default: one for small scenes, else the number in the environment variable
+        ``OMP_NUM_THREADS``, or as many as there are cores that this process may run on. The arrays
+        are the same for any number. Threads end before the call returns.
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
+    batch : array_like of int, shape (n,), optional
+        Many systems in one call: the system of each point, ascending from 0 or above; numbers may
+        be left out. Points pair within their system only, and the result is that of one call for
+        each system, in ascending order, with i and j numbering all points. `periodic` and all
+        else hold for every system, but `box` may have shape (s, d, d), one a system, and `cutoff`
+        shape (s,); then every number in `batch` is less than s. A `box` with two axes is one box
+        for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
+        systems out.
 
     Returns
     -------
     ndarray or tuple of ndarray
-        One array per letter of `quantities`, in that order; a bare array for one letter. With m
+        One array per letter of `quantities`, in that order; a bare array for one letter. With
+        `out`, views of its filled parts. With m
         pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with ``i < j``, or ``i == j`` for a point
         and its own image; ``d`` float64 (m,); ``D`` float64 (m, d); ``S`` int32 (m, d);
         ``P`` of `index_dtype` (m, 2). In real arithmetic ``D = points[j] - points[i] + S @ box``.
@@ -121,7 +153,11 @@ def pairs(
         finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
         linearly dependent, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
         or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
-        without `box`, or `box` or `periodic` beside an object that brings its own.
+        without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
+        not ascending or has a negative number or one that there is no box or cutoff for.
+    CapacityError
+        If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
+        then.
     OverflowError
         If there are 2**31 points or more, a number is too large for float64, or a shift that was
         asked for does not fit int32; also if a point lies more than 2**51 box vectors away in a
@@ -165,7 +201,57 @@ def pairs(
     ...                       quantities="ijdS", sort=True)
     >>> i.tolist(), j.tolist(), d.tolist(), S.tolist()
     ([0, 0], [1, 2], [1.0, 1.0], [[0, 0], [-1, 0]])
+
+    Two systems in one call, which do not see each other:
+
+    >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
+    ...                 batch=[0, 0, 1, 1])
+    >>> i.tolist(), j.tolist()
+    ([0, 2], [1, 3])
     """
+    if type(box) is Box:
+        box = box.vectors
+    if batch is not None:
+        systems = _batch.of(points, cutoff, box, periodic, batch)
+        return _core.batch_pairs(
+            systems.points,
+            systems.cutoff,
+            systems.box,
+            systems.periodic,
+            _inputs.as_flag(inclusive, "inclusive"),
+            precision,
+            kernel,
+            memory_limit,
+            None,
+            threads,
+            quantities,
+            _inputs.as_flag(sort, "sort"),
+            _inputs.as_index_bytes(index_dtype),
+            out,
+            systems.numbers,
+            systems.cutoffs,
+            systems.boxes,
+        )
+    # A small search takes as long as a handful of Python operations: none are made where the
+    # arguments need no conversion.
+    result: Any = _core.plain_pairs(
+        points,
+        cutoff,
+        box,
+        periodic,
+        inclusive,
+        precision,
+        kernel,
+        memory_limit,
+        None,
+        threads,
+        quantities,
+        sort,
+        index_dtype,
+        out,
+    )
+    if result is not NotImplemented:
+        return cast(Arrays, result)
     return _pairs_with_progress(
         points,
         cutoff,
@@ -176,8 +262,10 @@ def pairs(
         inclusive=inclusive,
         sort=sort,
         index_dtype=index_dtype,
+        out=out,
         precision=precision,
         kernel=kernel,
+        threads=threads,
         memory_limit=memory_limit,
     )
 
@@ -193,8 +281,10 @@ def _pairs_with_progress(
     inclusive: bool = True,
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
+    out: Any = None,
     precision: Precision = "exact",
     kernel: str | None = None,
+    threads: int | None = None,
     memory_limit: float | None = None,
 ) -> Arrays:
     """`pairs`, calling ``progress(fraction)`` now and then; for the command line."""
@@ -209,9 +299,11 @@ def _pairs_with_progress(
         kernel,
         memory_limit,
         progress,
+        threads,
         quantities,
         _inputs.as_flag(sort, "sort"),
         _inputs.as_index_bytes(index_dtype),
+        out,
     )
 
 
@@ -227,6 +319,10 @@ def count_pairs(
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
+    points: Any, cutoff: Any, *, batch: npt.ArrayLike, **options: Unpack[_SearchOptions]
+) -> npt.NDArray[np.int64]: ...
+@overload
+def count_pairs(
     points: Any, cutoff: Any, **options: Unpack[_CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
 def count_pairs(
@@ -238,23 +334,29 @@ def count_pairs(
     inclusive: bool = True,
     precision: Precision = "exact",
     kernel: str | None = None,
+    threads: int | None = None,
     memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
 ) -> int | npt.NDArray[np.int64]:
     """Count the pairs of points within one or several cutoffs.
 
     Parameters
     ----------
-    points, box, periodic, inclusive, precision, kernel
+    points, box, periodic, inclusive, precision, kernel, threads
         As in `pairs`.
     cutoff : float or array_like of float, shape (k,)
-        One cutoff, or several in ascending order. k cutoffs cost k searches.
+        One cutoff, or several in ascending order. k cutoffs cost k searches. With `batch`: one
+        for all systems, or one for each.
     memory_limit : float, optional
         Bytes that the search may take.
+    batch : array_like of int, shape (n,), optional
+        Count many systems in one call, as in `pairs`.
 
     Returns
     -------
     int or ndarray of int64, shape (k,)
-        The number of pairs of the half list for each cutoff.
+        The number of pairs of the half list for each cutoff; with `batch`, for each system: those
+        that `box` or `cutoff` is given for, or up to the largest number in `batch`.
 
     Raises
     ------
@@ -274,13 +376,39 @@ def count_pairs(
     1
     >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
     [0, 1, 2]
+    >>> hs.count_pairs(points, 1.5, batch=[0, 0, 2]).tolist()
+    [1, 0, 0]
     """
+    if type(box) is Box:
+        box = box.vectors
+    if batch is not None:
+        systems = _batch.of(points, cutoff, box, periodic, batch)
+        return _core.batch_count(
+            systems.points,
+            systems.cutoff,
+            systems.box,
+            systems.periodic,
+            _inputs.as_flag(inclusive, "inclusive"),
+            precision,
+            kernel,
+            memory_limit,
+            None,
+            threads,
+            systems.numbers,
+            systems.cutoffs,
+            systems.boxes,
+        )
+    result: Any = _core.plain_count(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
+    )
+    if result is not NotImplemented:
+        return cast(int, result)
     inclusive = _inputs.as_flag(inclusive, "inclusive")
     array, vectors, bits = _inputs.scene(points, box, periodic)
 
     def count(one: float) -> int:
         return _core.count_pairs(
-            array, one, vectors, bits, inclusive, precision, kernel, memory_limit, None
+            array, one, vectors, bits, inclusive, precision, kernel, memory_limit, None, threads
         )
 
     cutoffs = _inputs.as_cutoffs(cutoff)
@@ -290,7 +418,7 @@ def count_pairs(
 
 
 def kernels() -> list[str]:
-    """Names of the kernels that this CPU can run, the default one first.
+    """Names of the kernels that this CPU can run, the best one first.
 
     Examples
     --------

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell import _api
+from halfshell import _api, _core
 from halfshell._cli_scene import (
     describe_box,
     load_scene,
@@ -102,7 +102,7 @@ def run(args: Namespace) -> int:
         mean_coordination=2 * len(d) / len(scene.points),
         nearest_distance=float(d.min()) if len(d) else None,
         seconds=seconds,
-        kernel=args.kernel or hs.kernels()[0],
+        kernel=args.kernel or _core.default_kernel(),
         precision=args.precision,
         output=args.output,
         plot=args.plot,

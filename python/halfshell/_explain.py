@@ -37,6 +37,8 @@ class Explanation:
         What these pairs take in the returned arrays.
     kernel : str
         The kernel that is used.
+    threads : int
+        How many threads share the search.
     leaves_out : tuple of str
         What this scene does not need and does not pay for.
     measured : dict
@@ -62,6 +64,7 @@ class Explanation:
     expected_pairs: float
     expected_bytes: float
     kernel: str
+    threads: int
     leaves_out: tuple[str, ...]
     measured: dict[str, Any] = field(default_factory=dict)
 
@@ -75,6 +78,7 @@ class Explanation:
             f"images          {self.images}",
             f"expected        {self.expected_pairs:.4g} pairs, {self.expected_bytes:.4g} bytes",
             f"kernel          {self.kernel}",
+            f"threads         {self.threads}",
             *(f"leaves out      {what}" for what in self.leaves_out),
         ]
         for key, value in self.measured.items():
@@ -97,6 +101,7 @@ def explain(
     index_dtype: npt.DTypeLike = np.int64,
     precision: Precision = "exact",
     kernel: str | None = None,
+    threads: int | None = None,
     memory_limit: float | None = None,
     measure: bool = False,
 ) -> Explanation:
@@ -106,7 +111,7 @@ def explain(
     ----------
     points, cutoff, box, periodic, quantities, inclusive, sort
         As in `pairs`.
-    index_dtype, precision, kernel, memory_limit
+    index_dtype, precision, kernel, threads, memory_limit
         As in `pairs`.
     measure : bool, default False
         Run the search too, and report its own counters: bytes allocated by purpose, candidates
@@ -143,6 +148,7 @@ def explain(
         kernel,
         memory_limit,
         None,
+        threads,
         quantities,
         sort,
         index_bytes,
@@ -160,6 +166,7 @@ def explain(
         expected_pairs=plan["expected_pairs"],
         expected_bytes=plan["expected_pairs"] * _bytes_per_pair(quantities, ndim, index_bytes),
         kernel=plan["kernel"],
+        threads=plan["threads"],
         leaves_out=_left_out(plan, quantities, sort),
         measured={key: plan[key] for key in _MEASURED if key in plan},
     )
@@ -212,6 +219,8 @@ def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, .
         left.append("box algebra: every periodic vector lies along a coordinate axis")
     if not plan["keeps_originals"]:
         left.append("a second copy of the points: the wrapped ones hold every digit")
+    if plan["threads"] == 1:
+        left.append("further threads: the scene is small, or one was asked for")
     if plan["all_pairs"]:
         left.append("cells and sorting into them")
     if not sort:

@@ -239,7 +239,7 @@ def _run_info(args: argparse.Namespace) -> int:
     facts: dict[str, Any] = {
         "halfshell": hs.__version__,
         "kernels": list(hs.kernels()),
-        "kernel used": hs.kernels()[0],
+        "kernel used": _core.default_kernel(),
         "python": f"{platform.python_version()} ({platform.python_implementation()})",
         "numpy": np.__version__,
         "platform": f"{platform.system()} {platform.machine()}",

@@ -13,6 +13,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Under the thread sanitizer, which makes programs some thirty times slower. */
+#if defined(__SANITIZE_THREAD__)
+#define IS_SLOW 1
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define IS_SLOW 1
+#endif
+#endif
+#ifndef IS_SLOW
+#define IS_SLOW 0
+#endif
+
 extern int         harness_failures; /* failed checks so far */
 extern int         harness_tests;    /* tests run so far */
 extern const char *harness_filter;   /* run only tests whose name contains this, or NULL */

@@ -4,6 +4,7 @@
 Usage: python3 mutate.py [part of a constant's name]. Uses $CC, or cc. Prints a table; the exit
 code is 1 if a constant can be halved without a test noticing, or if the tests fail as they are.
 """
+
 import os
 import re
 import shutil
@@ -18,7 +19,7 @@ CORE = HERE.parent.parent / "csrc" / "core"
 COMPILER = os.environ.get("CC", "cc").split()
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", f"-I{HERE}"]
 
-MODULES = ["doubleword", "exact", "filter", "measure"]
+MODULES = ["doubleword", "exact", "filter", "expanded", "measure"]
 SOURCES = [CORE / f"{name}.c" for name in ("exact", "exact_integer", "measure", "filter")]
 SOURCES += [HERE / f"test_{name}.c" for name in MODULES]
 
@@ -78,8 +79,11 @@ def main():
         independent = [source for source in SOURCES if source not in dependent]
         base = scratch / "unchanged"
         base.mkdir()
-        fixed = list(pool.map(lambda source: compile_object(source, base),
-                              [scratch / "main.c", *independent]))
+        fixed = list(
+            pool.map(
+                lambda source: compile_object(source, base), [scratch / "main.c", *independent]
+            )
+        )
         unchanged = list(pool.map(lambda source: compile_object(source, base), dependent))
         count, names = run_tests(fixed + unchanged, base)
         if count:

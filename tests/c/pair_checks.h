@@ -8,7 +8,7 @@
 #define WANT_ALL \
     (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
-/* What a search returned; arrays of the C library, so that their ends are guarded by sanitizers. */
+/* What a search returned: arrays taken from it, NULL where not wanted. */
 typedef struct found_pairs {
     int64_t  n;
     int64_t *i, *j;
@@ -27,12 +27,16 @@ points_of(const brute_scene *scene)
                        .column_stride = sizeof(double)};
 }
 
+/* The kernel that is checked; NULL: the best of this CPU. */
+static const char *kernel_to_check;
+
 static inline hs_options
 options_of(const brute_scene *scene)
 {
     hs_options options = hs_options_default();
     options.cutoff = scene->cutoff;
     options.inclusive = scene->inclusive;
+    options.kernel = kernel_to_check;
     return options;
 }
 
@@ -48,15 +52,15 @@ array_of(int64_t count, size_t size)
 static inline void
 found_free(found_pairs *found)
 {
-    free(found->i);
-    free(found->j);
-    free(found->distance);
-    free(found->vector);
-    free(found->shift);
+    hs_array_free(found->i);
+    hs_array_free(found->j);
+    hs_array_free(found->distance);
+    hs_array_free(found->vector);
+    hs_array_free(found->shift);
     memset(found, 0, sizeof *found);
 }
 
-/* Find and write, all that options->want names. */
+/* Find, and take all that options->want names, i and j as int64. */
 static inline hs_status
 search_pairs(const hs_points *points, const hs_box *box, const hs_options *options,
              found_pairs *found, hs_failure *failure)
@@ -64,24 +68,17 @@ search_pairs(const hs_points *points, const hs_box *box, const hs_options *optio
     hs_pairs *pairs = NULL;
     memset(found, 0, sizeof *found);
     const hs_status status = hs_pairs_find(points, box, options, &pairs, failure);
-    if (status != HS_OK)
+    if (status != HS_OK) {
         return status;
-    const int64_t  n = found->n = hs_pairs_length(pairs);
-    const unsigned want = options->want;
-    hs_pair_arrays arrays = {.index_bytes = 8};
-    if (want & HS_WANT_I)
-        arrays.i = found->i = array_of(n, sizeof(int64_t));
-    if (want & HS_WANT_J)
-        arrays.j = found->j = array_of(n, sizeof(int64_t));
-    if (want & HS_WANT_DISTANCE)
-        arrays.distance = found->distance = array_of(n, sizeof(double));
-    if (want & HS_WANT_VECTOR)
-        arrays.vector = found->vector = array_of(n * points->ndim, sizeof(double));
-    if (want & HS_WANT_SHIFT)
-        arrays.shift = found->shift = array_of(n * points->ndim, sizeof(int32_t));
-    const hs_status written = hs_pairs_write(pairs, &arrays);
+    }
+    found->n = hs_pairs_length(pairs);
+    found->i = hs_pairs_take(pairs, HS_WANT_I);
+    found->j = hs_pairs_take(pairs, HS_WANT_J);
+    found->distance = hs_pairs_take(pairs, HS_WANT_DISTANCE);
+    found->vector = hs_pairs_take(pairs, HS_WANT_VECTOR);
+    found->shift = hs_pairs_take(pairs, HS_WANT_SHIFT);
     hs_pairs_free(pairs);
-    return written;
+    return HS_OK;
 }
 
 /* |D| within 1 ulp and on its side of the cutoff, D within 1 ulp of |D|; exactly checked. */
@@ -198,12 +195,48 @@ plain_difference(const brute_scene *scene, const brute_list *expected)
     return difference;
 }
 
+/* Unsorted and sorted into arrays of the caller, which have exactly the room, or one pair less. */
+static inline const char *
+into_difference(const brute_scene *scene, const brute_list *expected)
+{
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    const char     *difference = NULL;
+    options.want = HS_WANT_BOTH;
+    options.index_bytes = 4;
+    for (int trial = 0; difference == NULL && trial < 4; trial++) {
+        const int64_t  room = expected->n - (trial & 1);
+        int32_t       *both = array_of(room, 2 * sizeof(int32_t)); /* a sanitizer guards its end */
+        hs_pair_arrays out = {.capacity = room, .index_bytes = 4, .both = both};
+        hs_pairs      *pairs = NULL;
+        hs_failure     failure;
+        options.out = &out;
+        options.sorted = trial & 2;
+        const hs_status status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
+        if (status != (trial & 1 ? HS_ERR_CAPACITY : HS_OK))
+            difference = hs_status_text(status);
+        else if (trial & 1 && failure.expected_pairs != (double)expected->n)
+            difference = "another number of pairs needed";
+        for (int64_t e = 0; trial == 2 && difference == NULL && e < room; e++) {
+            if (both[2 * e] != expected->pairs[e].i || both[2 * e + 1] != expected->pairs[e].j)
+                difference = "another pair in the caller's arrays";
+        }
+        hs_pairs_free(pairs);
+        free(both);
+        trial += expected->n == 0; /* there is no less than none */
+    }
+    return difference;
+}
+
 /* What find and count get wrong, or NULL. */
 static inline const char *
 pairs_difference(const brute_scene *scene, const brute_list *expected, int64_t stride)
 {
     const char *difference = plain_difference(scene, expected);
-    return difference != NULL ? difference : sorted_difference(scene, expected, stride);
+    if (difference == NULL) {
+        difference = sorted_difference(scene, expected, stride);
+    }
+    return difference != NULL ? difference : into_difference(scene, expected);
 }
 
 #endif

@@ -17,13 +17,13 @@ sort_scene(hs_account *account, const hs_options *options, hs_scene *scene, hs_g
     const hs_points points = points_of(&shared.scene);
     hs_failure      failure;
     hs_account_init(account, options);
-    if (hs_scene_init(account, &points, shared.scene.box, options, scene, &failure) != HS_OK)
+    if (hs_scene_init(account, NULL, &points, shared.scene.box, options, scene, &failure) != HS_OK)
         return false;
     if (hs_grid_init(scene, grid, &failure) != HS_OK) {
         hs_scene_free(account, scene);
         return false;
     }
-    return hs_bins_build(account, options, scene, grid, bins) == HS_OK;
+    return hs_bins_build(account, NULL, options, scene, grid, bins) == HS_OK;
 }
 
 static int64_t
@@ -104,15 +104,15 @@ coordinates_and_turns_travel_with_their_point(void)
         if (!sort_scene(&account, &options, &scene, &grid, &bins))
             continue;
         const int d = bins.ndim, m = bins.n_periodic;
-        bool      right = bins.turns != NULL;
+        bool      right = bins.turns.known;
         for (int64_t si = 0; right && si < bins.n; si++) {
             const double *r = shared.x + (int64_t)bins.order[si] * d;
             for (int k = 0; k < d; k++) {
                 double moved = r[k];
                 for (int b = 0; b < m; b++)
-                    moved -= (double)bins.turns[si * m + b] * scene.lattice.rows[b][k];
+                    moved -= (double)hs_turns_get(&bins.turns, b, si) * scene.lattice.rows[b][k];
                 right = right && fabs(moved - bins.x[k][si]) < 1e-9;
-                right = right && (bins.originals == NULL || bins.originals[si * d + k] == r[k]);
+                right = right && (!bins.keeps_originals || bins.originals[k][si] == r[k]);
             }
         }
         CHECK(right);

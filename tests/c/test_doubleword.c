@@ -130,7 +130,7 @@ difference_error_used(const hs_metric *metric, const double *p, const double *q,
 {
     hs_difference difference;
     double        square = 0.0;
-    if (!hs_difference_shifted(&difference, metric, p, q, shift, metric->ndim))
+    if (!hs_difference_shifted(&difference, metric, p, q, shift, metric->ndim, false))
         return HUGE_VAL;
     for (int k = 0; k < metric->ndim; k++) {
         const big error =
@@ -186,7 +186,7 @@ random_pair(harness_random *random, hs_metric *metric, double *p, double *q, int
     if (random_bits(random) & 1) /* p cancels the rest to a few digits */
         for (int k = 0; k < metric->ndim; k++) {
             hs_difference difference;
-            if (hs_difference_shifted(&difference, metric, p, q, shift, metric->ndim))
+            if (hs_difference_shifted(&difference, metric, p, q, shift, metric->ndim, false))
                 p[k] = (difference.component[k].hi + p[k]) * (1.0 + 0x1p-40);
         }
 }
@@ -203,7 +203,7 @@ stage_errors_are_within_their_bounds(void)
         random_pair(&random, &metric, p, q, shift);
         CHECK(difference_error_used(&metric, p, q, shift) <= 1.0);
 
-        CHECK(hs_difference_shifted(&difference, &metric, p, q, shift, metric.ndim));
+        CHECK(hs_difference_shifted(&difference, &metric, p, q, shift, metric.ndim, false));
         const hs_dw square = hs_double_word_square(&difference, metric.ndim);
         const big   unit = big_from_bits(1, 1074, 1);
         const big   error = big_difference(
@@ -243,13 +243,13 @@ unsafe_terms_are_refused(void)
     hs_difference difference;
     const double  zero = 0.0, huge = 0x1.fffffffffffffp1023, minus = -0x1.fffffffffffffp1023;
     int64_t       shift = 1;
-    CHECK(hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1));
-    CHECK(!hs_difference_shifted(&difference, &metric, &zero, &huge, &shift, 1));
-    CHECK(!hs_difference_shifted(&difference, &metric, &minus, &huge, &shift, 1));
+    CHECK(hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1, false));
+    CHECK(!hs_difference_shifted(&difference, &metric, &zero, &huge, &shift, 1, false));
+    CHECK(!hs_difference_shifted(&difference, &metric, &minus, &huge, &shift, 1, false));
     shift = (INT64_C(1) << 53) + 1;
-    CHECK(!hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1));
+    CHECK(!hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1, false));
     shift = INT64_MIN;
-    CHECK(!hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1));
+    CHECK(!hs_difference_shifted(&difference, &metric, &zero, &zero, &shift, 1, false));
 }
 
 void

@@ -282,6 +282,58 @@ float64_stage_survives_its_worst_case(void)
     CHECK(least_reached > 0.999); /* of the d + 2 roundings that the stage allows for */
 }
 
+/*
+ * x^2 + y^2 = z^2 with y and z of 53 bits, and a third axis that adds less than the double-word
+ * stage can tell from nothing: only because it loses nothing, or notices that it does, is it right.
+ */
+static void
+ties_of_full_width_are_told_from_near_ties(void)
+{
+    hs_stages stages = {0, 0, 0};
+    int       n_ties = 0;
+    for (int trial = 0; trial < 3000; trial++) {
+        const double x = 94906265.0 - 2.0 * trial; /* at most sqrt(2^53), odd */
+        const double y = (x * x - 1.0) / 2.0;
+        scene        s = {.ndim = 3, .n_rows = 1, .p = {0, 0, 0}, .q = {x, y, 0}};
+        const int    small = trial % 9;
+        s.q[2] = small < 4 ? (double)small : ldexp(1.0, small < 8 ? -20 * (small - 4) : -600);
+        s.q[2] = trial % 2 ? 0.0 : s.q[2];
+        s.rows[0][1] = 4096.0;
+        s.shift[0] = trial / 9 % 3;
+        s.q[1] -= 4096.0 * (double)s.shift[0];
+        s.cutoff = y + 1.0 - (double)(trial / 27 % 2) * 2.0;
+        const int sign = true_sign(&s);
+        n_ties += sign == 0;
+        CHECK(decides_like(&s, sign, &stages));
+    }
+    CHECK(n_ties > 700);
+    CHECK(stages.by_double_word > 2000 && stages.by_integers > 0);
+}
+
+/*
+ * x^2 + y^2 just beside (x + 1)^2, by less than the last place of any low word; and a D that
+ * differs from the cutoff by 2^-105, where the sum of q - p = 1 + 3 2^-53 - 2^-105 and 3 a =
+ * 1 + 2^-53 loses that.
+ */
+static void
+what_is_lost_below_the_low_words_is_noticed(void)
+{
+    harness_random random = {31};
+    hs_stages      stages = {0, 0, 0};
+    for (int trial = 0; trial < 3000; trial++) {
+        const double x = floor(ldexp(1.0 + random_unit(&random), 52)) - 1.0;
+        const scene  s = {.ndim = 2, .q = {x, sqrt(2.0 * x + 1.0)}, .cutoff = x + 1.0};
+        CHECK(decides_like(&s, true_sign(&s), &stages));
+    }
+    CHECK(stages.by_integers > 0);
+    scene s = {.ndim = 1, .n_rows = 1, .shift = {3}, .cutoff = 2.0 + 0x1p-51};
+    s.p[0] = -0x1p-53 + 0x1p-105;
+    s.q[0] = 1.0 + 0x1p-52;
+    s.rows[0][0] = 3002399751580331.0 * 0x1p-53; /* (2^53 + 1) / 3 */
+    CHECK(true_sign(&s) < 0);
+    CHECK(decides_like(&s, -1, &stages));
+}
+
 static void
 zero_cutoff_means_coincident(void)
 {
@@ -349,6 +401,8 @@ test_exact(void)
     RUN(ties_hold_in_every_binade);
     RUN(near_ties_hold_in_every_binade);
     RUN(float64_stage_survives_its_worst_case);
+    RUN(ties_of_full_width_are_told_from_near_ties);
+    RUN(what_is_lost_below_the_low_words_is_noticed);
     RUN(zero_cutoff_means_coincident);
     RUN(double_formula_is_the_fixed_one);
 }

@@ -11,6 +11,8 @@
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 #define HS_CAN_FLUSH 1
+#elif defined(__aarch64__)
+#define HS_CAN_FLUSH 1
 #else
 #define HS_CAN_FLUSH 0
 #endif
@@ -19,14 +21,39 @@ void test_fpenv(void);
 
 static const int roundings[] = {FE_TONEAREST, FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
 
-/* Flush results and operands: FTZ is bit 15 of MXCSR, DAZ bit 6. */
+#if defined(__SSE2__)
+#define FLUSH_BITS 0x8040u /* of MXCSR: FTZ is bit 15, DAZ bit 6 */
+#elif defined(__aarch64__)
+#define FLUSH_BITS (UINT64_C(1) << 24) /* of FPCR: FZ */
+#endif
+
+/* Flush results and operands. */
 static void
 set_flushing(bool flush)
 {
-#if HS_CAN_FLUSH
-    _mm_setcsr((_mm_getcsr() & ~0x8040u) | (flush ? 0x8040u : 0u));
+#if defined(__SSE2__)
+    _mm_setcsr((_mm_getcsr() & ~FLUSH_BITS) | (flush ? FLUSH_BITS : 0u));
+#elif defined(__aarch64__)
+    uint64_t control;
+    __asm__ __volatile__("mrs %0, fpcr" : "=r"(control));
+    control = (control & ~FLUSH_BITS) | (flush ? FLUSH_BITS : 0);
+    __asm__ __volatile__("msr fpcr, %0" : : "r"(control));
 #else
     (void)flush;
+#endif
+}
+
+static bool
+is_flushing(void)
+{
+#if defined(__SSE2__)
+    return (_mm_getcsr() & FLUSH_BITS) == FLUSH_BITS;
+#elif defined(__aarch64__)
+    uint64_t control;
+    __asm__ __volatile__("mrs %0, fpcr" : "=r"(control));
+    return (control & FLUSH_BITS) == FLUSH_BITS;
+#else
+    return false;
 #endif
 }
 
@@ -55,11 +82,7 @@ entering_sets_and_leaving_restores(void)
             hs_fpenv_leave(saved);
             const int mode_after = fegetround();
             const int flags_after = fetestexcept(FE_ALL_EXCEPT);
-#if HS_CAN_FLUSH
-            const bool flush_after = (_mm_getcsr() & 0x8040u) == 0x8040u;
-#else
-            const bool flush_after = false;
-#endif
+            const bool flush_after = is_flushing();
             set_flushing(false);
             fesetround(FE_TONEAREST);
             CHECK(inside && nested_inside);

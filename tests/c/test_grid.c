@@ -28,7 +28,7 @@ prepare(searched *s)
     const hs_options options = options_of(&shared.scene);
     hs_failure       failure;
     hs_account_init(&s->account, &options);
-    hs_status status = hs_scene_init(&s->account, &points, shared.scene.box, &options, &s->scene,
+    hs_status status = hs_scene_init(&s->account, NULL, &points, shared.scene.box, &options, &s->scene,
                                      &failure);
     if (status != HS_OK)
         return status;

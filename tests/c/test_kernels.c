@@ -1,243 +1,176 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_kernels.c: every kernel of this CPU against a plain loop, its data against guard pages: a byte
- * read or written beyond the padding ends the test.
+ * test_kernels.c: the scans of every kernel of this CPU against a plain loop and the scalar kernel,
+ * and which kernels there are. test_copies.c has gathering and emitting.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS */
 #include <math.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
-#include "../../csrc/kernels/kernel.h"
-#include "harness.h"
+#include "scan_checks.h"
 
 void test_kernels(void);
 
-enum {
-    MOST_KERNELS = 16,
-    MOST_CANDIDATES = 4 * HS_SCAN_PADDING + 1,
-    N_ARRAYS = HS_MAX_DIM + 2 /* coordinates, labels, hits */
-};
+enum { SHORT = 3 * 32 + 2 }; /* past three times the widest vector */
 
-/* Pages that may be used, between two that may not. */
-typedef struct guarded {
-    char  *pages;
-    size_t bytes;
-} guarded;
+static numbers scene;
 
-static guarded arrays[N_ARRAYS];
-
-static void
-guard_arrays(void)
-{
-    const size_t page = (size_t)sysconf(_SC_PAGESIZE);
-    const size_t needed = (MOST_CANDIDATES + HS_SCAN_PADDING) * sizeof(float);
-    const size_t bytes = (needed + page - 1) / page * page;
-    for (int a = 0; a < N_ARRAYS; a++) {
-        char *all = mmap(NULL, bytes + 2 * page, PROT_READ | PROT_WRITE,
-                         MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-        if (all == MAP_FAILED || mprotect(all, page, PROT_NONE) != 0 ||
-            mprotect(all + page + bytes, page, PROT_NONE) != 0)
-            abort();
-        arrays[a] = (guarded){all + page, bytes};
-    }
-}
-
-/* Room for n numbers of 4 bytes that starts after a guard page, or ends before one. */
-static void *
-place(int array, int32_t n, bool at_end)
-{
-    return arrays[array].pages + (at_end ? arrays[array].bytes - 4 * (size_t)n : 0);
-}
-
-typedef struct scan {
-    int           ndim;
-    int32_t       first, last;
-    float         y[HS_MAX_DIM][MOST_CANDIDATES];
-    int32_t       label[MOST_CANDIDATES];
-    float         q[HS_MAX_DIM];
-    hs_thresholds thresholds;
-} scan;
-
-/* s of candidate c: rounded step by step, in the order that kernel.h gives. */
-static float
-square_of(const scan *s, int32_t c)
-{
-    volatile float sum = 0.0f;
-    for (int k = 0; k < s->ndim; k++) {
-        const volatile float along = s->y[k][c] - s->q[k];
-        const volatile float square = along * along;
-        sum = k == 0 ? square : sum + square;
-    }
-    return sum;
-}
-
-/* Runs one scan function with its data against one of the guards. */
-static int32_t
-run_guarded(hs_scan_fn function, const scan *s, bool at_end, const int32_t **hits, bool *ambiguous)
-{
-    hs_candidates candidates;
-    const int32_t n = s->last, room = n + HS_SCAN_PADDING;
-    memset(&candidates, 0, sizeof candidates);
-    for (int k = 0; k < s->ndim; k++) {
-        float *y = place(k, room, at_end);
-        memcpy(y, s->y[k], (size_t)n * sizeof(float));
-        for (int32_t c = n; c < room; c++)
-            y[c] = c % 2 ? s->q[k] : NAN; /* what lies past the last must never be listed */
-        candidates.y[k] = y;
-    }
-    int32_t *label = place(HS_MAX_DIM, room, at_end);
-    memcpy(label, s->label, (size_t)n * sizeof(int32_t));
-    for (int32_t c = n; c < room; c++)
-        label[c] = -1;
-    candidates.label = label;
-    int32_t *listed = place(HS_MAX_DIM + 1, n - s->first + HS_SCAN_PADDING, at_end);
-    *hits = listed;
-    return function(&candidates, s->first, s->last, s->q, s->thresholds, s->ndim, listed,
-                    ambiguous);
-}
-
-/* Exactly what the plain loop lists; only for scans where no rounding can differ, or unfused. */
-static void
-check_exactly(hs_scan_fn function, const scan *s)
-{
-    for (int variant = 0; variant < 4; variant++) {
-        const int32_t *hits;
-        bool           ambiguous = variant & 2, unsure = variant & 2, same = true;
-        const int32_t  n_hits = run_guarded(function, s, variant & 1, &hits, &ambiguous);
-        int32_t        expected = 0;
-        for (int32_t c = s->first; c < s->last; c++) {
-            const float square = square_of(s, c);
-            if (!(square > s->thresholds.out)) {
-                same = same && expected < n_hits && hits[expected] == s->label[c];
-                expected++;
-                unsure = unsure || !(square < s->thresholds.in);
-            }
-        }
-        CHECK(n_hits == expected);
-        CHECK(same);
-        CHECK(ambiguous == unsure);
-    }
-}
-
-/* What any order of summation and any fusing must list, and must not. */
-static void
-check_roughly(hs_scan_fn function, const scan *s)
-{
-    for (int variant = 0; variant < 2; variant++) {
-        const int32_t *hits;
-        bool           ambiguous = false, same = true;
-        const int32_t  n_hits = run_guarded(function, s, variant & 1, &hits, &ambiguous);
-        int32_t        at = 0;
-        for (int32_t c = s->first; c < s->last; c++) {
-            const double square = square_of(s, c), limit = s->thresholds.out;
-            const bool   listed = at < n_hits && hits[at] == s->label[c];
-            if (!(square > limit * (1.0 + 1e-6)) || !listed)
-                same = same && (listed || square >= limit * (1.0 - 1e-6));
-            else
-                same = false;
-            at += listed;
-        }
-        CHECK(same);
-        CHECK(at == n_hits);
-    }
-}
-
-static const hs_kernel *
-kernel_number(int k)
-{
-    const char *names[MOST_KERNELS];
-    const int   n = hs_kernel_names(names, MOST_KERNELS);
-    return k < n ? hs_kernel_select(names[k]) : NULL;
-}
-
-/* Small integers: sums of squares are exact however they are formed. */
-static void
-fill_with_integers(harness_random *random, scan *s)
-{
-    for (int k = 0; k < s->ndim; k++) {
-        s->q[k] = (float)(random_bits(random) % 5) - 2.0f;
-        for (int32_t c = 0; c < s->last; c++)
-            s->y[k][c] = (float)(random_bits(random) % 7) - 3.0f;
-    }
-    for (int32_t c = 0; c < s->last; c++)
-        s->label[c] = (int32_t)(random_bits(random) >> 33);
-}
-
-/* With both thresholds on numbers that occur. */
 static void
 every_kernel_lists_what_the_plain_loop_lists(void)
 {
-    harness_random random = {271828};
-    static scan    s;
+    harness_random   random = {271828};
     const hs_kernel *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
-        for (int32_t n = 0; n <= MOST_CANDIDATES; n++) {
-            for (s.ndim = 1; s.ndim <= HS_MAX_DIM; s.ndim++) {
-                s.last = n;
-                s.first = (int32_t)(random_bits(&random) % 3 ? random_bits(&random) % (n + 1) : 0);
-                fill_with_integers(&random, &s);
-                s.thresholds.out = (float)(random_bits(&random) % (8u * (unsigned)s.ndim));
-                s.thresholds.in = s.thresholds.out - (float)(random_bits(&random) % 4);
-                check_exactly(kernel->scan, &s);
-                check_exactly(kernel->unfused, &s);
+        for (int32_t n = 0; n <= SHORT; n++) {
+            for (int ndim = 1; ndim <= HS_MAX_DIM; ndim++) {
+                const int32_t n_points = 1 + (int32_t)(random_bits(&random) % 5);
+                fill_with_integers(&random, ndim, n, n_points, &scene);
+                const float out = (float)(random_bits(&random) % (8u * (unsigned)ndim));
+                set_limits(&scene, out - (float)(random_bits(&random) % 4), out);
+                (void)check_exactly(kernel, &scene);
             }
         }
     }
 }
 
+/* Blocks up to capacity, full groups, many hits or many unsure ones, ample room and little: a scan
+ * then stops before they might not fit. */
 static void
-infinity_and_nan_are_listed_as_ambiguous(void)
+scans_stop_before_hits_might_not_fit(void)
 {
-    static const float odd[] = {NAN, INFINITY, -INFINITY, 3e38f, -3e38f, 0x1p-149f, -0.0f};
-    static const hs_thresholds limits[] = {{-1.0f, INFINITY}, {INFINITY, 4.0f}, {1.0f, 4.0f},
-                                           {-1.0f, -1.0f},    {-1.0f, 0.0f},    {3e38f, 3.2e38f}};
-    harness_random             random = {314159};
-    static scan                s;
-    const hs_kernel           *kernel;
+    static const int32_t sizes[] = {1, 127, 1000, MOST_HITS / 3 + 1, /* one too many */
+                                    HS_BLOCK_CANDIDATES - 1, HS_BLOCK_CANDIDATES};
+    static const float   limits[][2] = {{100.0f, 100.0f}, {-1.0f, 100.0f}, {2.0f, 3.0f},
+                                        {-1.0f, 0.0f}};
+    harness_random       random = {577215};
+    const hs_kernel     *kernel;
+    int                  most = 0, least = 1000;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
-        for (int trial = 0; trial < 2000; trial++) {
-            s.ndim = 1 + trial % HS_MAX_DIM;
-            s.last = (int32_t)(random_bits(&random) % (MOST_CANDIDATES + 1));
-            s.first = (int32_t)(random_bits(&random) % (unsigned)(s.last + 1));
-            fill_with_integers(&random, &s);
-            for (int32_t c = 0; c < s.last; c++) {
-                const int axis = (int)(random_bits(&random) % (unsigned)s.ndim);
-                if (random_bits(&random) % 4 == 0)
-                    s.y[axis][c] = odd[random_bits(&random) % 7];
+        for (int trial = 0; trial < 24; trial++) {
+            const int32_t n = sizes[trial % 6], n_points = n == 1 ? 1 : HS_GROUP_POINTS - trial % 3;
+            fill_with_integers(&random, 1 + trial % 3, n, n_points, &scene);
+            set_limits(&scene, limits[trial / 6][0], limits[trial / 6][1]);
+            scene.triangular = trial >= 12 && n >= n_points;
+            if (trial / 3 % 2) {
+                scene.most_hits = MOST_HITS; /* what a large scene has */
+                scene.most_unsure = HS_BLOCK_CANDIDATES;
             }
-            if (trial % 5 == 0)
-                s.q[0] = odd[random_bits(&random) % 5];
-            s.thresholds = limits[random_bits(&random) % 6];
-            check_exactly(kernel->scan, &s);
-            check_exactly(kernel->unfused, &s);
+            const int calls = check_exactly(kernel, &scene);
+            most = calls > most ? calls : most;
+            least = calls < least ? calls : least;
+        }
+    }
+    CHECK(least == 8); /* one call of each of the four functions, twice */
+    CHECK(most > 8 * HS_GROUP_POINTS / 2);
+}
+
+static void
+infinity_and_nan_are_listed_as_unsure(void)
+{
+    static const float odd[] = {NAN, INFINITY, -INFINITY, 0x1p-149f, -0.0f};
+    static const float limits[][2] = {{-1.0f, INFINITY}, {INFINITY, 4.0f}, {1.0f, 4.0f},
+                                      {-1.0f, -1.0f},    {-1.0f, 0.0f}};
+    harness_random     random = {314159};
+    const hs_kernel   *kernel;
+    for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
+        for (int trial = 0; trial < 1000; trial++) {
+            const int32_t n = (int32_t)(random_bits(&random) % (SHORT + 1));
+            const int     ndim = 1 + trial % HS_MAX_DIM, which = (int)(random_bits(&random) % 5);
+            fill_with_integers(&random, ndim, n, 3, &scene);
+            for (int32_t c = 0; c < n; c++) {
+                const int axis = (int)(random_bits(&random) % (unsigned)ndim);
+                if (random_bits(&random) % 4 == 0) {
+                    scene.y[axis][c] = odd[random_bits(&random) % 5];
+                    scene.norm[c] = isfinite(scene.y[axis][c]) ? scene.norm[c] : INFINITY;
+                }
+            }
+            scene.q[0][0] = trial % 5 == 0 ? odd[random_bits(&random) % 4] : scene.q[0][0];
+            set_limits(&scene, limits[which][0], limits[which][1]);
+            if (which == 0) {
+                scene.expanded.in = -INFINITY; /* what hs_expanded_of gives when nothing is sure */
+            }
+            (void)check_exactly(kernel, &scene);
         }
     }
 }
 
+/* A NaN coordinate is a hit and unsure with every threshold, in both forms. */
 static void
-rounding_may_only_differ_near_the_threshold(void)
+a_nan_is_never_lost(void)
 {
-    harness_random   random = {161803};
-    static scan      s;
     const hs_kernel *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
-        for (int trial = 0; trial < 2000; trial++) {
-            s.ndim = 1 + trial % HS_MAX_DIM;
-            s.last = (int32_t)(random_bits(&random) % (MOST_CANDIDATES + 1));
-            s.first = 0;
-            fill_with_integers(&random, &s);
-            for (int32_t c = 0; c < s.last; c++) {
-                for (int a = 0; a < s.ndim; a++)
-                    s.y[a][c] += (float)random_unit(&random);
-                s.label[c] = c;
+        const hs_scan_fn functions[] = {kernel->list, kernel->count, kernel->list_direct,
+                                        kernel->count_direct};
+        for (int f = 0; f < 4; f++) {
+            for (int32_t place = 0; place < 40; place++) {
+                harness_random random = {1 + (uint64_t)place};
+                fill_with_integers(&random, 3, 40, 1, &scene);
+                scene.triangular = false;
+                scene.y[place % 3][place] = NAN;
+                set_limits(&scene, -100.0f, -100.0f); /* nothing else is near */
+                hs_scan scan = place_scan(&scene, true);
+                CHECK(functions[f](&scan, 0) == 1);
+                CHECK(scan.n_hits == 1 && scan.n_unsure == 1);
+                CHECK(scan.unsure[0].t == 0 && scan.unsure[0].place == place);
             }
-            s.thresholds.out = s.last > 0 ? square_of(&s, s.last / 2) : 1.0f;
-            s.thresholds.in = s.thresholds.out * 0.9f;
-            check_roughly(kernel->scan, &s);
-            check_exactly(kernel->unfused, &s);
         }
     }
+}
+
+/* Any numbers: kernels may differ between the thresholds that filter.h gives, and nowhere else. */
+static void
+kernels_differ_between_the_thresholds_only(void)
+{
+    static expectation scalar;
+    harness_random     random = {161803};
+    const hs_kernel   *kernel;
+    int                unsure = 0;
+    for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
+        for (int trial = 0; trial < 3000; trial++) {
+            const bool    expanded = trial % 2;
+            const int     ndim = 1 + trial / 2 % HS_MAX_DIM;
+            const int32_t n = (int32_t)(random_bits(&random) % (SHORT + 1));
+            fill_with_integers(&random, ndim, n, 1, &scene);
+            for (int a = 0; a < ndim; a++) {
+                for (int32_t c = 0; c < n; c++) {
+                    scene.y[a][c] += (float)random_unit(&random);
+                    scene.norm[c] = (a == 0 ? 0.0f : scene.norm[c]) + scene.y[a][c] * scene.y[a][c];
+                }
+            }
+            double square = 0.0; /* of some pair, so that some are near the cutoff */
+            for (int a = 0; a < ndim && n > 0; a++) {
+                const double along = (double)scene.y[a][n / 2] - (double)scene.q[a][0];
+                square += along * along;
+            }
+            scene.triangular = false;
+            scene.direct = hs_thresholds_of(ndim, sqrt(square), 8.0, 0.0);
+            scene.expanded = hs_expanded_of(ndim, sqrt(square), 8.0, 0.0);
+            expect(&scene, expanded, true, 0);
+            scalar = expected;
+            hs_scan       scan = place_scan(&scene, trial & 4);
+            hs_scan_fn    list = expanded ? kernel->list : kernel->list_direct;
+            CHECK(list(&scan, 0) == 1);
+            /* without the unsure ones, the lists are the same */
+            bool    same = scan.n_hits - scan.n_unsure == scalar.n_hits - scalar.n_unsure;
+            int32_t u = 0, v = 0, b = 0;
+            for (int32_t a = 0; a < scan.n_hits && same; a++) {
+                if (u < scan.n_unsure && scan.unsure[u].at == a) {
+                    u++;
+                    continue;
+                }
+                while (v < scalar.n_unsure && scalar.unsure[v].at == b) {
+                    v++;
+                    b++;
+                }
+                same = scan.hits[a] == scalar.hits[b++];
+            }
+            CHECK(same);
+            CHECK(u == scan.n_unsure);
+            CHECK(expanded || scan.n_unsure == scalar.n_unsure); /* the direct form never differs */
+            unsure += scan.n_unsure;
+        }
+    }
+    CHECK(unsure > 1000);
 }
 
 static void
@@ -249,8 +182,9 @@ kernels_are_known_by_their_names(void)
     CHECK(hs_kernel_names(NULL, 0) == n);
     CHECK(hs_kernel_select(NULL) == hs_kernel_select(names[0]));
     CHECK(strcmp(names[n - 1], "scalar") == 0);
-    for (int k = 0; k < n; k++)
+    for (int k = 0; k < n; k++) {
         CHECK(strcmp(hs_kernel_select(names[k])->name, names[k]) == 0);
+    }
     CHECK(hs_kernel_select("") == NULL);
     CHECK(hs_kernel_select("Scalar") == NULL);
     hs_options      options = hs_options_default();
@@ -265,9 +199,11 @@ kernels_are_known_by_their_names(void)
 void
 test_kernels(void)
 {
-    guard_arrays();
+    guard_scans();
     RUN(every_kernel_lists_what_the_plain_loop_lists);
-    RUN(infinity_and_nan_are_listed_as_ambiguous);
-    RUN(rounding_may_only_differ_near_the_threshold);
+    RUN(scans_stop_before_hits_might_not_fit);
+    RUN(infinity_and_nan_are_listed_as_unsure);
+    RUN(a_nan_is_never_lost);
+    RUN(kernels_differ_between_the_thresholds_only);
     RUN(kernels_are_known_by_their_names);
 }

@@ -87,7 +87,45 @@ zero_strides_repeat_a_number(void)
     CHECK(count == 2);
 }
 
-/* Every combination of wants, sorted and not, in both widths, side by side or apart. */
+/* The array of one HS_WANT_ bit holds these numbers, or is not there. */
+static void
+check_array(hs_pairs *pairs, const hs_options *options, unsigned bit, const void *expected,
+            size_t bytes)
+{
+    const void *borrowed = hs_pairs_array(pairs, bit);
+    CHECK((borrowed != NULL) == ((options->want & bit) != 0));
+    CHECK(borrowed == NULL || memcmp(borrowed, expected, bytes) == 0);
+    void *taken = hs_pairs_take(pairs, bit);
+    CHECK((taken != NULL) == ((options->want & bit) != 0));
+    CHECK(hs_pairs_array(pairs, bit) == NULL && hs_pairs_take(pairs, bit) == NULL);
+    if (bit != HS_WANT_J) {
+        CHECK(taken == NULL || memcmp(taken, expected, bytes) == 0);
+        hs_array_free(taken);
+    } else if (taken != NULL) { /* it outlives the result */
+        hs_pairs_free(pairs);
+        CHECK(memcmp(taken, expected, bytes) == 0);
+        hs_array_free(taken);
+    } else {
+        hs_pairs_free(pairs);
+    }
+}
+
+/* All pairs as int32 or int64: i, j, and both side by side. */
+static void
+narrow_indices(const found_pairs *all, int bytes, char *i, char *j, char *both)
+{
+    const size_t size = (size_t)bytes;
+    for (size_t e = 0; e < (size_t)all->n; e++) {
+        const int32_t narrow[2] = {(int32_t)all->i[e], (int32_t)all->j[e]};
+        const int64_t wide[2] = {all->i[e], all->j[e]};
+        const char   *right = bytes == 4 ? (const char *)narrow : (const char *)wide;
+        memcpy(i + e * size, right, size);
+        memcpy(j + e * size, right + size, size);
+        memcpy(both + 2 * e * size, right, 2 * size);
+    }
+}
+
+/* Every combination of wants, sorted and not, in both widths. */
 static void
 each_want_returns_the_same_numbers(void)
 {
@@ -99,49 +137,55 @@ each_want_returns_the_same_numbers(void)
         options.sorted = sorted;
         options.want = WANT_ALL;
         CHECK(search_pairs(&points, scene->box, &options, &all, NULL) == HS_OK);
-        for (unsigned want = 0; want < 32; want++) {
-            const int      bytes = options.index_bytes = want % 3 ? 4 : 8;
-            hs_pairs      *pairs;
-            hs_pair_arrays arrays = {.index_bytes = bytes};
-            const size_t   n = (size_t)all.n;
+        const size_t n = (size_t)all.n;
+        char        *i = array_of(all.n, 8), *j = array_of(all.n, 8), *both = array_of(all.n, 16);
+        for (unsigned want = 0; want < 64; want++) {
+            hs_pairs *pairs;
+            options.index_bytes = want % 3 ? 4 : 8;
             options.want = want;
+            const size_t size = (size_t)options.index_bytes;
+            narrow_indices(&all, options.index_bytes, i, j, both);
             CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) == HS_OK);
             CHECK(hs_pairs_length(pairs) == all.n);
-            unsigned char *i = array_of(all.n, 8), *j = array_of(all.n, 8);
-            unsigned char *both = array_of(all.n, 16);
-            double        *distance = array_of(all.n, 8), *vector = array_of(all.n, 24);
-            int32_t       *shift = array_of(all.n, 12);
-            arrays.i = want & HS_WANT_I ? i : NULL;
-            arrays.j = want & HS_WANT_J ? j : NULL;
-            arrays.both = (want & 3) == 3 ? both : NULL;
-            arrays.distance = want & HS_WANT_DISTANCE ? distance : NULL;
-            arrays.vector = want & HS_WANT_VECTOR ? vector : NULL;
-            arrays.shift = want & HS_WANT_SHIFT ? shift : NULL;
-            CHECK(hs_pairs_write(pairs, &arrays) == HS_OK);
-            hs_pairs_free(pairs);
-            bool same = true;
-            for (int64_t e = 0; e < all.n; e++) {
-                const int64_t wide[2] = {all.i[e], all.j[e]};
-                const int32_t narrow[2] = {(int32_t)wide[0], (int32_t)wide[1]};
-                const char   *right = bytes == 4 ? (const char *)narrow : (const char *)wide;
-                const size_t  size = (size_t)bytes, at = (size_t)e * size;
-                same = same && (arrays.i == NULL || memcmp(i + at, right, size) == 0);
-                same = same && (arrays.j == NULL || memcmp(j + at, right + size, size) == 0);
-                same = same && (arrays.both == NULL || memcmp(both + 2 * at, right, 2 * size) == 0);
-            }
-            CHECK(same);
-            CHECK(!arrays.distance || memcmp(distance, all.distance, n * 8) == 0);
-            CHECK(!arrays.vector || memcmp(vector, all.vector, n * 24) == 0);
-            CHECK(!arrays.shift || memcmp(shift, all.shift, n * 12) == 0);
-            free(i);
-            free(j);
-            free(both);
-            free(distance);
-            free(vector);
-            free(shift);
+            check_array(pairs, &options, HS_WANT_I, i, n * size);
+            check_array(pairs, &options, HS_WANT_BOTH, both, n * 2 * size);
+            check_array(pairs, &options, HS_WANT_DISTANCE, all.distance, n * 8);
+            check_array(pairs, &options, HS_WANT_VECTOR, all.vector, n * 24);
+            check_array(pairs, &options, HS_WANT_SHIFT, all.shift, n * 12);
+            check_array(pairs, &options, HS_WANT_J, j, n * size); /* frees the result */
         }
+        free(i);
+        free(j);
+        free(both);
         found_free(&all);
     }
+}
+
+/* No pairs, yet arrays that can be taken. */
+static void
+empty_results_have_arrays(void)
+{
+    const double    x[2] = {0.0, 5.0};
+    const hs_points points = {.data = x, .n = 2, .ndim = 1, .real = HS_FLOAT64, .row_stride = 8};
+    for (int trial = 0; trial < 4; trial++) {
+        hs_options options = hs_options_default();
+        hs_pairs  *pairs;
+        hs_points  some = points;
+        some.n = trial & 2 ? 0 : 2;
+        options.cutoff = 1.0;
+        options.sorted = trial & 1;
+        options.want = WANT_ALL | HS_WANT_BOTH;
+        CHECK(hs_pairs_find(&some, NULL, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_length(pairs) == 0);
+        for (unsigned bit = 1; bit < 64; bit <<= 1) {
+            void *taken = hs_pairs_take(pairs, bit);
+            CHECK(taken != NULL);
+            hs_array_free(taken);
+        }
+        hs_pairs_free(pairs);
+    }
+    hs_array_free(NULL);
+    hs_pairs_free(NULL);
 }
 
 /* One crowded point has more pairs than are sorted by insertion. */
@@ -201,17 +245,10 @@ polled_search(const brute_scene *scene, bool sorted, poll_state *state, hs_count
     options.poll = poll;
     options.poll_context = state;
     options.counters = counters;
-    hs_status status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
+    const hs_status status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
     CHECK((status == HS_OK) == (pairs != NULL));
     CHECK(counters->polls == state->calls);
-    if (status == HS_OK) {
-        const int64_t  n = hs_pairs_length(pairs);
-        int64_t       *i = array_of(n, 8);
-        hs_pair_arrays arrays = {.index_bytes = 8, .i = i};
-        CHECK(counters->pairs == n);
-        status = hs_pairs_write(pairs, &arrays);
-        free(i);
-    }
+    CHECK(status != HS_OK || counters->pairs == hs_pairs_length(pairs));
     hs_pairs_free(pairs);
     return status;
 }
@@ -244,11 +281,11 @@ poll_stops_the_search_whenever_it_says_so(void)
         x[e] = random_unit(&random);
     brute_scene many = {.ndim = 1, .n = n, .x = x, .box = &box, .cutoff = 1e-8};
     stop_at_every_poll(&many, false, 2); /* many points to read, wrap and sort */
-    brute_scene wide = {.ndim = 8, .n = 3600, .x = x, .cutoff = 0.3};
+    brute_scene wide = {.ndim = 8, .n = 6000, .x = x, .cutoff = 0.3};
     stop_at_every_poll(&wide, true, 2); /* many candidates */
     brute_scene dense = {.ndim = 1, .n = 1500, .x = x, .cutoff = 0.6};
     stop_at_every_poll(&dense, true, 3); /* many pairs to sort and write */
-    stop_at_every_poll(&dense, false, 1);
+    stop_at_every_poll(&dense, false, 0);
     free(x);
 }
 
@@ -323,6 +360,7 @@ test_results(void)
     RUN(any_strides_and_alignment_read_the_same_points);
     RUN(zero_strides_repeat_a_number);
     RUN(each_want_returns_the_same_numbers);
+    RUN(empty_results_have_arrays);
     RUN(sorted_pairs_ascend_strictly);
     RUN(poll_stops_the_search_whenever_it_says_so);
     RUN(memory_limit_refuses_or_is_kept);

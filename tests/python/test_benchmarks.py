@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The benchmarks measure what they say: scenes, comparison of answers, ratios, files.
+# ruff: noqa: F811 - `bench` is a fixture
+"""The benchmarks measure what they say: comparison of answers, turns, ratios, files.
 
 Nothing here is timed against a clock, and no other library is needed.
 """
@@ -7,11 +8,7 @@ Nothing here is timed against a clock, and no other library is needed.
 from __future__ import annotations
 
 import csv
-import importlib
-import itertools
-import math
-import sys
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,139 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-MODULES = (
-    "scenes", "agreement", "contestant", "peers", "measure", "machine", "report", "run",
-    "stages", "footprint",
-)  # fmt: skip
+from benchmark_modules import bench, measurement, only_in_a_checkout  # noqa: F401
 
-pytestmark = pytest.mark.skipif(not BENCHMARKS.exists(), reason="only in a checkout")
-
-# The first digits of SHA-256 over points, cutoff, box and periodic axes.
-DIGESTS = {
-    "call-2": "e1ae84fa1e9e83ac",
-    "clusters-1e5": "b0ada625a20bf5e8",
-    "count-1e5-k419": "89b7f67896d21537",
-    "count-1e5-k52": "3e7ebaaea2290d9a",
-    "diamond-shell": "91069461a3b41292",
-    "fcc-shell": "bdcfc5de21d8b36c",
-    "fcc-tie": "a56b60b0982ccd33",
-    "images-64": "286f0c9fc8dafefb",
-    "molecule-30": "ecf10619ec12ac10",
-    "open-1e4": "9eb8f351d6b964f9",
-    "pairs-1e4-k52": "591c588ebe613318",
-    "pairs-1e5-k419": "89b7f67896d21537",
-    "pairs-1e5-k419-int32": "89b7f67896d21537",
-    "pairs-1e5-k52": "3e7ebaaea2290d9a",
-    "pairs-1e5-k52-int32": "3e7ebaaea2290d9a",
-    "plane-1e5-k20": "acfd44725c8b2005",
-    "silicon-8": "5be367769c9fca4a",
-    "triclinic-1e4-k52": "22250674d028a6ef",
-    "vectors-1e5-k52": "3e7ebaaea2290d9a",
-}
-LARGEST = {"growth-1e7", "growth-1e7-sorted"}
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[SimpleNamespace]:
-    """The modules of benchmarks/, which is a folder of scripts and no package."""
-    sys.path.insert(0, str(BENCHMARKS))
-    try:
-        yield SimpleNamespace(**{name: importlib.import_module(name) for name in MODULES})
-    finally:
-        sys.path.remove(str(BENCHMARKS))
-        for name in MODULES:
-            sys.modules.pop(name, None)
-
-
-def count_by_brute_force(scene: Any) -> int:
-    """Pairs of a small scene in float64, every image within reach."""
-    rows = scene.rows
-    shifts = np.zeros((1, scene.dim))
-    if rows is not None:
-        reach = math.ceil(scene.cutoff / np.diag(rows).min()) + 1
-        shifts = np.array(list(itertools.product(range(-reach, reach + 1), repeat=scene.dim)))
-    found = 0
-    for shift in shifts:
-        moved = scene.points if rows is None else scene.points + shift @ rows
-        square = np.sum((moved[None, :] - scene.points[:, None]) ** 2, axis=-1)
-        found += int(np.sum(square <= scene.cutoff**2))
-    return (found - scene.n) // 2
-
-
-def measurement(bench: SimpleNamespace, contestant: str, seconds: float, **other: Any) -> Any:
-    """A row with made-up figures."""
-    values: dict[str, Any] = {
-        "scene": "pairs-1e4-k52", "contestant": contestant, "version": "1.0", "task": "pairs",
-        "n": 1000, "dim": 3, "cutoff": 5.0, "quantities": "ij", "index_dtype": "int64",
-        "pairs": 20_000, "repeats": 7, "calls": 1, "fresh_median": seconds,
-        "fresh_min": seconds, "recycled_median": seconds / 2.0, "recycled_min": seconds / 2.0,
-        "all_held": True, "complete": True, "agreement": "same",
-    }  # fmt: skip
-    return bench.report.Measurement(**{**values, **other})
-
-
-def test_scenes_are_the_same_bits_everywhere(bench: SimpleNamespace) -> None:
-    names = set(bench.scenes.SCENES) - LARGEST
-    assert {name: bench.scenes.load(name).digest()[:16] for name in sorted(names)} == DIGESTS
-
-
-def test_scenes_keep_their_promises(bench: SimpleNamespace) -> None:
-    for name in set(bench.scenes.SCENES) - LARGEST:
-        scene = bench.scenes.load(name)
-        assert scene.name == name
-        assert scene.points.dtype == np.float64
-        assert scene.points.flags.c_contiguous
-        assert len(scene.periodic) == (0 if scene.box is None else scene.dim)
-        assert set(scene.peers) <= set(bench.peers.PEERS)
-        assert {limit.other for limit in scene.limits} <= {*bench.scenes.SCENES, ""}
-        if scene.rows is not None:
-            fractions = scene.points @ np.linalg.inv(scene.rows)
-            assert fractions.min() >= 0.0
-            assert fractions.max() < 1.0
-    assert set(bench.scenes.QUICK) <= set(bench.scenes.SCENES)
-    with pytest.raises(KeyError, match="no scene 'nothing'"):
-        bench.scenes.load("nothing")
-
-
-def test_pair_numbers_of_small_scenes_are_those_of_brute_force(bench: SimpleNamespace) -> None:
-    for name in ("call-2", "molecule-30", "images-64", "silicon-8"):
-        scene = bench.scenes.load(name)
-        assert count_by_brute_force(scene) == scene.n_pairs, name
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["pairs-1e5-k52", "pairs-1e5-k419", "pairs-1e4-k52", "triclinic-1e4-k52", "plane-1e5-k20"],
-)
-def test_pair_numbers_of_uniform_scenes_follow_from_density(
-    bench: SimpleNamespace, name: str
-) -> None:
-    scene = bench.scenes.load(name)
-    ball = {2: math.pi * scene.cutoff**2, 3: 4.0 / 3.0 * math.pi * scene.cutoff**3}[scene.dim]
-    expected = scene.n * (scene.n - 1) / 2.0 * ball / abs(np.linalg.det(scene.rows))
-    assert abs(scene.n_pairs - expected) < 5.0 * math.sqrt(expected)
-
-
-@pytest.mark.parametrize(
-    ("name", "quarters", "bases"),
-    [("fcc-tie", 8, 4), ("fcc-shell", 8, 4), ("diamond-shell", 8, 8)],
-)
-def test_pair_numbers_of_crystals_lie_between_strict_and_inclusive(
-    bench: SimpleNamespace, name: str, quarters: int, bases: int
-) -> None:
-    scene = bench.scenes.load(name)
-    sites = np.rint(scene.points * (4.0 / scene.cutoff * quarters / 4.0)).astype(np.int64)
-    length = round(float(scene.box[0]) * quarters / scene.cutoff)
-    near = []
-    for site in sites[:bases]:
-        step = (sites - site + length // 2) % length - length // 2
-        near.append(np.sum(step * step, axis=1))
-    strict = scene.n * (np.sum(np.array(near) < quarters**2) - bases) // bases // 2
-    inclusive = scene.n * (np.sum(np.array(near) <= quarters**2) - bases) // bases // 2
-    assert strict < scene.n_pairs <= inclusive
-    if name == "fcc-tie":
-        assert scene.n_pairs == inclusive
+pytestmark = only_in_a_checkout
 
 
 def test_keys_do_not_depend_on_the_form_of_a_list(bench: SimpleNamespace) -> None:
@@ -263,6 +130,7 @@ def test_limits_compare_as_a_whole_by_pair_or_by_point(bench: SimpleNamespace) -
             measurement(bench, "halfshell", 0.004),
             measurement(bench, "halfshell [precision=single]", 0.002),
             measurement(bench, "halfshell [other]", 0.002, pairs=40_000, n=500),
+            measurement(bench, "halfshell [rewriting the output]", 0.1, recycled_median=0.0005),
         ],
         {
             "pairs-1e4-k52": (
@@ -271,14 +139,15 @@ def test_limits_compare_as_a_whole_by_pair_or_by_point(bench: SimpleNamespace) -
                 limit("growth", 1.5, other="other"),
                 limit("seconds", 0.001),
                 limit("floor", 3.0),
+                limit("rewrite", None),
             )
         },
     )
     assert [(label, state) for _, label, _, _, state in rows] == [
         ("precision=single", "reached"), ("other", "over"), ("other", "reached"),
-        ("one call", "over"),
+        ("one call", "over"), ("rewriting the output", ""),
     ]  # fmt: skip
-    assert [value for _, _, value, _, _ in rows] == pytest.approx([2.0, 4.0, 1.0, 0.004])
+    assert [value for _, _, value, _, _ in rows] == pytest.approx([2.0, 4.0, 1.0, 0.004, 4.0])
 
 
 def test_tables_print_without_the_rich_package(
@@ -297,7 +166,7 @@ def test_result_files_name_machine_kernel_commit_and_versions(
 ) -> None:
     path = tmp_path / "cpu" / "today.csv"
     rows = [measurement(bench, "halfshell", 0.004), measurement(bench, "fast", 0.05)]
-    facts = bench.machine.facts("lab", "avx2")
+    facts = bench.machine.facts("lab", "avx2", "gcc 1")
     bench.report.write_csv(path, facts, rows, {"pairs-1e4-k52": 30.0})
     bench.report.write_csv(path, facts, rows[:1], {"pairs-1e4-k52": 30.0})
     with path.open(newline="") as file:
@@ -306,6 +175,7 @@ def test_result_files_name_machine_kernel_commit_and_versions(
     assert {"date", "machine", "cpu", "kernel", "commit", "numpy", "version"} <= set(read[0])
     assert len(read) == 3
     assert (read[1]["machine"], read[1]["kernel"]) == ("lab", "avx2")
+    assert (read[0]["compiler"], read[0]["call_median"], read[0]["systems"]) == ("gcc 1", "", "1")
     assert (read[1]["ratio_fresh"], read[1]["ns_per_pair"], read[1]["want"]) == (
         "12.5", "2500", "30.0",
     )  # fmt: skip
@@ -334,3 +204,152 @@ def test_stage_shares_are_of_the_pairs(bench: SimpleNamespace) -> None:
 def test_memory_allowance_depends_on_the_box(bench: SimpleNamespace) -> None:
     assert bench.footprint.allowance(bench.scenes.load("open-1e4")) == 8_480_000
     assert bench.footprint.allowance(bench.scenes.load("triclinic-1e4-k52")) == 8_720_000
+
+
+def test_result_files_of_other_columns_are_left_alone(
+    bench: SimpleNamespace, tmp_path: Path
+) -> None:
+    path = tmp_path / "old.csv"
+    path.write_text("scene,time\n")
+    with pytest.raises(ValueError, match="other columns"):
+        bench.report.write_csv(path, {}, [measurement(bench, "halfshell", 0.1)], {})
+    assert path.read_text() == "scene,time\n"
+
+
+def test_a_scene_is_measured_with_its_limits_and_single_calls(
+    bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench.measure, "touch_memory", lambda n_bytes: None)
+    scene = replace(
+        bench.scenes.load("single-30"),
+        limits=(
+            bench.scenes.Limit("floor", 3.0),
+            bench.scenes.Limit("rewrite", None),
+            bench.scenes.Limit("variant", 1.1, {"precision": "single"}),
+        ),
+    )
+    patience = bench.runner.Patience(repeats=2, seconds=0.05, quick=True)
+    rows, correct = bench.runner.measure_scene(scene, bench.contestant.Halfshell(), [], patience)
+    assert correct
+    assert [row.contestant for row in rows] == [
+        "halfshell", "halfshell [writing the output]", "halfshell [rewriting the output]",
+        "halfshell [precision=single]",
+    ]  # fmt: skip
+    assert all(row.scene == "single-30" and row.pairs == scene.n_pairs for row in rows)
+    assert rows[0].call_p99 >= rows[0].call_median > 0.0
+    assert rows[1].call_median is None
+    wrong = replace(scene, n_pairs=scene.n_pairs + 1)
+    assert not bench.runner.measure_scene(wrong, bench.contestant.Halfshell(), [], patience)[1]
+    patience = bench.runner.Patience(largest=10)
+    rows, correct = bench.runner.measure_scene(scene, bench.contestant.Halfshell(), [], patience)
+    assert (rows, correct) == ([], True)
+
+
+def test_single_calls_give_median_and_percentile(bench: SimpleNamespace) -> None:
+    made: list[int] = []
+    single = bench.measure.single_calls({"a": lambda: made.append(1), "b": list}, samples=50)
+    assert len(made) == 50
+    assert all(high >= middle > 0.0 for middle, high in single.values())
+    bench.measure.single_calls({"a": lambda: made.append(1)}, samples=50, patience=0.0)
+    assert len(made) == 51
+
+
+def test_memory_of_dropped_results_is_not_used_again(bench: SimpleNamespace) -> None:
+    called: list[bool] = []
+    turns = {"a": bench.measure.Turn(lambda: np.zeros(1000), repeats=5)}
+    bench.measure.take_turns(turns, True, 20_000, dropped=lambda: called.append(True))
+    assert len(called) == 3
+    bench.measure.take_turns(turns, True, 1 << 20, dropped=lambda: called.append(True))
+    assert len(called) == 3
+
+
+class Strict:
+    """A library without batches: pairs of an open system, from brute force, full lists."""
+
+    def __new__(cls, bench: SimpleNamespace) -> Any:
+        class Library(bench.contestant.Contestant):
+            name = distribution = module = "numpy"
+            full = True
+            quantities = "ijS"
+
+            def prepare(self, scene: Any) -> Any:
+                def search() -> Any:
+                    steps = scene.points[None] - scene.points[:, None]
+                    near = np.sum(steps**2, axis=-1) < scene.cutoff**2
+                    np.fill_diagonal(near, False)
+                    return np.nonzero(near)
+
+                return search
+
+        return Library()
+
+
+def test_a_library_without_batches_is_called_for_each_system(bench: SimpleNamespace) -> None:
+    whole = bench.scenes.load("batch-30")
+    scene = replace(whole, points=whole.points[:90], batch=whole.batch[:90], n_pairs=None)
+    looped = Strict(bench).for_batch()
+    assert looped.refuses(scene) is None
+    result = looped.prepare(scene)()
+    keys = looped.keys(scene, result)
+    i, j = np.divmod(keys, scene.n)
+    assert len(result) == 3
+    assert len(keys) == looped.count(scene, result)
+    assert np.array_equal(i // 30, j // 30)
+    assert set(i // 30) == {0, 1, 2}
+    square = np.sum((scene.points[i] - scene.points[j]) ** 2, axis=-1)
+    assert square.max() < scene.cutoff**2
+    assert bench.agreement.compare(scene, keys, keys[1:], False, 1e-12, False).missed == 1
+    periodic = bench.scenes.load("batch-1e4-periodic")
+    assert (
+        bench.peers.PEERS["cKDTree"].for_batch().refuses(periodic) == "several images of one pair"
+    )
+    assert bench.peers.PEERS["neighborlist-rs"].for_batch().name == "neighborlist-rs"
+
+
+def test_pairs_of_a_batch_are_judged_in_the_box_of_their_system(bench: SimpleNamespace) -> None:
+    scene = bench.scenes.Scene(
+        "two", "", np.array([[0.0, 0, 0], [4, 0, 0], [0, 0, 0], [4, 0, 0]]), 1.0,
+        np.array([np.eye(3) * 5.0, np.eye(3) * 9.0]), (True,) * 3,
+        batch=np.array([0, 0, 1, 1]),
+    )  # fmt: skip
+    assert bench.agreement.is_pair(scene, 0, 1, (-1, 0, 0), True) == (True, 0.0)
+    assert not bench.agreement.is_pair(scene, 2, 3, (-1, 0, 0), True)[0]
+    assert not bench.agreement.is_pair(scene, 2, 3, None, True)[0]
+
+
+def test_what_the_installed_version_lacks_is_refused(
+    bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours = bench.contestant.Halfshell()
+    monkeypatch.setattr(bench.contestant, "_accepts", lambda *arguments: False)
+    assert ours.refuses(bench.scenes.load("batch-30")) == "no batches in this version"
+    assert ours.refuses(bench.scenes.load("threads-pairs-1e5-k52")) == "no threads in this version"
+    assert ours.refuses(bench.scenes.load("single-10")) is None
+    assert "threads" not in ours.prepare(bench.scenes.load("single-10")).keywords
+    monkeypatch.setattr(bench.contestant, "_accepts", lambda *arguments: True)
+    assert ours.refuses(bench.scenes.load("batch-30")) is None
+    assert ours.prepare(bench.scenes.load("threads-pairs-1e5-k52")).keywords["threads"] == 2
+    one = bench.contestant.Halfshell({"threads": 1})
+    assert one.prepare(bench.scenes.load("threads-pairs-1e5-k52")).keywords["threads"] == 1
+
+
+def test_groups_choose_scenes(bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
+    parse = bench.run._parse
+    assert parse([]).scenes == bench.scenes.GROUPS["main"]
+    assert parse(["--quick"]).scenes == list(bench.scenes.QUICK)
+    assert parse(["--group", "S7", "--scenes", "plane-1e5-k8", "call-2"]).scenes == [
+        "plane-1e5-k8", "plane-1e5-k30", "call-2",
+    ]  # fmt: skip
+    assert set(parse(["--group", "all"]).scenes) == set(bench.scenes.SCENES)
+    assert bench.run.main(["--list"]) == 0
+    assert "S13: input order" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        parse(["--group", "S99"])
+
+
+def test_memory_cases_name_a_scene_and_quantities(bench: SimpleNamespace) -> None:
+    parse = bench.footprint.parse_case
+    assert parse("open-1e4") == ("open-1e4", "")
+    assert parse("growth-1e5:ijdDS") == ("growth-1e5", "ijdDS")
+    with pytest.raises(Exception, match="no scene 'nothing'"):
+        parse("nothing:ij")

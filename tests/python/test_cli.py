@@ -677,7 +677,7 @@ def test_info_names_version_kernels_and_build(command):
         assert word in out
     told = json.loads(command("info", "--json")[1])
     assert told["kernels"] == list(hs.kernels())
-    assert told["kernel used"] == hs.kernels()[0]
+    assert told["kernel used"] == (os.environ.get("HALFSHELL_KERNEL") or hs.kernels()[0])
 
 
 def test_selftest_passes_its_status_on(monkeypatch, command):
@@ -741,8 +741,13 @@ def test_ctrl_c_is_one_line_and_status_130(tmp_path):
         run, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         with open(pipe, "wb"):  # returns once the command waits for our bytes
-            process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=60)
+            for attempt in range(12):  # an interpreter may swallow one, in a clean-up of its own
+                process.send_signal(signal.SIGINT)
+                try:
+                    out, err = process.communicate(timeout=5)
+                    break
+                except subprocess.TimeoutExpired:
+                    assert attempt < 11
     assert process.returncode == 130
     assert (out, err) == ("", "halfshell: interrupted\n")
 

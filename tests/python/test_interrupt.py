@@ -46,6 +46,7 @@ try:
 except KeyboardInterrupt:
     outcome = "interrupted"
 delay = time.perf_counter() - (sent or [0.0])[0]
+hs.clear_cache()
 gc.collect()
 print(json.dumps([outcome, delay, resident() - before, hs.count_pairs(small, 0.2) == expected]))
 """

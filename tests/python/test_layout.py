@@ -13,7 +13,7 @@ FILES = sorted(CSRC.rglob("*.[ch]"))
 ALLOWED = {
     "binding": r"binding/|halfshell\.h$",
     "core": r"core/|kernels/kernel\.h$|halfshell\.h$",
-    "kernels": r"kernels/|core/(base|filter)\.h$|halfshell\.h$",
+    "kernels": r"kernels/|core/(base|filter|exact|exact_float|doubleword)\.h$|halfshell\.h$",
     "": r"$^",
 }
 

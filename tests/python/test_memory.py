@@ -104,6 +104,7 @@ before = resident()
 for _ in range(20):
     once()
 gc.collect()
+hs.clear_cache()
 print(json.dumps([resident() - before, size]))
 """
     )

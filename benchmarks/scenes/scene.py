@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a scene is: an input, the question asked about it, and what the answer should cost."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["COUNT_PEERS", "FAST_PEERS", "LIST_PEERS", "Floats", "Limit", "Scene"]
+
+Floats = NDArray[np.float64]
+
+LIST_PEERS = (
+    "vesin",
+    "cKDTree",
+    "neighborlist-rs",
+    "matscipy-neighbours",
+    "MDAnalysis",
+    "pymatgen",
+    "freud",
+    "ase",
+)
+# Enough for families of many scenes: one of these was the fastest wherever all were measured.
+FAST_PEERS = ("vesin", "cKDTree", "neighborlist-rs", "pymatgen")
+COUNT_PEERS = ("Corrfunc", "cKDTree", "vesin", "neighborlist-rs")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Something of our own that a scene is held against.
+
+    kind
+        ``"variant"``: the same call with other `options`. ``"scene"``: our call on `other`,
+        each per pair. ``"growth"``: our call on `other`, each per point. ``"floor"``: writing
+        as many bytes once into new memory. ``"rewrite"``: writing them into memory in use,
+        compared with recycled results. ``"seconds"``: the time of one call itself.
+    at_most
+        Largest ratio of our time to the other's (``"seconds"``: largest time). None: the
+        ratio is reported and nothing is wanted of it.
+    """
+
+    kind: Literal["variant", "scene", "growth", "floor", "rewrite", "seconds"]
+    at_most: float | None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    other: str = ""
+
+    @property
+    def label(self) -> str:
+        """A name for tables, which also tells limits of one scene apart."""
+        if self.kind == "variant":
+            return ",".join(f"{key}={value}" for key, value in self.options.items())
+        fixed = {"floor": "writing the output", "rewrite": "rewriting the output",
+                 "seconds": "one call"}  # fmt: skip
+        return fixed.get(self.kind, self.other)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One input, what is asked about it, and what the answer should cost.
+
+    With `batch` the points are those of several systems, one after the other, and pairs are
+    sought within each; the box is then of shape (systems, d, d), or None.
+    """
+
+    name: str
+    stresses: str
+    points: Floats  # (n, d)
+    cutoff: float
+    box: Floats | None = None  # lengths (d,), row vectors (d, d), or None: open space
+    periodic: tuple[bool, ...] = ()
+    task: Literal["pairs", "count"] = "pairs"
+    quantities: str = "ij"
+    index_dtype: str = "int64"
+    n_pairs: int | None = None  # the exact answer, a pair at the cutoff included
+    about_pairs: float = 0.0  # an estimate, where the answer is not known
+    want: float | None = None  # time of the fastest peer over ours
+    limits: tuple[Limit, ...] = ()
+    peers: tuple[str, ...] = LIST_PEERS
+    batch: NDArray[np.int64] | None = None  # (n,) ascending numbers of systems
+    threads: int = 1
+    latency: bool = False  # whether single calls are timed one by one as well
+
+    @property
+    def n(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def dim(self) -> int:
+        """Number of coordinates of a point."""
+        return int(self.points.shape[1])
+
+    @property
+    def rows(self) -> Floats | None:
+        """The box as row vectors, shape (d, d), or (systems, d, d) with `batch`."""
+        if self.box is None or self.box.ndim > 1:
+            return self.box
+        return np.diag(self.box)
+
+    def rows_at(self, point: int) -> Floats | None:
+        """Return the box of the system that a point belongs to, as row vectors."""
+        if self.rows is None or self.batch is None:
+            return self.rows
+        rows: Floats = self.rows[self.batch[point]]
+        return rows
+
+    @property
+    def orthorhombic(self) -> bool:
+        """Whether the box is absent or along the coordinate axes."""
+        if self.rows is None:
+            return True
+        return not np.any(self.rows[..., ~np.eye(self.dim, dtype=np.bool_)])
+
+    @property
+    def has_images(self) -> bool:
+        """Whether a pair of points may be within the cutoff in more than one image."""
+        if self.rows is None:
+            return False
+        heights = 1.0 / np.linalg.norm(np.linalg.inv(self.rows), axis=-2)
+        return bool(np.any(heights[..., list(self.periodic)] <= 2.0 * self.cutoff))
+
+    def systems(self) -> list[Scene]:
+        """Return a scene for each system of a batch, or this scene alone."""
+        if self.batch is None:
+            return [self]
+        ends = np.searchsorted(self.batch, np.arange(int(self.batch[-1]) + 2))
+        return [
+            replace(
+                self, points=self.points[ends[k] : ends[k + 1]], batch=None, n_pairs=None,
+                box=None if self.box is None else self.box[k],
+            )
+            for k in range(len(ends) - 1)
+        ]  # fmt: skip
+
+    def digest(self) -> str:
+        """SHA-256 of everything that decides the answer, as hexadecimal digits."""
+        state = hashlib.sha256()
+        for array in (self.points, np.float64(self.cutoff), self.rows, np.array(self.periodic)):
+            state.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
+        if self.batch is not None:
+            state.update(self.batch.tobytes())
+        return state.hexdigest()
+
+    def bytes_of_output(self) -> int:
+        """Bytes of our result, from an estimate when the number of pairs is not known."""
+        if self.task == "count":
+            return 0
+        width = np.dtype(self.index_dtype).itemsize
+        size = {"i": width, "j": width, "P": 2 * width, "d": 8, "D": 8 * self.dim}
+        pairs = round(self.about_pairs) if self.n_pairs is None else self.n_pairs
+        return pairs * sum(size.get(letter, 4 * self.dim) for letter in self.quantities)

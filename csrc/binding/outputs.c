@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* outputs.c: see outputs.h. */
+#include "outputs.h"
+
+#include <string.h>
+
+/* Bytes from which an array keeps the memory that the search wrote it to; smaller ones are copied,
+ * so that what they were written to can be used again at once. */
+#define OWN_BYTES ((size_t)256 << 10)
+
+/* What the array of a letter looks like. */
+typedef struct array_form {
+    unsigned which; /* HS_WANT_ bit */
+    int      type;  /* of NumPy */
+    npy_intp width; /* entries a row, or 0 for one number a pair */
+    size_t   bytes; /* of a row */
+} array_form;
+
+static array_form
+form_of(char letter, int ndim, int index_bytes)
+{
+    const int index_type = index_bytes == 8 ? NPY_INT64 : NPY_INT32;
+    const size_t index = (size_t)index_bytes, d = (size_t)ndim;
+    switch (letter) {
+    case 'i': return (array_form){HS_WANT_I, index_type, 0, index};
+    case 'j': return (array_form){HS_WANT_J, index_type, 0, index};
+    case 'd': return (array_form){HS_WANT_DISTANCE, NPY_DOUBLE, 0, sizeof(double)};
+    case 'D': return (array_form){HS_WANT_VECTOR, NPY_DOUBLE, ndim, d * sizeof(double)};
+    case 'S': return (array_form){HS_WANT_SHIFT, NPY_INT32, ndim, d * sizeof(int32_t)};
+    default: return (array_form){HS_WANT_BOTH, index_type, 2, 2 * index};
+    }
+}
+
+static void
+free_array(PyObject *capsule)
+{
+    hs_array_free(PyCapsule_GetPointer(capsule, NULL));
+}
+
+/* An array over memory of the core; takes ownership of it, also on failure. */
+static PyObject *
+array_over(void *data, int n_dimensions, npy_intp *shape, int type)
+{
+    PyObject *capsule = PyCapsule_New(data, NULL, free_array);
+    if (capsule == NULL) {
+        hs_array_free(data);
+        return NULL;
+    }
+    PyObject *array = PyArray_SimpleNewFromData(n_dimensions, shape, type, data);
+    if (array == NULL) {
+        Py_DECREF(capsule);
+    } else if (PyArray_SetBaseObject((PyArrayObject *)array, capsule) < 0) {
+        Py_CLEAR(array); /* the capsule was given up either way */
+    }
+    return array;
+}
+
+static PyObject *
+new_array(hs_pairs *pairs, array_form form)
+{
+    npy_intp     shape[2] = {(npy_intp)hs_pairs_length(pairs), form.width};
+    const int    n_dimensions = form.width > 0 ? 2 : 1;
+    const size_t bytes = form.bytes * (size_t)shape[0];
+    if (bytes >= OWN_BYTES) {
+        return array_over(hs_pairs_take(pairs, form.which), n_dimensions, shape, form.type);
+    }
+    PyObject *array = PyArray_SimpleNew(n_dimensions, shape, form.type);
+    if (array != NULL && bytes > 0) {
+        memcpy(PyArray_DATA((PyArrayObject *)array), hs_pairs_array(pairs, form.which), bytes);
+    }
+    return array;
+}
+
+PyObject *
+hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    if (n == 1) {
+        return new_array(pairs, form_of(letters[0], ndim, index_bytes));
+    }
+    PyObject *result = PyTuple_New(n);
+    for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
+        PyObject *array = new_array(pairs, form_of(letters[k], ndim, index_bytes));
+        if (array == NULL) {
+            Py_CLEAR(result);
+        } else {
+            PyTuple_SET_ITEM(result, k, array);
+        }
+    }
+    return result;
+}
+
+/* Checks one array of `out`; returns how many pairs it holds, or -1 with an exception set. */
+static npy_intp
+check_array(PyObject *object, char letter, array_form form)
+{
+    if (!PyArray_Check(object)) {
+        PyErr_Format(PyExc_TypeError, "out must hold arrays, got %s for '%c'",
+                     Py_TYPE(object)->tp_name, letter);
+        return -1;
+    }
+    PyArrayObject *array = (PyArrayObject *)object;
+    if (PyArray_TYPE(array) != form.type || PyArray_ISBYTESWAPPED(array)) {
+        PyArray_Descr *wanted = PyArray_DescrFromType(form.type);
+        PyErr_Format(PyExc_TypeError, "out for '%c' must have dtype %S, got %S", letter,
+                     (PyObject *)wanted, (PyObject *)PyArray_DESCR(array));
+        Py_XDECREF(wanted);
+        return -1;
+    }
+    const int n_dimensions = form.width > 0 ? 2 : 1;
+    if (PyArray_NDIM(array) != n_dimensions ||
+        (form.width > 0 && PyArray_DIM(array, 1) != form.width)) {
+        if (form.width > 0) {
+            PyErr_Format(PyExc_ValueError, "out for '%c' must have shape (m, %zd)", letter,
+                         (Py_ssize_t)form.width);
+        } else {
+            PyErr_Format(PyExc_ValueError, "out for '%c' must have shape (m,)", letter);
+        }
+        return -1;
+    }
+    if (!PyArray_ISCARRAY(array)) {
+        PyErr_Format(PyExc_ValueError, "out for '%c' must be C-contiguous, aligned and writable",
+                     letter);
+        return -1;
+    }
+    return PyArray_DIM(array, 0);
+}
+
+/* The array of letter k; borrowed. NULL with an exception set. */
+static PyObject *
+item_of(PyObject *out, Py_ssize_t k, Py_ssize_t n)
+{
+    if (n == 1 && !PyTuple_Check(out)) {
+        return out;
+    }
+    if (!PyTuple_Check(out) || PyTuple_GET_SIZE(out) != n) {
+        PyErr_Format(PyExc_TypeError,
+                     "out must be a tuple of arrays, one for each of the %zd quantities", n);
+        return NULL;
+    }
+    return PyTuple_GET_ITEM(out, k);
+}
+
+/* Two arrays of `out` must not share memory: each would overwrite the other. */
+static bool
+are_apart(PyObject *a, PyObject *b)
+{
+    const char *first = PyArray_BYTES((PyArrayObject *)a);
+    const char *second = PyArray_BYTES((PyArrayObject *)b);
+    const bool  apart = first + PyArray_NBYTES((PyArrayObject *)a) <= second ||
+                       second + PyArray_NBYTES((PyArrayObject *)b) <= first;
+    if (!apart) {
+        PyErr_SetString(PyExc_ValueError, "the arrays of out must not overlap");
+    }
+    return apart;
+}
+
+bool
+hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair_arrays *arrays)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    *arrays = (hs_pair_arrays){.capacity = INT64_MAX, .index_bytes = index_bytes};
+    for (Py_ssize_t k = 0; k < n; k++) {
+        const array_form form = form_of(letters[k], ndim, index_bytes);
+        PyObject  *item = item_of(out, k, n);
+        const npy_intp capacity = item == NULL ? -1 : check_array(item, letters[k], form);
+        if (capacity < 0) {
+            return false;
+        }
+        for (Py_ssize_t l = 0; l < k; l++) {
+            if (!are_apart(item, item_of(out, l, n))) {
+                return false;
+            }
+        }
+        arrays->capacity = capacity < arrays->capacity ? capacity : arrays->capacity;
+        void *data = PyArray_DATA((PyArrayObject *)item);
+        switch (form.which) {
+        case HS_WANT_I: arrays->i = data; break;
+        case HS_WANT_J: arrays->j = data; break;
+        case HS_WANT_DISTANCE: arrays->distance = data; break;
+        case HS_WANT_VECTOR: arrays->vector = data; break;
+        case HS_WANT_SHIFT: arrays->shift = data; break;
+        default: arrays->both = data; break;
+        }
+    }
+    return true;
+}
+
+PyObject *
+hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    PyObject        *result = PyTuple_New(n);
+    for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
+        PyObject *view = PySequence_GetSlice(item_of(out, k, n), 0, (Py_ssize_t)n_pairs);
+        if (view == NULL) {
+            Py_CLEAR(result);
+        } else {
+            PyTuple_SET_ITEM(result, k, view);
+        }
+    }
+    if (result == NULL || n > 1) {
+        return result;
+    }
+    PyObject *only = PyTuple_GET_ITEM(result, 0);
+    Py_INCREF(only);
+    Py_DECREF(result);
+    return only;
+}

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* outputs.h: the arrays that pairs are returned in: new ones, or the caller's. */
+#ifndef HS_OUTPUTS_H
+#define HS_OUTPUTS_H
+
+#include "numpy_api.h"
+
+#include "../halfshell.h"
+
+/*
+ * The arrays of `out`, one for each letter, or for one letter the array itself, as the core takes
+ * them: C-contiguous, writable, of the type and width that the letter needs. They are borrowed.
+ * False with an exception set.
+ */
+bool hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes,
+               hs_pair_arrays *arrays);
+
+/* The filled parts of these arrays, in the same form; a new reference or NULL. */
+PyObject *hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs);
+
+/* New arrays in the order of the letters: a tuple, or for one letter the array itself. Takes
+ * what it can from the pairs; a new reference or NULL. */
+PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes);
+
+#endif

@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_batch.c: _core.batch_pairs and _core.batch_count: many systems in one call. */
+#include "py_functions.h"
+
+#include "call.h"
+#include "errors.h"
+#include "result.h"
+
+#define FIRST_CAPACITY 1024             /* systems; doubled as needed */
+#define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */
+
+/*
+ * The systems as the core takes them. Where all share box and cutoff, those without points are left
+ * out: numbers may be as far apart as users like. Otherwise each has its place.
+ */
+typedef struct batch {
+    hs_systems systems;
+    int64_t   *first;     /* owned */
+    int64_t   *number;    /* owned: of each system; NULL where that is its place */
+    int64_t    capacity;  /* of both */
+    int64_t    n_numbers; /* systems, those without points counted */
+} batch;
+
+static void
+free_batch(batch *given)
+{
+    PyMem_Free(given->first);
+    PyMem_Free(given->number);
+}
+
+/* Arrays for twice as many systems, or for the first. */
+static bool
+grow(batch *given)
+{
+    const int64_t capacity = given->capacity > 0 ? 2 * given->capacity : FIRST_CAPACITY;
+    int64_t *first = PyMem_Realloc(given->first, (size_t)(capacity + 1) * sizeof *first);
+    given->first = first != NULL ? first : given->first;
+    int64_t *number = PyMem_Realloc(given->number, (size_t)capacity * sizeof *number);
+    given->number = number != NULL ? number : given->number;
+    if (first == NULL || number == NULL) {
+        PyErr_NoMemory();
+        return false;
+    }
+    given->capacity = capacity;
+    return true;
+}
+
+static bool
+refuse_number(int64_t i, int64_t number, int64_t before, int64_t n_systems)
+{
+    if (number < 0) {
+        PyErr_Format(PyExc_ValueError, "batch must not be negative, got batch[%lld] = %lld",
+                     (long long)i, (long long)number);
+    } else if (number < before) {
+        PyErr_Format(PyExc_ValueError,
+                     "batch must be ascending, got batch[%lld] = %lld before batch[%lld] = %lld",
+                     (long long)(i - 1), (long long)before, (long long)i, (long long)number);
+    } else if (number >= n_systems && n_systems < MOST_NUMBER) {
+        PyErr_Format(PyExc_ValueError,
+                     "batch must be less than the number of systems that box or cutoff is given "
+                     "for, %lld, got batch[%lld] = %lld",
+                     (long long)n_systems, (long long)i, (long long)number);
+    } else {
+        PyErr_Format(PyExc_ValueError, "batch must be less than 2**62, got batch[%lld] = %lld",
+                     (long long)i, (long long)number);
+    }
+    return false;
+}
+
+/* Systems that have points. Each number is read once: somebody may write to them meanwhile. */
+static bool
+find_occupied(const int64_t *numbers, int64_t n_points, batch *given)
+{
+    int64_t n = 0, before = -1;
+    for (int64_t i = 0; i < n_points; i++) {
+        const int64_t number = numbers[i];
+        if (number == before && i > 0) {
+            continue;
+        }
+        if (number < before || number < 0 || number >= MOST_NUMBER) {
+            return refuse_number(i, number, before, MOST_NUMBER);
+        }
+        if (n == given->capacity && !grow(given)) {
+            return false;
+        }
+        given->first[n] = i;
+        given->number[n++] = before = number;
+    }
+    if (given->first == NULL && !grow(given)) {
+        return false;
+    }
+    given->first[n] = n_points;
+    given->systems.n = n;
+    given->n_numbers = before + 1;
+    return true;
+}
+
+/* All of n_systems, with or without points. */
+static bool
+find_all(const int64_t *numbers, int64_t n_points, int64_t n_systems, batch *given)
+{
+    int64_t before = -1;
+    given->first = PyMem_Malloc((size_t)(n_systems + 1) * sizeof *given->first);
+    if (given->first == NULL) {
+        PyErr_NoMemory();
+        return false;
+    }
+    for (int64_t i = 0; i < n_points; i++) {
+        const int64_t number = numbers[i];
+        if (number < before || number < 0 || number >= n_systems) {
+            return refuse_number(i, number, before, n_systems);
+        }
+        while (before < number) {
+            given->first[++before] = i;
+        }
+    }
+    while (before < n_systems) {
+        given->first[++before] = n_points;
+    }
+    given->systems.n = given->n_numbers = n_systems;
+    return true;
+}
+
+/* A C-contiguous float64 array with so many axes, or None: its length, else -1. */
+static int64_t
+length_of(PyObject *object, int n_axes, int64_t otherwise, const double **data)
+{
+    PyArrayObject *array = (PyArrayObject *)object;
+    *data = NULL;
+    if (object == Py_None) {
+        return otherwise;
+    }
+    if (!PyArray_Check(object) || PyArray_TYPE(array) != NPY_DOUBLE ||
+        !PyArray_ISCARRAY_RO(array) || PyArray_NDIM(array) != n_axes) {
+        PyErr_Format(PyExc_TypeError, "a float64 array with %d axes is expected", n_axes);
+        return -1;
+    }
+    *data = PyArray_DATA(array);
+    return PyArray_DIM(array, 0);
+}
+
+/* Three arguments: batch, int64 (n,); cutoffs, None or float64 (s,); boxes, None or float64
+ * (s, d, d), for which the call's box has the axes that repeat. */
+static bool
+take_batch(PyObject *const *arguments, const hs_call *call, batch *given)
+{
+    PyArrayObject *numbers = (PyArrayObject *)arguments[0];
+    hs_systems    *systems = &given->systems;
+    *given = (batch){.first = NULL};
+    if (!PyArray_Check(arguments[0]) || PyArray_TYPE(numbers) != NPY_INT64 ||
+        !PyArray_ISCARRAY_RO(numbers) || PyArray_SIZE(numbers) != call->points.n) {
+        PyErr_SetString(PyExc_TypeError, "batch must be an int64 array with a number a point");
+        return false;
+    }
+    const int64_t n_cutoffs = length_of(arguments[1], 1, MOST_NUMBER, &systems->cutoffs);
+    const int64_t n_boxes = length_of(arguments[2], 3, MOST_NUMBER, &systems->rows);
+    if (n_cutoffs < 0 || n_boxes < 0) {
+        return false;
+    }
+    systems->box = hs_call_box(call);
+    if (systems->rows != NULL) {
+        const npy_intp *shape = PyArray_DIMS((PyArrayObject *)arguments[2]);
+        if (systems->box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1] ||
+            (systems->cutoffs != NULL && n_cutoffs != n_boxes)) {
+            PyErr_SetString(PyExc_ValueError, "boxes do not fit points, box and cutoffs");
+            return false;
+        }
+    }
+    const int64_t n_systems = n_boxes < n_cutoffs ? n_boxes : n_cutoffs;
+    const bool    found =
+        n_systems < MOST_NUMBER
+               ? find_all(PyArray_DATA(numbers), call->points.n, n_systems, given)
+               : find_occupied(PyArray_DATA(numbers), call->points.n, given);
+    systems->first = given->first;
+    if (!found) {
+        free_batch(given);
+    }
+    return found;
+}
+
+/* Systems are named where each has something of its own. */
+static PyObject *
+raise_failure(hs_status status, hs_failure *failure, const hs_call *call, const batch *given)
+{
+    if (given->number != NULL) {
+        failure->system = -1;
+    }
+    return hs_raise(status, failure, &call->options);
+}
+
+PyObject *
+hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call    call;
+    hs_result  result;
+    hs_failure failure;
+    hs_pairs  *pairs = NULL;
+    batch      given;
+    (void)module;
+    if (n_arguments != HS_CALL_ARGUMENTS + 7) {
+        PyErr_Format(PyExc_TypeError, "batch_pairs takes %d arguments", HS_CALL_ARGUMENTS + 7);
+        return NULL;
+    }
+    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
+    if (!hs_call_init(&call, arguments) || !hs_result_init(&result, more, &call) ||
+        !take_batch(more + 4, &call, &given)) {
+        return NULL;
+    }
+    hs_call_release(&call);
+    const hs_status status =
+        hs_systems_find(&call.points, &given.systems, &call.options, &pairs, &failure);
+    hs_call_acquire(&call);
+    PyObject *arrays = status == HS_OK ? hs_result_of(&result, pairs, &call)
+                                       : raise_failure(status, &failure, &call, &given);
+    hs_pairs_free(pairs);
+    free_batch(&given);
+    return arrays;
+}
+
+PyObject *
+hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call    call;
+    hs_failure failure;
+    batch      given;
+    (void)module;
+    if (n_arguments != HS_CALL_ARGUMENTS + 3) {
+        PyErr_Format(PyExc_TypeError, "batch_count takes %d arguments", HS_CALL_ARGUMENTS + 3);
+        return NULL;
+    }
+    if (!hs_call_init(&call, arguments) ||
+        !take_batch(arguments + HS_CALL_ARGUMENTS, &call, &given)) {
+        return NULL;
+    }
+    npy_intp  length = (npy_intp)given.n_numbers;
+    PyObject *array = PyArray_ZEROS(1, &length, NPY_INT64, 0);
+    int64_t  *counts = PyMem_Malloc((size_t)given.systems.n * sizeof *counts + 1);
+    if (array != NULL && counts == NULL) {
+        PyErr_NoMemory();
+        Py_CLEAR(array);
+    }
+    if (array != NULL) {
+        hs_call_release(&call);
+        const hs_status status =
+            hs_systems_count(&call.points, &given.systems, &call.options, counts, &failure);
+        hs_call_acquire(&call);
+        if (status != HS_OK) {
+            Py_CLEAR(array);
+            (void)raise_failure(status, &failure, &call, &given);
+        }
+    }
+    int64_t *to = array != NULL ? PyArray_DATA((PyArrayObject *)array) : NULL;
+    for (int64_t s = 0; to != NULL && s < given.systems.n; s++) {
+        to[given.number != NULL ? given.number[s] : s] = counts[s];
+    }
+    PyMem_Free(counts);
+    free_batch(&given);
+    return array;
+}

@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_info.c: _core.kernels, default_kernel, build_info, available_memory, and the cache of output
+ * memory. */
+#include "py_functions.h"
+
+#include "../halfshell.h"
+#include "available.h"
+#include "environment.h"
+
+/* Puts a new reference into a dictionary and gives it up; false on failure, also of `value`. */
+static bool
+put(PyObject *dict, const char *key, PyObject *value)
+{
+    const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
+    Py_XDECREF(value);
+    return done;
+}
+
+PyObject *
+hs_py_kernels(PyObject *module, PyObject *ignored)
+{
+    const char *names[8];
+    const int   n = hs_kernel_names(names, 8);
+    PyObject   *tuple = PyTuple_New(n);
+    (void)module;
+    (void)ignored;
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        PyObject *name = PyUnicode_FromString(names[k]);
+        if (name == NULL) {
+            Py_CLEAR(tuple);
+        } else {
+            PyTuple_SET_ITEM(tuple, k, name);
+        }
+    }
+    return tuple;
+}
+
+PyObject *
+hs_py_default_kernel(PyObject *module, PyObject *ignored)
+{
+    const char *best = "", *forced = hs_environment_kernel();
+    (void)module;
+    (void)ignored;
+    hs_kernel_names(&best, 1);
+    return PyUnicode_DecodeLocale(forced != NULL ? forced : best, "surrogateescape");
+}
+
+#if defined(__clang__)
+#define COMPILER "clang " __clang_version__
+#elif defined(__GNUC__)
+#define COMPILER "gcc " __VERSION__
+#elif defined(_MSC_VER)
+#define COMPILER "msvc"
+#else
+#define COMPILER "unknown"
+#endif
+
+PyObject *
+hs_py_build_info(PyObject *module, PyObject *ignored)
+{
+    PyObject *dict = PyDict_New();
+    if (dict != NULL &&
+        put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
+#ifdef NDEBUG
+        put(dict, "assertions", PyBool_FromLong(0)) &&
+#else
+        put(dict, "assertions", PyBool_FromLong(1)) &&
+#endif
+        put(dict, "kernels", hs_py_kernels(module, ignored))) {
+        return dict;
+    }
+    Py_XDECREF(dict);
+    return NULL;
+}
+
+PyObject *
+hs_py_available_memory(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyFloat_FromDouble(hs_available_memory(NULL));
+}
+
+PyObject *
+hs_py_clear_cache(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    hs_pool_clear();
+    Py_RETURN_NONE;
+}
+
+PyObject *
+hs_py_set_cache_limit(PyObject *module, PyObject *limit)
+{
+    const size_t before = hs_pool_limit();
+    const size_t bytes = PyLong_AsSize_t(limit);
+    (void)module;
+    if (bytes == (size_t)-1 && PyErr_Occurred()) {
+        return NULL;
+    }
+    hs_pool_set_limit(bytes);
+    return PyLong_FromSize_t(before);
+}
+
+PyObject *
+hs_py_cache_held(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyLong_FromSize_t(hs_pool_held());
+}

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* result.h: what functions that return pairs share: which quantities, and in which arrays. */
+#ifndef HS_RESULT_H
+#define HS_RESULT_H
+
+#include "call.h"
+
+typedef struct hs_result {
+    const char    *letters; /* borrowed */
+    PyObject      *out;     /* borrowed; NULL: new arrays */
+    hs_pair_arrays arrays;  /* those of out */
+} hs_result;
+
+/* Four arguments: quantities, sort, index_bytes, out. Sets the options of the call, which borrow
+ * from the result. False with an exception set. */
+bool hs_result_init(hs_result *result, PyObject *const *arguments, hs_call *call);
+
+/* The arrays of these pairs; a new reference or NULL. */
+PyObject *hs_result_of(const hs_result *result, hs_pairs *pairs, const hs_call *call);
+
+#endif

@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* threads.h: how many threads a search may use when nobody says. */
+#ifndef HS_THREADS_H
+#define HS_THREADS_H
+
+/* The first number of OMP_NUM_THREADS if that is set to one, else the cores that this process may
+ * run on; at least 1. */
+int hs_default_threads(void);
+
+#endif

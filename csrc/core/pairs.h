@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* pairs.h: what a finished search is, for those who make one. */
+#ifndef HS_PAIRS_H
+#define HS_PAIRS_H
+
+#include "output.h"
+#include "search.h"
+
+struct hs_pairs {
+    hs_search search; /* closed: kept for its account, options and scene */
+    hs_output output;
+};
+
+#endif

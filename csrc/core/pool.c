@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* pool.c: see pool.h. Chunks are freed after the lock is left: that is a system call. */
+#if !defined(_WIN32)
+#define _DEFAULT_SOURCE /* sched_yield */
+#endif
+#include "pool.h"
+
+#include "chunk.h"
+
+#include <string.h>
+
+#if defined(_MSC_VER)
+#include <intrin.h>
+#else
+#include <sched.h>
+#include <stdatomic.h>
+#endif
+
+static struct {
+    size_t limit, held;
+    int    n;
+    void  *data[HS_POOL_CHUNKS]; /* oldest first */
+} pool = {.limit = HS_POOL_LIMIT};
+
+#if defined(_MSC_VER)
+
+static volatile long lock;
+
+static bool
+try_lock(void)
+{
+    return _InterlockedExchange(&lock, 1) == 0;
+}
+
+static void
+unlock(void)
+{
+    _InterlockedExchange(&lock, 0);
+}
+
+static void
+let_others_run(void)
+{
+}
+
+#else
+
+static atomic_flag lock = ATOMIC_FLAG_INIT;
+
+static bool
+try_lock(void)
+{
+    return !atomic_flag_test_and_set_explicit(&lock, memory_order_acquire);
+}
+
+static void
+unlock(void)
+{
+    atomic_flag_clear_explicit(&lock, memory_order_release);
+}
+
+static void
+let_others_run(void)
+{
+    sched_yield();
+}
+
+#endif
+
+/* For what should not be skipped. The lock is held for some hundred instructions: whoever has it
+ * is done after a few of these, or never. */
+static bool
+lock_patiently(void)
+{
+    enum { TRIES = 10000 };
+    for (int trial = 0; trial < TRIES; trial++) {
+        if (try_lock()) {
+            return true;
+        }
+        let_others_run();
+    }
+    return false;
+}
+
+#ifdef HS_TESTING
+void
+hs_test_pool_hold(bool hold)
+{
+    if (!hold) {
+        unlock();
+    } else {
+        (void)lock_patiently();
+    }
+}
+#endif
+
+/* Takes entry k out. The lock is held. */
+static void *
+remove_entry(int k)
+{
+    void *data = pool.data[k];
+    pool.held -= hs_chunk_of(data)->touched;
+    pool.n--;
+    memmove(&pool.data[k], &pool.data[k + 1], (size_t)(pool.n - k) * sizeof pool.data[0]);
+    return data;
+}
+
+/* Takes the oldest entries out until `more` bytes in `chunks` more chunks fit. Returns how many;
+ * the caller frees them. The lock is held. */
+static int
+remove_oldest(size_t more, int chunks, void **removed)
+{
+    int n = 0;
+    while (pool.n > 0 && (pool.n + chunks > HS_POOL_CHUNKS || more > pool.limit ||
+                          pool.held > pool.limit - more)) {
+        removed[n++] = remove_entry(0);
+    }
+    return n;
+}
+
+static void
+free_all(void **chunks, int n)
+{
+    for (int k = 0; k < n; k++) {
+        hs_chunk_free(chunks[k]);
+    }
+}
+
+size_t
+hs_pool_limit(void)
+{
+    if (!lock_patiently()) {
+        return 0;
+    }
+    const size_t limit = pool.limit;
+    unlock();
+    return limit;
+}
+
+size_t
+hs_pool_held(void)
+{
+    if (!lock_patiently()) {
+        return 0;
+    }
+    const size_t held = pool.held;
+    unlock();
+    return held;
+}
+
+void
+hs_pool_set_limit(size_t bytes)
+{
+    void *removed[HS_POOL_CHUNKS];
+    if (!lock_patiently()) {
+        return;
+    }
+    pool.limit = bytes;
+    /* Limit 0 is off: then not even a chunk without touched memory stays. */
+    const int n = remove_oldest(bytes == 0 ? 1 : 0, 0, removed);
+    unlock();
+    free_all(removed, n);
+}
+
+void
+hs_pool_clear(void)
+{
+    void *removed[HS_POOL_CHUNKS];
+    if (!lock_patiently()) {
+        return;
+    }
+    const int n = remove_oldest(SIZE_MAX, 0, removed);
+    unlock();
+    free_all(removed, n);
+}
+
+/*
+ * Pages can be added to a chunk and given back from its end, so that any chunk in pages suits any
+ * request. A chunk from malloc must have the room, and not twice what is wanted: it cannot be
+ * shrunk for sure. For scratch, which comes back whole and at once, that does not matter.
+ */
+static bool
+suits(const hs_chunk *chunk, size_t expected)
+{
+    return chunk->length > 0 ||
+           (chunk->capacity >= expected &&
+            (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected));
+}
+
+/* The chunk with the least touched memory that holds all that is expected, or else the one with
+ * the most. */
+static bool
+is_better(const hs_chunk *chunk, const hs_chunk *best, size_t expected)
+{
+    if ((chunk->touched >= expected) != (best->touched >= expected)) {
+        return chunk->touched >= expected;
+    }
+    return chunk->touched >= expected ? chunk->touched < best->touched
+                                      : chunk->touched > best->touched;
+}
+
+void *
+hs_pool_take(size_t expected)
+{
+    int best = -1;
+    if (!try_lock()) {
+        return NULL;
+    }
+    for (int k = 0; k < pool.n; k++) {
+        const hs_chunk *chunk = hs_chunk_of(pool.data[k]);
+        if (suits(chunk, expected) &&
+            (best < 0 || is_better(chunk, hs_chunk_of(pool.data[best]), expected))) {
+            best = k;
+        }
+    }
+    void *data = best >= 0 ? remove_entry(best) : NULL;
+    unlock();
+    return data;
+}
+
+bool
+hs_pool_give(void *data)
+{
+    void        *removed[HS_POOL_CHUNKS];
+    int          n = 0;
+    const size_t touched = hs_chunk_of(data)->touched;
+    if (HS_ADDRESS_SANITIZER || !try_lock()) { /* it must see who writes to what was freed */
+        return false;
+    }
+    const bool keep = pool.limit > 0 && touched <= pool.limit;
+    if (keep) {
+        n = remove_oldest(touched, 1, removed);
+        pool.data[pool.n++] = data;
+        pool.held += touched;
+    }
+    unlock();
+    free_all(removed, n);
+    return keep;
+}

@@ -1,0 +1,188 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* region.c: see region.h. */
+#include "region.h"
+
+#include "chunk.h"
+#include "memory.h"
+#include "pages.h"
+#include "pool.h"
+
+/* Address space without memory that a chunk takes along to the pool, so that the next request
+ * needs no system call. More of it would only be in the way of others. */
+#define KEPT_SPARE ((size_t)64 << 20)
+
+static bool
+allocation_fails(void)
+{
+#ifdef HS_TESTING
+    return hs_test_allocation_fails();
+#else
+    return false;
+#endif
+}
+
+static void
+count_block(int change)
+{
+#ifdef HS_TESTING
+    hs_test_count_block(change);
+#else
+    (void)change;
+#endif
+}
+
+/* To the pool or to the system. */
+static void
+give_back(void *data)
+{
+    const hs_chunk *chunk = hs_chunk_of(data);
+    const size_t    spare = chunk->capacity - chunk->touched;
+    if (chunk->length > 0 && spare > KEPT_SPARE) {
+        (void)hs_chunk_cut(data, chunk->touched, NULL);
+    }
+    if (!hs_pool_give(data)) {
+        hs_chunk_free(data);
+    }
+}
+
+/* What to ask for: not more than expected where that would be taken from others. */
+static size_t
+affordable(size_t expected, size_t most)
+{
+    return most >= HS_PAGES_FROM && !hs_pages_spare() ? expected : most;
+}
+
+static void *
+take_recycled(size_t expected, size_t most)
+{
+    void *data = hs_pool_take(expected);
+    if (data == NULL || hs_chunk_of(data)->capacity >= most) {
+        return data;
+    }
+    most = affordable(expected, most);
+    /* One from malloc would be copied, and has the room for what is expected. */
+    if (hs_chunk_of(data)->capacity < most && hs_chunk_of(data)->length > 0) {
+        void *grown = hs_chunk_grow(data, most, 0);
+        data = grown != NULL ? grown : data;
+    }
+    if (hs_chunk_of(data)->capacity >= expected) {
+        return data;
+    }
+    hs_chunk_free(data);
+    return NULL;
+}
+
+static void *
+take_new(size_t expected, size_t most)
+{
+    most = affordable(expected, most);
+    void *data = hs_chunk_new(most > HS_POOL_SCRATCH ? most : HS_POOL_SCRATCH);
+    if (data == NULL) {
+        data = hs_chunk_new(expected);
+    }
+    if (data == NULL) { /* what the pool holds may be what is missing */
+        hs_pool_clear();
+        data = hs_chunk_new(expected);
+    }
+    return data;
+}
+
+bool
+hs_region_reserve(hs_region *region, size_t expected, size_t most)
+{
+    HS_ASSERT(region->data == NULL);
+    if (allocation_fails()) {
+        return false;
+    }
+    most = most > expected ? most : expected;
+    void *data = take_recycled(expected, most);
+    if (data == NULL) {
+        data = take_new(expected, most);
+    }
+    if (data == NULL) {
+        return false;
+    }
+    count_block(1);
+    *region = (hs_region){.data = data, .capacity = hs_chunk_of(data)->capacity};
+    hs_region_expect(region, expected);
+    return true;
+}
+
+bool
+hs_region_grow(hs_region *region, size_t bytes)
+{
+    HS_ASSERT(region->data != NULL && region->used <= region->capacity);
+    if (bytes <= region->capacity) {
+        return true;
+    }
+    if (allocation_fails()) {
+        return false;
+    }
+    hs_chunk_touch(region->data, region->used);
+    void *data = hs_chunk_grow(region->data, bytes, region->used);
+    if (data == NULL) {
+        hs_pool_clear();
+        data = hs_chunk_grow(region->data, bytes, region->used);
+    }
+    if (data == NULL) {
+        return false;
+    }
+    region->data = data;
+    region->capacity = hs_chunk_of(data)->capacity;
+    return true;
+}
+
+void
+hs_region_expect(hs_region *region, size_t bytes)
+{
+    if (region->data != NULL) {
+        hs_chunk_touch(region->data, region->used);
+        hs_chunk_expect(region->data, bytes);
+    }
+}
+
+void
+hs_region_prepare(hs_region *region, size_t bytes)
+{
+    if (region->data != NULL) {
+        hs_chunk_fill(region->data, bytes);
+    }
+}
+
+void *
+hs_region_detach(hs_region *region, size_t bytes)
+{
+    if (region->data == NULL) {
+        return NULL;
+    }
+    void *rest;
+    HS_ASSERT(bytes <= region->capacity);
+    hs_chunk_touch(region->data, region->used > bytes ? region->used : bytes);
+    void *data = hs_chunk_cut(region->data, bytes, &rest);
+    if (rest != NULL) {
+        give_back(rest);
+    }
+    *region = (hs_region){0};
+    return data;
+}
+
+void
+hs_region_release(hs_region *region)
+{
+    if (region == NULL || region->data == NULL) {
+        return;
+    }
+    count_block(-1);
+    hs_chunk_touch(region->data, region->used);
+    give_back(region->data);
+    *region = (hs_region){0};
+}
+
+void
+hs_buffer_free(void *data)
+{
+    if (data != NULL) {
+        count_block(-1);
+        give_back(data);
+    }
+}

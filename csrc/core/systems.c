@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* systems.c: the public searches of many systems: find and count. Threads take ranges of them. */
+#include "fpenv.h"
+#include "pairs.h"
+#include "poll.h"
+#include "systems_worker.h"
+
+#include <math.h>
+
+/* Points that a range of systems should have: their pairs fit the stage of a thread, so that it
+ * seldom waits for its turn, and taking a range costs little beside them. */
+#define RANGE_POINTS 512
+
+/* `total` has the account of the output and sums up what was done. */
+static hs_status
+run_crew(hs_systems_crew *crew, hs_team *team, hs_search *total, hs_failure *failure)
+{
+    const hs_options *options = &total->options;
+    const int         n_workers = hs_team_size(team);
+    const int64_t     n_systems = crew->systems->n, n_points = crew->points->n;
+    const int64_t     in_range = RANGE_POINTS * n_systems / (n_points + 1);
+    crew->in_range = in_range > 1 ? in_range : 1;
+    crew->is_direct = n_workers == 1 && crew->output != NULL && !crew->output->fixed;
+    crew->workers =
+        hs_alloc(&total->account, HS_FOR_CANDIDATES, n_workers, sizeof(hs_systems_worker));
+    crew->turns = hs_commits_new(&total->account, crew->output,
+                               (n_systems + crew->in_range - 1) / crew->in_range);
+    hs_status status = HS_ERR_MEMORY;
+    for (int w = 0; w < n_workers && crew->workers != NULL; w++) {
+        hs_systems_open_worker(crew, options, &crew->workers[w]);
+    }
+    if (crew->workers != NULL && crew->turns != NULL) {
+        hs_team_run(team, n_workers, hs_systems_work, crew);
+        status = HS_OK;
+    }
+    for (int w = 0; w < n_workers && crew->workers != NULL; w++) {
+        hs_systems_close_worker(&crew->workers[w], total);
+    }
+    if (crew->turns != NULL) {
+        const hs_status ended = hs_commits_end(&total->account, crew->turns, failure);
+        status = status == HS_OK ? ended : status;
+    }
+    hs_free(&total->account, crew->workers);
+    return status;
+}
+
+/* What all systems share is checked also where there are none. */
+static hs_status
+check_shared(const hs_points *points, const hs_systems *systems, const hs_options *options,
+             hs_failure *failure)
+{
+    if (points->n > INT32_MAX) {
+        failure->value = (double)points->n;
+        return HS_ERR_TOO_MANY;
+    }
+    if (hs_kernel_select(options->kernel) == NULL) {
+        return HS_ERR_KERNEL;
+    }
+    if (systems->cutoffs == NULL && !(options->cutoff >= 0.0 && isfinite(options->cutoff))) {
+        failure->value = options->cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    return systems->rows == NULL ? hs_box_check(systems->box, failure) : HS_OK;
+}
+
+/* The whole of both functions. `total`: where the account and the counts are kept. */
+static hs_status
+search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
+{
+    const hs_options *options = &total->options;
+    hs_status         status = check_shared(crew->points, crew->systems, options, failure);
+    if (status == HS_OK && crew->systems->n > 0) {
+        const int n_threads = hs_search_threads(crew->points->n, options);
+        const int most = crew->systems->n < n_threads ? (int)crew->systems->n : n_threads;
+        hs_team  *team = hs_team_create(most);
+        status = run_crew(crew, team, total, failure);
+        hs_team_free(team);
+    }
+    if (status == HS_ERR_MEMORY) {
+        const double found = crew->output != NULL ? (double)crew->output->n_pairs : 0.0;
+        failure->expected_pairs = fmax(failure->expected_pairs, found);
+        failure->limit_bytes = total->account.limit;
+    }
+    return status;
+}
+
+hs_status
+hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_options *options,
+                hs_pairs **result, hs_failure *failure)
+{
+    hs_failure ignored;
+    *result = NULL;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
+    if (pairs == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_search     *total = &pairs->search;
+    hs_output     *output = &pairs->output;
+    hs_systems_crew crew = {.points = points, .systems = systems, .output = output};
+    hs_search_begin(options, total);
+    total->options.poll = options->poll; /* the workers' searches count the calls */
+    total->options.poll_context = options->poll_context;
+    hs_output_init(&total->account, points->ndim, options->want, options->index_bytes, output);
+    if (options->out != NULL) {
+        hs_output_fix(output, options->out);
+    }
+    hs_status status = search_systems(&crew, total, failure);
+    if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
+        failure->expected_pairs = (double)output->n_pairs;
+        status = HS_ERR_CAPACITY;
+    }
+    hs_search_report(total, output->n_pairs);
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_pairs_free(pairs);
+        return status;
+    }
+    *result = pairs;
+    return HS_OK;
+}
+
+hs_status
+hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_options *options,
+                 int64_t *counts, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_options counting = *options;
+    hs_search  total;
+    hs_systems_crew crew = {.points = points, .systems = systems, .counts = counts};
+    int64_t    found = 0;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    counting.want = 0;
+    counting.sorted = false;
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_search_begin(&counting, &total);
+    total.options.poll = options->poll;
+    total.options.poll_context = options->poll_context;
+    const hs_status status = search_systems(&crew, &total, failure);
+    for (int64_t s = 0; s < systems->n && status == HS_OK; s++) {
+        found += counts[s];
+    }
+    hs_search_report(&total, found);
+    hs_account_close(&total.account);
+    hs_fpenv_leave(saved);
+    return status;
+}

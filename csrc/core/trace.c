@@ -1,0 +1,309 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* trace.c: see trace.h. */
+#include "trace.h"
+
+#include <string.h>
+
+/* Integers up to here are float64 numbers, and what the batch kernels take. */
+#define WIDEST_SHIFT (INT64_C(1) << 53)
+
+/* Turns and images up to here are few: sums of four of them are int32. */
+#define MOST_FEW 0x1p28
+
+/* Whether shifts over B are those over the rows as given. */
+static bool
+is_plain(const hs_lattice *lattice)
+{
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            if (lattice->U[r][l] != (r == l)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
+static bool
+is_narrow(const hs_search *search)
+{
+    const hs_scene *scene = &search->scene;
+    const double    largest = hs_scale_apply(scene->scale, scene->cloud.largest);
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0 &&
+            search->grid.reach[k] / search->grid.shape[k] >= MOST_FEW) {
+            return false;
+        }
+    }
+    return is_plain(&scene->lattice) && !search->bins.keeps_originals &&
+           (!search->bins.turns.known || hs_fold_turns(&scene->lattice, largest) < MOST_FEW);
+}
+
+/* n arrays of `length` numbers of 8 bytes, zero at first: batch kernels read a little beyond the
+ * last pair, where any finite number will do. */
+static bool
+new_arrays(hs_account *account, int n, int64_t length, void **arrays)
+{
+    for (int k = 0; k < n; k++) {
+        arrays[k] = hs_alloc(account, HS_FOR_CANDIDATES, length, sizeof(double));
+        if (arrays[k] == NULL) {
+            return false;
+        }
+        memset(arrays[k], 0, (size_t)length * sizeof(double));
+    }
+    return true;
+}
+
+static bool
+allocate(hs_account *account, hs_trace *trace)
+{
+    const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
+    const int     m_given = trace->needs_given && !trace->is_narrow ? m : 0;
+    const int     m_narrow = trace->needs_given && trace->is_narrow ? m : 0;
+    const int64_t batch = HS_BATCH + HS_BATCH_PADDING, block = trace->block->capacity;
+    return new_arrays(account, d, batch, (void **)trace->p) &&
+           new_arrays(account, d, batch, (void **)trace->q) &&
+           new_arrays(account, m, batch, (void **)trace->times) &&
+           new_arrays(account, m, batch, (void **)trace->image) &&
+           new_arrays(account, m_given, batch, (void **)trace->given) &&
+           new_arrays(account, d, block, (void **)trace->of.q) &&
+           new_arrays(account, m, block, (void **)trace->of.image) &&
+           new_arrays(account, m_given, block, (void **)trace->of.turned) &&
+           new_arrays(account, m_narrow, batch, (void **)trace->shift) &&
+           new_arrays(account, m_narrow, block, (void **)trace->of.few);
+}
+
+hs_status
+hs_trace_init(hs_search *search, const hs_block *block, bool needs_given, hs_trace *trace)
+{
+    *trace = (hs_trace){.search = search, .block = block};
+    trace->is_plain = is_plain(&search->scene.lattice);
+    trace->needs_given = needs_given || search->bins.keeps_originals;
+    trace->is_narrow = is_narrow(search);
+    trace->has_zeros = true;
+    if (!allocate(&search->account, trace)) {
+        hs_trace_free(&search->account, trace);
+        return HS_ERR_MEMORY;
+    }
+    return HS_OK;
+}
+
+void
+hs_trace_free(hs_account *account, hs_trace *trace)
+{
+    for (int k = HS_MAX_DIM - 1; k >= 0; k--) {
+        hs_free(account, trace->of.few[k]);
+        hs_free(account, trace->shift[k]);
+        hs_free(account, trace->of.turned[k]);
+        hs_free(account, trace->of.image[k]);
+        hs_free(account, trace->of.q[k]);
+        hs_free(account, trace->given[k]);
+        hs_free(account, trace->image[k]);
+        hs_free(account, trace->times[k]);
+        hs_free(account, trace->q[k]);
+        hs_free(account, trace->p[k]);
+    }
+    *trace = (hs_trace){0};
+}
+
+/* Rows of B that point si was wrapped by; 0 where that is known to cancel or not needed. */
+HS_ALWAYS_INLINE int64_t
+turns_of(const hs_bins *bins, int r, int64_t si)
+{
+    return bins->turns.known ? hs_turns_get(&bins->turns, r, si) : 0;
+}
+
+/* The shifts of the candidates of one run. */
+static void
+load_run(hs_trace *trace, const hs_run *run)
+{
+    const hs_bins *bins = &trace->search->bins;
+    const int32_t  n = run[1].at - run->at;
+    const int      m = bins->n_periodic;
+    for (int r = 0; r < m; r++) {
+        const int64_t image = run->image[r];
+        int64_t      *to = trace->of.image[r] + run->at;
+        for (int32_t c = 0; c < n; c++) {
+            to[c] = image;
+        }
+        trace->has_images = trace->has_images || image != 0;
+        if (trace->needs_given && trace->is_narrow) {
+            const int32_t *turns = bins->turns.known ? bins->turns.narrow[r] + run->si : NULL;
+            int32_t       *few = trace->of.few[r] + run->at;
+            for (int32_t c = 0; c < n; c++) {
+                few[c] = (int32_t)image - (turns != NULL ? turns[c] : 0);
+            }
+        } else if (trace->needs_given) {
+            int64_t *turned = trace->of.turned[r] + run->at;
+            for (int32_t c = 0; c < n; c++) {
+                turned[c] = image - turns_of(bins, r, run->si + c);
+            }
+        }
+    }
+}
+
+/* Writes down all candidates of the block. */
+static void
+load(hs_trace *trace)
+{
+    const hs_bins *bins = &trace->search->bins;
+    trace->has_images = false;
+    for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
+        const int32_t n = run[1].at - run->at;
+        for (int k = 0; k < bins->ndim; k++) {
+            const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
+            memcpy(trace->of.q[k] + run->at, from + run->si, (size_t)n * sizeof(double));
+        }
+        load_run(trace, run);
+    }
+    trace->is_loaded = true;
+}
+
+/* S = image + turns_i - turns_j. */
+static void
+add_narrow(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
+{
+    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
+        const int32_t  mine = (int32_t)turns_of(&trace->search->bins, r, si);
+        const int32_t *few = trace->of.few[r];
+        int32_t       *to = trace->shift[r] + trace->n;
+        for (int32_t e = 0; e < n; e++) {
+            to[e] = few[places[e]] + mine;
+        }
+    }
+}
+
+/* S = image + turns_i - turns_j over B, then over the rows as given. Without turns they are all
+ * known to cancel or not to be needed. False when one passes its range. */
+static bool
+add_given(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
+{
+    const int      m = trace->search->bins.n_periodic;
+    for (int r = 0; r < m; r++) {
+        const int64_t  mine = turns_of(&trace->search->bins, r, si);
+        const int64_t *turned = trace->of.turned[r];
+        int64_t       *to = trace->given[r] + trace->n;
+        for (int32_t e = 0; e < n; e++) {
+            to[e] = turned[places[e]] + mine;
+        }
+    }
+    for (int32_t e = trace->n; !trace->is_plain && e < trace->n + n; e++) {
+        int64_t reduced[HS_MAX_DIM], given[HS_MAX_DIM];
+        for (int r = 0; r < m; r++) {
+            reduced[r] = trace->given[r][e];
+        }
+        if (!hs_lattice_shift(&trace->search->scene.lattice, reduced, given)) {
+            return false;
+        }
+        for (int r = 0; r < m; r++) {
+            trace->given[r][e] = given[r];
+        }
+    }
+    return true;
+}
+
+/* The metric's shift: of X over B, or of the points as given over the rows as given. */
+static void
+add_times(hs_trace *trace, int32_t n)
+{
+    const bool as_given = trace->search->bins.keeps_originals;
+    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
+        const int64_t *from = (as_given ? trace->given[r] : trace->image[r]) + trace->n;
+        double        *times = trace->times[r] + trace->n;
+        int64_t        any = 0, wide = 0;
+        for (int32_t e = 0; e < n; e++) {
+            times[e] = (double)from[e];
+            any |= from[e];
+            wide |= from[e] > WIDEST_SHIFT || from[e] < -WIDEST_SHIFT;
+        }
+        trace->is_shifted = trace->is_shifted || any != 0;
+        trace->is_wide = trace->is_wide || wide != 0;
+    }
+}
+
+/* Shifts over B. Where the block has none, the arrays are zeroed once and left alone. */
+static void
+add_images(hs_trace *trace, const int32_t *places, int32_t n)
+{
+    const bool zero = !trace->has_images;
+    if (zero && trace->has_zeros) {
+        return;
+    }
+    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
+        const int64_t *from = trace->of.image[r];
+        int64_t       *to = trace->image[r] + trace->n;
+        if (zero) {
+            memset(trace->image[r], 0, HS_BATCH * sizeof *to);
+            memset(trace->times[r], 0, HS_BATCH * sizeof(double));
+        }
+        for (int32_t e = 0; e < n && !zero; e++) {
+            to[e] = from[places[e]];
+        }
+    }
+    trace->has_zeros = zero;
+}
+
+int32_t
+hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
+{
+    const hs_bins *bins = &trace->search->bins;
+    const int32_t  room = HS_BATCH - trace->n;
+    n = n < room ? n : room;
+    if (!trace->is_loaded) {
+        load(trace);
+    }
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *from = trace->of.q[k];
+        const double  at = bins->keeps_originals ? bins->originals[k][si] : bins->x[k][si];
+        double       *p = trace->p[k] + trace->n, *q = trace->q[k] + trace->n;
+        for (int32_t e = 0; e < n; e++) {
+            p[e] = at;
+            q[e] = from[places[e]];
+        }
+    }
+    if (bins->n_periodic > 0) {
+        add_images(trace, places, n);
+        if (trace->needs_given && trace->is_narrow) {
+            add_narrow(trace, si, places, n);
+        } else if (trace->needs_given && !add_given(trace, si, places, n)) {
+            return -1;
+        }
+        if (trace->has_images || bins->keeps_originals) {
+            add_times(trace, n);
+        }
+    }
+    trace->n += n;
+    return n;
+}
+
+hs_batch
+hs_trace_batch(const hs_trace *trace)
+{
+    hs_batch batch = {.n = trace->n};
+    for (int k = 0; k < trace->search->scene.ndim; k++) {
+        batch.p[k] = trace->p[k];
+        batch.q[k] = trace->q[k];
+    }
+    for (int r = 0; trace->is_shifted && r < trace->search->scene.lattice.n_periodic; r++) {
+        batch.shift[r] = trace->times[r];
+    }
+    return batch;
+}
+
+const int64_t *
+hs_trace_pair(const hs_trace *trace, int32_t e, double *p, double *q, int64_t *shift)
+{
+    const bool as_given = trace->search->bins.keeps_originals;
+    for (int k = 0; k < trace->search->scene.ndim; k++) {
+        p[k] = trace->p[k][e];
+        q[k] = trace->q[k][e];
+    }
+    if (!trace->is_shifted) {
+        return NULL;
+    }
+    for (int r = 0; r < trace->search->scene.lattice.n_periodic; r++) {
+        shift[r] = as_given ? trace->given[r][e] : trace->image[r][e];
+    }
+    return shift;
+}

@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * walk.h: the walk over groups of points. Rows of cells in order, cells along each row, at most
+ * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every
+ * point of the group, decided, and the hits are handed to a visitor. Groups depend on the scene
+ * alone, never on who walks them.
+ */
+#ifndef HS_WALK_H
+#define HS_WALK_H
+
+#include "gather.h"
+#include "rows.h"
+#include "trace.h"
+
+typedef struct hs_walker hs_walker;
+
+/*
+ * The decided hits of points [first, first + rows->n) in cell order against the present block, as
+ * entries of walker->block: point numbers, or places when walker->use says so. Anything but HS_OK
+ * ends the walk with that status.
+ */
+typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
+                                 const hs_rows *rows);
+
+/* One at a time belongs to a thread. */
+struct hs_walker {
+    const hs_search *search;  /* borrowed, read only */
+    hs_options       options; /* the search's, with a poll only for the caller's own thread */
+    hs_block         block;
+    hs_block_use     use;
+    hs_group         group;
+    hs_trace         trace;
+    hs_link         *links;   /* owned; of the row being walked */
+    int64_t          n_links;
+    int64_t         *hints;   /* owned; for hs_row_links, NULL unless the grid is sparse */
+    hs_visit_fn      visit;   /* not called when counting */
+    void            *visit_context;
+    hs_scan_fn       scan;     /* these for groups of this extent: */
+    hs_thresholds    direct;
+    hs_expanded      expanded;
+    double           extent;
+    bool             block_is_first; /* of its group: candidate t is group point t */
+    int64_t          n_found;
+    int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
+    int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
+    hs_stages        stages;
+    int64_t          n_groups, n_candidates, n_ambiguous;
+    int64_t          work_since_poll;
+};
+
+/* `visit` NULL: hits are only counted, in n_found. */
+hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
+                         hs_walker *walker);
+
+/* Visit the groups whose first point is in [first, end), in cell order. */
+hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end);
+
+/* Visit one point, as a group of its own. */
+hs_status hs_walk_point(hs_walker *walker, int32_t si);
+
+/* How much of all points lies behind, those before the search's own included: for progress and
+ * guesses. */
+HS_ALWAYS_INLINE double
+hs_walk_fraction(const hs_walker *walker)
+{
+    const hs_search *search = walker->search;
+    return ((double)search->first_point + walker->group.first) / (double)search->n_in_all;
+}
+
+/* Adds what was done to search->walked and frees; harmless twice. */
+void hs_walker_close(hs_search *search, hs_walker *walker);
+
+#endif

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* batch_baseline.c: the batch kernels for CPUs of any kind. See batch.h. */
+#include "../core/exact_float.h"
+#include "batch.h"
+#include "target.h"
+
+#include <string.h>
+
+#if HS_X86_64
+#include <emmintrin.h>
+#include "wide_sse2.h"
+#elif HS_AARCH64
+#include <arm_neon.h>
+#include "wide_neon.h"
+#else
+#include "wide_plain.h"
+#endif
+#define JUDGE   hs_judge_baseline
+#define MEASURE hs_measure_baseline
+#include "batch_template.h"

@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * copy_template.h: the vector loops that bring candidates in and pairs out, once for each
+ * instruction set. Include it as scan_template.h. Defines gather (hs_gather_fn), emit_int32 and
+ * emit_int64 (hs_emit_fn).
+ */
+
+/* Largest magnitude of n floats. */
+HS_ALWAYS_INLINE integers
+largest_of(const float *y, int32_t n, integers largest)
+{
+    int32_t c = 0;
+    for (; c + LANES <= n; c += LANES) {
+        largest = larger(largest, magnitudes(load(y + c)));
+    }
+    return c < n ? larger(largest, keep_lanes(magnitudes(load(y + c)), n - c)) : largest;
+}
+
+HS_ALWAYS_INLINE void
+gather_runs(hs_gather *gather, const hs_run *runs, int32_t n_runs, const int ndim)
+{
+    const int32_t *order = gather->order;
+    int32_t       *id = gather->id;
+    const double  *x[HS_MAX_DIM];
+    float         *norm = gather->norm;
+    float         *y[HS_MAX_DIM];
+    for (int k = 0; k < ndim; k++) {
+        x[k] = gather->x[k];
+        y[k] = gather->y[k];
+    }
+    for (int32_t r = 0; r < n_runs; r++) {
+        const hs_run *run = &runs[r];
+        const int32_t end = run[1].at;
+        int64_t       si = run->si;
+        for (int32_t c = run->at; c < end; c += LANES, si += LANES) {
+            floats sum = broadcast(0.0f);
+            for (int k = 0; k < ndim; k++) {
+                const floats place = load_moved(x[k] + si, run->moved[k]);
+                store(y[k] + c, place);
+                sum = multiply_add(place, place, sum);
+            }
+            store(norm + c, sum);
+            store_integers(id + c, load_integers(order + si));
+        }
+    }
+    integers largest = broadcast_integer((int32_t)gather->largest);
+    for (int k = 0; k < ndim; k++) {
+        largest = largest_of(y[k], runs[n_runs].at, largest);
+    }
+    gather->largest = (uint32_t)largest_lane(largest);
+}
+
+static void
+gather(hs_gather *gather, const hs_run *runs, int32_t n)
+{
+    switch (gather->ndim) {
+    case 2: gather_runs(gather, runs, n, 2); break;
+    case 3: gather_runs(gather, runs, n, 3); break;
+    default: gather_runs(gather, runs, n, gather->ndim); break;
+    }
+}
+
+HS_ALWAYS_INLINE void
+emit(const hs_rows *rows, void *i, void *j, const bool wide)
+{
+    int32_t h = 0;
+    for (int32_t row = 0; row < rows->n; row++) {
+        const integers point = broadcast_integer(rows->point[row]);
+        const int32_t  end = rows->end[row];
+        for (int32_t at = h; at < end; at += LANES) {
+            const integers hit = load_integers(rows->hits + at);
+            if (i != NULL && wide) {
+                store_wide((int64_t *)i + at, smaller(hit, point));
+            } else if (i != NULL) {
+                store_integers((int32_t *)i + at, smaller(hit, point));
+            }
+            if (j != NULL && wide) {
+                store_wide((int64_t *)j + at, larger(hit, point));
+            } else if (j != NULL) {
+                store_integers((int32_t *)j + at, larger(hit, point));
+            }
+        }
+        h = end;
+    }
+}
+
+static void
+emit_int32(const hs_rows *rows, void *i, void *j)
+{
+    if (i != NULL && j != NULL) {
+        emit(rows, i, j, false);
+    } else if (i != NULL) {
+        emit(rows, i, NULL, false);
+    } else {
+        emit(rows, NULL, j, false);
+    }
+}
+
+static void
+emit_int64(const hs_rows *rows, void *i, void *j)
+{
+    if (i != NULL && j != NULL) {
+        emit(rows, i, j, true);
+    } else if (i != NULL) {
+        emit(rows, i, NULL, true);
+    } else {
+        emit(rows, NULL, j, true);
+    }
+}

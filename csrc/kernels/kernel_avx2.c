@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* kernel_avx2.c: the kernels for x86-64 CPUs with AVX2. See kernel.h. */
+#include "kernel.h"
+
+#include "cpu.h"
+#include "target.h"
+
+#if HS_X86_64
+#include <immintrin.h>
+HS_TARGET_BEGIN("avx2,fma,popcnt")
+#include "simd_avx2.h"
+
+#include "copy_template.h"
+#include "scan_template.h"
+HS_TARGET_END
+
+const hs_kernel hs_kernel_avx2 = {
+    .name = "avx2",
+    .supported = hs_cpu_has_avx2,
+    .gather = gather,
+    .list = list,
+    .count = count,
+    .list_direct = list_direct,
+    .count_direct = count_direct,
+    .emit_int32 = emit_int32,
+    .emit_int64 = emit_int64,
+    .judge = hs_judge_avx2,
+    .measure = hs_measure_avx2,
+};
+#else
+typedef int hs_kernel_avx2_is_for_x86_64; /* a translation unit must not be empty */
+#endif

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* kernel_avx512.c: the kernels for x86-64 CPUs with AVX-512. See kernel.h. */
+#include "kernel.h"
+
+#include "cpu.h"
+#include "target.h"
+
+#if HS_X86_64
+#include <immintrin.h>
+HS_TARGET_BEGIN("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,popcnt")
+#include "simd_avx512.h"
+
+#include "copy_template.h"
+#include "scan_template.h"
+HS_TARGET_END
+
+const hs_kernel hs_kernel_avx512 = {
+    .name = "avx512",
+    .supported = hs_cpu_has_avx512,
+    .gather = gather,
+    .list = list,
+    .count = count,
+    .list_direct = list_direct,
+    .count_direct = count_direct,
+    .emit_int32 = emit_int32,
+    .emit_int64 = emit_int64,
+    .judge = hs_judge_avx512,
+    .measure = hs_measure_avx512,
+};
+#else
+typedef int hs_kernel_avx512_is_for_x86_64; /* a translation unit must not be empty */
+#endif

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* kernel_neon.c: the kernels for AArch64 CPUs, all of which have NEON. See kernel.h. */
+#include "kernel.h"
+
+#include "target.h"
+
+#if HS_AARCH64
+#include <arm_neon.h>
+#include "simd_neon.h"
+
+#include "copy_template.h"
+#include "scan_template.h"
+
+static bool
+always(void)
+{
+    return true;
+}
+
+const hs_kernel hs_kernel_neon = {
+    .name = "neon",
+    .supported = always,
+    .gather = gather,
+    .list = list,
+    .count = count,
+    .list_direct = list_direct,
+    .count_direct = count_direct,
+    .emit_int32 = emit_int32,
+    .emit_int64 = emit_int64,
+    .judge = hs_judge_baseline, /* NEON is the baseline */
+    .measure = hs_measure_baseline,
+};
+#else
+typedef int hs_kernel_neon_is_for_aarch64; /* a translation unit must not be empty */
+#endif

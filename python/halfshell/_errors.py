@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The exceptions that have no counterpart in Python."""
+
+from __future__ import annotations
+
+
+class CapacityError(ValueError):
+    """Arrays that the caller gave are too small for the result.
+
+    Attributes
+    ----------
+    needed : int
+        The number of pairs that there are.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> import numpy as np
+    >>> too_small = np.empty(1, np.int64), np.empty(1, np.int64)
+    >>> try:
+    ...     hs.pairs([[0.0], [1.0], [2.0]], 1.0, out=too_small)
+    ... except hs.CapacityError as error:
+    ...     print(error.needed)
+    2
+    """
+
+    def __init__(self, message: str, needed: int) -> None:
+        super().__init__(message)
+        self.needed = needed
+
+    def __reduce__(self) -> tuple[type[CapacityError], tuple[str, int]]:
+        return type(self), (str(self), self.needed)

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_systems.c: many systems in one call against one call for each. */
+#include "harness.h"
+
+#include "../../csrc/core/memory.h"
+#include "../../csrc/halfshell.h"
+
+#include <math.h>
+
+void test_systems(void);
+
+enum { N_SYSTEMS = 40, MOST_POINTS = 90 };
+
+/* Systems of 0 to MOST_POINTS - 1 points in boxes of their own. */
+typedef struct batch {
+    int64_t first[N_SYSTEMS + 1];
+    double  x[N_SYSTEMS * MOST_POINTS * 3];
+    double  rows[N_SYSTEMS * 9];
+    double  cutoffs[N_SYSTEMS];
+    hs_box  box;
+} batch;
+
+static void
+make_batch(uint64_t seed, batch *made)
+{
+    harness_random random = {seed};
+    memset(made, 0, sizeof *made);
+    made->box.ndim = 3;
+    for (int s = 0; s < N_SYSTEMS; s++) {
+        const int n = s % 7 == 3 ? 0 : (int)(random_unit(&random) * MOST_POINTS);
+        made->first[s + 1] = made->first[s] + n;
+        made->cutoffs[s] = 0.3 + 1.2 * random_unit(&random);
+        for (int k = 0; k < 9; k++) {
+            made->rows[9 * s + k] = (k % 4 == 0 ? 3.0 : 0.0) + random_unit(&random);
+        }
+    }
+    for (int64_t e = 0; e < 3 * made->first[N_SYSTEMS]; e++) {
+        made->x[e] = 4.0 * random_unit(&random);
+    }
+    for (int k = 0; k < 3; k++) {
+        made->box.periodic[k] = true;
+    }
+}
+
+static hs_points
+points_of(const batch *made, int64_t first, int64_t end)
+{
+    return (hs_points){made->x + 3 * first, end - first, 3, HS_FLOAT64, 3 * sizeof(double),
+                       sizeof(double)};
+}
+
+/* Compares with single calls; returns the number of pairs, -1 when something differs. */
+static int64_t
+compare(const batch *made, hs_options options, bool has_box, int threads)
+{
+    const hs_points  points = points_of(made, 0, made->first[N_SYSTEMS]);
+    const hs_systems systems = {N_SYSTEMS, made->first, has_box ? &made->box : NULL,
+                                has_box ? made->rows : NULL, made->cutoffs};
+    hs_pairs        *pairs = NULL;
+    hs_failure       failure;
+    int64_t          counts[N_SYSTEMS], at = 0;
+    bool             same = true;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    options.threads = threads;
+    if (hs_systems_find(&points, &systems, &options, &pairs, &failure) != HS_OK ||
+        hs_systems_count(&points, &systems, &options, counts, &failure) != HS_OK) {
+        hs_pairs_free(pairs);
+        return -1;
+    }
+    const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
+    const double  *d = hs_pairs_array(pairs, HS_WANT_DISTANCE);
+    options.threads = 1;
+    for (int s = 0; s < N_SYSTEMS; s++) {
+        const int64_t   first = made->first[s];
+        const hs_points own = points_of(made, first, made->first[s + 1]);
+        hs_box          box = made->box;
+        hs_pairs       *expected;
+        for (int k = 0; k < 9; k++) {
+            box.rows[k / 3][k % 3] = made->rows[9 * s + k];
+        }
+        options.cutoff = made->cutoffs[s];
+        if (hs_pairs_find(&own, has_box ? &box : NULL, &options, &expected, &failure) != HS_OK) {
+            hs_pairs_free(pairs);
+            return -1;
+        }
+        const int64_t  n = hs_pairs_length(expected);
+        const int64_t *a = hs_pairs_array(expected, HS_WANT_I);
+        const int64_t *b = hs_pairs_array(expected, HS_WANT_J);
+        const double  *c = hs_pairs_array(expected, HS_WANT_DISTANCE);
+        same = same && counts[s] == n && at + n <= hs_pairs_length(pairs);
+        for (int64_t p = 0; p < n && same; p++, at++) {
+            same = i[at] == a[p] + first && j[at] == b[p] + first && d[at] == c[p];
+        }
+        hs_pairs_free(expected);
+    }
+    same = same && at == hs_pairs_length(pairs);
+    hs_pairs_free(pairs);
+    return same ? at : -1;
+}
+
+static void
+the_same_as_single_calls(void)
+{
+    static batch made;
+    for (uint64_t seed = 1; seed <= 20; seed++) {
+        make_batch(seed, &made);
+        for (int kind = 0; kind < 8; kind++) {
+            hs_options options = hs_options_default();
+            options.sorted = kind % 2 == 1;
+            CHECK(compare(&made, options, kind & 2, kind & 4 ? 3 : 1) > 100);
+        }
+    }
+}
+
+static void
+failures_name_system_and_point(void)
+{
+    static batch made;
+    hs_options   options = hs_options_default();
+    hs_failure   failure;
+    int64_t      counts[N_SYSTEMS];
+    make_batch(5, &made);
+    const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs};
+    const double     saved = made.rows[9 * 17 + 4];
+    made.rows[9 * 17 + 4] = INFINITY;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_BOX_FINITE);
+    CHECK(failure.system == 17 && failure.row == 1 && failure.column == 1);
+    made.rows[9 * 17 + 4] = saved;
+    const int64_t row = made.first[20] + 1;
+    made.x[3 * row + 2] = NAN;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.row == row && failure.column == 2);
+}
+
+/* Every allocation fails once; nothing is left behind. */
+static void
+nothing_is_lost_when_memory_is_short(void)
+{
+    static batch  made;
+    const int64_t before = hs_test_live_blocks();
+    make_batch(9, &made);
+    const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs};
+    for (int kind = 0; kind < 4; kind++) {
+        hs_status status = HS_ERR_MEMORY;
+        for (int64_t nth = 1; status != HS_OK && nth < 100000; nth += nth < 200 ? 1 : 37) {
+            hs_options options = hs_options_default();
+            hs_pairs  *pairs = NULL;
+            hs_failure failure;
+            options.sorted = kind & 1;
+            options.threads = kind & 2 ? 2 : 1;
+            options.want = HS_WANT_BOTH | HS_WANT_VECTOR | HS_WANT_SHIFT;
+            hs_test_fail_allocation(nth);
+            status = hs_systems_find(&points, &systems, &options, &pairs, &failure);
+            hs_test_fail_allocation(0);
+            CHECK(status == HS_OK || (status == HS_ERR_MEMORY && pairs == NULL));
+            hs_pairs_free(pairs);
+        }
+        CHECK(status == HS_OK);
+    }
+    hs_pool_clear();
+    CHECK(hs_test_live_blocks() == before);
+}
+
+void
+test_systems(void)
+{
+    RUN(the_same_as_single_calls);
+    RUN(failures_name_system_and_point);
+    RUN(nothing_is_lost_when_memory_is_short);
+}

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The memory of deleted results: kept up to a limit, given back on request, never seen again."""
+
+import gc
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell import _core
+
+POINTS = np.random.RandomState(3).rand(20000, 3) * 20.0
+
+
+@pytest.fixture(autouse=True)
+def fresh_cache():
+    before = hs.set_cache_limit(256 << 20)
+    hs.clear_cache()
+    yield
+    hs.set_cache_limit(before)
+    hs.clear_cache()
+
+
+def search():
+    return hs.pairs(POINTS, 1.5, quantities="ijd", threads=1)
+
+
+def test_deleted_results_are_kept_and_cleared():
+    found = search()
+    size = sum(array.nbytes for array in found)
+    assert size > 4_000_000
+    del found
+    gc.collect()
+    assert _core.cache_held() >= size // 2
+    hs.clear_cache()
+    assert _core.cache_held() == 0
+
+
+def test_results_that_live_are_not_touched_by_later_ones():
+    first = search()
+    copies = [array.copy() for array in first]
+    for _ in range(3):
+        other = search()
+        for array in other:
+            array[...] = 0
+        del other
+    assert all(np.array_equal(a, b) for a, b in zip(first, copies, strict=True))
+
+
+def test_recycled_results_are_the_same():
+    first = [array.copy() for array in search()]
+    for _ in range(3):
+        assert all(np.array_equal(a, b) for a, b in zip(first, search(), strict=True))
+
+
+def test_a_limit_of_zero_keeps_nothing():
+    hs.set_cache_limit(0)
+    search()
+    gc.collect()
+    assert _core.cache_held() == 0
+
+
+def test_lowering_the_limit_gives_back_at_once():
+    search()
+    gc.collect()
+    assert _core.cache_held() > 1_000_000
+    hs.set_cache_limit(1_000_000)
+    assert _core.cache_held() <= 1_000_000
+    assert hs.set_cache_limit(256 << 20) == 1_000_000
+
+
+def test_parts_of_a_result_live_on_alone():
+    i, j, d = search()
+    expected = j.copy()
+    del i, d
+    gc.collect()
+    search()
+    assert np.array_equal(j, expected)
+    assert j.flags.writeable
+    assert j.flags.c_contiguous
+
+
+@pytest.mark.parametrize(
+    ("limit", "error"), [(-1, ValueError), (1.5, TypeError), (True, TypeError)]
+)
+def test_bad_limits(limit, error):
+    with pytest.raises(error, match="limit must"):
+        hs.set_cache_limit(limit)
+
+
+def test_arrays_of_results_can_be_pickled_viewed_and_resized_away():
+    import pickle
+
+    i, _, d = search()
+    assert np.array_equal(pickle.loads(pickle.dumps(i)), i)
+    view = d[10:20]
+    expected = view.copy()
+    del d
+    gc.collect()
+    search()
+    assert np.array_equal(view, expected)

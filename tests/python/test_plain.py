@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plain arguments take a shorter way through the binding: to the same answers and errors."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell import _api, _core
+
+POINTS = np.random.default_rng(31).random((40, 3)) * 4.0
+LENGTHS = np.array([4.0, 4.5, 5.0])
+ROWS = np.array([[4.0, 0.0, 0.0], [1.0, 4.0, 0.0], [0.5, -1.0, 5.0]])
+SHARED = {
+    "box": None,
+    "periodic": None,
+    "inclusive": True,
+    "precision": "exact",
+    "kernel": None,
+    "memory_limit": None,
+    "progress": None,
+    "threads": None,
+}
+
+
+class Subclass(np.ndarray):
+    pass
+
+
+def plain(points, cutoff=1.5, *, quantities="ij", sort=False, index_dtype=np.int64, **options):
+    shared = {**SHARED, **options}
+    return _core.plain_pairs(points, cutoff, *shared.values(), quantities, sort, index_dtype, None)
+
+
+PERIODIC = [None, True, False, (True, False, True), [False, True, True]]
+BOXES = [(None, None), *((box, periodic) for box in (LENGTHS, ROWS) for periodic in PERIODIC)]
+
+
+@pytest.mark.parametrize(("box", "periodic"), BOXES)
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("index_dtype", [np.int32, np.int64])
+def test_same_answer_as_converted_arguments(box, periodic, real, index_dtype):
+    points = POINTS.astype(real)
+    options = {"box": box, "periodic": periodic, "quantities": "ijdDSP", "sort": True}
+    options["index_dtype"] = index_dtype
+    direct = plain(points, **options)
+    converted = _api._pairs_with_progress(points, 1.5, progress=None, **options)
+    public = hs.pairs(points, 1.5, **options)
+    for a, b, c in zip(direct, converted, public, strict=True):
+        assert a.dtype == b.dtype == c.dtype
+        assert a.tobytes() == b.tobytes() == c.tobytes()
+    shared = SHARED | {"box": box, "periodic": periodic}
+    assert _core.plain_count(points, 1.5, *shared.values()) == len(direct[0])
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        POINTS.tolist(),
+        POINTS.view(Subclass),
+        np.ma.array(POINTS),
+        POINTS.astype(POINTS.dtype.newbyteorder()),
+        POINTS.astype(np.float16),
+        POINTS.astype(int),
+        POINTS[0],
+        np.empty((3, 0)),
+        np.empty((3, 9)),
+    ],
+    ids=["list", "subclass", "masked", "swapped", "float16", "int", "1-D", "d=0", "d=9"],
+)
+def test_other_points_are_converted(points):
+    assert plain(points) is NotImplemented
+    assert _core.plain_count(points, 1.5, *SHARED.values()) is NotImplemented
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"cutoff": 1},
+        {"cutoff": np.float32(1)},
+        {"periodic": False},
+        {"periodic": (False, False, False)},
+        {"box": [4.0, 4.0, 4.0]},
+        {"box": hs.Box(LENGTHS)},
+        {"box": LENGTHS.astype(np.float32)},
+        {"box": LENGTHS[:2]},
+        {"box": np.array(4.0)},
+        {"box": np.asfortranarray(ROWS)},
+        {"box": ROWS[:2]},
+        {"box": LENGTHS, "periodic": (True, True)},
+        {"box": LENGTHS, "periodic": (1, 0, 1)},
+        {"box": LENGTHS, "periodic": "yes"},
+        {"box": LENGTHS, "periodic": np.array([True, True, False])},
+        {"inclusive": 1},
+        {"sort": np.True_},
+        {"index_dtype": "int32"},
+        {"index_dtype": np.dtype(np.int64)},
+    ],
+    ids=str,
+)
+def test_other_arguments_are_converted(options):
+    assert plain(POINTS, **options) is NotImplemented
+
+
+def test_box_object_is_plain_to_the_public_functions(monkeypatch):
+    def refuse(*arguments, **options):
+        raise AssertionError("arguments were converted")
+
+    expected = hs.pairs(POINTS, 1.5, box=LENGTHS.tolist(), quantities="P")
+    monkeypatch.setattr(_api._inputs, "scene", refuse)
+    assert (hs.pairs(POINTS, 1.5, box=hs.Box(LENGTHS), quantities="P") == expected).all()
+    assert hs.count_pairs(POINTS, 1.5, box=hs.Box(LENGTHS)) == len(expected)
+
+
+def test_arguments_are_not_kept():
+    arguments = (POINTS, 1.5, LENGTHS, (True, True, False))
+    before = [sys.getrefcount(argument) for argument in arguments]
+    for _ in range(100):
+        plain(arguments[0], arguments[1], box=arguments[2], periodic=arguments[3])
+        with pytest.raises(ValueError, match="precision"):
+            plain(POINTS, box=LENGTHS, precision="none")
+    assert [sys.getrefcount(argument) for argument in arguments] == before
+
+
+def test_progress_and_signals_reach_small_scenes_with_many_images():
+    fractions = []
+    shared = SHARED | {"box": LENGTHS, "progress": fractions.append}
+    n = _core.plain_count(POINTS, 40.0, *shared.values())
+    assert n > 1_000_000
+    assert fractions
+
+    def stop(fraction):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _core.plain_count(POINTS, 40.0, *(shared | {"progress": stop}).values())
