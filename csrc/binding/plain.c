@@ -103,6 +103,23 @@ take_plain(PyObject *const *arguments, PyObject **taken)
     return true;
 }
 
+/* 4 or 8 for NumPy's types, or native dtypes of them, else IS_NOT_PLAIN. */
+static int
+index_bytes_of(PyObject *object)
+{
+    if (object == (PyObject *)&PyInt64ArrType_Type) {
+        return 8;
+    }
+    if (object == (PyObject *)&PyInt32ArrType_Type) {
+        return 4;
+    }
+    if (!PyArray_DescrCheck(object) || !PyArray_ISNBO(((PyArray_Descr *)object)->byteorder)) {
+        return IS_NOT_PLAIN;
+    }
+    const int type = ((PyArray_Descr *)object)->type_num;
+    return type == NPY_INT64 ? 8 : type == NPY_INT32 ? 4 : IS_NOT_PLAIN;
+}
+
 PyObject *
 hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
@@ -112,14 +129,14 @@ hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         return NULL;
     }
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS; /* quantities, sort, index_dtype, out */
-    const bool       is_int64 = more[2] == (PyObject *)&PyInt64ArrType_Type;
-    if (!is_flag(more[1]) || !(is_int64 || more[2] == (PyObject *)&PyInt32ArrType_Type) ||
+    const int        index_bytes = index_bytes_of(more[2]);
+    if (!is_flag(more[1]) || index_bytes == IS_NOT_PLAIN ||
         !take_plain(arguments, taken)) {
         Py_RETURN_NOTIMPLEMENTED;
     }
     taken[HS_CALL_ARGUMENTS] = more[0];
     taken[HS_CALL_ARGUMENTS + 1] = more[1];
-    taken[HS_CALL_ARGUMENTS + 2] = PyLong_FromLong(is_int64 ? 8 : 4);
+    taken[HS_CALL_ARGUMENTS + 2] = PyLong_FromLong(index_bytes);
     taken[HS_CALL_ARGUMENTS + 3] = more[3];
     PyObject *result = taken[HS_CALL_ARGUMENTS + 2] == NULL
                            ? NULL

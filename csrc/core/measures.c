@@ -93,8 +93,8 @@ put_vectors(const hs_recorder *recorder, const hs_search *search, const double *
 }
 
 /* Shifts that only sort the images of one pair may leave out what all of these share: the turns by
- * which i and j were wrapped, which can be too many for int32. */
-static bool
+ * which i and j were wrapped, which can be too many for int32. Returns as put_shifts. */
+static int32_t
 find_keys(const hs_trace *trace, int64_t keys[][HS_BATCH])
 {
     const int m = trace->search->scene.lattice.n_periodic;
@@ -104,13 +104,13 @@ find_keys(const hs_trace *trace, int64_t keys[][HS_BATCH])
             image[r] = trace->image[r][e];
         }
         if (!hs_lattice_shift(&trace->search->scene.lattice, image, key)) {
-            return false;
+            return e;
         }
         for (int l = 0; l < m; l++) {
             keys[l][e] = key[l];
         }
     }
-    return true;
+    return trace->n;
 }
 
 /* S over all box vectors, zero on open ones, when all are few. */
@@ -132,8 +132,9 @@ put_narrow(const hs_trace *trace, const double *sign, int32_t *to)
     }
 }
 
-/* S over all box vectors, zero on open ones; false when one does not fit int32. */
-static bool
+/* S over all box vectors, zero on open ones. Returns the first pair whose S does not fit int32, or
+ * their number. */
+static int32_t
 put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sign, int32_t first)
 {
     const hs_lattice *lattice = &trace->search->scene.lattice;
@@ -141,27 +142,29 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
     const bool        keys_only = !(trace->search->options.want & HS_WANT_SHIFT);
     int64_t           keys[HS_MAX_DIM][HS_BATCH];
     int32_t *to = (int32_t *)hs_output_next(recorder->output, HS_WANT_SHIFT) + (int64_t)first * d;
-    bool     fits = true;
+    int32_t  fitting = trace->n;
     if (m < d) {
         memset(to, 0, (size_t)trace->n * (size_t)d * sizeof *to);
     }
     if (trace->is_narrow) { /* keys as well: what is left out is zero or the same for all images */
         put_narrow(trace, sign, to);
-        return true;
+        return fitting;
     }
-    if (keys_only && !find_keys(trace, keys)) {
-        return false;
+    if (keys_only) {
+        fitting = find_keys(trace, keys);
     }
     for (int l = 0; l < m; l++) {
         const int64_t *shifts = keys_only ? keys[l] : trace->given[l];
         int32_t       *column = to + lattice->vector_of_row[l];
-        for (int32_t e = 0; e < trace->n; e++) {
+        for (int32_t e = 0; e < fitting; e++) {
             const int64_t value = sign[e] < 0.0 ? -shifts[e] : shifts[e];
             column[(int64_t)e * d] = (int32_t)value;
-            fits = fits && value >= INT32_MIN && value <= INT32_MAX;
+            if (value < INT32_MIN || value > INT32_MAX) {
+                fitting = e;
+            }
         }
     }
-    return fits;
+    return fitting;
 }
 
 /* Writes the batch. */
@@ -183,9 +186,12 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
     if (recorder->columns & HS_WANT_VECTOR) {
         put_vectors(recorder, search, sign, part->first, trace->n);
     }
-    if ((recorder->columns & HS_WANT_SHIFT) && !put_shifts(recorder, trace, sign, part->first)) {
-        walker->failed_point = part->point[0];
-        return HS_ERR_SHIFT_RANGE;
+    if (recorder->columns & HS_WANT_SHIFT) {
+        const int32_t fitting = put_shifts(recorder, trace, sign, part->first);
+        if (fitting < trace->n) {
+            walker->failed_point = part->point[fitting];
+            return HS_ERR_SHIFT_RANGE;
+        }
     }
     return HS_OK;
 }

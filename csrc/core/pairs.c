@@ -120,6 +120,9 @@ hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *opti
             hs_output_fix(&pairs->output, options->out);
         }
         status = find_pairs(search, &pairs->output, failure);
+        if (status == HS_OK && !pairs->output.fixed) {
+            status = hs_output_reserve(&pairs->output, 0, 1.0); /* arrays also without pairs */
+        }
         hs_search_report(search, pairs->output.n_pairs);
         hs_search_close(search);
     }

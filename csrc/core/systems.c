@@ -63,6 +63,18 @@ check_shared(const hs_points *points, const hs_systems *systems, const hs_option
     return systems->rows == NULL ? hs_box_check(systems->box, failure) : HS_OK;
 }
 
+/* Each thread has an account of its own: together they must not pass the limit of the call. */
+static void
+share_limit(hs_options *options, int n_threads)
+{
+    if (n_threads > 1 && options->find_limit != NULL) {
+        options->memory_limit =
+            fmin(options->memory_limit, options->find_limit(options->find_context));
+        options->find_limit = NULL;
+    }
+    options->memory_limit /= n_threads;
+}
+
 /* The whole of both functions. `total`: where the account and the counts are kept. */
 static hs_status
 search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
@@ -73,6 +85,7 @@ search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
         const int n_threads = hs_search_threads(crew->points->n, options);
         const int most = crew->systems->n < n_threads ? (int)crew->systems->n : n_threads;
         hs_team  *team = hs_team_create(most);
+        share_limit(&total->options, hs_team_size(team));
         status = run_crew(crew, team, total, failure);
         hs_team_free(team);
     }
@@ -108,6 +121,9 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
         hs_output_fix(output, options->out);
     }
     hs_status status = search_systems(&crew, total, failure);
+    if (status == HS_OK && !output->fixed) {
+        status = hs_output_reserve(output, 0, 1.0); /* arrays also without pairs */
+    }
     if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
         failure->expected_pairs = (double)output->n_pairs;
         status = HS_ERR_CAPACITY;

@@ -29,7 +29,6 @@ static bool
 is_narrow(const hs_search *search)
 {
     const hs_scene *scene = &search->scene;
-    const double    largest = hs_scale_apply(scene->scale, scene->cloud.largest);
     for (int k = 0; k < scene->ndim; k++) {
         if (scene->lattice.row_of_axis[k] >= 0 &&
             search->grid.reach[k] / search->grid.shape[k] >= MOST_FEW) {
@@ -37,7 +36,8 @@ is_narrow(const hs_search *search)
         }
     }
     return is_plain(&scene->lattice) && !search->bins.keeps_originals &&
-           (!search->bins.turns.known || hs_fold_turns(&scene->lattice, largest) < MOST_FEW);
+           (!search->bins.turns.known ||
+            hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
 }
 
 /* n arrays of `length` numbers of 8 bytes, zero at first: batch kernels read a little beyond the
@@ -129,6 +129,7 @@ load_run(hs_trace *trace, const hs_run *run)
         }
         trace->has_images = trace->has_images || image != 0;
         if (trace->needs_given && trace->is_narrow) {
+            HS_ASSERT(!bins->turns.known || bins->turns.narrow[r] != NULL);
             const int32_t *turns = bins->turns.known ? bins->turns.narrow[r] + run->si : NULL;
             int32_t       *few = trace->of.few[r] + run->at;
             for (int32_t c = 0; c < n; c++) {

@@ -221,18 +221,34 @@ set_links(hs_walker *walker, const hs_row *row)
     walker->n_links = hs_row_links(walker->search, row, walker->links, walker->hints);
 }
 
-/* Groups of the row, as far as their first point is in [from, to). */
+/* Takes up a row at its first group. */
+static void
+open_row(hs_walker *walker, int64_t number)
+{
+    hs_row_open(walker->search, number, &walker->row);
+    walker->row_number = number;
+    walker->last_first = -1;
+    walker->has_next = walker->row.first < walker->row.end;
+    if (walker->has_next) {
+        set_links(walker, &walker->row);
+        walker->has_next = hs_row_next(walker->search, &walker->row, &walker->next);
+    }
+}
+
+/*
+ * Groups of the row, as far as their first point is in [from, to). Goes on where the last range of
+ * this row ended, so that many ranges in a long row do not step through it again and again.
+ */
 static hs_status
 walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
 {
-    hs_row       row;
-    hs_row_group group;
-    hs_row_open(walker->search, number, &row);
-    if (row.first == row.end) {
-        return HS_OK;
+    if (walker->row_number != number || from <= walker->last_first) {
+        open_row(walker, number);
     }
-    set_links(walker, &row);
-    while (hs_row_next(walker->search, &row, &group) && group.first < to) {
+    while (walker->has_next && walker->next.first < to) {
+        const hs_row_group group = walker->next;
+        walker->last_first = group.first;
+        walker->has_next = hs_row_next(walker->search, &walker->row, &walker->next);
         if (group.first >= from) {
             const hs_status status = visit_group(walker, &group);
             if (status != HS_OK) {
@@ -267,6 +283,7 @@ hs_walk_point(hs_walker *walker, int32_t si)
     hs_row       row;
     hs_row_group group;
     hs_row_open_at(walker->search, si, &row, &group);
+    walker->row_number = -1; /* its links are overwritten */
     set_links(walker, &row);
     return visit_group(walker, &group);
 }
@@ -316,6 +333,7 @@ hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *con
     walker->visit = visit;
     walker->visit_context = context;
     walker->extent = -1.0;
+    walker->row_number = -1;
     walker->candidate_limit = INT64_MAX;
     hs_status status = init_links(search, walker);
     if (status == HS_OK) {

@@ -30,6 +30,11 @@ struct hs_walker {
     hs_block_use     use;
     hs_group         group;
     hs_trace         trace;
+    hs_row           row;        /* being walked: */
+    int64_t          row_number; /* its number, or -1 */
+    int32_t          last_first; /* first point of the last group that was taken, or -1 */
+    bool             has_next;
+    hs_row_group     next;
     hs_link         *links;   /* owned; of the row being walked */
     int64_t          n_links;
     int64_t         *hints;   /* owned; for hs_row_links, NULL unless the grid is sparse */

@@ -573,3 +573,12 @@ def test_subclasses_of_arrays_are_arrays():
     expected = hs.count_pairs(POINTS, 1.0, box=CUBE)
     assert hs.count_pairs(np.asmatrix(POINTS), 1.0, box=np.asmatrix(CUBE)) == expected
     assert hs.count_pairs(POINTS.view(Mine), 1.0, box=CUBE.view(Mine)) == expected
+
+
+def test_shifts_too_large_for_int32_name_their_point_at_any_scale():
+    far = np.array([[0.10], [0.15], [3e9 + 0.5], [0.55]])
+    with pytest.raises(OverflowError, match=r"points\[[23]\]"):
+        hs.pairs(far, 0.1, box=[1.0], quantities="S")
+    box = [2.0**25] * 3
+    with pytest.raises(OverflowError):
+        hs.pairs([[0.0] * 3, [2.0**65 + 2.0**13, 0.0, 0.0]], 2.0**22, box=box, quantities="S")

@@ -167,3 +167,12 @@ def test_failures_in_threads_are_the_same_as_alone():
             hs.pairs(far, 2.0, box=box, quantities="S", threads=threads)
         with pytest.raises(MemoryError):
             hs.pairs(RNG.rand(20000, 3), 0.9, threads=threads, memory_limit=3e7)
+
+
+def test_long_rows_are_walked_once():
+    # Stepping to the start of each range from the start of the row took seconds.
+    points = np.random.RandomState(0).rand(300_000, 1) * 3e5
+    started = time.perf_counter()
+    n = hs.count_pairs(points, 1.0, threads=1)
+    assert n == len(hs.pairs(points, 1.0, threads=2)[0])
+    assert time.perf_counter() - started < 10.0
