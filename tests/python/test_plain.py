@@ -95,7 +95,6 @@ def test_other_points_are_converted(points):
         {"inclusive": 1},
         {"sort": np.True_},
         {"index_dtype": "int32"},
-        {"index_dtype": np.dtype(np.int64)},
     ],
     ids=str,
 )
