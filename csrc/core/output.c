@@ -78,7 +78,22 @@ hs_output_next(const hs_output *output, unsigned bit)
                : column + (size_t)output->n_pairs * hs_output_width(output, bit);
 }
 
-/* Columns of at least `pairs` pairs and the padding. */
+/* What some columns got is of no use where another was refused, and may be what that one lacks. */
+static void
+undo_resize(hs_output *output)
+{
+    for (int k = 0; k < HS_COLUMNS; k++) {
+        hs_region *column = &output->column[k];
+        if (output->capacity == 0) {
+            hs_region_release(column);
+        } else if (column->data != NULL) {
+            hs_region_shrink(column, ((size_t)output->capacity + HS_PADDING) *
+                                         hs_output_width(output, 1u << k));
+        }
+    }
+}
+
+/* Columns of at least `pairs` pairs and the padding; as before if that is refused. */
 static bool
 resize(hs_output *output, double pairs)
 {
@@ -95,6 +110,7 @@ resize(hs_output *output, double pairs)
         column->used = (size_t)output->n_pairs * width;
         if (column->data == NULL ? !hs_region_reserve(column, bytes, bytes)
                                  : column->capacity < bytes && !hs_region_grow(column, bytes)) {
+            undo_resize(output);
             return false;
         }
         hs_region_expect(column, bytes);

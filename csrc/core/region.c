@@ -149,6 +149,15 @@ hs_region_prepare(hs_region *region, size_t bytes)
     }
 }
 
+void
+hs_region_shrink(hs_region *region, size_t bytes)
+{
+    HS_ASSERT(region->data != NULL && region->used <= bytes);
+    hs_chunk_touch(region->data, region->used);
+    region->data = hs_chunk_cut(region->data, bytes, NULL);
+    region->capacity = hs_chunk_of(region->data)->capacity;
+}
+
 void *
 hs_region_detach(hs_region *region, size_t bytes)
 {

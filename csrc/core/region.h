@@ -46,6 +46,10 @@ void hs_region_expect(hs_region *region, size_t bytes);
 #define HS_REGION_AHEAD ((size_t)256 << 10) /* few calls, and still in L2 when it is written */
 void hs_region_prepare(hs_region *region, size_t bytes);
 
+/* Gives room beyond the first `bytes` bytes, at least the used ones, back to the system where it
+ * takes it. May move. */
+void hs_region_shrink(hs_region *region, size_t bytes);
+
 /* The first `bytes` bytes become the caller's, to be freed by hs_buffer_free; the rest is given
  * back. May move. The region is empty afterwards. NULL only if it was empty before. */
 void *hs_region_detach(hs_region *region, size_t bytes);

@@ -10,6 +10,7 @@
 typedef struct wrapping {
     hs_scene *scene;
     bool      few_turns;
+    int       n_slabs; /* that so many points have; the others are not set */
     hs_folded folded[HS_SLABS];
 } wrapping;
 
@@ -61,7 +62,7 @@ join_slabs(const wrapping *wrap)
 {
     const hs_scene *scene = wrap->scene;
     hs_folded       folded = hs_folded_none();
-    for (int slab = 0; slab < HS_SLABS; slab++) {
+    for (int slab = 0; slab < wrap->n_slabs; slab++) {
         hs_folded_join(&folded, &wrap->folded[slab]);
     }
     for (int k = 0; scene->lattice.aligned && k < scene->ndim; k++) {
@@ -82,7 +83,10 @@ hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double 
     wrapping wrap;
     wrap.scene = scene;
     wrap.few_turns = hs_fold_turns(&scene->lattice, scene->cloud.largest) <= HS_FOLD_TURNS;
-    for (int slab = 0; slab < HS_SLABS; slab++) {
+    wrap.n_slabs = scene->n < HS_SLABS * HS_SLAB_POINTS
+                       ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
+                       : HS_SLABS;
+    for (int slab = 0; slab < wrap.n_slabs; slab++) {
         wrap.folded[slab] = hs_folded_none();
     }
     const hs_status status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);

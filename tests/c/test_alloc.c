@@ -30,8 +30,8 @@ count_pairs(const brute_scene *scene)
     return count;
 }
 
-/* Lets allocation 1, 2, 3 ... of find fail, into arrays of the caller or new ones. Some a search can
- * do without. Returns how many there are. */
+/* Lets allocation 1, 2, 3 ... of find fail, into arrays of the caller or new ones. Some of them a
+ * search can do without. Returns how many there are. */
 static int
 fail_each(const brute_scene *scene, unsigned want, bool sorted, bool into)
 {

@@ -127,6 +127,26 @@ growth_in_small_steps(void)
         hs_region_release(&others[k]);
 }
 
+/* From malloc and from pages; what is left can be written to and grown again. */
+static void
+shrinking_keeps_what_is_used(void)
+{
+    static const size_t sizes[] = {4000, 900000, 3 * MB, 30 * MB};
+    for (int k = 0; k < 4; k++) {
+        hs_region region = {0};
+        hs_pool_clear();
+        CHECK(hs_region_reserve(&region, sizes[k], sizes[k]));
+        fill(&region, sizes[k] / 16 * 8);
+        const size_t used = region.used;
+        hs_region_shrink(&region, used + 512);
+        CHECK(region.used == used && region.capacity >= used + 512);
+        CHECK(holds(region.data, used) && is_aligned(region.data, HS_ALIGNMENT));
+        fill(&region, region.capacity / 8 * 8);
+        CHECK(hs_region_grow(&region, 2 * sizes[k]) && holds(region.data, region.used));
+        hs_region_release(&region);
+    }
+}
+
 static void
 detach_keeps_the_front(void)
 {
@@ -366,6 +386,7 @@ test_region(void)
     RUN(reserve_gives_room);
     RUN(contents_survive_growth);
     RUN(growth_in_small_steps);
+    RUN(shrinking_keeps_what_is_used);
     RUN(detach_keeps_the_front);
     RUN(chunks_stay_aligned);
     RUN(failures_lose_nothing);

@@ -1,5 +1,8 @@
 """Memory does not grow over thousands of calls, failing ones included, and stays modest."""
 
+import os
+import sys
+
 import pytest
 
 from subprocesses import RESIDENT, run
@@ -130,3 +133,98 @@ print(json.dumps(resident() - before))
 """
     )
     assert grown < 20_000_000
+
+
+# Calls under a limit of the address space, as `ulimit -v` sets it: room(bytes, call) gives the call
+# so many bytes more than the process has. Lattice points have a third of the pairs that their
+# density lets expect, so that most of what is reserved is not needed.
+LIMITED = """
+import json, resource
+import numpy as np
+import halfshell as hs
+
+def mapped():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[0]) * resource.getpagesize()
+
+def room(bytes, call):
+    hs.clear_cache()
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (mapped() + bytes, hard))
+    try:
+        return call()
+    except MemoryError:
+        return None
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+MB = 1 << 20
+axis = np.arange(90.0)
+lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+uniform = np.random.default_rng(1).random((50_000, 3))
+"""
+
+limited_address_space = pytest.mark.skipif(
+    sys.platform != "linux" or "LD_PRELOAD" in os.environ,
+    reason="needs Linux, and no sanitizer, which maps terabytes",
+)
+
+
+@limited_address_space
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_large_result_fits_a_limited_address_space(threads):
+    same, size = run(
+        LIMITED
+        + f"""
+expected = hs.pairs(uniform, 0.12)
+found = room(600 * MB, lambda: hs.pairs(uniform, 0.12, threads={threads}))
+same = all(np.array_equal(a, b) for a, b in zip(expected, found))
+print(json.dumps([same, sum(a.nbytes for a in found)]))
+"""
+    )
+    assert same
+    assert size > 100_000_000
+
+
+@limited_address_space
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_reservation_that_is_refused_is_not_an_error(threads):
+    # Expected are 4.4 million pairs of 60 bytes, 280 MB with a margin; there are 2.2 million.
+    same, size = run(
+        LIMITED
+        + f"""
+search = lambda: hs.pairs(lattice, 1.41, quantities="ijdDS", threads={threads})
+expected = search()
+found = room(235 * MB, search)
+same = all(np.array_equal(a, b) for a, b in zip(expected, found))
+print(json.dumps([same, sum(a.nbytes for a in found)]))
+"""
+    )
+    assert same
+    assert 120_000_000 < size < 140_000_000
+
+
+@limited_address_space
+@pytest.mark.parametrize("threads", [1, 3])
+def test_too_little_address_space_is_a_memory_error(threads):
+    # From next to nothing to nearly enough: an answer or MemoryError, and no harm done.
+    outcomes = run(
+        LIMITED
+        + f"""
+outcomes = []
+for quantities, most in (("ij", 60), ("ijdDS", 150)):
+    search = lambda: hs.pairs(lattice, 1.41, quantities=quantities, threads={threads})
+    expected = search()
+    for megabytes in (0, 1, 3, 8, 15, 20, 25, *range(30, most, 4)):
+        found = room(megabytes * MB, search)
+        same = found and all(np.array_equal(a, b) for a, b in zip(expected, found))
+        outcomes.append(None if found is None else bool(same))
+        del found
+    found = search()
+    outcomes.append(all(np.array_equal(a, b) for a, b in zip(expected, found)))
+print(json.dumps(outcomes))
+"""
+    )
+    assert outcomes.count(None) >= 20
+    assert False not in outcomes
+    assert outcomes[-1] is True
