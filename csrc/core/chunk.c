@@ -26,11 +26,23 @@ round_up(uintptr_t address, size_t multiple)
     return (address + multiple - 1) / multiple * multiple;
 }
 
-/* Where data lies in what malloc returned. */
-static void *
-place(void *raw)
+/* How far behind the start of what malloc returned the data lie. */
+static size_t
+lead_of(const void *raw)
 {
-    return (void *)round_up((uintptr_t)raw + sizeof(hs_chunk), HS_ALIGNMENT);
+    const uintptr_t address = (uintptr_t)raw;
+    return (size_t)(round_up(address + sizeof(hs_chunk), HS_ALIGNMENT) - address);
+}
+
+/* A chunk of `bytes` bytes in what malloc returned: its data. No part of it can be given back, so
+ * all of it counts as touched. */
+static void *
+place(void *raw, size_t bytes)
+{
+    const size_t lead = lead_of(raw);
+    void        *data = (char *)raw + lead;
+    *hs_chunk_of(data) = (hs_chunk){.raw = raw, .lead = lead, .capacity = bytes, .touched = bytes};
+    return data;
 }
 
 static void *
@@ -57,13 +69,7 @@ hs_chunk_new(size_t bytes)
         return data;
     }
     void *raw = malloc(bytes + OVERHEAD);
-    if (raw == NULL) {
-        return NULL;
-    }
-    data = place(raw);
-    /* No part of it can be given back: all of it counts as touched. */
-    *hs_chunk_of(data) = (hs_chunk){.raw = raw, .capacity = bytes, .touched = bytes};
-    return data;
+    return raw != NULL ? place(raw, bytes) : NULL;
 }
 
 void
@@ -99,17 +105,16 @@ grow_in_pages(void *data, size_t bytes)
 static void *
 resize_in_malloc(void *data, size_t bytes, size_t kept)
 {
-    const size_t before = (size_t)((char *)data - (char *)hs_chunk_of(data)->raw);
-    void        *raw = realloc(hs_chunk_of(data)->raw, bytes + OVERHEAD);
+    const size_t before = hs_chunk_of(data)->lead;
+    char        *raw = realloc(hs_chunk_of(data)->raw, bytes + OVERHEAD);
     if (raw == NULL) {
         return NULL;
     }
-    char *resized = place(raw);
-    if (resized != (char *)raw + before) {
-        memmove(resized, (char *)raw + before, kept);
+    /* The data first: the header may come to lie where they are now. */
+    if (lead_of(raw) != before) {
+        memmove(raw + lead_of(raw), raw + before, kept);
     }
-    *hs_chunk_of(resized) = (hs_chunk){.raw = raw, .capacity = bytes, .touched = bytes};
-    return resized;
+    return place(raw, bytes);
 }
 
 void *
