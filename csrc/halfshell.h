@@ -48,6 +48,7 @@ const char *hs_status_text(hs_status status);
 typedef struct hs_failure {
     int64_t row;            /* point or box vector, -1 when it does not apply */
     int64_t column;         /* coordinate, -1 when it does not apply */
+    bool    in_queries;     /* the row is one of the queries, not of the points */
     int64_t system;         /* of several that were searched at once, -1 when it does not apply */
     double  value;          /* the offending number */
     double  expected_pairs; /* HS_ERR_MEMORY: pairs that were expected, or 0; HS_ERR_CAPACITY */

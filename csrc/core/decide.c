@@ -69,11 +69,12 @@ trace_unsure(hs_walker *walker, const hs_scan *scan, int32_t u, int32_t *next)
         int32_t       places[HS_BATCH], n = 0;
         const int32_t t = scan->unsure[u].t, si = walker->group.first + t;
         for (; u + n < scan->n_unsure && n < HS_BATCH && scan->unsure[u + n].t == t; n++) {
-            places[n] = scan->unsure[u + n].place;
+            const int32_t place = scan->unsure[u + n].place;
+            places[n] = walker->is_ordered ? walker->block.origin[place] : place;
         }
         const int32_t taken = hs_trace_add(trace, si, places, n);
         if (taken < 0) {
-            walker->failed_point = walker->search->bins.order[si];
+            walker->failed_point = hs_search_asking(walker->search)->order[si];
             return HS_ERR_SHIFT_RANGE;
         }
         u += taken;

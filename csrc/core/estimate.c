@@ -11,17 +11,30 @@
 #define MOST_PAIRS 0x1p62  /* more than int64 should be asked to count */
 #define SURE_ERRORS 3.0    /* standard errors below the mean at which a refusal is sure enough */
 
+static double
+sum_of_squares(const hs_bins *bins, int64_t n_cells)
+{
+    double squares = 0.0;
+    for (int64_t c = 0; c < n_cells; c++) {
+        const double n = bins->start[c + 1] - bins->start[c];
+        squares += n * n;
+    }
+    return squares;
+}
+
 /*
  * A bound on the number of pairs. Each stencil offset pairs every cell with at most one other, so
- * by the Cauchy-Schwarz inequality it contributes at most the sum of squared occupancies.
+ * by the Cauchy-Schwarz inequality it contributes at most the sum of squared occupancies; for two
+ * sets, the root of the product of both sums.
  */
 static double
 bound_pairs(const hs_search *search)
 {
-    double squares = 0.0, offsets = 0.0;
-    for (int64_t c = 0; c < search->grid.n_cells; c++) {
-        const double n = search->bins.start[c + 1] - search->bins.start[c];
-        squares += n * n;
+    double squares = sum_of_squares(&search->bins, search->grid.n_cells), offsets = 0.0;
+    if (search->has_queries) {
+        const int64_t n_cells =
+            search->is_sparse ? search->query_sparse.n_cells : search->grid.n_cells;
+        squares = sqrt(squares * sum_of_squares(&search->query_bins, n_cells));
     }
     for (int64_t s = 0; s < search->stencil.n_rows; s++) {
         offsets += (double)search->stencil.rows[s].last - search->stencil.rows[s].first + 1.0;
@@ -78,7 +91,8 @@ least_pairs(const hs_search *search)
     for (int k = 0; k < scene->ndim; k++) {
         least *= covered;
     }
-    return least - 0.5 * n;
+    /* Half a pair of each point would be the one with itself. */
+    return (least - (search->has_queries ? 0.0 : 0.5 * n)) * search->pairs_per_half;
 }
 
 hs_status
@@ -96,7 +110,8 @@ hs_estimate_by_density(hs_search *search, hs_failure *failure)
     if (!(least > 0.0) || hs_account_allows(&search->account, least * bytes_per_pair)) {
         return HS_OK;
     }
-    return refuse(search, search->grid.expected_pairs, bytes_per_pair, failure);
+    return refuse(search, search->grid.expected_pairs * search->pairs_per_half, bytes_per_pair,
+                  failure);
 }
 
 /* What a few points have found: the sum of their counts, of the squares, and how many. */
@@ -137,7 +152,7 @@ hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
     const double  bytes_per_pair = hs_bytes_per_pair(&search->options, search->scene.ndim);
-    const int64_t n = search->bins.n;
+    const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
     sample        taken;
     if (n == 0 ||

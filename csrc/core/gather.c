@@ -11,14 +11,12 @@
 #define FLOATS_PER_LINE (HS_ALIGNMENT / (int64_t)sizeof(float))
 
 hs_status
-hs_block_init(hs_account *account, int ndim, hs_block_use use, double most, hs_block *block)
+hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
+              hs_block *block)
 {
-    *block = (hs_block){0};
-    block->capacity =
-        most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
-    block->most_hits = HITS_PER_CANDIDATE * block->capacity;
-    block->most_runs = block->capacity < HS_BLOCK_RUNS ? block->capacity : HS_BLOCK_RUNS;
-    const int64_t capacity = block->capacity + HS_PADDING;
+    *block = (hs_block){.capacity = most, .most_runs = most_runs};
+    block->most_hits = most < INT32_MAX / HITS_PER_CANDIDATE ? HITS_PER_CANDIDATE * most : most;
+    const int64_t capacity = (int64_t)most + HS_PADDING;
     const int64_t room = (capacity + FLOATS_PER_LINE - 1) / FLOATS_PER_LINE * FLOATS_PER_LINE;
     block->y[0] = hs_alloc(account, HS_FOR_CANDIDATES, room * (ndim + 1), sizeof(float));
     bool complete = block->y[0] != NULL;
@@ -28,11 +26,12 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, double most, hs_b
     block->norm = complete ? block->y[0] + ndim * room : NULL;
     block->id = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
     block->unsure = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(hs_unsure));
-    block->runs = hs_alloc(account, HS_FOR_CANDIDATES, block->most_runs + 1, sizeof(hs_run));
+    block->runs =
+        hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)most_runs + 1, sizeof(hs_run));
     complete = complete && block->id != NULL && block->unsure != NULL && block->runs != NULL;
     if (use != HS_BLOCK_COUNTS) {
-        block->hits = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING,
-                               sizeof(int32_t));
+        block->hits = hs_alloc(account, HS_FOR_CANDIDATES,
+                               (int64_t)block->most_hits + HS_PADDING, sizeof(int32_t));
         complete = complete && block->hits != NULL;
     }
     if (use == HS_BLOCK_LISTS_PLACES) {
@@ -71,6 +70,22 @@ hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group
     const int32_t middle = first + (last - first) / 2;
     for (int k = 0; k < bins->ndim; k++) {
         group->centre[k] = bins->x[k][middle];
+    }
+}
+
+void
+hs_group_load(const hs_bins *bins, hs_group *group)
+{
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *x = bins->x[k] + group->first;
+        for (int32_t t = 0; t < group->last - group->first; t++) {
+            const float q = (float)(x[t] - group->centre[k]);
+            uint32_t    bits;
+            memcpy(&bits, &q, sizeof bits);
+            bits &= UINT32_C(0x7fffffff);
+            group->q[k][t] = q;
+            group->largest = bits > group->largest ? bits : group->largest;
+        }
     }
 }
 

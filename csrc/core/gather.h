@@ -22,6 +22,8 @@ typedef struct hs_block {
     float     *norm;   /* sum of y_k^2 */
     int32_t   *id;     /* point numbers of the candidates */
     int32_t   *place;  /* 0, 1, 2, ...; NULL unless asked for */
+    int32_t   *origin; /* where candidates were before they were put in order (order.h); NULL when
+                        * they are not */
     int32_t   *hits;   /* most_hits + HS_PADDING; NULL when only counting */
     hs_unsure *unsure; /* capacity */
     hs_run    *runs;   /* most_runs + 1; runs[n_runs].at is the number of candidates */
@@ -45,14 +47,17 @@ typedef struct hs_group {
     uint32_t largest; /* bits of the largest |q| or |y| gathered for it so far */
 } hs_group;
 
-/* most: a bound on the candidates of any group, or more than HS_BLOCK_CANDIDATES: a small scene
- * gets a small block. */
-hs_status hs_block_init(hs_account *account, int ndim, hs_block_use use, double most,
-                        hs_block *block);
+/* Room for so many candidates and runs at a time. */
+hs_status hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t capacity,
+                        int32_t most_runs, hs_block *block);
 void      hs_block_free(hs_account *account, hs_block *block);
 
 /* Chooses the centre. */
 void hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group);
+
+/* Its points, copied from where they are: for groups whose neighbourhood does not begin with them,
+ * after hs_group_start. Rounded as candidates are. */
+void hs_group_load(const hs_bins *bins, hs_group *group);
 
 /*
  * Appends points [si, end) of one image to the block, as many as there is room for; returns how

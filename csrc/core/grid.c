@@ -335,7 +335,7 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     choose_counts(scene, grid, finer, density, counts, parts);
     const bool capped = cap_counts(scene->ndim, cap, counts);
     hs_status  status = set_shape(scene, counts, grid);
-    if (status == HS_OK && scene->lattice.aligned && !capped) {
+    if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
         cut_by_faces(scene, parts, cap, grid);
     }
     if (single_cost < INFINITY &&

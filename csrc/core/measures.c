@@ -26,7 +26,7 @@ is_backward(const hs_trace *trace, int32_t e)
     return false;
 }
 
-/* 1, or -1 for pairs that are listed the other way round. */
+/* 1, or -1 for pairs of a half list that are listed the other way round. */
 static void
 find_signs(const hs_trace *trace, const int32_t *point, const int32_t *id, double *sign)
 {
@@ -174,7 +174,11 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
     const hs_trace  *trace = &walker->trace;
     const hs_search *search = walker->search;
     double           sign[HS_BATCH];
-    if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
+    if (search->is_full) {
+        for (int32_t e = 0; e < trace->n; e++) {
+            sign[e] = 1.0;
+        }
+    } else if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
         find_signs(trace, part->point, recorder->ids + part->first, sign);
     }
     if (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) {

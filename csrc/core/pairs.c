@@ -112,7 +112,7 @@ hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *opti
     hs_search     *search = &pairs->search;
     const hs_fpenv saved = hs_fpenv_enter();
     memset(&pairs->output, 0, sizeof pairs->output);
-    hs_status status = hs_search_open(points, box, options, search, failure);
+    hs_status status = hs_search_open(&(hs_sets){.points = points}, box, options, search, failure);
     if (status == HS_OK) {
         hs_output_init(&search->account, points->ndim, options->want, options->index_bytes,
                        &pairs->output);
@@ -148,7 +148,7 @@ hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *opt
     counting.want = 0;
     counting.sorted = false;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(points, box, &counting, &search, failure);
+    hs_status      status = hs_search_open(&(hs_sets){.points = points}, box, &counting, &search, failure);
     if (status == HS_OK) {
         status = hs_parallel_count(&search, &found, failure);
         hs_search_report(&search, found);

@@ -9,10 +9,17 @@
  */
 #define TARGET_POINTS 20
 
+/* The rows and cells of the points that ask, in a sparse grid. */
+static const hs_sparse *
+asking_sparse(const hs_search *search)
+{
+    return search->has_queries ? &search->query_sparse : &search->sparse;
+}
+
 int64_t
 hs_row_count(const hs_search *search)
 {
-    return search->is_sparse ? search->sparse.n_rows
+    return search->is_sparse ? asking_sparse(search)->n_rows
                              : search->grid.n_cells / search->grid.shape[0];
 }
 
@@ -20,9 +27,9 @@ hs_row_count(const hs_search *search)
 static int32_t
 first_point(const hs_search *search, int64_t number)
 {
-    const int64_t cell = search->is_sparse ? search->sparse.row_cell[number]
+    const int64_t cell = search->is_sparse ? asking_sparse(search)->row_cell[number]
                                            : number * search->grid.shape[0];
-    return search->bins.start[cell];
+    return hs_search_asking(search)->start[cell];
 }
 
 int64_t
@@ -51,9 +58,9 @@ hs_row_open(const hs_search *search, int64_t number, hs_row *row)
     if (search->is_sparse) {
         row->base = number;
         for (int k = 1; k < grid->ndim; k++) {
-            row->index[k] = search->sparse.row_index[number * (grid->ndim - 1) + k - 1];
+            row->index[k] = asking_sparse(search)->row_index[number * (grid->ndim - 1) + k - 1];
         }
-        hs_sparse_first_group(&search->sparse, number, &row->taken);
+        hs_sparse_first_group(asking_sparse(search), number, &row->taken);
         return;
     }
     row->base = number * grid->shape[0];
@@ -67,7 +74,7 @@ hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *g
 {
     double x[HS_MAX_DIM];
     for (int k = 0; k < search->scene.ndim; k++) {
-        x[k] = search->bins.x[k][si];
+        x[k] = hs_search_asking(search)->x[k][si];
     }
     const double t = hs_lattice_coordinate(&search->scene.lattice, x, 0);
     hs_row_open(search, hs_row_of(search, si), row);
@@ -82,12 +89,12 @@ hs_row_next(const hs_search *search, hs_row *row, hs_row_group *group)
 {
     if (search->is_sparse) {
         const bool found =
-            hs_sparse_next_group(&search->sparse, row->base, HS_GROUP_POINTS, &row->taken);
+            hs_sparse_next_group(asking_sparse(search), row->base, HS_GROUP_POINTS, &row->taken);
         *group = (hs_row_group){row->taken.first, row->taken.last, row->taken.x_first,
                                 row->taken.x_last};
         return found;
     }
-    const int32_t *start = search->bins.start + row->base;
+    const int32_t *start = hs_search_asking(search)->start + row->base;
     const int64_t  n_x = search->grid.shape[0];
     if (row->next >= row->end) {
         return false;
@@ -156,7 +163,8 @@ hs_row_links(const hs_search *search, const hs_row *row, hs_link *links, int64_t
             }
         } else {
             const int32_t *start = search->bins.start + link->base;
-            n_links += s == 0 || start[0] < start[search->grid.shape[0]];
+            /* The own row of the half list leads them all. */
+            n_links += (s == 0 && !search->is_full) || start[0] < start[search->grid.shape[0]];
         }
     }
     return n_links;

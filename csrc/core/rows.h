@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * rows.h: rows of cells, dense or sparse, as the walk sees them: which rows there are, which
- * groups of points each one has, which rows neighbour it, and which points of these lie in a window
+ * rows.h: rows of cells, dense or sparse, as the walk sees them: which rows there are, which groups
+ * of asking points each one has, which rows neighbour it, and which points of these lie in a window
  * of cells.
  */
 #ifndef HS_ROWS_H
@@ -48,7 +48,7 @@ void hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_gro
 bool hs_row_next(const hs_search *search, hs_row *row, hs_row_group *group);
 
 /*
- * Settles which rows neighbour this one, its own first; returns how many. links: room for
+ * Settles which rows neighbour this one, for half lists its own first; returns how many. links: room for
  * search->stencil.n_rows; hints: as many, zero at first, for sparse grids only.
  */
 int64_t hs_row_links(const hs_search *search, const hs_row *row, hs_link *links, int64_t *hints);

@@ -49,9 +49,10 @@ box_magnitudes(const hs_box *box)
     return found;
 }
 
-/* The exponent to scale by, and whether that loses digits. */
+/* The exponent to scale by, and whether that loses digits. asking: the other cloud, or NULL. */
 static int
-choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *extreme)
+choose_exponent(const hs_cloud *cloud, const hs_cloud *asking, const hs_box *box, double cutoff,
+                bool *extreme)
 {
     const magnitudes found = box_magnitudes(box);
     /* With cutoff 0 the scene has another length to go by: its box, or where its points are. */
@@ -69,6 +70,7 @@ choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *e
     *extreme = false;
     if (exponent > 0) {
         double smallest = fmin(found.smallest, hs_cloud_smallest(cloud));
+        smallest = asking != NULL ? fmin(smallest, hs_cloud_smallest(asking)) : smallest;
         smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
         *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
     }
@@ -269,22 +271,35 @@ box_is_vanishing(const hs_lattice *lattice)
 }
 
 static hs_status
-fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-           hs_failure *failure)
+wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
+            double *magnitude, hs_failure *failure)
 {
-    double magnitude = 0.0;
+    const hs_status status = prepare_points(account, team, options, scene);
+    return status == HS_OK ? hs_scene_wrap(scene, team, options, magnitude, failure) : status;
+}
+
+/* asking: NULL, or wrapped as well, and left with the same bounds. */
+static hs_status
+fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
+           hs_scene *asking, hs_failure *failure)
+{
+    double magnitude = 0.0, of_asking = 0.0;
     if (box_is_vanishing(&scene->lattice)) {
         failure->expected_pairs = failure->expected_bytes = INFINITY;
         return HS_ERR_MEMORY;
     }
-    hs_status status = prepare_points(account, team, options, scene);
-    if (status == HS_OK) {
-        status = hs_scene_wrap(scene, team, options, &magnitude, failure);
+    hs_status status = wrap_points(account, team, options, scene, &magnitude, failure);
+    if (status == HS_OK && asking != NULL) {
+        status = wrap_points(account, team, options, asking, &of_asking, failure);
+        failure->in_queries = status == HS_ERR_SHIFT_RANGE;
     }
     if (status != HS_OK) {
         return status;
     }
-    bound_errors(scene, magnitude);
+    if (asking != NULL) {
+        hs_scene_join_wrapped(scene, asking);
+    }
+    bound_errors(scene, hs_larger(magnitude, of_asking));
     settle_ranges(scene);
     init_metric(scene, options);
     return HS_OK;
@@ -296,30 +311,36 @@ start_scene(const hs_points *points, hs_scene *scene)
 {
     scene->ndim = points->ndim;
     scene->n = points->n;
-    scene->keeps_originals = scene->x_is_beside = false;
+    scene->keeps_originals = scene->x_is_beside = scene->is_asked = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
     memset(scene->x_largest, 0, sizeof scene->x_largest);
 }
 
-hs_status
-hs_scene_init(hs_account *account, hs_team *team, const hs_points *points, const hs_box *box,
-              const hs_options *options, hs_scene *scene, hs_failure *failure)
+/* Reads both clouds, the other one if there is one. */
+static hs_status
+load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_options *options,
+            hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
-    start_scene(points, scene);
-    if (!(options->cutoff >= 0.0) || !isfinite(options->cutoff)) {
-        failure->value = options->cutoff;
-        return HS_ERR_CUTOFF;
+    hs_status status =
+        hs_cloud_load(account, team, sets->points, options, &scene->cloud, failure);
+    if (status == HS_OK && asking != NULL) {
+        status = hs_cloud_load(account, team, sets->queries, options, &asking->cloud, failure);
+        failure->in_queries = status != HS_OK;
     }
-    hs_status status = hs_box_check(box, failure);
-    if (status == HS_OK) {
-        status = hs_cloud_load(account, team, points, options, &scene->cloud, failure);
+    if (status == HS_OK && asking != NULL) {
+        hs_scene_join_clouds(scene, asking);
     }
-    if (status != HS_OK) {
-        return status;
-    }
-    const int exponent =
-        choose_exponent(&scene->cloud, box, options->cutoff, &scene->extreme);
+    return status;
+}
+
+/* Scale, cutoff and lattice. */
+static void
+settle_unit(const hs_box *box, const hs_options *options, hs_scene *scene,
+            const hs_scene *asking)
+{
+    const int exponent = choose_exponent(&scene->cloud, asking != NULL ? &asking->cloud : NULL,
+                                         box, options->cutoff, &scene->extreme);
     scene->scale = hs_scale_of(exponent);
     scene->unscale = hs_scale_of(-scene->scale.exponent);
     scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
@@ -330,15 +351,52 @@ hs_scene_init(hs_account *account, hs_team *team, const hs_points *points, const
         scene->cutoff += SCALING_LOSS;
     }
     /* Without points nothing has an image, however small the box is. */
-    hs_lattice_init(points->n > 0 ? box : NULL, points->ndim, scene->scale, &scene->lattice);
+    const bool empty = scene->n == 0 || (asking != NULL && asking->n == 0);
+    hs_lattice_init(empty ? NULL : box, scene->ndim, scene->scale, &scene->lattice);
     scene->formula_error =
         options->precision == HS_DOUBLE ? bound_formula(scene) : 0.0;
     scene->radius = scene->cutoff + scene->formula_error;
-    status = fill_scene(account, team, options, scene, failure);
+}
+
+hs_status
+hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, const hs_box *box,
+                   const hs_options *options, hs_scene *scene, hs_scene *asking,
+                   hs_failure *failure)
+{
+    start_scene(sets->points, scene);
+    if (asking != NULL) {
+        start_scene(sets->queries, asking);
+    }
+    if (!(options->cutoff >= 0.0) || !isfinite(options->cutoff)) {
+        failure->value = options->cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    hs_status status = hs_box_check(box, failure);
+    if (status == HS_OK) {
+        status = load_clouds(account, team, sets, options, scene, asking, failure);
+    }
+    if (status == HS_OK) {
+        settle_unit(box, options, scene, asking);
+        if (asking != NULL) {
+            hs_scene_share(scene, asking);
+        }
+        status = fill_scene(account, team, options, scene, asking, failure);
+    }
     if (status != HS_OK) {
         hs_scene_free(account, scene);
+        if (asking != NULL) {
+            hs_scene_free(account, asking);
+        }
     }
     return status;
+}
+
+hs_status
+hs_scene_init(hs_account *account, hs_team *team, const hs_points *points, const hs_box *box,
+              const hs_options *options, hs_scene *scene, hs_failure *failure)
+{
+    const hs_sets alone = {.points = points};
+    return hs_scene_init_sets(account, team, &alone, box, options, scene, NULL, failure);
 }
 
 void

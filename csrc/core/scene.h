@@ -34,7 +34,16 @@ typedef struct hs_scene {
     double     x_error;       /* each component of X is within this of r - w B */
     double     t_error[HS_MAX_DIM]; /* and each computed t_k of the true one, clamping included */
     double     formula_error; /* precision="double": its |D| against the true one */
+    bool       is_asked;      /* by queries: the bounds above hold for these too */
 } hs_scene;
+
+/* Who looks for neighbours among whom; borrowed. */
+typedef struct hs_sets {
+    const hs_points *points;
+    const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
+    bool             is_full; /* each asking point meets all its neighbours, not the half list that
+                               * has each pair once; always so with queries */
+} hs_sets;
 
 /*
  * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing
@@ -43,6 +52,24 @@ typedef struct hs_scene {
 hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *points,
                         const hs_box *box, const hs_options *options, hs_scene *scene,
                         hs_failure *failure);
+
+/*
+ * The same for two sets of points in one box: each becomes a scene of its own, with one scale, one
+ * lattice and bounds that hold for both. asking: that of the queries, NULL when there are none; only
+ * its arrays and what they are like are its own.
+ */
+hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
+                             const hs_box *box, const hs_options *options, hs_scene *scene,
+                             hs_scene *asking, hs_failure *failure);
+
+/* Steps of that; scene_sets.c. Both clouds get the range of both. */
+void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
+
+/* What has been settled for the points is settled for the queries. */
+void hs_scene_share(const hs_scene *scene, hs_scene *asking);
+
+/* The scene's x_largest, lower and upper cover what wrapping found in both. */
+void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
 
 /* Wraps the points into the box; scene_wrap.c. Sets x_largest, the range of t_k of the points in
  * lower and upper, and *magnitude as hs_wrap_point says. */

@@ -47,37 +47,71 @@ choose_grid(hs_search *search, hs_failure *failure)
     return status;
 }
 
-hs_status
-hs_search_build(const hs_points *points, const hs_box *box, hs_search *search,
-                hs_failure *failure)
+/* Points into the cells of the grid. */
+static hs_status
+build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
 {
-    const hs_options *options = &search->options;
-    hs_account       *account = &search->account;
-    search->kernel = hs_kernel_select(options->kernel);
-    if (search->kernel == NULL) {
-        return HS_ERR_KERNEL;
-    }
-    hs_status status =
-        hs_scene_init(account, search->team, points, box, options, &search->scene, failure);
-    if (status == HS_OK) {
-        status = choose_grid(search, failure);
-    }
+    hs_account *account = &search->account;
+    return search->is_sparse
+               ? hs_sparse_build(account, search->team, &search->options, scene, grid, sparse, bins)
+               : hs_bins_build(account, search->team, &search->options, scene, grid, bins);
+}
+
+/* The queries into cells of the same grid; their scene gives up its arrays. */
+static hs_status
+build_query_bins(hs_search *search, hs_scene *asking)
+{
+    hs_grid grid = search->grid; /* of which occupied cells are counted anew */
+    return build_bins(search, asking, &grid, &search->query_sparse, &search->query_bins);
+}
+
+/* Grid, stencil and bins. */
+static hs_status
+build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
+{
+    hs_scene *scene = &search->scene;
+    hs_status status = choose_grid(search, failure);
     if (status == HS_OK) {
         status = hs_estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
-        status = hs_stencil_build(account, options, &search->scene, &search->grid,
-                                  &search->stencil);
+        status = hs_stencil_build(&search->account, &search->options, scene, &search->grid,
+                                  search->is_full, &search->stencil);
     }
     if (status == HS_OK) {
-        status = search->is_sparse
-                     ? hs_sparse_build(account, search->team, options, &search->scene,
-                                       &search->grid, &search->sparse, &search->bins)
-                     : hs_bins_build(account, search->team, options, &search->scene, &search->grid,
-                                     &search->bins);
+        status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);
+    }
+    if (status == HS_OK && asking != NULL) {
+        status = build_query_bins(search, asking);
+    }
+    return status;
+}
+
+hs_status
+hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
+{
+    const hs_options *options = &search->options;
+    hs_scene          queries, *asking = sets->queries != NULL ? &queries : NULL;
+    search->kernel = hs_kernel_select(options->kernel);
+    if (search->kernel == NULL) {
+        return HS_ERR_KERNEL;
+    }
+    const int64_t n_asking = asking != NULL ? sets->queries->n : sets->points->n;
+    search->has_queries = asking != NULL;
+    search->is_full = sets->is_full || asking != NULL;
+    search->pairs_per_half = !search->is_full      ? 1.0
+                             : sets->points->n > 0 ? 2.0 * (double)n_asking / (double)sets->points->n
+                                                   : 0.0;
+    hs_status status = hs_scene_init_sets(&search->account, search->team, sets, box, options,
+                                          &search->scene, asking, failure);
+    if (status == HS_OK) {
+        status = build_cells(search, asking, failure);
+        if (asking != NULL) {
+            hs_scene_free(&search->account, asking);
+        }
     }
     if (status == HS_OK) {
-        search->n_in_all = points->n;
+        search->n_in_all = n_asking;
         search->filter_error = search->scene.x_error + search->grid.shift_error +
                                search->scene.formula_error;
     }
@@ -111,12 +145,13 @@ hs_search_begin(const hs_options *options, hs_search *search)
 }
 
 hs_status
-hs_search_open(const hs_points *points, const hs_box *box, const hs_options *options,
+hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                hs_search *search, hs_failure *failure)
 {
     hs_search_begin(options, search);
-    search->team = hs_team_create(hs_search_threads(points->n, options));
-    const hs_status status = hs_search_build(points, box, search, failure);
+    const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
+    search->team = hs_team_create(hs_search_threads(sets->points->n + n_queries, options));
+    const hs_status status = hs_search_build(sets, box, search, failure);
     if (status != HS_OK) {
         hs_search_report(search, 0);
         hs_search_close(search);
@@ -145,6 +180,10 @@ hs_search_close(hs_search *search)
     hs_stencil_free(account, &search->stencil);
     hs_bins_free(account, &search->bins);
     hs_sparse_free(account, &search->sparse);
+    if (search->has_queries) {
+        hs_bins_free(account, &search->query_bins);
+        hs_sparse_free(account, &search->query_sparse);
+    }
     hs_team_free(search->team);
     search->team = NULL;
 }

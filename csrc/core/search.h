@@ -22,10 +22,15 @@ typedef struct hs_search {
     hs_stencil       stencil;
     hs_bins          bins;
     hs_sparse        sparse;  /* when is_sparse: the rows and cells that bins follows */
+    bool             is_full; /* every asking point meets all its neighbours, not the half list */
+    bool             has_queries;  /* then these ask, in the cells of the same grid: */
+    hs_bins          query_bins;
+    hs_sparse        query_sparse;
     bool             is_sparse;
     const hs_kernel *kernel;
     int32_t          first_point;  /* number of the first point */
     int64_t          n_in_all;     /* points, of which these may be a part: for fractions done */
+    double           pairs_per_half; /* pairs to be found for each pair of the half list */
     double           filter_error; /* bound on each component before rounding to float32 */
     hs_poll_fn       callers_poll; /* behind options.poll, which counts the calls */
     void            *callers_context;
@@ -36,9 +41,9 @@ typedef struct hs_search {
 /*
  * Everything up to the first group: hs_search_begin, the team, hs_search_build. On failure nothing
  * is held but the account, which the caller closes in any case. The options are copied; what they
- * point to is borrowed until hs_search_close.
+ * point to is borrowed until hs_search_close; the points are not needed any more.
  */
-hs_status hs_search_open(const hs_points *points, const hs_box *box, const hs_options *options,
+hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                          hs_search *search, hs_failure *failure);
 
 /* An account and options, no scene yet. */
@@ -49,9 +54,16 @@ void hs_search_begin(const hs_options *options, hs_search *search);
  * have changed. For points that are part of more: their numbers begin at first_point, of
  * n_points_in_all.
  */
-hs_status hs_search_build(const hs_points *points, const hs_box *box, hs_search *search,
+hs_status hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search,
                           hs_failure *failure);
 void      hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
+
+/* The points that ask, in cell order. */
+HS_ALWAYS_INLINE const hs_bins *
+hs_search_asking(const hs_search *search)
+{
+    return search->has_queries ? &search->query_bins : &search->bins;
+}
 
 /* How many threads these options mean for so many points. */
 int hs_search_threads(int64_t n_points, const hs_options *options);

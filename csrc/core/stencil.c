@@ -26,6 +26,13 @@ typedef struct frame {
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
 
+/* What rows are looked for in. */
+typedef struct scope {
+    const hs_scene *scene;
+    const hs_grid  *grid;
+    frame           axes;
+} scope;
+
 /* Is v = sum_k (normal_k . v) direction_k, for every v? */
 static bool
 axes_are_dual(const hs_lattice *lattice)
@@ -195,46 +202,62 @@ grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
     return true;
 }
 
-hs_status
-hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
-                 const hs_grid *grid, hs_stencil *stencil)
+/* The rows from this one on to the last in the order of the axes, as far as they are in reach. */
+static hs_status
+add_rows(hs_account *account, const hs_options *options, const scope *of, hs_stencil_row *row,
+         hs_stencil *stencil, int64_t capacity)
 {
-    const double bound = hs_stencil_bound(grid);
-    frame        axes; /* which the own row alone does not need */
-    axes.usable = false;
-    *stencil = (hs_stencil){0};
-    if (bound > 1.0 && scene->lattice.aligned) {
-        set_unit_frame(grid->ndim, &axes);
-    } else if (bound > 1.0) {
-        set_triangular_frame(&scene->lattice, &axes);
-    }
-    if (bound > (axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
-        return HS_ERR_MEMORY;
-    }
-    int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
-    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
-    if (stencil->rows == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_stencil_row row = {{0}, 0, 0};
-    (void)reach_along_row(scene, grid, &axes, &row);
-    row.first = 0; /* in the own row only what lies ahead */
-    row.last = row.last > 0 ? row.last : 0;
-    stencil->rows[stencil->n_rows++] = row;
-    /* From the zero offset on, counting up visits exactly the forward half. */
-    for (int64_t tried = 1; advance(grid, row.offset); tried++) {
-        if (tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
+    int64_t tried = 0;
+    do {
+        if (++tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
             hs_stencil_free(account, stencil);
             return HS_ERR_INTERRUPTED;
         }
         if (stencil->n_rows == capacity && !grow(account, &capacity, stencil)) {
             return HS_ERR_MEMORY;
         }
-        if (reach_along_row(scene, grid, &axes, &row)) {
-            stencil->rows[stencil->n_rows++] = row;
+        if (reach_along_row(of->scene, of->grid, &of->axes, row)) {
+            stencil->rows[stencil->n_rows++] = *row;
         }
-    }
+    } while (advance(of->grid, row->offset));
     return HS_OK;
+}
+
+hs_status
+hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
+                 const hs_grid *grid, bool is_full, hs_stencil *stencil)
+{
+    const double bound = hs_stencil_bound(grid) * (is_full ? 2.0 : 1.0);
+    scope        of = {.scene = scene, .grid = grid};
+    of.axes.usable = false; /* the own row alone needs none */
+    *stencil = (hs_stencil){0};
+    if (bound > 1.0 && scene->lattice.aligned) {
+        set_unit_frame(grid->ndim, &of.axes);
+    } else if (bound > 1.0) {
+        set_triangular_frame(&scene->lattice, &of.axes);
+    }
+    if (bound > (of.axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
+        return HS_ERR_MEMORY;
+    }
+    const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
+    stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
+    if (stencil->rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_stencil_row row = {{0}, 0, 0};
+    if (is_full) {
+        for (int k = 1; k < grid->ndim; k++) {
+            row.offset[k] = (int32_t)-grid->reach[k];
+        }
+        return add_rows(account, options, &of, &row, stencil, capacity);
+    }
+    (void)reach_along_row(scene, grid, &of.axes, &row);
+    row.first = 0; /* in the own row only what lies ahead */
+    row.last = row.last > 0 ? row.last : 0;
+    stencil->rows[stencil->n_rows++] = row;
+    /* From the zero offset on, counting up visits exactly the forward half. */
+    return advance(grid, row.offset) ? add_rows(account, options, &of, &row, stencil, capacity)
+                                     : HS_OK;
 }
 
 void

@@ -18,13 +18,14 @@ typedef struct hs_stencil_row {
 } hs_stencil_row;
 
 typedef struct hs_stencil {
-    hs_stencil_row *rows; /* owned; rows[0] is the own row, with first = 0 */
+    hs_stencil_row *rows; /* owned; rows[0] is the own row, with first = 0 unless full */
     int64_t         n_rows;
 } hs_stencil;
 
-/* Polls now and then. HS_ERR_MEMORY when the rows do not fit. */
-hs_status hs_stencil_build(hs_account *account, const hs_options *options,
-                           const hs_scene *scene, const hs_grid *grid, hs_stencil *stencil);
+/* Polls now and then. HS_ERR_MEMORY when the rows do not fit. is_full: the backward half as well,
+ * for points that meet all their neighbours. */
+hs_status hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
+                           const hs_grid *grid, bool is_full, hs_stencil *stencil);
 
 /* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
 double hs_stencil_bound(const hs_grid *grid);

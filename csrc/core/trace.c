@@ -166,7 +166,7 @@ static void
 add_narrow(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
 {
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        const int32_t  mine = (int32_t)turns_of(&trace->search->bins, r, si);
+        const int32_t  mine = (int32_t)turns_of(hs_search_asking(trace->search), r, si);
         const int32_t *few = trace->of.few[r];
         int32_t       *to = trace->shift[r] + trace->n;
         for (int32_t e = 0; e < n; e++) {
@@ -182,7 +182,7 @@ add_given(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
 {
     const int      m = trace->search->bins.n_periodic;
     for (int r = 0; r < m; r++) {
-        const int64_t  mine = turns_of(&trace->search->bins, r, si);
+        const int64_t  mine = turns_of(hs_search_asking(trace->search), r, si);
         const int64_t *turned = trace->of.turned[r];
         int64_t       *to = trace->given[r] + trace->n;
         for (int32_t e = 0; e < n; e++) {
@@ -248,7 +248,7 @@ add_images(hs_trace *trace, const int32_t *places, int32_t n)
 int32_t
 hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
 {
-    const hs_bins *bins = &trace->search->bins;
+    const hs_bins *bins = hs_search_asking(trace->search);
     const int32_t  room = HS_BATCH - trace->n;
     n = n < room ? n : room;
     if (!trace->is_loaded) {

@@ -77,7 +77,9 @@ set_scan(const hs_walker *walker, hs_scan *scan)
         scan->y[k] = block->y[k];
         scan->q[k] = walker->group.q[k];
     }
-    scan->label = walker->use == HS_BLOCK_LISTS_PLACES ? block->place : block->id;
+    scan->label = walker->use != HS_BLOCK_LISTS_PLACES ? block->id
+                  : walker->is_ordered                 ? block->origin
+                                                       : block->place;
     scan->n = block->n;
     scan->n_points = walker->group.last - walker->group.first;
     scan->triangular = walker->block_is_first;
@@ -93,40 +95,40 @@ set_scan(const hs_walker *walker, hs_scan *scan)
     scan->most_unsure = block->capacity;
 }
 
-/* Test every point of the group against the block, then empty the block. */
+/* Hands the hits of points [first, next) of the group to the visitor. */
 static hs_status
-scan_block(hs_walker *walker)
+visit_hits(hs_walker *walker, const hs_scan *scan, int32_t first, int32_t next)
+{
+    const int32_t si = walker->group.first + first;
+    const hs_rows rows = {.n = next - first,
+                          .point = hs_search_asking(walker->search)->order + si,
+                          .end = scan->end + first,
+                          .hits = scan->hits};
+    return walker->visit(walker->visit_context, walker, si, &rows);
+}
+
+/* The block as it was appended, ready to be scanned. */
+static hs_status
+fill_block(hs_walker *walker)
 {
     hs_block *block = &walker->block;
-    int32_t   end[HS_GROUP_POINTS];
-    hs_scan   scan;
+    walker->of_group.candidates += block->n;
+    walker->of_group.runs += block->n_runs;
     hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
                     &walker->group);
     hs_trace_reset(&walker->trace);
     set_form(walker);
-    set_scan(walker, &scan);
-    const int64_t n_points = scan.n_points;
+    return walker->is_ordered ? hs_order_block(&walker->search->scene.lattice, walker->use, block,
+                                               &walker->order)
+                              : HS_OK;
+}
+
+/* What was tested, and whether to go on. */
+static hs_status
+finish_block(hs_walker *walker, int64_t n_points)
+{
+    hs_block     *block = &walker->block;
     const int64_t skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
-    scan.end = end;
-    for (int32_t first = 0, next; first < scan.n_points; first = next) {
-        next = walker->scan(&scan, first);
-        hs_status status = HS_OK;
-        if (scan.n_unsure > 0 && walker->options.precision != HS_SINGLE) {
-            status = hs_decide(walker, &scan, first, next);
-        }
-        walker->n_found += scan.n_hits;
-        if (status == HS_OK && walker->visit != NULL && scan.n_hits > 0) {
-            const int32_t si = walker->group.first + first;
-            const hs_rows rows = {.n = next - first,
-                                  .point = walker->search->bins.order + si,
-                                  .end = end + first,
-                                  .hits = scan.hits};
-            status = walker->visit(walker->visit_context, walker, si, &rows);
-        }
-        if (status != HS_OK) {
-            return status;
-        }
-    }
     walker->n_candidates += n_points * block->n - skipped;
     walker->work_since_poll += n_points * block->n;
     block->n = 0;
@@ -140,6 +142,28 @@ scan_block(hs_walker *walker)
         return hs_poll(&walker->options, hs_walk_fraction(walker));
     }
     return HS_OK;
+}
+
+/* Test every point of the group against the block, then empty the block. */
+static hs_status
+scan_block(hs_walker *walker)
+{
+    int32_t   end[HS_GROUP_POINTS];
+    hs_scan   scan;
+    hs_status status = fill_block(walker);
+    set_scan(walker, &scan);
+    scan.end = end;
+    for (int32_t first = 0, next; status == HS_OK && first < scan.n_points; first = next) {
+        next = walker->scan(&scan, first);
+        if (scan.n_unsure > 0 && walker->options.precision != HS_SINGLE) {
+            status = hs_decide(walker, &scan, first, next);
+        }
+        walker->n_found += scan.n_hits;
+        if (status == HS_OK && walker->visit != NULL && scan.n_hits > 0) {
+            status = visit_hits(walker, &scan, first, next);
+        }
+    }
+    return status == HS_OK ? finish_block(walker, scan.n_points) : status;
 }
 
 static hs_status
@@ -192,26 +216,40 @@ gather_link(hs_walker *walker, hs_link *link, int64_t low, int64_t high, int32_t
     return HS_OK;
 }
 
+static void
+keep_largest(int64_t found, int64_t *largest)
+{
+    *largest = found > *largest ? found : *largest;
+}
+
 /* Visit a group of the row that the links belong to. */
 static hs_status
 visit_group(hs_walker *walker, const hs_row_group *group)
 {
+    const hs_search *search = walker->search;
     walker->n_groups++;
     walker->block.n = 0;
     walker->block.n_runs = 0;
-    walker->block_is_first = true;
-    hs_group_start(&walker->search->bins, group->first, group->last, &walker->group);
+    walker->block_is_first = !search->is_full;
+    walker->of_group = (hs_neighbourhood){0, 0};
+    hs_group_start(hs_search_asking(search), group->first, group->last, &walker->group);
+    if (search->is_full) {
+        hs_group_load(hs_search_asking(search), &walker->group);
+    }
     for (int64_t l = 0; l < walker->n_links; l++) {
         hs_link *link = &walker->links[l];
         /* The own row comes first; in it each point meets only those that follow. */
         const hs_status status =
             gather_link(walker, link, group->x_first + link->first, group->x_last + link->last,
-                        l == 0 ? group->first : 0);
+                        l == 0 && !search->is_full ? group->first : 0);
         if (status != HS_OK) {
             return status;
         }
     }
-    return scan_block(walker);
+    const hs_status status = scan_block(walker);
+    keep_largest(walker->of_group.candidates, &walker->most.candidates);
+    keep_largest(walker->of_group.runs, &walker->most.runs);
+    return status;
 }
 
 static void
@@ -321,29 +359,66 @@ init_links(hs_search *search, hs_walker *walker)
     return HS_OK;
 }
 
-hs_status
-hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
-               hs_walker *walker)
+/* Everything but what the walker is asked to do. */
+static hs_status
+init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
+            hs_walker *walker)
 {
     hs_account *account = &search->account;
     memset(walker, 0, sizeof *walker);
     walker->search = search;
     walker->options = search->options;
     walker->use = use;
-    walker->visit = visit;
-    walker->visit_context = context;
     walker->extent = -1.0;
     walker->row_number = -1;
     walker->candidate_limit = INT64_MAX;
     hs_status status = init_links(search, walker);
     if (status == HS_OK) {
-        status = hs_block_init(account, search->scene.ndim, use, most_candidates(search),
+        status = hs_block_init(account, search->scene.ndim, use, capacity, most_runs,
                                &walker->block);
     }
     if (status == HS_OK) {
         status = hs_trace_init(search, &walker->block, use == HS_BLOCK_LISTS_PLACES,
                                &walker->trace);
     }
+    return status;
+}
+
+hs_status
+hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
+               hs_walker *walker)
+{
+    const double  most = most_candidates(search); /* a small scene gets a small block */
+    const int32_t capacity =
+        most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
+    const hs_status status = init_walker(search, use, capacity,
+                                         capacity < HS_BLOCK_RUNS ? capacity : HS_BLOCK_RUNS,
+                                         walker);
+    walker->visit = visit;
+    walker->visit_context = context;
+    if (status != HS_OK) {
+        hs_walker_close(search, walker);
+    }
+    return status;
+}
+
+hs_status
+hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourhood *most,
+                       hs_visit_fn visit, void *context, hs_walker *walker)
+{
+    if (most->candidates > HS_ORDER_CANDIDATES) {
+        memset(walker, 0, sizeof *walker);
+        return HS_ERR_MEMORY;
+    }
+    /* One more of each: a block that is full is scanned before the next run. */
+    hs_status status = init_walker(search, use, (int32_t)most->candidates + 1,
+                                   (int32_t)most->runs + 1, walker);
+    if (status == HS_OK) {
+        status = hs_order_init(&search->account, &walker->block, &walker->order);
+    }
+    walker->is_ordered = true;
+    walker->visit = visit;
+    walker->visit_context = context;
     if (status != HS_OK) {
         hs_walker_close(search, walker);
     }
@@ -366,6 +441,7 @@ hs_walker_close(hs_search *search, hs_walker *walker)
     walker->links = NULL;
     hs_free(&search->account, walker->hints);
     walker->hints = NULL;
+    hs_order_free(&search->account, &walker->block, &walker->order);
     hs_block_free(&search->account, &walker->block);
     hs_trace_free(&search->account, &walker->trace);
 }

@@ -9,6 +9,7 @@
 #define HS_WALK_H
 
 #include "gather.h"
+#include "order.h"
 #include "rows.h"
 #include "trace.h"
 
@@ -22,12 +23,19 @@ typedef struct hs_walker hs_walker;
 typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
                                  const hs_rows *rows);
 
+/* How large the neighbourhood of a group is. */
+typedef struct hs_neighbourhood {
+    int64_t candidates, runs;
+} hs_neighbourhood;
+
 /* One at a time belongs to a thread. */
 struct hs_walker {
     const hs_search *search;  /* borrowed, read only */
     hs_options       options; /* the search's, with a poll only for the caller's own thread */
     hs_block         block;
     hs_block_use     use;
+    bool             is_ordered; /* as hs_walker_init_ordered says */
+    hs_order         order;
     hs_group         group;
     hs_trace         trace;
     hs_row           row;        /* being walked: */
@@ -44,7 +52,8 @@ struct hs_walker {
     hs_thresholds    direct;
     hs_expanded      expanded;
     double           extent;
-    bool             block_is_first; /* of its group: candidate t is group point t */
+    bool             block_is_first; /* of its group: candidate t is group point t; half lists */
+    hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;
     int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
     int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
@@ -56,6 +65,15 @@ struct hs_walker {
 /* `visit` NULL: hits are only counted, in n_found. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                          hs_walker *walker);
+
+/*
+ * The same for a full search that lists: each point's hits come in one visit, ascending by the
+ * candidate's number and then by S. most: the largest neighbourhood, as another walk over all
+ * groups has found it.
+ */
+hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use,
+                                 const hs_neighbourhood *most, hs_visit_fn visit, void *context,
+                                 hs_walker *walker);
 
 /* Visit the groups whose first point is in [first, end), in cell order. */
 hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end);

@@ -42,7 +42,8 @@ sparse_open(const brute_scene *brute, double width, sparse_scene *s)
     if (status == HS_OK)
         status = hs_sparse_grid(&s->scene, &s->dense, width, &s->grid);
     if (status == HS_OK)
-        status = hs_stencil_build(&s->account, &s->options, &s->scene, &s->grid, &s->stencil);
+        status = hs_stencil_build(&s->account, &s->options, &s->scene, &s->grid, false,
+                                      &s->stencil);
     if (status != HS_OK) {
         hs_scene_free(&s->account, &s->scene);
         return status;

@@ -34,7 +34,8 @@ prepare(searched *s)
         return status;
     status = hs_grid_init(&s->scene, &s->grid, &failure);
     if (status == HS_OK)
-        status = hs_stencil_build(&s->account, &options, &s->scene, &s->grid, &s->stencil);
+        status = hs_stencil_build(&s->account, &options, &s->scene, &s->grid, false,
+                                      &s->stencil);
     if (status != HS_OK)
         hs_scene_free(&s->account, &s->scene);
     return status;

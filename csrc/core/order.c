@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * order.c: a radix sort from the least digit, stable, of numbers that share few bits: those of some
+ * hundred candidates. See order.h.
+ */
+#include "order.h"
+
+#include <string.h>
+
+#define DIGIT_BITS 9 /* of a digit, at most: two kB of counts stay in the nearest cache */
+#define FEW 24       /* candidates that are quicker sorted by insertion */
+
+hs_status
+hs_order_init(hs_account *account, hs_block *block, hs_order *order)
+{
+    const int64_t n = (int64_t)block->capacity + HS_PADDING;
+    order->entries = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
+    order->spare = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
+    order->column = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(float));
+    order->shifts = hs_alloc(account, HS_FOR_CANDIDATES, ((int64_t)block->most_runs + 1) * HS_MAX_DIM,
+                             sizeof(int64_t));
+    block->origin = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+    const bool complete = order->entries != NULL && order->spare != NULL &&
+                          order->column != NULL && order->shifts != NULL && block->origin != NULL;
+    if (complete) { /* padding of labels may be read */
+        memset(block->origin, 0, (size_t)n * sizeof(int32_t));
+    }
+    return complete ? HS_OK : HS_ERR_MEMORY;
+}
+
+void
+hs_order_free(hs_account *account, hs_block *block, hs_order *order)
+{
+    hs_free(account, block->origin);
+    block->origin = NULL;
+    hs_free(account, order->shifts);
+    hs_free(account, order->column);
+    hs_free(account, order->spare);
+    hs_free(account, order->entries);
+    *order = (hs_order){0};
+}
+
+static void
+sort_few(uint64_t *entries, int32_t n)
+{
+    for (int32_t c = 1; c < n; c++) {
+        const uint64_t entry = entries[c];
+        int32_t        to = c;
+        for (; to > 0 && entries[to - 1] >> 32 > entry >> 32; to--) {
+            entries[to] = entries[to - 1];
+        }
+        entries[to] = entry;
+    }
+}
+
+/* By one digit of the key, into the spare entries, which become the entries. */
+static void
+sort_digit(hs_order *order, int32_t n, int shift, int bits)
+{
+    uint32_t       start[1 << DIGIT_BITS];
+    const uint32_t mask = (UINT32_C(1) << bits) - 1;
+    uint64_t      *from = order->entries, *to = order->spare;
+    memset(start, 0, ((size_t)mask + 1) * sizeof *start);
+    for (int32_t c = 0; c < n; c++) {
+        start[(uint32_t)(from[c] >> shift) & mask]++;
+    }
+    for (uint32_t digit = 0, sum = 0; digit <= mask; digit++) {
+        const uint32_t count = start[digit];
+        start[digit] = sum;
+        sum += count;
+    }
+    for (int32_t c = 0; c < n; c++) {
+        to[start[(uint32_t)(from[c] >> shift) & mask]++] = from[c];
+    }
+    order->entries = to;
+    order->spare = from;
+}
+
+/* Stable, by the keys, none of which is larger than `most`. */
+static void
+sort_entries(hs_order *order, int32_t n, uint32_t most)
+{
+    int bits = 0;
+    while (bits < 32 && most >> bits != 0) {
+        bits++;
+    }
+    if (n <= FEW) {
+        sort_few(order->entries, n);
+        return;
+    }
+    const int digits = (bits + DIGIT_BITS - 1) / DIGIT_BITS;
+    for (int digit = 0, from = 0; digit < digits; digit++) {
+        const int width = (bits - from + digits - digit - 1) / (digits - digit);
+        sort_digit(order, n, 32 + from, width);
+        from += width;
+    }
+}
+
+/* Stable, by the candidates' numbers. Returns whether one occurs twice. */
+static bool
+sort_by_number(const hs_block *block, hs_order *order)
+{
+    const int32_t n = block->n;
+    uint32_t      any = 0, twice = 0;
+    for (int32_t c = 0; c < n; c++) {
+        const uint32_t place = (uint32_t)(order->entries[c] & UINT32_MAX);
+        const uint32_t key = (uint32_t)block->id[place];
+        order->entries[c] = (uint64_t)key << 32 | place;
+        any |= key;
+    }
+    sort_entries(order, n, any);
+    for (int32_t c = 1; c < n; c++) {
+        twice |= (order->entries[c] >> 32) == (order->entries[c - 1] >> 32);
+    }
+    return twice != 0;
+}
+
+/* S of each run's image, over the rows as given. */
+static bool
+find_shifts(const hs_lattice *lattice, const hs_block *block, int64_t *shifts)
+{
+    for (int32_t r = 0; r < block->n_runs; r++) {
+        int64_t image[HS_MAX_DIM], *given = shifts + (int64_t)r * HS_MAX_DIM;
+        for (int b = 0; b < lattice->n_periodic; b++) {
+            image[b] = block->runs[r].image[b];
+        }
+        if (!hs_lattice_shift(lattice, image, given)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Stable, by one component of S: its lower 32 bits, or what lies above. */
+static void
+sort_by_shift(const hs_block *block, const int64_t *shifts, bool upper, hs_order *order)
+{
+    int64_t  least = INT64_MAX;
+    uint32_t any = 0;
+    for (int32_t r = 0; r < block->n_runs; r++) {
+        const int64_t shift = shifts[(int64_t)r * HS_MAX_DIM];
+        least = shift < least ? shift : least;
+    }
+    for (int32_t r = 0; r < block->n_runs; r++) {
+        const uint64_t above = (uint64_t)shifts[(int64_t)r * HS_MAX_DIM] - (uint64_t)least;
+        const uint32_t key = upper ? (uint32_t)(above >> 32) : (uint32_t)above;
+        any |= key;
+        for (int32_t c = block->runs[r].at; c < block->runs[r + 1].at; c++) {
+            order->spare[c] = (uint64_t)key << 32;
+        }
+    }
+    for (int32_t c = 0; c < block->n; c++) {
+        const uint32_t place = (uint32_t)(order->entries[c] & UINT32_MAX);
+        order->entries[c] = order->spare[place] | place;
+    }
+    if (any != 0) {
+        sort_entries(order, block->n, any);
+    }
+}
+
+/* Candidates in their order. */
+static void
+arrange(int ndim, hs_block_use use, hs_block *block, const hs_order *order)
+{
+    const int32_t n = block->n;
+    int32_t *HS_RESTRICT     origin = block->origin;
+    float *HS_RESTRICT       column = order->column;
+    for (int32_t c = 0; c < n; c++) {
+        origin[c] = (int32_t)(order->entries[c] & UINT32_MAX);
+        if (use == HS_BLOCK_LISTS_IDS) {
+            block->id[c] = (int32_t)(order->entries[c] >> 32);
+        }
+    }
+    for (int k = 0; k <= ndim; k++) {
+        float *values = k < ndim ? block->y[k] : block->norm;
+        for (int32_t c = 0; c < n; c++) {
+            column[c] = values[origin[c]];
+        }
+        memcpy(values, column, (size_t)n * sizeof *values);
+    }
+}
+
+hs_status
+hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_order *order)
+{
+    for (int32_t c = 0; c < block->n; c++) {
+        order->entries[c] = (uint64_t)c;
+    }
+    const bool twice = sort_by_number(block, order);
+    if (twice && use == HS_BLOCK_LISTS_PLACES) {
+        if (!find_shifts(lattice, block, order->shifts)) {
+            return HS_ERR_SHIFT_RANGE;
+        }
+        for (int l = lattice->n_periodic - 1; l >= 0; l--) {
+            sort_by_shift(block, order->shifts + l, false, order);
+            sort_by_shift(block, order->shifts + l, true, order);
+        }
+        (void)sort_by_number(block, order);
+    }
+    arrange(lattice->ndim, use, block, order);
+    return HS_OK;
+}
