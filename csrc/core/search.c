@@ -125,6 +125,19 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
 }
 
 void
+hs_search_note(hs_search *search, const hs_counters *walked)
+{
+    hs_counters *sum = &search->walked;
+    sum->groups += walked->groups;
+    sum->candidates += walked->candidates;
+    sum->ambiguous += walked->ambiguous;
+    sum->by_float64 += walked->by_float64;
+    sum->by_double_word += walked->by_double_word;
+    sum->by_integers += walked->by_integers;
+    sum->polls += walked->polls;
+}
+
+void
 hs_search_report(const hs_search *search, int64_t n_pairs)
 {
     hs_counters *counters = search->options.counters;

@@ -227,18 +227,10 @@ hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options, hs_syst
 void
 hs_systems_close_worker(hs_systems_worker *worker, hs_search *total)
 {
-    hs_counters       *sum = &total->walked;
-    const hs_counters *walked = &worker->search.walked;
-    hs_account        *account = &worker->search.account;
+    hs_account *account = &worker->search.account;
     hs_output_free(&worker->stage.pairs);
     hs_output_free(&worker->found);
-    sum->groups += walked->groups;
-    sum->candidates += walked->candidates;
-    sum->ambiguous += walked->ambiguous;
-    sum->by_float64 += walked->by_float64;
-    sum->by_double_word += walked->by_double_word;
-    sum->by_integers += walked->by_integers;
-    sum->polls += walked->polls;
+    hs_search_note(total, &worker->search.walked);
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += account->total.bytes[p];
     }
