@@ -49,7 +49,7 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 static hs_status
 record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
-    if (output->fixed) { /* a stage keeps what is written ahead out of the caller's arrays */
+    if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
         return hs_parallel_record(search, output, failure);
     }
     hs_output_expect(output, search->grid.expected_pairs);

@@ -2,71 +2,61 @@
 /* parallel.c: see parallel.h. */
 #include "parallel.h"
 
+#include "backlog.h"
 #include "poll.h"
-#include "stage.h"
 #include "team.h"
-#include "commits.h"
 
 #include <string.h>
 
 /* Points of a range: some groups at least, and so few that their pairs, with all that may be asked
- * for, fit what a thread can hold back: it seldom waits for its turn. */
+ * for, fit what a thread can hold back: it seldom waits for others. */
 #define RANGE_POINTS 256
 
 typedef struct hs_crew hs_crew;
 
 /* What one thread works with. */
 typedef struct hs_worker {
-    hs_crew  *crew;
-    hs_walker walker;
-    hs_stage  stage;
-    hs_turn   turn;
+    hs_crew     *crew;
+    hs_walker    walker;
+    hs_backlog   backlog;
+    hs_committer committer;
+    hs_failure   failure;
 } hs_worker;
 
 struct hs_crew {
-    hs_search *search;
-    hs_output *output; /* NULL: only counting */
-    hs_worker *workers;
-    hs_commits  *turns;
+    hs_search  *search;
+    hs_output  *output; /* NULL: only counting */
+    hs_worker  *workers;
+    hs_commits *commits;
 };
 
-/* A hs_flush_fn. */
+/* A hs_range_fn. */
 static hs_status
-commit_stage(void *context, hs_stage *stage, double fraction)
+search_range(void *context, int64_t range)
 {
-    hs_worker *worker = context;
-    (void)stage;
-    return hs_turn_commit(&worker->turn, fraction, false);
+    hs_worker     *worker = context;
+    const hs_crew *crew = worker->crew;
+    const int64_t  n = crew->search->bins.n, first = range * RANGE_POINTS;
+    const int64_t  end = first + (n - first < RANGE_POINTS ? n - first : RANGE_POINTS);
+    hs_status      status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        worker->failure.row = worker->walker.failed_point;
+    }
+    if (status == HS_OK && crew->output != NULL) {
+        status = hs_commit(&worker->committer, (double)end / (double)n, true);
+    }
+    return status;
 }
 
 /* A hs_task_fn: ranges, as long as there are any. */
 static void
 work(void *context, int64_t task)
 {
-    hs_crew      *crew = context;
-    hs_worker    *worker = &crew->workers[task];
-    const int64_t n = crew->search->bins.n;
-    hs_status     status = HS_OK;
-    hs_turn_join(crew->turns, &worker->walker.options, &worker->stage.pairs, &worker->turn);
-    while (status == HS_OK && hs_turn_next(&worker->turn)) {
-        const int64_t first = worker->turn.range * RANGE_POINTS;
-        const int64_t left = n - first;
-        const int64_t end = first + (left < RANGE_POINTS ? left : RANGE_POINTS);
-        status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
-        if (status == HS_OK && crew->output != NULL) {
-            status = hs_turn_commit(&worker->turn, (double)end / (double)n, true);
-        }
-    }
-    if (status == HS_OK) {
-        status = hs_turn_finish(&worker->turn);
-    }
-    if (status != HS_OK) {
-        hs_failure failure = HS_NO_FAILURE;
-        if (status == HS_ERR_SHIFT_RANGE) {
-            failure.row = worker->walker.failed_point;
-        }
-        hs_turn_fail(&worker->turn, status, &failure);
-    }
+    hs_crew   *crew = context;
+    hs_worker *worker = &crew->workers[task];
+    hs_commits_join(crew->commits, &worker->walker.options, &worker->backlog.pairs,
+                    &worker->committer);
+    hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
 }
 
 static hs_status
@@ -74,14 +64,16 @@ open_worker(hs_crew *crew, hs_worker *worker)
 {
     hs_search *search = crew->search;
     worker->crew = crew;
+    worker->failure = HS_NO_FAILURE;
     if (crew->output == NULL) {
         return hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &worker->walker);
     }
-    hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns), hs_stage_hits,
-                                      &worker->stage, &worker->walker);
+    hs_backlog_init(crew->output, &worker->committer, &worker->backlog);
+    hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns),
+                                      hs_backlog_hits, &worker->backlog, &worker->walker);
     if (status == HS_OK) {
-        status = hs_stage_init(&search->account, crew->output, worker->walker.block.most_hits,
-                               commit_stage, worker, &worker->stage);
+        status = hs_recorder_init(&search->account, &worker->backlog.pairs,
+                                  worker->walker.block.most_hits, &worker->backlog.recorder);
     }
     return status;
 }
@@ -91,12 +83,12 @@ run_crew(hs_crew *crew, hs_failure *failure)
 {
     hs_search    *search = crew->search;
     const int64_t n_ranges = (search->bins.n + RANGE_POINTS - 1) / RANGE_POINTS;
-    crew->turns = hs_commits_new(&search->account, crew->output, n_ranges);
-    if (crew->turns == NULL) {
+    crew->commits = hs_commits_new(&search->account, crew->output, n_ranges);
+    if (crew->commits == NULL) {
         return HS_ERR_MEMORY;
     }
     hs_team_run(search->team, hs_team_size(search->team), work, crew);
-    return hs_commits_end(&search->account, crew->turns, failure);
+    return hs_commits_end(&search->account, crew->commits, failure);
 }
 
 /* Everybody walks; *count: what they found. */
@@ -124,7 +116,7 @@ walk_together(hs_search *search, hs_output *output, int64_t *count, hs_failure *
         *count += crew.workers[w].walker.n_found;
         hs_walker_close(search, &crew.workers[w].walker);
         if (output != NULL) {
-            hs_stage_free(account, &crew.workers[w].stage);
+            hs_backlog_free(account, &crew.workers[w].backlog);
         }
     }
     hs_free(account, crew.workers);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * parallel.h: the walk over all points by several threads. Points are handed out in ranges; what a
- * thread finds in one waits in a stage of its own until all earlier ranges have been written, so
+ * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
  * that the result is the same for any number of threads.
  */
 #ifndef HS_PARALLEL_H
