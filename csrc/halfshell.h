@@ -144,6 +144,10 @@ typedef struct hs_pair_arrays {
 /* Called at most once per call, when the result may be large: bytes that may still be used. */
 typedef double (*hs_limit_fn)(void *context);
 
+/* Points from which on the work takes a millisecond, while a thread costs some ten microseconds to
+ * start and to end. */
+#define HS_POINTS_FOR_THREADS 20000
+
 typedef struct hs_options {
     double       cutoff;       /* finite, not negative; same unit as the points */
     bool         inclusive;    /* whether |D| == cutoff counts */
@@ -153,7 +157,7 @@ typedef struct hs_options {
     int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
-    int          threads;      /* exactly so many; -n: at most n, and one for small scenes */
+    int          threads;      /* exactly so many; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
     double       memory_limit; /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;

@@ -7,8 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#define POINTS_FOR_TEAM 20000
-
 /* An hs_poll_fn: the caller's, counted. */
 static bool
 counted_poll(void *context, double fraction)
@@ -18,15 +16,11 @@ counted_poll(void *context, double fraction)
     return search->callers_poll(search->callers_context, fraction);
 }
 
-/*
- * Threads cost some ten microseconds each to start and to end. An explicit number is taken as it
- * is; -n means up to n where there are points enough that the work takes a millisecond.
- */
 int
 hs_search_threads(int64_t n_points, const hs_options *options)
 {
     const int n = options->threads;
-    return n < 0 ? (n_points >= POINTS_FOR_TEAM ? -n : 1) : n;
+    return n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
 }
 
 /* The dense grid, or where points crowd in few of its cells one that stores occupied cells only. */
