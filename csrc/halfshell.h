@@ -145,6 +145,10 @@ typedef struct hs_pair_arrays {
 /* Called at most once per call, when the result may be large: bytes that may still be used. */
 typedef double (*hs_limit_fn)(void *context);
 
+/* Points from which on the work takes a millisecond, while a thread costs some ten microseconds to
+ * start and to end. */
+#define HS_POINTS_FOR_THREADS 20000
+
 typedef struct hs_options {
     double       cutoff;       /* finite, not negative; same unit as the points */
     bool         inclusive;    /* whether |D| == cutoff counts */
@@ -154,7 +158,7 @@ typedef struct hs_options {
     int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
-    int          threads;      /* exactly so many; -n: at most n, and one for small scenes */
+    int          threads;      /* exactly so many; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
     double       memory_limit; /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;
@@ -187,6 +191,35 @@ hs_status hs_pairs_find(const hs_points *points, const hs_box *box, const hs_opt
 /* The same search, counting only; options->want and ->sorted are ignored. */
 hs_status hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
                          int64_t *count, hs_failure *failure);
+
+/*
+ * Find all neighbours of each query among the points, row after row: pairs (i in queries, j in
+ * points, S) with the vector D = points[j] - queries[i] + S * box. queries NULL: of each point among
+ * the points, itself left out where S = 0, so that each pair is there twice, as (i, j, S) and
+ * (j, i, -S). With queries nothing is left out: an identical point is a neighbour at distance 0.
+ *
+ * Rows are in the order of the queries, each ascending by (j, S); options->sorted is ignored.
+ * hs_pairs_offsets says where each begins. Memory and failures as for hs_pairs_find; a failure's
+ * row is that of a query when failure->in_queries.
+ */
+hs_status hs_neighbors_find(const hs_points *points, const hs_points *queries, const hs_box *box,
+                            const hs_options *options, hs_pairs **rows, hs_failure *failure);
+
+/* The length of each row only. counts: one for each query, or point; unspecified on failure. */
+hs_status hs_neighbors_count(const hs_points *points, const hs_points *queries, const hs_box *box,
+                             const hs_options *options, int64_t *counts, hs_failure *failure);
+
+/* The sum of these lengths only, for queries that are not NULL. */
+hs_status hs_between_count(const hs_points *points, const hs_points *queries, const hs_box *box,
+                           const hs_options *options, int64_t *count, hs_failure *failure);
+
+/* Rows of a result of hs_neighbors_find, and where each begins: rows + 1 numbers, the last one the
+ * length of all; borrowed. NULL when taken, or of another search. */
+int64_t        hs_pairs_rows(const hs_pairs *pairs);
+const int64_t *hs_pairs_offsets(const hs_pairs *pairs);
+
+/* The same, but ownership goes to the caller: hs_array_free. */
+int64_t *hs_pairs_take_offsets(hs_pairs *pairs);
 
 /* Number of pairs: each array has one entry or row for each. */
 int64_t hs_pairs_length(const hs_pairs *pairs);

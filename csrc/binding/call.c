@@ -54,14 +54,12 @@ take_memory_limit(PyObject *object, hs_options *options)
     return true;
 }
 
-/* Fewer points are not worth asking for; the core would not use more than one thread for them. */
-#define POINTS_FOR_THREADS 4096
-
 static bool
 take_threads(PyObject *object, int64_t n_points, hs_options *options)
 {
     if (object == Py_None) {
-        options->threads = n_points < POINTS_FOR_THREADS ? 1 : -hs_default_threads();
+        /* Where the core would use one thread in any case, the system need not be asked. */
+        options->threads = n_points < HS_POINTS_FOR_THREADS ? 1 : -hs_default_threads();
         return true;
     }
     const long n = PyBool_Check(object) ? -1 : PyLong_AsLong(object);

@@ -187,21 +187,6 @@ hs_chunk_touch(void *data, size_t used)
     }
 }
 
-void
-hs_chunk_fill(void *data, size_t bytes)
-{
-    hs_chunk *chunk = hs_chunk_of(data);
-    size_t    from = chunk->huge > chunk->touched ? chunk->huge : chunk->touched;
-    size_t    to = bytes < chunk->capacity ? bytes : chunk->capacity;
-    /* The data lies one step behind the mapping: steps from it are steps from the mapping. */
-    from = round_up(from, HS_PAGES_STEP);
-    to = round_up(to, HS_PAGES_STEP);
-    if (chunk->length > 0 && from < to) {
-        hs_pages_fill((char *)data + from, (char *)data + to);
-        chunk->touched = to;
-    }
-}
-
 /* The part of a chunk from `from` on, a multiple of HS_PAGES_STEP from the mapping, becomes a
  * chunk of its own if what was touched of it deserves that. The rest of it is unmapped. */
 static void *

@@ -34,10 +34,6 @@ void *hs_chunk_grow(void *data, size_t bytes, size_t used);
 /* About `bytes` bytes will be written: huge pages for the whole ones of them, small ones beyond. */
 void hs_chunk_expect(void *data, size_t bytes);
 
-/* All of the first `bytes` bytes are about to be written, if they have not been: gets the small
- * pages among them in one go. */
-void hs_chunk_fill(void *data, size_t bytes);
-
 /* The first `used` bytes have been written. */
 void hs_chunk_touch(void *data, size_t used);
 

@@ -10,17 +10,14 @@
 
 #include <string.h>
 
-/* Bytes that a thread holds back at most: a share of the second-level cache. */
-#define MOST_BYTES (256 * 1024)
-
 struct hs_commits {
     hs_output       *output;
     hs_thread_id     caller;
     int64_t          n_ranges;
     volatile int64_t next_range; /* atomic */
     hs_mutex         mutex;      /* guards all below, and the output but for what columns hold */
-    hs_condition     changed;    /* turn, n_copying or status */
-    int64_t          turn;       /* the range whose pairs are next in the output */
+    hs_condition     changed;    /* due, n_copying or status */
+    int64_t          due;        /* the range whose pairs are next in the output */
     int              n_copying;  /* threads that write to columns: these must not move then */
     hs_status        status;
     hs_failure       failure;
@@ -30,26 +27,26 @@ struct hs_commits {
 hs_commits *
 hs_commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
 {
-    hs_commits *turns = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *turns);
-    if (turns != NULL) {
-        *turns = (hs_commits){.output = output, .n_ranges = n_ranges};
-        turns->caller = hs_thread_self();
-        hs_mutex_init(&turns->mutex);
-        hs_condition_init(&turns->changed);
+    hs_commits *commits = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *commits);
+    if (commits != NULL) {
+        *commits = (hs_commits){.output = output, .n_ranges = n_ranges};
+        commits->caller = hs_thread_self();
+        hs_mutex_init(&commits->mutex);
+        hs_condition_init(&commits->changed);
     }
-    return turns;
+    return commits;
 }
 
 hs_status
-hs_commits_end(hs_account *account, hs_commits *turns, hs_failure *failure)
+hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure)
 {
-    const hs_status status = turns->status;
+    const hs_status status = commits->status;
     if (status != HS_OK) {
-        *failure = turns->failure;
+        *failure = commits->failure;
     }
-    hs_condition_destroy(&turns->changed);
-    hs_mutex_destroy(&turns->mutex);
-    hs_free(account, turns);
+    hs_condition_destroy(&commits->changed);
+    hs_mutex_destroy(&commits->mutex);
+    hs_free(account, commits);
     return status;
 }
 
@@ -57,74 +54,78 @@ hs_commits_end(hs_account *account, hs_commits *turns, hs_failure *failure)
 static bool
 goes_on(void *context, double fraction)
 {
-    hs_commits *turns = context;
+    hs_commits *commits = context;
     (void)fraction;
-    hs_mutex_lock(&turns->mutex);
-    const bool result = turns->status == HS_OK;
-    hs_mutex_unlock(&turns->mutex);
+    hs_mutex_lock(&commits->mutex);
+    const bool result = commits->status == HS_OK;
+    hs_mutex_unlock(&commits->mutex);
     return result;
 }
 
 void
-hs_turn_join(hs_commits *turns, hs_options *options, hs_output *stage, hs_turn *turn)
+hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
+                hs_committer *committer)
 {
-    *turn = (hs_turn){.turns = turns, .options = options, .stage = stage};
-    if (!hs_thread_is(turns->caller)) {
+    *committer = (hs_committer){.commits = commits, .options = options, .pairs = pairs};
+    if (!hs_thread_is(commits->caller)) {
         options->poll = goes_on;
-        options->poll_context = turns;
+        options->poll_context = commits;
     }
 }
 
-bool
-hs_turn_next(hs_turn *turn)
+/* Takes the next range; false when there is none, or when somebody has failed. */
+static bool
+take_range(hs_committer *committer)
 {
-    hs_commits *turns = turn->turns;
-    if (!goes_on(turns, 0.0)) {
+    hs_commits *commits = committer->commits;
+    if (!goes_on(commits, 0.0)) {
         return false;
     }
-    turn->range = hs_fetch_increment(&turns->next_range);
-    return turn->range < turns->n_ranges;
+    committer->range = hs_fetch_increment(&commits->next_range);
+    return committer->range < commits->n_ranges;
 }
 
-void
-hs_turn_fail(hs_turn *turn, hs_status status, const hs_failure *failure)
+/* This range has failed: everybody stops. A status that only follows from another's failure is
+ * not noted. */
+static void
+fail(hs_committer *committer, hs_status status, const hs_failure *failure)
 {
-    hs_commits  *turns = turn->turns;
-    const bool stopped = status == HS_STATUS_END ||
-                         (status == HS_ERR_INTERRUPTED && turn->options->poll == goes_on);
-    hs_mutex_lock(&turns->mutex);
-    if (!stopped && (turns->status == HS_OK || turn->range < turns->failed_range)) {
-        turns->status = status;
-        turns->failure = *failure;
-        turns->failed_range = turn->range;
+    hs_commits *commits = committer->commits;
+    const bool  stopped = status == HS_STATUS_END ||
+                          (status == HS_ERR_INTERRUPTED && committer->options->poll == goes_on);
+    hs_mutex_lock(&commits->mutex);
+    if (!stopped && (commits->status == HS_OK || committer->range < commits->failed_range)) {
+        commits->status = status;
+        commits->failure = *failure;
+        commits->failed_range = committer->range;
     }
-    hs_condition_wake(&turns->changed);
-    hs_mutex_unlock(&turns->mutex);
+    hs_condition_wake(&commits->changed);
+    hs_mutex_unlock(&commits->mutex);
 }
 
 /* With the mutex held: waits for a change. The caller's thread goes on polling meanwhile. */
 static hs_status
-wait_for_change(hs_commits *turns, const hs_turn *turn, double fraction)
+wait_for_change(hs_commits *commits, const hs_committer *committer, double fraction)
 {
-    if (turn->options->poll == goes_on) {
-        hs_condition_wait(&turns->changed, &turns->mutex);
+    if (committer->options->poll == goes_on) {
+        hs_condition_wait(&commits->changed, &commits->mutex);
         return HS_OK;
     }
-    hs_condition_wait_briefly(&turns->changed, &turns->mutex);
-    hs_mutex_unlock(&turns->mutex);
-    const hs_status status = hs_poll(turn->options, fraction);
-    hs_mutex_lock(&turns->mutex);
+    hs_condition_wait_briefly(&commits->changed, &commits->mutex);
+    hs_mutex_unlock(&commits->mutex);
+    const hs_status status = hs_poll(committer->options, fraction);
+    hs_mutex_lock(&commits->mutex);
     return status;
 }
 
-/* With the mutex held: settles where the n pairs go whose turn it is. */
+/* With the mutex held: settles where the n pairs that are due go. */
 static hs_status
-claim(hs_commits *turns, int64_t n, double fraction, int64_t *at)
+claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
 {
-    hs_output *output = turns->output;
+    hs_output *output = commits->output;
     if (!hs_output_has_room(output, n)) {
-        while (turns->n_copying > 0) { /* soon over */
-            hs_condition_wait(&turns->changed, &turns->mutex);
+        while (commits->n_copying > 0) { /* soon over */
+            hs_condition_wait(&commits->changed, &commits->mutex);
         }
         const hs_status status = hs_output_reserve(output, n, fraction);
         if (status != HS_OK) {
@@ -136,75 +137,87 @@ claim(hs_commits *turns, int64_t n, double fraction, int64_t *at)
     return HS_OK;
 }
 
-/* With the mutex held, which it gives up while it copies: the part whose turn it is. */
+/* With the mutex held, which it gives up while it copies: the part that is due. */
 static hs_status
-write_part(hs_turn *turn, const hs_turn_part *part)
+write_part(hs_committer *committer, const hs_commit_part *part)
 {
-    hs_commits       *turns = turn->turns;
+    hs_commits     *commits = committer->commits;
     int64_t         at = 0;
-    const hs_status status = claim(turns, part->end - turn->written, part->fraction, &at);
+    const hs_status status = claim(commits, part->end - committer->written, part->fraction, &at);
     if (status != HS_OK) {
         return status;
     }
-    turns->n_copying++;
+    commits->n_copying++;
     if (part->is_last) {
-        turns->turn++;
-        hs_condition_wake(&turns->changed);
+        commits->due++;
+        hs_condition_wake(&commits->changed);
     }
-    hs_mutex_unlock(&turns->mutex);
-    hs_output_copy(turns->output, at, turn->stage, turn->written, part->end);
-    turn->written = part->end;
-    hs_mutex_lock(&turns->mutex);
-    if (--turns->n_copying == 0) {
-        hs_condition_wake(&turns->changed);
+    hs_mutex_unlock(&commits->mutex);
+    hs_output_copy(commits->output, at, committer->pairs, committer->written, part->end);
+    committer->written = part->end;
+    hs_mutex_lock(&commits->mutex);
+    if (--commits->n_copying == 0) {
+        hs_condition_wake(&commits->changed);
     }
     return HS_OK;
 }
 
-/* Writes parts as long as it is their turn; with `waits`, all of them. */
+/* Writes parts as long as they are due; with `waits`, all of them. */
 static hs_status
-write_parts(hs_turn *turn, bool waits)
+write_parts(hs_committer *committer, bool waits)
 {
-    hs_commits *turns = turn->turns;
-    hs_status status = HS_OK;
-    int       done = 0;
-    hs_mutex_lock(&turns->mutex);
-    while (done < turn->n_parts && status == HS_OK) {
-        const hs_turn_part *part = &turn->parts[done];
-        if (turns->status != HS_OK) {
+    hs_commits *commits = committer->commits;
+    hs_status   status = HS_OK;
+    int         done = 0;
+    hs_mutex_lock(&commits->mutex);
+    while (done < committer->n_parts && status == HS_OK) {
+        const hs_commit_part *part = &committer->parts[done];
+        if (commits->status != HS_OK) {
             status = HS_STATUS_END; /* somebody else has failed */
-        } else if (turns->turn == part->range) {
-            status = write_part(turn, part);
+        } else if (commits->due == part->range) {
+            status = write_part(committer, part);
             done++;
         } else if (waits) {
-            status = wait_for_change(turns, turn, part->fraction);
+            status = wait_for_change(commits, committer, part->fraction);
         } else {
             break;
         }
     }
-    hs_mutex_unlock(&turns->mutex);
-    turn->n_parts -= done;
-    memmove(turn->parts, turn->parts + done, (size_t)turn->n_parts * sizeof *turn->parts);
-    if (turn->n_parts == 0) {
-        turn->stage->n_pairs = turn->written = 0;
+    hs_mutex_unlock(&commits->mutex);
+    committer->n_parts -= done;
+    memmove(committer->parts, committer->parts + done,
+            (size_t)committer->n_parts * sizeof committer->parts[0]);
+    if (committer->n_parts == 0) {
+        committer->pairs->n_pairs = committer->written = 0;
     }
     return status;
 }
 
 hs_status
-hs_turn_commit(hs_turn *turn, double fraction, bool ends)
+hs_commit(hs_committer *committer, double fraction, bool ends)
 {
-    const hs_output *stage = turn->stage;
-    const int64_t    bytes = stage->n_pairs * hs_output_bytes_per_pair(stage);
-    turn->parts[turn->n_parts++] = (hs_turn_part){.range = turn->range,
-                                                  .end = stage->n_pairs,
-                                                  .fraction = fraction,
-                                                  .is_last = ends};
-    return write_parts(turn, !ends || turn->n_parts == HS_TURN_PARTS || bytes >= MOST_BYTES);
+    const hs_output *pairs = committer->pairs;
+    const int64_t    bytes = pairs->n_pairs * hs_output_bytes_per_pair(pairs);
+    committer->parts[committer->n_parts++] = (hs_commit_part){.range = committer->range,
+                                                              .end = pairs->n_pairs,
+                                                              .fraction = fraction,
+                                                              .is_last = ends};
+    return write_parts(committer,
+                       !ends || committer->n_parts == HS_COMMIT_PARTS || bytes >= HS_COMMIT_BYTES);
 }
 
-hs_status
-hs_turn_finish(hs_turn *turn)
+void
+hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
+                const hs_failure *failure)
 {
-    return turn->n_parts > 0 ? write_parts(turn, true) : HS_OK;
+    hs_status status = HS_OK;
+    while (status == HS_OK && take_range(committer)) {
+        status = search_range(worker, committer->range);
+    }
+    if (status == HS_OK && committer->n_parts > 0) {
+        status = write_parts(committer, true);
+    }
+    if (status != HS_OK) {
+        fail(committer, status, failure);
+    }
 }

@@ -3,6 +3,11 @@
  * commits.h: several threads that fill one output in a fixed order. The work is cut into numbered
  * ranges, which are handed out one at a time; what is found in one is written when all earlier
  * ranges have been, so that the result is the same for any number of threads.
+ *
+ * Usage, in each thread of a crew:
+ *     hs_commits_join(commits, options, pairs, &committer);
+ *     hs_commits_work(&committer, search_range, worker, &failure);
+ * where search_range collects pairs and calls hs_commit, for the last time at its end.
  */
 #ifndef HS_COMMITS_H
 #define HS_COMMITS_H
@@ -11,53 +16,59 @@
 
 typedef struct hs_commits hs_commits;
 
-#define HS_TURN_PARTS 32 /* that a thread may hold back at a time */
+/* What a thread may hold back at a time: so many parts, and about so many bytes, a share of the
+ * second-level cache. */
+#define HS_COMMIT_PARTS 32
+#define HS_COMMIT_BYTES (256 * 1024)
 
-/* Pairs of one range that are ready: of a stage, those before `end` that are in no earlier part. */
-typedef struct hs_turn_part {
+/* Pairs of one range that are ready: of those collected, the ones before `end` that are in no
+ * earlier part. */
+typedef struct hs_commit_part {
     int64_t range;
     int64_t end;
     double  fraction; /* of the whole search that is done with it */
     bool    is_last;  /* of its range */
-} hs_turn_part;
+} hs_commit_part;
 
-/* One thread's part in it. */
-typedef struct hs_turn {
-    hs_commits  *turns;    /* borrowed */
-    hs_options  *options; /* borrowed; its poll tells whether to go on */
-    hs_output   *stage;   /* borrowed: where the thread collects pairs; NULL when counting */
-    int64_t      range;   /* that the thread is working on */
-    int64_t      written; /* pairs of the stage that are in the output already */
-    int          n_parts;
-    hs_turn_part parts[HS_TURN_PARTS]; /* that wait for their turn */
-} hs_turn;
+/* One thread's share in it. */
+typedef struct hs_committer {
+    hs_commits    *commits; /* borrowed */
+    hs_options    *options; /* borrowed; its poll tells whether to go on */
+    hs_output     *pairs;   /* borrowed: where the thread collects them; NULL when counting */
+    int64_t        range;   /* that the thread is working on */
+    int64_t        written; /* of the pairs, those that are in the output already */
+    int            n_parts;
+    hs_commit_part parts[HS_COMMIT_PARTS]; /* that wait until earlier ranges are written */
+} hs_committer;
+
+/* Does the work of one range. */
+typedef hs_status (*hs_range_fn)(void *worker, int64_t range);
 
 /* output: borrowed; NULL when nothing is written. The thread that calls this is the only one that
  * may poll. NULL when memory is short. */
 hs_commits *hs_commits_new(hs_account *account, hs_output *output, int64_t n_ranges);
 
 /* After all threads are done: HS_OK, or the failure of the earliest range that had one. Frees. */
-hs_status hs_commits_end(hs_account *account, hs_commits *turns, hs_failure *failure);
+hs_status hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure);
 
-/* Called by the thread itself. stage: NULL when it writes nothing in turn. options: those that it
- * works with; for threads that may not poll they are changed to ask whether anybody has failed. */
-void hs_turn_join(hs_commits *turns, hs_options *options, hs_output *stage, hs_turn *turn);
-
-/* Takes the next range; false when there is none, or when somebody has failed. */
-bool hs_turn_next(hs_turn *turn);
+/* Called by the thread itself. pairs: NULL when it commits nothing. options: those that it works
+ * with; for threads that may not poll they are changed to ask whether anybody has failed. */
+void hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
+                     hs_committer *committer);
 
 /*
- * What the stage holds of this range is all of it, or with `ends` false all but what comes: writes
- * what has its turn and waits for the rest only when the range goes on or much is held back. What
- * is written leaves the stage, sooner or later. HS_STATUS_END: somebody else has failed.
+ * Takes ranges as long as there are any and nobody has failed, and waits until all that was
+ * committed has been written. Everybody stops when a range fails; `failure` tells why it did.
  */
-hs_status hs_turn_commit(hs_turn *turn, double fraction, bool ends);
+void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
+                     const hs_failure *failure);
 
-/* Waits until all that was committed has been written. */
-hs_status hs_turn_finish(hs_turn *turn);
-
-/* This range has failed: everybody stops. A status that only follows from another's failure is
- * not noted. */
-void hs_turn_fail(hs_turn *turn, hs_status status, const hs_failure *failure);
+/*
+ * What has been collected of this range is all of it, or with `ends` false all but what comes:
+ * writes it if the earlier ranges have been written, and waits for these only when the range goes
+ * on or much is held back. What is written leaves the collected pairs, sooner or later.
+ * HS_STATUS_END: somebody else has failed.
+ */
+hs_status hs_commit(hs_committer *committer, double fraction, bool ends);
 
 #endif

@@ -2,6 +2,7 @@
 /* estimate.c: see estimate.h. */
 #include "estimate.h"
 
+#include "output.h"
 #include "walk.h"
 
 #include <math.h>
@@ -42,22 +43,23 @@ bound_pairs(const hs_search *search)
     return squares * offsets;
 }
 
-double
-hs_bytes_per_pair(const hs_options *options, int ndim)
+/* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
+ * search still holds beside them. 0 when nothing is wanted but the count. */
+static double
+find_bytes_per_pair(const hs_options *options, int ndim)
 {
-    const unsigned want = options->want;
-    double         stored = 0.0, returned = 0.0;
-    for (unsigned bit = HS_WANT_I; bit <= HS_WANT_J; bit <<= 1) {
-        stored += want & bit ? sizeof(int32_t) : 0.0;
-        returned += want & bit ? options->index_bytes : 0.0;
+    int64_t   bytes = 0;
+    hs_output columns;
+    if (options->out == NULL) {
+        hs_output_init(NULL, ndim, options->want, options->index_bytes, &columns);
+        bytes += hs_output_bytes_per_pair(&columns);
     }
-    returned += want & HS_WANT_BOTH ? 2.0 * options->index_bytes : 0.0;
-    const double measures = (want & HS_WANT_DISTANCE ? sizeof(double) : 0.0) +
-                            (want & HS_WANT_VECTOR ? sizeof(double) * ndim : 0.0) +
-                            (want & HS_WANT_SHIFT ? sizeof(int32_t) * ndim : 0.0);
-    /* Sorting holds the merged pairs and their order while it writes. */
-    const double sorting = options->sorted ? stored + measures + sizeof(int64_t) : 0.0;
-    return options->out != NULL ? sorting : returned + measures + sorting;
+    if (options->sorted) { /* holds the pairs as they were found, and their order, while it writes */
+        hs_output_init(NULL, ndim, options->want & ~(unsigned)HS_WANT_BOTH, sizeof(int32_t),
+                       &columns);
+        bytes += hs_output_bytes_per_pair(&columns) + (int64_t)sizeof(int64_t);
+    }
+    return (double)bytes;
 }
 
 static hs_status
@@ -98,7 +100,7 @@ least_pairs(const hs_search *search)
 hs_status
 hs_estimate_by_density(hs_search *search, hs_failure *failure)
 {
-    const double bytes_per_pair = hs_bytes_per_pair(&search->options, search->scene.ndim);
+    const double bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
     if (search->scene.lattice.n_periodic < search->scene.ndim || search->scene.n == 0) {
         return HS_OK;
     }
@@ -151,7 +153,7 @@ take_sample(hs_walker *walker, int64_t n, sample *taken)
 hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
-    const double  bytes_per_pair = hs_bytes_per_pair(&search->options, search->scene.ndim);
+    const double  bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
     const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
     sample        taken;

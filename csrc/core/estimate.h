@@ -5,10 +5,6 @@
 
 #include "search.h"
 
-/* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
- * search still holds beside them. 0 when nothing is wanted but the count. */
-double hs_bytes_per_pair(const hs_options *options, int ndim);
-
 /*
  * Before any work: a fully periodic box has at least so many pairs as its density says, less what a
  * cell's diameter can hide. HS_ERR_MEMORY when even these pass the limit, HS_ERR_TOO_MANY when

@@ -108,7 +108,7 @@ resize(hs_output *output, double pairs)
         const size_t width = hs_output_width(output, 1u << k);
         const size_t bytes = ((size_t)pairs + HS_PADDING) * width;
         column->used = (size_t)output->n_pairs * width;
-        if (column->data == NULL ? !hs_region_reserve(column, bytes, bytes)
+        if (column->data == NULL ? !hs_region_reserve(column, bytes)
                                  : column->capacity < bytes && !hs_region_grow(column, bytes)) {
             undo_resize(output);
             return false;

@@ -9,11 +9,6 @@
 #if defined(__linux__) && !HS_ADDRESS_SANITIZER
 
 #include <sys/mman.h>
-#include <sys/resource.h>
-
-#if !defined(MADV_POPULATE_WRITE)
-#define MADV_POPULATE_WRITE 23 /* Linux 5.14; the headers may be older than the kernel */
-#endif
 
 static size_t
 round_up(size_t bytes)
@@ -88,14 +83,6 @@ hs_pages_reserve(size_t bytes, void **mapping, size_t *length)
     return block;
 }
 
-bool
-hs_pages_spare(void)
-{
-    struct rlimit limit;
-    return sizeof(void *) >= 8 && getrlimit(RLIMIT_AS, &limit) == 0 &&
-           limit.rlim_cur == RLIM_INFINITY;
-}
-
 void
 hs_pages_advise(void *from, void *to, bool huge)
 {
@@ -109,12 +96,6 @@ hs_pages_advise(void *from, void *to, bool huge)
     (void)to;
     (void)huge;
 #endif
-}
-
-void
-hs_pages_fill(void *from, void *to)
-{
-    (void)madvise(from, (size_t)((char *)to - (char *)from), MADV_POPULATE_WRITE);
 }
 
 void *
@@ -203,25 +184,12 @@ hs_pages_reserve(size_t bytes, void **mapping, size_t *length)
     return hs_pages_alloc(bytes, mapping, length);
 }
 
-bool
-hs_pages_spare(void)
-{
-    return false;
-}
-
 void
 hs_pages_advise(void *from, void *to, bool huge)
 {
     (void)from;
     (void)to;
     (void)huge;
-}
-
-void
-hs_pages_fill(void *from, void *to)
-{
-    (void)from;
-    (void)to;
 }
 
 void *

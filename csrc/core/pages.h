@@ -30,14 +30,8 @@ void  hs_pages_free(void *mapping, size_t length);
  */
 void *hs_pages_reserve(size_t bytes, void **mapping, size_t *length);
 
-/* Whether reserving far more than will be used is free: not where address space is limited. */
-bool hs_pages_spare(void);
-
 /* Huge pages for what is written from now on in [from, to), or small ones. A wish. */
 void hs_pages_advise(void *from, void *to, bool huge);
-
-/* Small pages for [from, to) in one go, which costs half of what a fault for each of them does. */
-void hs_pages_fill(void *from, void *to);
 
 /* The reservation with room for `bytes` bytes, more than before, contents kept, all of it advised
  * for small pages; returns the block, which may have moved off its alignment. NULL when refused:

@@ -49,7 +49,7 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 static hs_status
 record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
-    if (output->fixed) { /* a stage keeps what is written ahead out of the caller's arrays */
+    if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
         return hs_parallel_record(search, output, failure);
     }
     hs_output_expect(output, search->grid.expected_pairs);
@@ -97,6 +97,17 @@ find_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     return status;
 }
 
+hs_pairs *
+hs_pairs_new(void)
+{
+    hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
+    if (pairs != NULL) {
+        memset(&pairs->output, 0, sizeof pairs->output);
+        memset(&pairs->offsets, 0, sizeof pairs->offsets);
+    }
+    return pairs;
+}
+
 hs_status
 hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
               hs_pairs **result, hs_failure *failure)
@@ -105,13 +116,12 @@ hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *opti
     *result = NULL;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
-    hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
+    hs_pairs *pairs = hs_pairs_new();
     if (pairs == NULL) {
         return HS_ERR_MEMORY;
     }
     hs_search     *search = &pairs->search;
     const hs_fpenv saved = hs_fpenv_enter();
-    memset(&pairs->output, 0, sizeof pairs->output);
     hs_status status = hs_search_open(&(hs_sets){.points = points}, box, options, search, failure);
     if (status == HS_OK) {
         hs_output_init(&search->account, points->ndim, options->want, options->index_bytes,
@@ -193,6 +203,7 @@ hs_pairs_free(hs_pairs *pairs)
         return;
     }
     hs_output_free(&pairs->output);
+    hs_output_free(&pairs->offsets);
     hs_account_close(&pairs->search.account);
     hs_free(NULL, pairs);
 }

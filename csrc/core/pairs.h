@@ -7,8 +7,12 @@
 #include "search.h"
 
 struct hs_pairs {
-    hs_search search; /* closed: kept for its account, options and scene */
+    hs_search search;  /* closed: kept for its account, options and scene */
     hs_output output;
+    hs_output offsets; /* one column of int64: where rows of hs_neighbors_find begin, else nothing */
 };
+
+/* One that holds nothing yet; hs_search_begin comes first. NULL when memory is short. */
+hs_pairs *hs_pairs_new(void);
 
 #endif

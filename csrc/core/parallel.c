@@ -2,86 +2,98 @@
 /* parallel.c: see parallel.h. */
 #include "parallel.h"
 
+#include "backlog.h"
 #include "poll.h"
-#include "stage.h"
 #include "team.h"
-#include "commits.h"
 
 #include <string.h>
 
 /* Points of a range: some groups at least, and so few that their pairs, with all that may be asked
- * for, fit what a thread can hold back: it seldom waits for its turn. */
+ * for, fit what a thread can hold back: it seldom waits for others. */
 #define RANGE_POINTS 256
 
 typedef struct hs_crew hs_crew;
 
 /* What one thread works with. */
 typedef struct hs_worker {
-    hs_crew  *crew;
-    hs_walker walker;
-    hs_stage  stage;
-    hs_turn   turn;
+    hs_crew     *crew;
+    hs_walker    walker;
+    hs_backlog   backlog;
+    hs_committer committer;
+    hs_failure   failure;
 } hs_worker;
 
 struct hs_crew {
-    hs_search *search;
-    hs_output *output; /* NULL: only counting */
-    hs_worker *workers;
-    hs_commits  *turns;
+    hs_search         *search;
+    hs_output         *output;   /* NULL: nothing is recorded */
+    const hs_visitors *visitors; /* NULL: hits are recorded, or only counted */
+    hs_worker         *workers;
+    hs_commits        *commits;
+    hs_neighbourhood   most;     /* set at the end, as the next */
+    int64_t            n_found;
 };
 
-/* A hs_flush_fn. */
+/* A hs_range_fn. */
 static hs_status
-commit_stage(void *context, hs_stage *stage, double fraction)
+search_range(void *context, int64_t range)
 {
-    hs_worker *worker = context;
-    (void)stage;
-    return hs_turn_commit(&worker->turn, fraction, false);
+    hs_worker     *worker = context;
+    const hs_crew *crew = worker->crew;
+    const int64_t  n = hs_search_asking(crew->search)->n, first = range * RANGE_POINTS;
+    const int64_t  end = first + (n - first < RANGE_POINTS ? n - first : RANGE_POINTS);
+    hs_status      status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        worker->failure.row = worker->walker.failed_point;
+        worker->failure.in_queries = crew->search->has_queries;
+    }
+    if (status == HS_OK && crew->output != NULL) {
+        status = hs_commit(&worker->committer, (double)end / (double)n, true);
+    }
+    return status;
 }
 
 /* A hs_task_fn: ranges, as long as there are any. */
 static void
 work(void *context, int64_t task)
 {
-    hs_crew      *crew = context;
-    hs_worker    *worker = &crew->workers[task];
-    const int64_t n = crew->search->bins.n;
-    hs_status     status = HS_OK;
-    hs_turn_join(crew->turns, &worker->walker.options, &worker->stage.pairs, &worker->turn);
-    while (status == HS_OK && hs_turn_next(&worker->turn)) {
-        const int64_t first = worker->turn.range * RANGE_POINTS;
-        const int64_t left = n - first;
-        const int64_t end = first + (left < RANGE_POINTS ? left : RANGE_POINTS);
-        status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
-        if (status == HS_OK && crew->output != NULL) {
-            status = hs_turn_commit(&worker->turn, (double)end / (double)n, true);
-        }
-    }
-    if (status == HS_OK) {
-        status = hs_turn_finish(&worker->turn);
-    }
-    if (status != HS_OK) {
-        hs_failure failure = HS_NO_FAILURE;
-        if (status == HS_ERR_SHIFT_RANGE) {
-            failure.row = worker->walker.failed_point;
-        }
-        hs_turn_fail(&worker->turn, status, &failure);
-    }
+    hs_crew   *crew = context;
+    hs_worker *worker = &crew->workers[task];
+    hs_commits_join(crew->commits, &worker->walker.options, &worker->backlog.pairs,
+                    &worker->committer);
+    hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
+}
+
+/* The walker of worker number w. */
+static hs_status
+open_visitor(const hs_crew *crew, int w, hs_walker *walker)
+{
+    const hs_visitors *visitors = crew->visitors;
+    void              *context = (char *)visitors->contexts + (size_t)w * visitors->context_size;
+    return visitors->most == NULL
+               ? hs_walker_init(crew->search, visitors->use, visitors->visit, context, walker)
+               : hs_walker_init_ordered(crew->search, visitors->use, visitors->most,
+                                        visitors->visit, context, walker);
 }
 
 static hs_status
-open_worker(hs_crew *crew, hs_worker *worker)
+open_worker(hs_crew *crew, int w)
 {
     hs_search *search = crew->search;
+    hs_worker *worker = &crew->workers[w];
     worker->crew = crew;
+    worker->failure = HS_NO_FAILURE;
+    if (crew->visitors != NULL) {
+        return open_visitor(crew, w, &worker->walker);
+    }
     if (crew->output == NULL) {
         return hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &worker->walker);
     }
-    hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns), hs_stage_hits,
-                                      &worker->stage, &worker->walker);
+    hs_backlog_init(crew->output, &worker->committer, &worker->backlog);
+    hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns),
+                                      hs_backlog_hits, &worker->backlog, &worker->walker);
     if (status == HS_OK) {
-        status = hs_stage_init(&search->account, crew->output, worker->walker.block.most_hits,
-                               commit_stage, worker, &worker->stage);
+        status = hs_recorder_init(&search->account, &worker->backlog.pairs,
+                                  worker->walker.block.most_hits, &worker->backlog.recorder);
     }
     return status;
 }
@@ -90,56 +102,81 @@ static hs_status
 run_crew(hs_crew *crew, hs_failure *failure)
 {
     hs_search    *search = crew->search;
-    const int64_t n_ranges = (search->bins.n + RANGE_POINTS - 1) / RANGE_POINTS;
-    crew->turns = hs_commits_new(&search->account, crew->output, n_ranges);
-    if (crew->turns == NULL) {
+    const int64_t n_ranges = (hs_search_asking(search)->n + RANGE_POINTS - 1) / RANGE_POINTS;
+    crew->commits = hs_commits_new(&search->account, crew->output, n_ranges);
+    if (crew->commits == NULL) {
         return HS_ERR_MEMORY;
     }
     hs_team_run(search->team, hs_team_size(search->team), work, crew);
-    return hs_commits_end(&search->account, crew->turns, failure);
+    return hs_commits_end(&search->account, crew->commits, failure);
 }
 
-/* Everybody walks; *count: what they found. */
-static hs_status
-walk_together(hs_search *search, hs_output *output, int64_t *count, hs_failure *failure)
+/* What a worker has found, and its end. */
+static void
+close_worker(hs_crew *crew, hs_worker *worker)
 {
-    hs_account *account = &search->account;
-    const int   n_workers = hs_team_size(search->team);
-    hs_crew     crew = {.search = search, .output = output};
+    const hs_neighbourhood *most = &worker->walker.most;
+    crew->n_found += worker->walker.n_found;
+    crew->most.runs = most->runs > crew->most.runs ? most->runs : crew->most.runs;
+    if (most->candidates > crew->most.candidates) {
+        crew->most.candidates = most->candidates;
+    }
+    hs_walker_close(crew->search, &worker->walker);
+    if (crew->output != NULL) {
+        hs_backlog_free(&crew->search->account, &worker->backlog);
+    }
+}
+
+/* Everybody walks. */
+static hs_status
+walk_together(hs_crew *crew, hs_failure *failure)
+{
+    hs_account *account = &crew->search->account;
+    const int   n_workers = hs_team_size(crew->search->team);
     hs_status   status = HS_OK;
     int         opened = 0;
-    crew.workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof(hs_worker));
-    if (crew.workers == NULL) {
+    crew->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof(hs_worker));
+    if (crew->workers == NULL) {
         return HS_ERR_MEMORY;
     }
-    memset(crew.workers, 0, (size_t)n_workers * sizeof(hs_worker));
+    memset(crew->workers, 0, (size_t)n_workers * sizeof(hs_worker));
     while (opened < n_workers && status == HS_OK) {
-        status = open_worker(&crew, &crew.workers[opened++]);
+        status = open_worker(crew, opened++);
     }
     if (status == HS_OK) {
-        status = run_crew(&crew, failure);
+        status = run_crew(crew, failure);
     }
-    *count = 0;
     for (int w = 0; w < opened; w++) {
-        *count += crew.workers[w].walker.n_found;
-        hs_walker_close(search, &crew.workers[w].walker);
-        if (output != NULL) {
-            hs_stage_free(account, &crew.workers[w].stage);
-        }
+        close_worker(crew, &crew->workers[w]);
     }
-    hs_free(account, crew.workers);
+    hs_free(account, crew->workers);
     return status;
 }
 
 hs_status
 hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure)
 {
-    int64_t count;
-    return walk_together(search, output, &count, failure);
+    hs_crew crew = {.search = search, .output = output};
+    return walk_together(&crew, failure);
+}
+
+hs_status
+hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
+                  hs_failure *failure)
+{
+    hs_crew         crew = {.search = search, .visitors = visitors};
+    const hs_status status = walk_together(&crew, failure);
+    if (most != NULL) {
+        *most = crew.most;
+    }
+    return status;
 }
 
 hs_status
 hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure)
 {
-    return walk_together(search, NULL, count, failure);
+    hs_crew         crew = {.search = search};
+    const hs_status status = walk_together(&crew, failure);
+    *count = crew.n_found;
+    return status;
 }

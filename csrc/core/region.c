@@ -4,7 +4,6 @@
 
 #include "chunk.h"
 #include "memory.h"
-#include "pages.h"
 #include "pool.h"
 
 /* Address space without memory that a chunk takes along to the pool, so that the next request
@@ -45,38 +44,24 @@ give_back(void *data)
     }
 }
 
-/* What to ask for: not more than expected where that would be taken from others. */
-static size_t
-affordable(size_t expected, size_t most)
-{
-    return most >= HS_PAGES_FROM && !hs_pages_spare() ? expected : most;
-}
-
 static void *
-take_recycled(size_t expected, size_t most)
+take_recycled(size_t expected)
 {
     void *data = hs_pool_take(expected);
-    if (data == NULL || hs_chunk_of(data)->capacity >= most) {
+    if (data == NULL || hs_chunk_of(data)->capacity >= expected) {
         return data;
     }
-    most = affordable(expected, most);
-    /* One from malloc would be copied, and has the room for what is expected. */
-    if (hs_chunk_of(data)->capacity < most && hs_chunk_of(data)->length > 0) {
-        void *grown = hs_chunk_grow(data, most, 0);
-        data = grown != NULL ? grown : data;
+    void *grown = hs_chunk_grow(data, expected, 0); /* in pages: others come with the room */
+    if (grown == NULL) {
+        hs_chunk_free(data);
     }
-    if (hs_chunk_of(data)->capacity >= expected) {
-        return data;
-    }
-    hs_chunk_free(data);
-    return NULL;
+    return grown;
 }
 
 static void *
-take_new(size_t expected, size_t most)
+take_new(size_t expected)
 {
-    most = affordable(expected, most);
-    void *data = hs_chunk_new(most > HS_POOL_SCRATCH ? most : HS_POOL_SCRATCH);
+    void *data = hs_chunk_new(expected > HS_POOL_SCRATCH ? expected : HS_POOL_SCRATCH);
     if (data == NULL) {
         data = hs_chunk_new(expected);
     }
@@ -88,16 +73,15 @@ take_new(size_t expected, size_t most)
 }
 
 bool
-hs_region_reserve(hs_region *region, size_t expected, size_t most)
+hs_region_reserve(hs_region *region, size_t expected)
 {
     HS_ASSERT(region->data == NULL);
     if (allocation_fails()) {
         return false;
     }
-    most = most > expected ? most : expected;
-    void *data = take_recycled(expected, most);
+    void *data = take_recycled(expected);
     if (data == NULL) {
-        data = take_new(expected, most);
+        data = take_new(expected);
     }
     if (data == NULL) {
         return false;
@@ -138,14 +122,6 @@ hs_region_expect(hs_region *region, size_t bytes)
     if (region->data != NULL) {
         hs_chunk_touch(region->data, region->used);
         hs_chunk_expect(region->data, bytes);
-    }
-}
-
-void
-hs_region_prepare(hs_region *region, size_t bytes)
-{
-    if (region->data != NULL) {
-        hs_chunk_fill(region->data, bytes);
     }
 }
 

@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * region.h: the memory that results are written to. A region is reserved for the most that may
- * come, written from the front, and at the end either detached, with what was not needed given
- * back, or released. Memory that is no longer used goes to the pool (pool.h).
+ * region.h: the memory that results are written to. A region is reserved for what is expected,
+ * written from the front, grown if that was too little, and at the end either detached, with what
+ * was not needed given back, or released. Memory that is no longer used goes to the pool (pool.h).
  *
  * Where the system has such a service (pages.h) the room beyond what is written costs nothing.
- * Elsewhere, and where address space is limited, a region starts with what is expected and grows.
  *
  * Usage:
  *     hs_region region = {0};
- *     if (!hs_region_reserve(&region, expected, most)) { ... }
+ *     if (!hs_region_reserve(&region, expected)) { ... }
  *     ... write to region.data, keep region.used; hs_region_grow when capacity is reached ...
  *     array = hs_region_detach(&region, region.used);      (freed by hs_buffer_free)
  *     or hs_region_release(&region);
@@ -27,9 +26,9 @@ typedef struct hs_region {
                         keeps these, releasing recycles these. The capacity is never passed. */
 } hs_region;
 
-/* An empty region gets at least `expected` writable bytes, and as much of `most` as costs nothing.
- * False when refused: it is still empty, and less may be asked for. Implies hs_region_expect. */
-bool hs_region_reserve(hs_region *region, size_t expected, size_t most);
+/* An empty region gets at least `expected` writable bytes. False when refused: it is still empty,
+ * and less may be asked for. Implies hs_region_expect. */
+bool hs_region_reserve(hs_region *region, size_t expected);
 
 /* At least `bytes` writable bytes; the first `used` ones are kept but may move. False when
  * refused: the region is as before. Call hs_region_expect when all of it will be needed. */
@@ -40,11 +39,6 @@ bool hs_region_grow(hs_region *region, size_t bytes);
  * rather a little too few than too many. Calling this with more later costs next to nothing.
  * It holds for pages that have not been written yet. */
 void hs_region_expect(hs_region *region, size_t bytes);
-
-/* Advice: the first `bytes` bytes are about to be written. Gets their small pages in one go, for
- * half the time of a fault each; to be called every HS_REGION_AHEAD bytes, that much ahead. */
-#define HS_REGION_AHEAD ((size_t)256 << 10) /* few calls, and still in L2 when it is written */
-void hs_region_prepare(hs_region *region, size_t bytes);
 
 /* Gives room beyond the first `bytes` bytes, at least the used ones, back to the system where it
  * takes it. May move. */

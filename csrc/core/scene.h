@@ -91,13 +91,6 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-/* A length that the metric measured, in the caller's unit. */
-HS_ALWAYS_INLINE double
-hs_scene_restore(const hs_scene *scene, double length)
-{
-    return scene->extreme ? length : hs_scale_apply(scene->unscale, length);
-}
-
 void hs_scene_free(hs_account *account, hs_scene *scene);
 
 #endif

@@ -7,8 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#define POINTS_FOR_TEAM 20000
-
 /* An hs_poll_fn: the caller's, counted. */
 static bool
 counted_poll(void *context, double fraction)
@@ -18,15 +16,11 @@ counted_poll(void *context, double fraction)
     return search->callers_poll(search->callers_context, fraction);
 }
 
-/*
- * Threads cost some ten microseconds each to start and to end. An explicit number is taken as it
- * is; -n means up to n where there are points enough that the work takes a millisecond.
- */
 int
 hs_search_threads(int64_t n_points, const hs_options *options)
 {
     const int n = options->threads;
-    return n < 0 ? (n_points >= POINTS_FOR_TEAM ? -n : 1) : n;
+    return n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
 }
 
 /* The dense grid, or where points crowd in few of its cells one that stores occupied cells only. */
@@ -157,6 +151,19 @@ hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options
         hs_search_close(search);
     }
     return status;
+}
+
+void
+hs_search_note(hs_search *search, const hs_counters *walked)
+{
+    hs_counters *sum = &search->walked;
+    sum->groups += walked->groups;
+    sum->candidates += walked->candidates;
+    sum->ambiguous += walked->ambiguous;
+    sum->by_float64 += walked->by_float64;
+    sum->by_double_word += walked->by_double_word;
+    sum->by_integers += walked->by_integers;
+    sum->polls += walked->polls;
 }
 
 void

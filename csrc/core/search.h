@@ -68,6 +68,9 @@ hs_search_asking(const hs_search *search)
 /* How many threads these options mean for so many points. */
 int hs_search_threads(int64_t n_points, const hs_options *options);
 
+/* Adds what a walker, or another search, did to search->walked. */
+void hs_search_note(hs_search *search, const hs_counters *walked);
+
 /* Copies the counts to options.counters, if wanted. */
 void hs_search_report(const hs_search *search, int64_t n_pairs);
 

@@ -7,8 +7,8 @@
 
 #include <math.h>
 
-/* Points that a range of systems should have: their pairs fit the stage of a thread, so that it
- * seldom waits for its turn, and taking a range costs little beside them. */
+/* Points that a range of systems should have: their pairs fit the backlog of a thread, so that
+ * it seldom waits for others, and taking a range costs little beside them. */
 #define RANGE_POINTS 512
 
 /* `total` has the account of the output and sums up what was done. */
@@ -23,21 +23,21 @@ run_crew(hs_systems_crew *crew, hs_team *team, hs_search *total, hs_failure *fai
     crew->is_direct = n_workers == 1 && crew->output != NULL && !crew->output->fixed;
     crew->workers =
         hs_alloc(&total->account, HS_FOR_CANDIDATES, n_workers, sizeof(hs_systems_worker));
-    crew->turns = hs_commits_new(&total->account, crew->output,
-                               (n_systems + crew->in_range - 1) / crew->in_range);
+    crew->commits = hs_commits_new(&total->account, crew->output,
+                                   (n_systems + crew->in_range - 1) / crew->in_range);
     hs_status status = HS_ERR_MEMORY;
     for (int w = 0; w < n_workers && crew->workers != NULL; w++) {
         hs_systems_open_worker(crew, options, &crew->workers[w]);
     }
-    if (crew->workers != NULL && crew->turns != NULL) {
+    if (crew->workers != NULL && crew->commits != NULL) {
         hs_team_run(team, n_workers, hs_systems_work, crew);
         status = HS_OK;
     }
     for (int w = 0; w < n_workers && crew->workers != NULL; w++) {
         hs_systems_close_worker(&crew->workers[w], total);
     }
-    if (crew->turns != NULL) {
-        const hs_status ended = hs_commits_end(&total->account, crew->turns, failure);
+    if (crew->commits != NULL) {
+        const hs_status ended = hs_commits_end(&total->account, crew->commits, failure);
         status = status == HS_OK ? ended : status;
     }
     hs_free(&total->account, crew->workers);
@@ -105,7 +105,7 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
     *result = NULL;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
-    hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
+    hs_pairs *pairs = hs_pairs_new();
     if (pairs == NULL) {
         return HS_ERR_MEMORY;
     }

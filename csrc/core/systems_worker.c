@@ -12,15 +12,6 @@
 #define POLL_WORK   (INT64_C(1) << 21)
 #define SYSTEM_WORK 1024
 
-/* A hs_flush_fn. */
-static hs_status
-commit_stage(void *context, hs_stage *stage, double fraction)
-{
-    hs_systems_worker *worker = context;
-    (void)stage;
-    return hs_turn_commit(&worker->turn, fraction, false);
-}
-
 /* Makes the scene of system s ready, its points numbered among all. */
 static hs_status
 build_system(hs_systems_worker *worker, int64_t s)
@@ -78,12 +69,12 @@ count_system(hs_systems_worker *worker, int64_t s)
     return status;
 }
 
-/* All pairs of the present system, unsorted; `visit` takes the stage or its recorder. */
+/* All pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
 static hs_status
 record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, void *context)
 {
     hs_search   *search = &worker->search;
-    hs_recorder *recorder = &worker->stage.recorder;
+    hs_recorder *recorder = &worker->backlog.recorder;
     hs_walker    walker;
     hs_status    status =
         hs_walker_init(search, hs_record_use(output->columns), visit, context, &walker);
@@ -112,7 +103,7 @@ sort_system(hs_systems_worker *worker)
         hs_output_init(&search->account, search->scene.ndim, columns, 4, found);
     }
     found->n_pairs = 0;
-    hs_status status = record_system(worker, found, hs_record_hits, &worker->stage.recorder);
+    hs_status status = record_system(worker, found, hs_record_hits, &worker->backlog.recorder);
     if (status == HS_OK) {
         status = hs_sort_pairs(search, found, worker->target);
     }
@@ -133,8 +124,8 @@ find_system(hs_systems_worker *worker)
         return sort_system(worker);
     }
     return worker->crew->is_direct
-               ? record_system(worker, worker->target, hs_record_hits, &worker->stage.recorder)
-               : record_system(worker, worker->target, hs_stage_hits, &worker->stage);
+               ? record_system(worker, worker->target, hs_record_hits, &worker->backlog.recorder)
+               : record_system(worker, worker->target, hs_backlog_hits, &worker->backlog);
 }
 
 static hs_status
@@ -161,12 +152,15 @@ search_system(hs_systems_worker *worker, int64_t s)
     return status;
 }
 
-/* Systems [first, end), and the turn of what was found in them. */
+/* A hs_range_fn. */
 static hs_status
-search_range(hs_systems_worker *worker, int64_t first, int64_t end)
+search_range(void *context, int64_t range)
 {
+    hs_systems_worker     *worker = context;
     const hs_systems_crew *crew = worker->crew;
-    hs_status      status = HS_OK;
+    const int64_t          first = range * crew->in_range, left = crew->systems->n - first;
+    const int64_t          end = first + (left < crew->in_range ? left : crew->in_range);
+    hs_status              status = HS_OK;
     for (int64_t s = first; s < end && status == HS_OK; s++) {
         status = search_system(worker, s);
     }
@@ -175,7 +169,7 @@ search_range(hs_systems_worker *worker, int64_t first, int64_t end)
     }
     const double done = (double)crew->systems->first[end] / (double)crew->points->n;
     if (!crew->is_direct) {
-        return hs_turn_commit(&worker->turn, done, true);
+        return hs_commit(&worker->committer, done, true);
     }
     if (first == 0 && done > 0.0) { /* most batches are much the same from end to end */
         hs_output_expect(crew->output, (double)crew->output->n_pairs / done);
@@ -188,22 +182,9 @@ hs_systems_work(void *context, int64_t task)
 {
     hs_systems_crew   *crew = context;
     hs_systems_worker *worker = &crew->workers[task];
-    const int64_t      n = crew->systems->n;
-    hs_status          status = HS_OK;
-    hs_turn_join(crew->turns, &worker->options, &worker->stage.pairs, &worker->turn);
+    hs_commits_join(crew->commits, &worker->options, &worker->backlog.pairs, &worker->committer);
     hs_search_begin(&worker->options, &worker->search);
-    while (status == HS_OK && hs_turn_next(&worker->turn)) {
-        const int64_t first = worker->turn.range * crew->in_range;
-        const int64_t left = n - first;
-        status =
-            search_range(worker, first, first + (left < crew->in_range ? left : crew->in_range));
-    }
-    if (status == HS_OK) {
-        status = hs_turn_finish(&worker->turn);
-    }
-    if (status != HS_OK) {
-        hs_turn_fail(&worker->turn, status, &worker->failure);
-    }
+    hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
 }
 
 void
@@ -217,29 +198,18 @@ hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options, hs_syst
         worker->box = *crew->systems->box;
     }
     if (crew->output != NULL) {
-        const hs_output *output = crew->output;
-        worker->stage = (hs_stage){.flush = commit_stage, .flush_context = worker};
-        hs_output_init(NULL, output->ndim, output->columns, output->index_bytes,
-                       &worker->stage.pairs);
-        worker->target = crew->is_direct ? crew->output : &worker->stage.pairs;
+        hs_backlog_init(crew->output, &worker->committer, &worker->backlog);
+        worker->target = crew->is_direct ? crew->output : &worker->backlog.pairs;
     }
 }
 
 void
 hs_systems_close_worker(hs_systems_worker *worker, hs_search *total)
 {
-    hs_counters       *sum = &total->walked;
-    const hs_counters *walked = &worker->search.walked;
-    hs_account        *account = &worker->search.account;
-    hs_output_free(&worker->stage.pairs);
+    hs_account *account = &worker->search.account;
+    hs_backlog_free(account, &worker->backlog);
     hs_output_free(&worker->found);
-    sum->groups += walked->groups;
-    sum->candidates += walked->candidates;
-    sum->ambiguous += walked->ambiguous;
-    sum->by_float64 += walked->by_float64;
-    sum->by_double_word += walked->by_double_word;
-    sum->by_integers += walked->by_integers;
-    sum->polls += walked->polls;
+    hs_search_note(total, &worker->search.walked);
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += account->total.bytes[p];
     }

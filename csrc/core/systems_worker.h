@@ -1,36 +1,35 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * systems_worker.h: one of the threads that search many systems. It searches one after the other
- * with the same account and arena, and writes in turn (turns.h).
+ * with the same account and arena, and writes in their order (commits.h).
  */
 #ifndef HS_SYSTEMS_WORKER_H
 #define HS_SYSTEMS_WORKER_H
 
+#include "backlog.h"
 #include "search.h"
-#include "stage.h"
-#include "commits.h"
 
 typedef struct hs_systems_crew hs_systems_crew;
 
 /* What one thread works with. */
 typedef struct hs_systems_worker {
     hs_systems_crew *crew;
-    hs_options options; /* the caller's, with this thread's poll */
-    hs_turn    turn;
-    hs_search  search;  /* of one system after the other */
-    hs_box     box;     /* of the present system, where each has its own */
-    hs_output *target;  /* the crew's output, or the stage's */
-    hs_stage   stage;
-    hs_output  found;   /* pairs of one system before they are sorted */
-    hs_failure failure;
-    int64_t    work;    /* since the last poll */
+    hs_options       options; /* the caller's, with this thread's poll */
+    hs_committer     committer;
+    hs_search        search;  /* of one system after the other */
+    hs_box           box;     /* of the present system, where each has its own */
+    hs_output       *target;  /* the crew's output, or the backlog's */
+    hs_backlog       backlog;
+    hs_output        found;   /* pairs of one system before they are sorted */
+    hs_failure       failure;
+    int64_t          work;    /* since the last poll */
 } hs_systems_worker;
 
 struct hs_systems_crew {
     const hs_points   *points;
     const hs_systems  *systems;
     hs_systems_worker *workers;
-    hs_commits          *turns;
+    hs_commits        *commits;
     hs_output         *output;    /* NULL: only counting, into ... */
     int64_t           *counts;
     int64_t            in_range;  /* systems of a range */

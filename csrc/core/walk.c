@@ -428,13 +428,13 @@ hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourho
 void
 hs_walker_close(hs_search *search, hs_walker *walker)
 {
-    hs_counters *walked = &search->walked;
-    walked->groups += walker->n_groups;
-    walked->candidates += walker->n_candidates;
-    walked->ambiguous += walker->n_ambiguous;
-    walked->by_float64 += walker->stages.by_float64;
-    walked->by_double_word += walker->stages.by_double_word;
-    walked->by_integers += walker->stages.by_integers;
+    const hs_counters walked = {.groups = walker->n_groups,
+                                .candidates = walker->n_candidates,
+                                .ambiguous = walker->n_ambiguous,
+                                .by_float64 = walker->stages.by_float64,
+                                .by_double_word = walker->stages.by_double_word,
+                                .by_integers = walker->stages.by_integers};
+    hs_search_note(search, &walked);
     walker->n_groups = walker->n_candidates = walker->n_ambiguous = 0;
     walker->stages = (hs_stages){0};
     hs_free(&search->account, walker->links);

@@ -131,6 +131,11 @@ typedef struct hs_kernel {
     hs_measure_fn measure;
 } hs_kernel;
 
+/* The fields for which every kernel's file has functions of its own, of these names. */
+#define HS_KERNEL_LOOPS                                                                          \
+    .gather = gather, .list = list, .count = count, .list_direct = list_direct,                  \
+    .count_direct = count_direct, .emit_int32 = emit_int32, .emit_int64 = emit_int64
+
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */
 extern const hs_kernel hs_kernel_avx512; /* x86-64 only */

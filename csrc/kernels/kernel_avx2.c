@@ -17,13 +17,7 @@ HS_TARGET_END
 const hs_kernel hs_kernel_avx2 = {
     .name = "avx2",
     .supported = hs_cpu_has_avx2,
-    .gather = gather,
-    .list = list,
-    .count = count,
-    .list_direct = list_direct,
-    .count_direct = count_direct,
-    .emit_int32 = emit_int32,
-    .emit_int64 = emit_int64,
+    HS_KERNEL_LOOPS,
     .judge = hs_judge_avx2,
     .measure = hs_measure_avx2,
 };

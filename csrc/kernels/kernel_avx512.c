@@ -17,13 +17,7 @@ HS_TARGET_END
 const hs_kernel hs_kernel_avx512 = {
     .name = "avx512",
     .supported = hs_cpu_has_avx512,
-    .gather = gather,
-    .list = list,
-    .count = count,
-    .list_direct = list_direct,
-    .count_direct = count_direct,
-    .emit_int32 = emit_int32,
-    .emit_int64 = emit_int64,
+    HS_KERNEL_LOOPS,
     .judge = hs_judge_avx512,
     .measure = hs_measure_avx512,
 };

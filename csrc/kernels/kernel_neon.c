@@ -20,13 +20,7 @@ always(void)
 const hs_kernel hs_kernel_neon = {
     .name = "neon",
     .supported = always,
-    .gather = gather,
-    .list = list,
-    .count = count,
-    .list_direct = list_direct,
-    .count_direct = count_direct,
-    .emit_int32 = emit_int32,
-    .emit_int64 = emit_int64,
+    HS_KERNEL_LOOPS,
     .judge = hs_judge_baseline, /* NEON is the baseline */
     .measure = hs_measure_baseline,
 };

@@ -121,40 +121,7 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
     return t;
 }
 
-HS_ALWAYS_INLINE int32_t
-scan_dimensions(hs_scan *scan, int32_t first, const bool expanded, const bool lists)
-{
-    switch (scan->ndim) {
-    case 1: return scan_points(scan, first, 1, expanded, lists);
-    case 2: return scan_points(scan, first, 2, expanded, lists);
-    case 3: return scan_points(scan, first, 3, expanded, lists);
-    default: return scan_points(scan, first, scan->ndim, expanded, lists);
-    }
-}
-
-static int32_t
-list(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, true, true);
-}
-
-static int32_t
-count(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, true, false);
-}
-
-static int32_t
-list_direct(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, false, true);
-}
-
-static int32_t
-count_direct(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, false, false);
-}
+#include "scan_forms.h"
 
 static void
 gather(hs_gather *gather, const hs_run *runs, int32_t n_runs)
@@ -194,27 +161,45 @@ gather(hs_gather *gather, const hs_run *runs, int32_t n_runs)
     gather->largest = largest;
 }
 
-#define DEFINE_EMIT(name, integer)                              \
-    static void name(const hs_rows *rows, void *to_i, void *to_j) \
-    {                                                           \
-        integer *i = to_i, *j = to_j;                           \
-        int32_t  h = 0;                                         \
-        for (int32_t row = 0; row < rows->n; row++) {           \
-            const int32_t point = rows->point[row];             \
-            const int32_t begin = h;                            \
-            for (; i != NULL && h < rows->end[row]; h++) {      \
-                i[h] = rows->hits[h] < point ? rows->hits[h] : point; \
-            }                                                   \
-            h = begin;                                          \
-            for (; j != NULL && h < rows->end[row]; h++) {      \
-                j[h] = rows->hits[h] < point ? point : rows->hits[h]; \
-            }                                                   \
-            h = rows->end[row];                                 \
-        }                                                       \
+/* Entry h of an array of int64_t or int32_t. */
+HS_ALWAYS_INLINE void
+put(void *array, int32_t h, int32_t value, const bool wide)
+{
+    if (wide) {
+        ((int64_t *)array)[h] = value;
+    } else {
+        ((int32_t *)array)[h] = value;
     }
+}
 
-DEFINE_EMIT(emit_int32, int32_t)
-DEFINE_EMIT(emit_int64, int64_t)
+HS_ALWAYS_INLINE void
+emit(const hs_rows *rows, void *i, void *j, const bool wide)
+{
+    const int32_t *hits = rows->hits;
+    int32_t        begin = 0;
+    for (int32_t row = 0; row < rows->n; row++) {
+        const int32_t point = rows->point[row], end = rows->end[row];
+        for (int32_t h = begin; i != NULL && h < end; h++) {
+            put(i, h, hits[h] < point ? hits[h] : point, wide);
+        }
+        for (int32_t h = begin; j != NULL && h < end; h++) {
+            put(j, h, hits[h] < point ? point : hits[h], wide);
+        }
+        begin = end;
+    }
+}
+
+static void
+emit_int32(const hs_rows *rows, void *i, void *j)
+{
+    emit(rows, i, j, false);
+}
+
+static void
+emit_int64(const hs_rows *rows, void *i, void *j)
+{
+    emit(rows, i, j, true);
+}
 
 static bool
 always(void)
@@ -225,13 +210,7 @@ always(void)
 const hs_kernel hs_kernel_scalar = {
     .name = "scalar",
     .supported = always,
-    .gather = gather,
-    .list = list,
-    .count = count,
-    .list_direct = list_direct,
-    .count_direct = count_direct,
-    .emit_int32 = emit_int32,
-    .emit_int64 = emit_int64,
+    HS_KERNEL_LOOPS,
     .judge = hs_judge_baseline,
     .measure = hs_measure_baseline,
 };

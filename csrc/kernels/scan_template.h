@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * scan_template.h: the vector scans, once for each instruction set. Include it after a vocabulary
- * (simd_<isa>.h), inside that instruction set's target region. Defines list, count, list_direct and
- * count_direct (hs_scan_fn), each with one loop for 1, 2, 3 and any number of axes, made by
- * inlining scan_points with constants.
+ * (simd_<isa>.h), inside that instruction set's target region. Defines scan_points and, by
+ * scan_forms.h, list, count, list_direct and count_direct (hs_scan_fn).
  */
 
 /* Notes the lanes of m, all of them hits that are listed from entry `at` on. Rare, or in crystals
@@ -107,37 +106,4 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
     return t;
 }
 
-HS_ALWAYS_INLINE int32_t
-scan_dimensions(hs_scan *scan, int32_t first, const bool expanded, const bool lists)
-{
-    switch (scan->ndim) {
-    case 1: return scan_points(scan, first, 1, expanded, lists);
-    case 2: return scan_points(scan, first, 2, expanded, lists);
-    case 3: return scan_points(scan, first, 3, expanded, lists);
-    default: return scan_points(scan, first, scan->ndim, expanded, lists);
-    }
-}
-
-static int32_t
-list(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, true, true);
-}
-
-static int32_t
-count(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, true, false);
-}
-
-static int32_t
-list_direct(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, false, true);
-}
-
-static int32_t
-count_direct(hs_scan *scan, int32_t first)
-{
-    return scan_dimensions(scan, first, false, false);
-}
+#include "scan_forms.h"
