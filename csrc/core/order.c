@@ -9,6 +9,7 @@
 
 #define DIGIT_BITS 9 /* of a digit, at most: two kB of counts stay in the nearest cache */
 #define FEW 24       /* candidates that are quicker sorted by insertion */
+#define CROWD 12     /* entries that agree in their leading digit, from which insertion does not pay */
 
 hs_status
 hs_order_init(hs_account *account, hs_block *block, hs_order *order)
@@ -53,13 +54,15 @@ sort_few(uint64_t *entries, int32_t n)
     }
 }
 
-/* By one digit of the key, into the spare entries, which become the entries. */
-static void
+/* By one digit of the key, into the spare entries, which become the entries. Returns the largest
+ * number of entries that agree in it. */
+static uint32_t
 sort_digit(hs_order *order, int32_t n, int shift, int bits)
 {
     uint32_t       start[1 << DIGIT_BITS];
     const uint32_t mask = (UINT32_C(1) << bits) - 1;
     uint64_t      *from = order->entries, *to = order->spare;
+    uint32_t       most = 0;
     memset(start, 0, ((size_t)mask + 1) * sizeof *start);
     for (int32_t c = 0; c < n; c++) {
         start[(uint32_t)(from[c] >> shift) & mask]++;
@@ -68,30 +71,38 @@ sort_digit(hs_order *order, int32_t n, int shift, int bits)
         const uint32_t count = start[digit];
         start[digit] = sum;
         sum += count;
+        most = count > most ? count : most;
     }
     for (int32_t c = 0; c < n; c++) {
         to[start[(uint32_t)(from[c] >> shift) & mask]++] = from[c];
     }
     order->entries = to;
     order->spare = from;
+    return most;
 }
 
-/* Stable, by the keys, none of which is larger than `most`. */
+/* Stable, by the keys, none of which has a bit that `any` has not. */
 static void
-sort_entries(hs_order *order, int32_t n, uint32_t most)
+sort_entries(hs_order *order, int32_t n, uint32_t any)
 {
     int bits = 0;
-    while (bits < 32 && most >> bits != 0) {
+    while (bits < 32 && any >> bits != 0) {
         bits++;
     }
     if (n <= FEW) {
         sort_few(order->entries, n);
         return;
     }
+    /* The leading digit alone tells nearly all apart, when keys are spread evenly. */
+    const int lead = bits < DIGIT_BITS ? bits : n < 1 << (DIGIT_BITS - 1) ? DIGIT_BITS - 1 : DIGIT_BITS;
+    if (sort_digit(order, n, 32 + bits - lead, lead) <= CROWD) {
+        sort_few(order->entries, n);
+        return;
+    }
     const int digits = (bits + DIGIT_BITS - 1) / DIGIT_BITS;
     for (int digit = 0, from = 0; digit < digits; digit++) {
         const int width = (bits - from + digits - digit - 1) / (digits - digit);
-        sort_digit(order, n, 32 + from, width);
+        (void)sort_digit(order, n, 32 + from, width);
         from += width;
     }
 }

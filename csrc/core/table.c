@@ -8,6 +8,8 @@
 
 #include <string.h>
 
+#define AHEAD         32   /* points, about two groups, between asking for a row and writing it */
+#define MOST_EXPECTED 2048 /* bytes of it */
 #define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
 /* A hs_visit_fn; each point belongs to one thread. */
@@ -71,32 +73,40 @@ typedef struct stretch {
     const int32_t *numbers; /* of the hits, from that one on */
 } stretch;
 
-static void
-put_number(void *column, int index_bytes, int64_t at, int32_t number)
+/* numbers[0 ... n - 1], or where that is NULL n times `same`, to every `step`-th entry from `at`. */
+HS_ALWAYS_INLINE void
+put_numbers(void *column, int index_bytes, int64_t at, const int32_t *numbers, int32_t same,
+            int32_t n, const int step)
 {
+    int64_t *wide = (int64_t *)column + at;
+    int32_t *narrow = (int32_t *)column + at;
     if (index_bytes == 8) {
-        ((int64_t *)column)[at] = number;
+        for (int64_t h = 0; h < n; h++) {
+            wide[h * step] = numbers != NULL ? numbers[h] : same;
+        }
     } else {
-        ((int32_t *)column)[at] = number;
+        for (int64_t h = 0; h < n; h++) {
+            narrow[h * step] = numbers != NULL ? numbers[h] : same;
+        }
     }
 }
 
 /* i, j, or both side by side. */
 static void
-put_numbers(const hs_output *entries, const stretch *part)
+put_ends(const hs_output *entries, const stretch *part)
 {
     void     *i = hs_output_column(entries, HS_WANT_I), *j = hs_output_column(entries, HS_WANT_J);
     void     *both = hs_output_column(entries, HS_WANT_BOTH);
     const int bytes = entries->index_bytes;
-    for (int32_t h = 0; i != NULL && h < part->n; h++) {
-        put_number(i, bytes, part->at + h, part->point);
+    if (i != NULL) {
+        put_numbers(i, bytes, part->at, NULL, part->point, part->n, 1);
     }
-    for (int32_t h = 0; j != NULL && h < part->n; h++) {
-        put_number(j, bytes, part->at + h, part->numbers[h]);
+    if (j != NULL) {
+        put_numbers(j, bytes, part->at, part->numbers, 0, part->n, 1);
     }
-    for (int32_t h = 0; both != NULL && h < part->n; h++) {
-        put_number(both, bytes, 2 * (part->at + h), part->point);
-        put_number(both, bytes, 2 * (part->at + h) + 1, part->numbers[h]);
+    if (both != NULL) {
+        put_numbers(both, bytes, 2 * part->at, NULL, part->point, part->n, 2);
+        put_numbers(both, bytes, 2 * part->at + 1, part->numbers, 0, part->n, 2);
     }
 }
 
@@ -104,7 +114,7 @@ static void
 put_stretch(const filler *fill, const stretch *part)
 {
     const hs_output *entries = fill->table->entries;
-    put_numbers(entries, part);
+    put_ends(entries, part);
     for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT; bit <<= 1) {
         char *to = hs_output_column(entries, bit);
         if (to != NULL) {
@@ -162,23 +172,59 @@ fill_part(filler *fill, hs_walker *walker, int32_t first, const hs_rows *rows)
     return status == HS_OK ? hs_put_measures(&fill->recorder, walker, first, rows) : status;
 }
 
-/* Numbers of n hits; returns which of them is `self`, a hit as it is listed, or n. */
+/* Which of n ascending numbers is the first that is not below this one, or n. */
 static int32_t
-find_numbers(const hs_walker *walker, const int32_t *hits, int32_t n, int32_t self,
-             int32_t *numbers)
+find_number(const int32_t *numbers, int32_t n, int32_t number)
 {
-    int32_t own = n;
-    if (walker->use == HS_BLOCK_LISTS_IDS) {
-        memcpy(numbers, hits, (size_t)n * sizeof *hits);
-    }
-    for (int32_t h = 0; walker->use == HS_BLOCK_LISTS_PLACES && h < n; h++) {
-        numbers[h] = walker->block.id[hits[h]];
-    }
-    if (!walker->search->has_queries) {
-        for (own = 0; own < n && hits[own] != self; own++) {
+    int32_t low = 0;
+    for (int32_t left = n; left > 0; left /= 2) {
+        const int32_t middle = low + left / 2;
+        if (numbers[middle] < number) {
+            low = middle + 1;
+            left--;
         }
     }
-    return own;
+    return low;
+}
+
+/* The numbers of a point's hits; returns which of these is the point itself, or n. own: its place,
+ * if hits are places. */
+static int32_t
+find_numbers(filler *fill, const hs_walker *walker, const int32_t *hits, int32_t n, int32_t point,
+             int32_t own)
+{
+    const bool has_self = !walker->search->has_queries;
+    int32_t   *numbers = fill->numbers;
+    if (walker->use == HS_BLOCK_LISTS_IDS) {
+        memcpy(numbers, hits, (size_t)n * sizeof *hits);
+        return has_self ? find_number(numbers, n, point) : n;
+    }
+    for (int32_t h = 0; h < n; h++) {
+        numbers[h] = walker->block.id[hits[h]];
+    }
+    int32_t self = has_self ? find_number(numbers, n, point) : n;
+    while (self < n && hits[self] != own) { /* images of the point come before it */
+        self++;
+    }
+    return self;
+}
+
+/* Rows lie anywhere in the result: asks for the memory of one that is soon to be written. */
+HS_ALWAYS_INLINE void
+expect_row(const hs_table *table, int64_t si)
+{
+    const hs_bins   *asking = hs_search_asking(table->search);
+    const hs_output *entries = table->entries;
+    const size_t     width = hs_output_width(entries, HS_WANT_J);
+    const char      *j = hs_output_column(entries, HS_WANT_J);
+    if (j != NULL && si < asking->n) {
+        const int64_t *row = table->offsets + asking->order[si];
+        const char    *end = j + (size_t)row[1] * width;
+        const char    *most = j + (size_t)row[0] * width + MOST_EXPECTED;
+        for (j += (size_t)row[0] * width; j < end && j < most; j += HS_ALIGNMENT) {
+            HS_PREFETCH_WRITE(j);
+        }
+    }
 }
 
 /* A hs_visit_fn of ordered walkers: whole rows. */
@@ -196,9 +242,10 @@ fill_rows(void *context, hs_walker *walker, int32_t first, const hs_rows *rows)
     }
     for (int32_t t = 0, hit = 0; t < rows->n; t++) {
         const int32_t point = rows->point[t], n = rows->end[t] - hit;
-        const int32_t self = by_place ? own + first + t - walker->group.first : point;
+        const int32_t place = own + first + t - walker->group.first;
+        expect_row(fill->table, (int64_t)first + t + AHEAD);
         put_row(fill, point, hit, n,
-                find_numbers(walker, rows->hits + hit, n, self, fill->numbers));
+                find_numbers(fill, walker, rows->hits + hit, n, point, place));
         hit = rows->end[t];
     }
     return HS_OK;
