@@ -117,11 +117,11 @@ scan_block(hs_walker *walker)
         walker->n_found += scan.n_hits;
         if (status == HS_OK && walker->visit != NULL && scan.n_hits > 0) {
             const int32_t si = walker->group.first + first;
-            const hs_rows rows = {.n = next - first,
+            const hs_hits hits = {.n = next - first,
                                   .point = walker->search->bins.order + si,
                                   .end = end + first,
-                                  .hits = scan.hits};
-            status = walker->visit(walker->visit_context, walker, si, &rows);
+                                  .label = scan.hits};
+            status = walker->visit(walker->visit_context, walker, si, &hits);
         }
         if (status != HS_OK) {
             return status;
