@@ -102,6 +102,35 @@ put_counters(PyObject *dict, const hs_counters *counters)
            put(dict, "by_integers", PyLong_FromLongLong(counters->by_integers));
 }
 
+/* A new dictionary; NULL on failure. counters: NULL when nothing was measured. */
+static PyObject *
+dictionary_of(const hs_plan *plan, const hs_counters *counters)
+{
+    PyObject *dict = PyDict_New();
+    if (dict == NULL || !put_plan(dict, plan) ||
+        (counters != NULL && !put_counters(dict, counters))) {
+        Py_XDECREF(dict);
+        return NULL;
+    }
+    return dict;
+}
+
+/* quantities, sort, index_bytes, measure. */
+static bool
+take_more(PyObject *const *more, hs_call *call, bool *measures)
+{
+    const char *letters;
+    if (!hs_quantities_of(more[0], &letters, &call->options.want)) {
+        return false;
+    }
+    const int sorted = PyObject_IsTrue(more[1]);
+    const int measure = PyObject_IsTrue(more[3]);
+    call->options.index_bytes = (int)PyLong_AsLong(more[2]);
+    call->options.sorted = sorted > 0;
+    *measures = measure > 0;
+    return sorted >= 0 && measure >= 0 && !PyErr_Occurred();
+}
+
 PyObject *
 hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
@@ -110,40 +139,25 @@ hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     hs_plan     plan;
     hs_counters counters = {0};
     hs_pairs   *pairs = NULL;
-    const char *letters;
+    bool        measures;
     (void)module;
     if (n_arguments != HS_CALL_ARGUMENTS + 4) {
         PyErr_Format(PyExc_TypeError, "explain takes %d arguments", HS_CALL_ARGUMENTS + 4);
         return NULL;
     }
-    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
     if (!hs_call_init(&call, arguments) ||
-        !hs_quantities_of(more[0], &letters, &call.options.want)) {
-        return NULL;
-    }
-    const int sorted = PyObject_IsTrue(more[1]);
-    const int measure = PyObject_IsTrue(more[3]);
-    call.options.index_bytes = (int)PyLong_AsLong(more[2]);
-    call.options.sorted = sorted > 0;
-    if (sorted < 0 || measure < 0 || PyErr_Occurred()) {
+        !take_more(arguments + HS_CALL_ARGUMENTS, &call, &measures)) {
         return NULL;
     }
     hs_call_release(&call);
     hs_status status =
         hs_plan_make(&call.points, hs_call_box(&call), &call.options, &plan, &failure);
-    if (status == HS_OK && measure) {
+    if (status == HS_OK && measures) {
         call.options.counters = &counters;
         status = hs_pairs_find(&call.points, hs_call_box(&call), &call.options, &pairs, &failure);
     }
     hs_call_acquire(&call);
     hs_pairs_free(pairs);
-    if (status != HS_OK) {
-        return hs_raise(status, &failure, &call.options);
-    }
-    PyObject *dict = PyDict_New();
-    if (dict == NULL || !put_plan(dict, &plan) || (measure && !put_counters(dict, &counters))) {
-        Py_XDECREF(dict);
-        return NULL;
-    }
-    return dict;
+    return status == HS_OK ? dictionary_of(&plan, measures ? &counters : NULL)
+                           : hs_raise(status, &failure, &call.options);
 }

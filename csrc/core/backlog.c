@@ -17,11 +17,11 @@ hs_backlog_free(hs_account *account, hs_backlog *backlog)
 }
 
 hs_status
-hs_backlog_hits(void *context, hs_walker *walker, int32_t first, const hs_rows *rows)
+hs_backlog_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
     hs_backlog      *backlog = context;
     const hs_output *pairs = &backlog->pairs;
-    const hs_status  status = hs_record_hits(&backlog->recorder, walker, first, rows);
+    const hs_status  status = hs_record_hits(&backlog->recorder, walker, first, hits);
     if (status == HS_OK &&
         pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
         return hs_commit(backlog->committer, hs_walk_fraction(walker), false);

@@ -54,7 +54,7 @@ find_bytes_per_pair(const hs_options *options, int ndim)
         hs_output_init(NULL, ndim, options->want, options->index_bytes, &columns);
         bytes += hs_output_bytes_per_pair(&columns);
     }
-    if (options->sorted) { /* holds the pairs as they were found, and their order, while it writes */
+    if (options->sorted) { /* it holds the pairs as found, and their order, while it writes */
         hs_output_init(NULL, ndim, options->want & ~(unsigned)HS_WANT_BOTH, sizeof(int32_t),
                        &columns);
         bytes += hs_output_bytes_per_pair(&columns) + (int64_t)sizeof(int64_t);

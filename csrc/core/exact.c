@@ -40,13 +40,15 @@ hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_M
     for (int l = 0; l < n_rows; l++) {
         for (int k = 0; k < ndim; k++) {
             metric->rows[l][k] = rows[l][k];
-            if (rows[l][k] != 0.0 && !is_safe(rows[l][k]))
+            if (rows[l][k] != 0.0 && !is_safe(rows[l][k])) {
                 metric->floats_usable = false;
+            }
         }
     }
     metric->square_hi = metric->square_lo = metric->sure_in = metric->sure_out = 0.0;
-    if (!metric->floats_usable)
+    if (!metric->floats_usable) {
         return;
+    }
 
     const hs_dw  square = hs_two_square(cutoff);
     const double roundings = HS_FLOAT64_ROUNDINGS + HS_FLOAT64_ROUNDINGS_PER_AXIS * ndim;
@@ -64,10 +66,11 @@ judge_in_floats(const hs_metric *metric, const double *p, const double *q, const
 {
     hs_difference difference;
     hs_verdict    verdict;
-    if (shift == NULL)
+    if (shift == NULL) {
         hs_difference_plain(&difference, p, q, ndim);
-    else if (!hs_difference_shifted(&difference, metric, p, q, shift, ndim, false))
+    } else if (!hs_difference_shifted(&difference, metric, p, q, shift, ndim, false)) {
         return HS_UNDECIDED;
+    }
 
     const double square = hs_float64_square(&difference, ndim);
     verdict = hs_float64_verdict(metric, square, difference.error);
@@ -75,8 +78,9 @@ judge_in_floats(const hs_metric *metric, const double *p, const double *q, const
         stages->by_float64++;
         return verdict;
     }
-    if (shift != NULL)
+    if (shift != NULL) {
         (void)hs_difference_shifted(&difference, metric, p, q, shift, ndim, true);
+    }
     verdict = hs_double_word_verdict(metric, &difference, ndim);
     stages->by_double_word += verdict != HS_UNDECIDED;
     return verdict;
@@ -86,9 +90,11 @@ static bool
 is_shifted(const hs_metric *metric, const int64_t *shift)
 {
     uint64_t any = 0;
-    if (shift != NULL)
-        for (int l = 0; l < metric->n_rows; l++)
+    if (shift != NULL) {
+        for (int l = 0; l < metric->n_rows; l++) {
             any |= (uint64_t)shift[l];
+        }
+    }
     return any != 0;
 }
 
@@ -96,8 +102,9 @@ bool
 hs_metric_within(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
                  hs_stages *stages)
 {
-    if (!is_shifted(metric, shift))
+    if (!is_shifted(metric, shift)) {
         shift = NULL;
+    }
     if (metric->floats_usable) {
         hs_verdict verdict;
         switch (metric->ndim) {
@@ -110,8 +117,9 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
         default:
             verdict = judge_in_floats(metric, p, q, shift, metric->ndim, stages);
         }
-        if (verdict != HS_UNDECIDED)
+        if (verdict != HS_UNDECIDED) {
             return verdict == HS_WITHIN;
+        }
     }
     return hs_metric_settle(metric, p, q, shift, stages);
 }
@@ -135,8 +143,9 @@ hs_metric_within_double(const hs_metric *metric, const double *p, const double *
         double difference = q[k] - p[k];
         if (shift != NULL && metric->n_rows > 0) {
             double offset = (double)shift[0] * metric->rows[0][k];
-            for (int l = 1; l < metric->n_rows; l++)
+            for (int l = 1; l < metric->n_rows; l++) {
                 offset += (double)shift[l] * metric->rows[l][k];
+            }
             difference += offset;
         }
         square += difference * difference;

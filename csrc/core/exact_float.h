@@ -46,8 +46,9 @@ hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const 
     double        magnitude = 0.0, weighted = 0.0, lost = 0.0;
 
     for (int l = 0; l < metric->n_rows; l++) {
-        if (shift[l] > shift_end || shift[l] < -shift_end)
+        if (shift[l] > shift_end || shift[l] < -shift_end) {
             return false;
+        }
         times[l] = (double)shift[l];
     }
     int k = 0;
@@ -57,8 +58,9 @@ hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const 
         double sums = 0.0;
         for (int l = 0; l < metric->n_rows; l++) {
             const double entry = metric->rows[l][k];
-            if (times[l] == 0.0 || entry == 0.0)
+            if (times[l] == 0.0 || entry == 0.0) {
                 continue;
+            }
             const hs_dw product = hs_two_product(times[l], entry);
             sum = watched ? hs_dw_add_watched(sum, product, &lost) : hs_dw_add(sum, product);
             size += fabs(product.hi);
@@ -78,8 +80,9 @@ HS_ALWAYS_INLINE double
 hs_float64_square(const hs_difference *difference, int ndim)
 {
     double square = difference->component[0].hi * difference->component[0].hi;
-    for (int k = 1; k < ndim; k++)
+    for (int k = 1; k < ndim; k++) {
         square += difference->component[k].hi * difference->component[k].hi;
+    }
     return square;
 }
 
@@ -92,10 +95,12 @@ HS_ALWAYS_INLINE hs_verdict
 hs_float64_verdict(const hs_metric *metric, double square, double error)
 {
     const double slack = 2.0 * error * (metric->cutoff + error);
-    if (metric->sure_in - square >= slack)
+    if (metric->sure_in - square >= slack) {
         return HS_WITHIN;
-    if (square - metric->sure_out >= slack)
+    }
+    if (square - metric->sure_out >= slack) {
         return HS_BEYOND;
+    }
     return HS_UNDECIDED;
 }
 
@@ -104,8 +109,9 @@ HS_ALWAYS_INLINE hs_dw
 hs_double_word_square(const hs_difference *difference, int ndim)
 {
     hs_dw square = hs_dw_square(difference->component[0]);
-    for (int k = 1; k < ndim; k++)
+    for (int k = 1; k < ndim; k++) {
         square = hs_dw_add(square, hs_dw_square(difference->component[k]));
+    }
     return square;
 }
 
@@ -149,8 +155,9 @@ hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference,
     const hs_dw  square = hs_double_word_square_watched(difference, ndim, &exact);
     const hs_dw  excess = hs_dw_add(square, (hs_dw){-metric->square_hi, -metric->square_lo});
     const double bound = hs_double_word_error(square.hi, difference->error, ndim);
-    if (fabs(excess.hi) > bound || exact)
+    if (fabs(excess.hi) > bound || exact) {
         return excess.hi < 0.0 || (excess.hi == 0.0 && metric->inclusive) ? HS_WITHIN : HS_BEYOND;
+    }
     return HS_UNDECIDED;
 }
 

@@ -84,8 +84,9 @@ set_sums(exact_sums *sums, const hs_metric *metric, const double *p, const doubl
         }
         for (int l = 0; shift != NULL && l < metric->n_rows; l++) {
             const double entry = metric->rows[l][k];
-            if (shift[l] == 0 || entry == 0.0)
+            if (shift[l] == 0 || entry == 0.0) {
                 continue;
+            }
             const uint64_t times =
                 shift[l] < 0 ? ~(uint64_t)shift[l] + 1 : (uint64_t)shift[l];
             *next = decompose(entry);
@@ -103,8 +104,9 @@ set_sums(exact_sums *sums, const hs_metric *metric, const double *p, const doubl
 static int
 count_limbs(const exact_sums *sums)
 {
-    if (sums->lowest > sums->highest)
+    if (sums->lowest > sums->highest) {
         return 0;
+    }
     const int bits =
         sums->highest - sums->lowest + hs_bit_length((uint64_t)sums->most_terms - 1);
     const int n = (bits + 2 + 63) / 64;
@@ -136,16 +138,19 @@ add_term(uint64_t *difference, const exact_term *term, int lowest, int n)
 HS_ALWAYS_INLINE bool
 sum_terms(uint64_t *difference, const exact_sums *sums, int k, int n)
 {
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) {
         difference[i] = 0;
-    for (int t = 0; t < sums->n_terms[k]; t++)
+    }
+    for (int t = 0; t < sums->n_terms[k]; t++) {
         add_term(difference, &sums->terms[k][t], sums->lowest, n);
+    }
 
     const bool     negative = difference[n - 1] >> 63;
     const uint64_t sign = negative ? UINT64_MAX : 0;
     uint64_t       carry = negative;
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) {
         difference[i] = hs_add_carry(difference[i] ^ sign, 0, &carry);
+    }
     return negative;
 }
 
@@ -155,10 +160,12 @@ add_square(uint64_t *total, const uint64_t *value, int n)
 {
     for (int i = 0; i < n; i++) {
         uint64_t carry = 0;
-        if (value[i] == 0)
+        if (value[i] == 0) {
             continue;
-        for (int j = 0; j < n; j++)
+        }
+        for (int j = 0; j < n; j++) {
             total[i + j] = hs_multiply_add(value[i], value[j], total[i + j], &carry);
+        }
         for (int j = i + n; j < 2 * n && carry != 0; j++) {
             total[j] += carry;
             carry = total[j] < carry;
@@ -170,9 +177,11 @@ add_square(uint64_t *total, const uint64_t *value, int n)
 HS_ALWAYS_INLINE int
 compare_limbs(const uint64_t *a, const uint64_t *b, int n)
 {
-    for (int i = n - 1; i >= 0; i--)
-        if (a[i] != b[i])
+    for (int i = n - 1; i >= 0; i--) {
+        if (a[i] != b[i]) {
             return a[i] < b[i] ? -1 : 1;
+        }
+    }
     return 0;
 }
 
@@ -181,16 +190,19 @@ HS_ALWAYS_INLINE int
 compare_squares(const exact_sums *sums, int ndim, int n, uint64_t *total, uint64_t *limit,
                 uint64_t *value)
 {
-    for (int i = 0; i < 2 * n; i++)
+    for (int i = 0; i < 2 * n; i++) {
         total[i] = limit[i] = 0;
+    }
     for (int k = 0; k < ndim; k++) {
         sum_terms(value, sums, k, n);
         add_square(total, value, n);
     }
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) {
         value[i] = 0;
-    if (sums->cutoff.low != 0)
+    }
+    if (sums->cutoff.low != 0) {
         add_term(value, &sums->cutoff, sums->lowest, n);
+    }
     add_square(limit, value, n);
     return compare_limbs(total, limit, 2 * n);
 }
@@ -282,17 +294,21 @@ hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
     for (int k = 0; k < metric->ndim; k++) {
         value[k] = (hs_dw){0.0, 0.0};
         negative[k] = n > 0 && sum_terms(component[k], &sums, k, n);
-        for (int i = top + 1; i < n; i++)
-            if (component[k][i] != 0)
+        for (int i = top + 1; i < n; i++) {
+            if (component[k][i] != 0) {
                 top = i;
+            }
+        }
     }
     *exponent = 0;
-    if (top < 0)
+    if (top < 0) {
         return;
+    }
     *exponent = sums.lowest + 64 * (top - 2);
     for (int k = 0; k < metric->ndim; k++) {
         value[k] = gather_limbs(component[k], top);
-        if (negative[k])
+        if (negative[k]) {
             value[k] = (hs_dw){-value[k].hi, -value[k].lo};
+        }
     }
 }

@@ -51,8 +51,9 @@ hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double
     const double lost = multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny);
     *in = -1.0;
     *out = HUGE_VAL;
-    if (!(a <= DBL_MAX) || !(roundings < 0.5)) /* not for infinity and NaN either */
+    if (!(a <= DBL_MAX) || !(roundings < 0.5)) { /* not for infinity and NaN either */
         return;
+    }
 
     /* n roundings in a row change a number by at most the factor 1 +- gamma. */
     const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
@@ -60,14 +61,16 @@ hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double
     const double far_root = multiply_up(hs_next_up(1.0 + difference), add_up(cutoff, a));
     *out = add_up(multiply_up(multiply_up(far_root, far_root), hs_next_up(1.0 + gamma)), lost);
 
-    if (cutoff <= a)
+    if (cutoff <= a) {
         return;
+    }
     const double near_root =
         multiply_down(hs_next_down(1.0 - difference), hs_next_down(cutoff - a));
     const double near_square =
         multiply_down(multiply_down(near_root, near_root), hs_next_down(1.0 - gamma));
-    if (near_square > lost)
+    if (near_square > lost) {
         *in = hs_next_down(near_square - lost);
+    }
 }
 
 /* Rounded outwards: s < in and s > out keep their meaning for every float s. */

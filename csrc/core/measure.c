@@ -23,28 +23,32 @@ measure_in_floats(const hs_metric *metric, const double *p, const double *q, con
                   int ndim, double *vector, double *distance)
 {
     hs_difference difference;
-    if (shift == NULL || metric->n_rows == 0)
+    if (shift == NULL || metric->n_rows == 0) {
         hs_difference_plain(&difference, p, q, ndim);
-    else if (!metric->floats_usable ||
-             !hs_difference_shifted(&difference, metric, p, q, shift, ndim, false))
+    } else if (!metric->floats_usable ||
+               !hs_difference_shifted(&difference, metric, p, q, shift, ndim, false)) {
         return false;
+    }
 
     double largest = 0.0;
     for (int k = 0; k < ndim; k++) {
         const double size = fabs(difference.component[k].hi);
         largest = size > largest ? size : largest;
     }
-    if (largest == 0.0 && difference.error == 0.0)
+    if (largest == 0.0 && difference.error == 0.0) {
         *distance = 0.0;
-    else if (!(largest >= 0x1p-400 && largest <= 0x1p400))
+    } else if (!(largest >= 0x1p-400 && largest <= 0x1p400)) {
         return false;
-    else
+    } else {
         *distance = distance_of(&difference, ndim);
+    }
     /* The lower neighbour is the closer one, so this is the stricter side. */
-    if (*distance - 2.0 * difference.error != *distance)
+    if (*distance - 2.0 * difference.error != *distance) {
         return false;
-    for (int k = 0; vector != NULL && k < ndim; k++)
+    }
+    for (int k = 0; vector != NULL && k < ndim; k++) {
         vector[k] = difference.component[k].hi;
+    }
     return true;
 }
 
@@ -61,8 +65,9 @@ measure_in_integers(const hs_metric *metric, const double *p, const double *q,
     for (int k = 0; k < metric->ndim; k++) {
         const double component = difference.component[k].hi;
         largest = fabs(component) > largest ? fabs(component) : largest;
-        if (vector != NULL)
+        if (vector != NULL) {
             vector[k] = ldexp(component, exponent);
+        }
     }
     return largest == 0.0 ? 0.0 : ldexp(distance_of(&difference, metric->ndim), exponent);
 }

@@ -201,21 +201,21 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
 }
 
 hs_status
-hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_rows *rows)
+hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
     hs_trace *trace = &walker->trace;
     batch_part part = {.first = 0};
     hs_trace_clear(trace);
-    for (int32_t row = 0, h = 0; row < rows->n; row++) {
-        while (h < rows->end[row]) {
+    for (int32_t t = 0, h = 0; t < hits->n; t++) {
+        while (h < hits->end[t]) {
             const int32_t taken =
-                hs_trace_add(trace, first + row, rows->hits + h, rows->end[row] - h);
+                hs_trace_add(trace, first + t, hits->label + h, hits->end[t] - h);
             if (taken < 0) {
-                walker->failed_point = rows->point[row];
+                walker->failed_point = hits->point[t];
                 return HS_ERR_SHIFT_RANGE;
             }
             for (int32_t e = trace->n - taken; e < trace->n; e++) {
-                part.point[e] = rows->point[row];
+                part.point[e] = hits->point[t];
             }
             h += taken;
             if (trace->n == HS_BATCH) {

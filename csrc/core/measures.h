@@ -8,6 +8,6 @@
 /* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
  * the output; recorder->ids holds their numbers. HS_ERR_SHIFT_RANGE sets walker->failed_point. */
 hs_status hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first,
-                          const hs_rows *rows);
+                          const hs_hits *hits);
 
 #endif

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * memory.h: every byte of the core comes from here: overflow-checked, 64-byte aligned, counted by
- * purpose, and bounded by the caller's limit.
+ * memory.h: the memory that the core works with: overflow-checked, 64-byte aligned, counted by
+ * purpose, and bounded by the caller's limit. Results have theirs from region.h; they are counted
+ * and bounded here too.
  */
 #ifndef HS_MEMORY_H
 #define HS_MEMORY_H

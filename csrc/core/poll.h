@@ -21,11 +21,4 @@ hs_poll(const hs_options *options, double fraction)
                : HS_ERR_INTERRUPTED;
 }
 
-/* The same once in HS_POLL_POINTS points; `done` counts them from 1. */
-HS_ALWAYS_INLINE hs_status
-hs_poll_points(const hs_options *options, int64_t done)
-{
-    return HS_UNLIKELY(done % HS_POLL_POINTS == 0) ? hs_poll(options, 0.0) : HS_OK;
-}
-
 #endif

@@ -58,13 +58,13 @@ hs_recorder_free(hs_account *account, hs_recorder *recorder)
 
 /* i and j side by side. */
 static void
-put_both(const hs_recorder *recorder, const hs_kernel *kernel, const hs_rows *rows)
+put_both(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
 {
     const hs_output *output = recorder->output;
     int32_t         *i = recorder->ends[0], *j = recorder->ends[1];
-    const int32_t    n = rows->end[rows->n - 1];
+    const int32_t    n = hits->end[hits->n - 1];
     void            *both = hs_output_next(output, HS_WANT_BOTH);
-    kernel->emit_int32(rows, i, j);
+    kernel->emit_int32(hits, i, j);
     for (int32_t h = 0; h < n; h++) {
         if (output->index_bytes == 8) {
             ((int64_t *)both)[2 * h] = i[h];
@@ -77,43 +77,43 @@ put_both(const hs_recorder *recorder, const hs_kernel *kernel, const hs_rows *ro
 }
 
 static void
-put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_rows *rows)
+put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
 {
     const hs_output *output = recorder->output;
     const hs_emit_fn emit = output->index_bytes == 8 ? kernel->emit_int64 : kernel->emit_int32;
     if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
-        emit(rows, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
+        emit(hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
     }
     if (recorder->columns & HS_WANT_BOTH) {
-        put_both(recorder, kernel, rows);
+        put_both(recorder, kernel, hits);
     }
 }
 
 static hs_status
-record_places(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_rows *rows)
+record_places(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
-    const int32_t  n = rows->end[rows->n - 1];
+    const int32_t  n = hits->end[hits->n - 1];
     const int32_t *id = walker->block.id;
-    hs_rows        by_id = *rows;
+    hs_hits        by_id = *hits;
     for (int32_t h = 0; h < n; h++) {
-        recorder->ids[h] = id[rows->hits[h]];
+        recorder->ids[h] = id[hits->label[h]];
     }
-    by_id.hits = recorder->ids;
+    by_id.label = recorder->ids;
     put_indices(recorder, walker->search->kernel, &by_id);
-    return hs_put_measures(recorder, walker, first, rows);
+    return hs_put_measures(recorder, walker, first, hits);
 }
 
 hs_status
-hs_record_hits(void *context, hs_walker *walker, int32_t first, const hs_rows *rows)
+hs_record_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
     hs_recorder  *recorder = context;
     hs_output    *output = recorder->output;
-    const int32_t n = rows->end[rows->n - 1];
+    const int32_t n = hits->end[hits->n - 1];
     hs_status     status = hs_output_reserve(output, n, hs_walk_fraction(walker));
     if (status == HS_OK && walker->use == HS_BLOCK_LISTS_PLACES) {
-        status = record_places(recorder, walker, first, rows);
+        status = record_places(recorder, walker, first, hits);
     } else if (status == HS_OK) {
-        put_indices(recorder, walker->search->kernel, rows);
+        put_indices(recorder, walker->search->kernel, hits);
     }
     output->n_pairs += status == HS_OK ? n : 0;
     return status;

@@ -22,25 +22,25 @@ hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive)
 }
 
 HS_ALWAYS_INLINE void
-restore_rows(double *HS_RESTRICT rows, double *const *vector, const double *sign, int32_t n,
-             const int ndim, hs_scale unscale)
+restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign, int32_t n,
+                const int ndim, hs_scale unscale)
 {
     for (int32_t e = 0; e < n; e++) {
         for (int k = 0; k < ndim; k++) {
             /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
-            rows[(int64_t)e * ndim + k] = hs_scale_apply(unscale, vector[k][e]) * sign[e] + 0.0;
+            to[(int64_t)e * ndim + k] = hs_scale_apply(unscale, vector[k][e]) * sign[e] + 0.0;
         }
     }
 }
 
 void
-hs_restore_vectors(double *HS_RESTRICT rows, double *const *vector, const double *sign, int32_t n,
+hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign, int32_t n,
                    int ndim, hs_scale unscale)
 {
     switch (ndim) {
-    case 1: restore_rows(rows, vector, sign, n, 1, unscale); break;
-    case 2: restore_rows(rows, vector, sign, n, 2, unscale); break;
-    case 3: restore_rows(rows, vector, sign, n, 3, unscale); break;
-    default: restore_rows(rows, vector, sign, n, ndim, unscale);
+    case 1: restore_vectors(to, vector, sign, n, 1, unscale); break;
+    case 2: restore_vectors(to, vector, sign, n, 2, unscale); break;
+    case 3: restore_vectors(to, vector, sign, n, 3, unscale); break;
+    default: restore_vectors(to, vector, sign, n, ndim, unscale);
     }
 }

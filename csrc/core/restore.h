@@ -13,7 +13,7 @@ void hs_restore_distances(double *distance, int32_t n, hs_scale unscale);
 void hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive);
 
 /* n rows of ndim numbers: the vectors in the caller's unit, times sign[e], which is 1 or -1. */
-void hs_restore_vectors(double *HS_RESTRICT rows, double *const *vector, const double *sign,
+void hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign,
                         int32_t n, int ndim, hs_scale unscale);
 
 #endif

@@ -50,7 +50,7 @@ walk(hs_team *team, const hs_options *options, pass *doing)
                 return doing->status[task];
             }
         }
-        const hs_status status = hs_poll_points(options, now);
+        const hs_status status = now == HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
         if (status != HS_OK) {
             return status;
         }

@@ -109,6 +109,65 @@ slack_along(const hs_scene *scene, const hs_grid *grid, int k)
     return (grid->range[k] - scene->radius) + FRAME_SLACK * scene->radius + 0x1p-50 * extent;
 }
 
+/* Differences of t_k along the later axes, as far as the radius lets them go. */
+typedef struct spans {
+    double low[HS_MAX_DIM], high[HS_MAX_DIM];
+} spans;
+
+/* Those that points of the cells at `offset` can have, rounding included. */
+static void
+set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, double radius,
+          spans *t)
+{
+    for (int k = grid->ndim - 1; k >= 1; k--) {
+        const double slack = slack_along(scene, grid, k);
+        t->low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
+        t->high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
+    }
+}
+
+/* Range of component c of D; of the first one, what the later axes add to it. */
+static void
+range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least,
+                   double *most)
+{
+    const int last = axes->diagonal ? c : ndim - 1;
+    *least = *most = 0.0;
+    for (int k = c > 0 ? c : 1; k <= last; k++) {
+        const double a = axes->lower[k][c] * t->low[k], b = axes->lower[k][c] * t->high[k];
+        *least += hs_smaller(a, b);
+        *most += hs_larger(a, b);
+    }
+}
+
+/* Narrows the range of t_0 in which points of the row at `offset` can be within the radius. Returns
+ * false when none can. */
+static bool
+narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
+                const int32_t *offset, double *low, double *high)
+{
+    const double radius = scene->radius * (1.0 + FRAME_SLACK);
+    const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
+    double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
+    double       least, most;
+    spans        t;
+    set_spans(scene, grid, offset, radius, &t);
+    for (int c = grid->ndim - 1; c >= 1; c--) {
+        range_of_component(axes, &t, grid->ndim, c, &least, &most);
+        const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
+        left -= gap * gap;
+        if (left < 0.0) {
+            return false;
+        }
+    }
+    range_of_component(axes, &t, grid->ndim, 0, &least, &most);
+    const double rest = sqrt(left) * unit;
+    const double slack = slack_along(scene, grid, 0);
+    *low = hs_larger((-rest - most) / axes->lower[0][0] - slack, *low);
+    *high = hs_smaller((rest - least) / axes->lower[0][0] + slack, *high);
+    return true;
+}
+
 /*
  * Cells of the row at `offset` that a pair within the radius can reach. Returns false when there
  * are none.
@@ -117,42 +176,10 @@ static bool
 reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
                 hs_stencil_row *row)
 {
-    const double radius = scene->radius * (1.0 + FRAME_SLACK);
-    const double unit = radius > 0.0 ? radius : 1.0; /* squares of tiny lengths would vanish */
-    double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
-    double       low = -grid->range[0], high = grid->range[0];
-    if (axes->usable && grid->ndim > 1) {
-        double t_low[HS_MAX_DIM], t_high[HS_MAX_DIM];
-        for (int k = grid->ndim - 1; k >= 1; k--) {
-            /* Differences of t that points of these two cells can have, rounding included. */
-            const double slack = slack_along(scene, grid, k);
-            t_low[k] =
-                hs_larger((row->offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
-            t_high[k] =
-                hs_smaller((row->offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
-        }
-        for (int c = grid->ndim - 1; c >= 0; c--) {
-            /* Range of the component; of the first one, what the later axes add to it. */
-            const int last = axes->diagonal ? c : grid->ndim - 1;
-            double    least = 0.0, most = 0.0;
-            for (int k = c > 0 ? c : 1; k <= last; k++) {
-                const double a = axes->lower[k][c] * t_low[k], b = axes->lower[k][c] * t_high[k];
-                least += hs_smaller(a, b);
-                most += hs_larger(a, b);
-            }
-            if (c > 0) {
-                const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;
-                left -= gap * gap;
-                if (left < 0.0) {
-                    return false;
-                }
-            } else {
-                const double rest = sqrt(left) * unit;
-                const double slack = slack_along(scene, grid, 0);
-                low = hs_larger((-rest - most) / axes->lower[0][0] - slack, low);
-                high = hs_smaller((rest - least) / axes->lower[0][0] + slack, high);
-            }
-        }
+    double low = -grid->range[0], high = grid->range[0];
+    if (axes->usable && grid->ndim > 1 &&
+        !narrow_by_frame(scene, grid, axes, row->offset, &low, &high)) {
+        return false;
     }
     const double cells = grid->cells_per_length[0];
     const double reach = (double)grid->reach[0];

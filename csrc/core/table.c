@@ -14,14 +14,14 @@
 
 /* A hs_visit_fn; each point belongs to one thread. */
 static hs_status
-count_hits(void *context, hs_walker *walker, int32_t first, const hs_rows *rows)
+count_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
     int64_t *counts = context;
     (void)walker;
     (void)first;
-    for (int32_t t = 0, begin = 0; t < rows->n; t++) {
-        counts[rows->point[t]] += rows->end[t] - begin;
-        begin = rows->end[t];
+    for (int32_t t = 0, begin = 0; t < hits->n; t++) {
+        counts[hits->point[t]] += hits->end[t] - begin;
+        begin = hits->end[t];
     }
     return HS_OK;
 }
@@ -165,11 +165,11 @@ put_row(const filler *fill, int32_t point, int32_t hit, int32_t n, int32_t own)
 
 /* Measures of all hits of a visit, as the part. */
 static hs_status
-fill_part(filler *fill, hs_walker *walker, int32_t first, const hs_rows *rows)
+fill_part(filler *fill, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
     fill->part.n_pairs = 0;
-    const hs_status status = hs_output_reserve(&fill->part, rows->end[rows->n - 1], 0.0);
-    return status == HS_OK ? hs_put_measures(&fill->recorder, walker, first, rows) : status;
+    const hs_status status = hs_output_reserve(&fill->part, hits->end[hits->n - 1], 0.0);
+    return status == HS_OK ? hs_put_measures(&fill->recorder, walker, first, hits) : status;
 }
 
 /* Which of n ascending numbers is the first that is not below this one, or n. */
@@ -229,24 +229,24 @@ expect_row(const hs_table *table, int64_t si)
 
 /* A hs_visit_fn of ordered walkers: whole rows. */
 static hs_status
-fill_rows(void *context, hs_walker *walker, int32_t first, const hs_rows *rows)
+fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
     filler       *fill = context;
     const bool    by_place = walker->use == HS_BLOCK_LISTS_PLACES;
     const int32_t own = by_place && !walker->search->has_queries ? own_place(walker) : 0;
     if (by_place) {
-        const hs_status status = fill_part(fill, walker, first, rows);
+        const hs_status status = fill_part(fill, walker, first, hits);
         if (status != HS_OK) {
             return status;
         }
     }
-    for (int32_t t = 0, hit = 0; t < rows->n; t++) {
-        const int32_t point = rows->point[t], n = rows->end[t] - hit;
+    for (int32_t t = 0, hit = 0; t < hits->n; t++) {
+        const int32_t point = hits->point[t], n = hits->end[t] - hit;
         const int32_t place = own + first + t - walker->group.first;
         expect_row(fill->table, (int64_t)first + t + AHEAD);
         put_row(fill, point, hit, n,
-                find_numbers(fill, walker, rows->hits + hit, n, point, place));
-        hit = rows->end[t];
+                find_numbers(fill, walker, hits->label + hit, n, point, place));
+        hit = hits->end[t];
     }
     return HS_OK;
 }

@@ -2,176 +2,16 @@
 /* walk.c: see walk.h. */
 #include "walk.h"
 
-#include "decide.h"
-#include "poll.h"
+#include "scan.h"
 
-#include <math.h>
 #include <string.h>
-
-/* Candidates between two calls of poll(): some milliseconds. */
-#define POLL_WORK (INT64_C(1) << 21)
-
-/*
- * Hits after which a scan stops, so that they can be written out. Measured: the stores of a short
- * burst drain to memory while the next one is scanned; with bursts of thousands the two take turns,
- * which costs up to 0.9 ns a pair.
- */
-#define BURST 128
-
-/* By one float32 comparison: nothing is decided again. */
-static void
-set_single(hs_walker *walker)
-{
-    const double cutoff = walker->search->scene.cutoff;
-    const float  square = (float)(cutoff * cutoff);
-    walker->direct.out = walker->options.inclusive ? square : nextafterf(square, -1.0f);
-    walker->direct.in = INFINITY;
-}
-
-/* Thresholds for the present extent. A scaled cutoff may be known between bounds only. */
-static void
-set_thresholds(hs_walker *walker)
-{
-    const hs_scene *scene = &walker->search->scene;
-    const double    extent = walker->extent, error = walker->search->filter_error;
-    walker->direct = hs_thresholds_of(scene->ndim, scene->cutoff, extent, error);
-    walker->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
-    if (scene->extreme) {
-        const double low = scene->cutoff_low;
-        walker->direct.in =
-            low > 0.0 ? hs_thresholds_of(scene->ndim, low, extent, error).in : -1.0f;
-        walker->expanded.in =
-            low > 0.0 ? hs_expanded_of(scene->ndim, low, extent, error).in : -INFINITY;
-    }
-}
-
-/* Thresholds and form of the scan, by the size of the present group and block. */
-static void
-set_form(hs_walker *walker)
-{
-    const hs_kernel *kernel = walker->search->kernel;
-    const bool       counts = walker->use == HS_BLOCK_COUNTS;
-    const double     extent = hs_group_extent(&walker->group);
-    if (extent == walker->extent) {
-        return;
-    }
-    walker->extent = extent;
-    walker->scan = counts ? kernel->count_direct : kernel->list_direct;
-    if (walker->options.precision == HS_SINGLE) {
-        set_single(walker);
-        return;
-    }
-    set_thresholds(walker);
-    if (hs_expanded_pays(walker->search->scene.cutoff, extent)) {
-        walker->scan = counts ? kernel->count : kernel->list;
-    }
-}
-
-/* The present block and group as a kernel sees them. */
-static void
-set_scan(const hs_walker *walker, hs_scan *scan)
-{
-    const hs_block *block = &walker->block;
-    scan->ndim = walker->search->scene.ndim;
-    for (int k = 0; k < scan->ndim; k++) {
-        scan->y[k] = block->y[k];
-        scan->q[k] = walker->group.q[k];
-    }
-    scan->label = walker->use != HS_BLOCK_LISTS_PLACES ? block->id
-                  : walker->is_ordered                 ? block->origin
-                                                       : block->place;
-    scan->n = block->n;
-    scan->n_points = walker->group.last - walker->group.first;
-    scan->triangular = walker->block_is_first;
-    scan->norm = block->norm;
-    scan->direct = walker->direct;
-    scan->expanded = walker->expanded;
-    scan->hits = block->hits;
-    scan->unsure = block->unsure;
-    scan->most_hits = block->most_hits;
-    if (walker->use == HS_BLOCK_LISTS_IDS && block->n + BURST < scan->most_hits) {
-        scan->most_hits = block->n + BURST;
-    }
-    scan->most_unsure = block->capacity;
-}
-
-/* Hands the hits of points [first, next) of the group to the visitor. */
-static hs_status
-visit_hits(hs_walker *walker, const hs_scan *scan, int32_t first, int32_t next)
-{
-    const int32_t si = walker->group.first + first;
-    const hs_rows rows = {.n = next - first,
-                          .point = hs_search_asking(walker->search)->order + si,
-                          .end = scan->end + first,
-                          .hits = scan->hits};
-    return walker->visit(walker->visit_context, walker, si, &rows);
-}
-
-/* The block as it was appended, ready to be scanned. */
-static hs_status
-fill_block(hs_walker *walker)
-{
-    hs_block *block = &walker->block;
-    walker->of_group.candidates += block->n;
-    walker->of_group.runs += block->n_runs;
-    hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
-                    &walker->group);
-    hs_trace_reset(&walker->trace);
-    set_form(walker);
-    return walker->is_ordered ? hs_order_block(&walker->search->scene.lattice, walker->use, block,
-                                               &walker->order)
-                              : HS_OK;
-}
-
-/* What was tested, and whether to go on. */
-static hs_status
-finish_block(hs_walker *walker, int64_t n_points)
-{
-    hs_block     *block = &walker->block;
-    const int64_t skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
-    walker->n_candidates += n_points * block->n - skipped;
-    walker->work_since_poll += n_points * block->n;
-    block->n = 0;
-    block->n_runs = 0;
-    walker->block_is_first = false;
-    if (walker->n_candidates > walker->candidate_limit) {
-        return HS_STATUS_END;
-    }
-    if (walker->work_since_poll > POLL_WORK) {
-        walker->work_since_poll = 0;
-        return hs_poll(&walker->options, hs_walk_fraction(walker));
-    }
-    return HS_OK;
-}
-
-/* Test every point of the group against the block, then empty the block. */
-static hs_status
-scan_block(hs_walker *walker)
-{
-    int32_t   end[HS_GROUP_POINTS];
-    hs_scan   scan;
-    hs_status status = fill_block(walker);
-    set_scan(walker, &scan);
-    scan.end = end;
-    for (int32_t first = 0, next; status == HS_OK && first < scan.n_points; first = next) {
-        next = walker->scan(&scan, first);
-        if (scan.n_unsure > 0 && walker->options.precision != HS_SINGLE) {
-            status = hs_decide(walker, &scan, first, next);
-        }
-        walker->n_found += scan.n_hits;
-        if (status == HS_OK && walker->visit != NULL && scan.n_hits > 0) {
-            status = visit_hits(walker, &scan, first, next);
-        }
-    }
-    return status == HS_OK ? finish_block(walker, scan.n_points) : status;
-}
 
 static hs_status
 gather_run(hs_walker *walker, int32_t si, int32_t end, const double *shift, const int32_t *image)
 {
     while (si < end) {
         if (hs_block_is_full(&walker->block)) {
-            const hs_status status = scan_block(walker);
+            const hs_status status = hs_scan_block(walker);
             if (status != HS_OK) {
                 return status;
             }
@@ -246,7 +86,7 @@ visit_group(hs_walker *walker, const hs_row_group *group)
             return status;
         }
     }
-    const hs_status status = scan_block(walker);
+    const hs_status status = hs_scan_block(walker);
     keep_largest(walker->of_group.candidates, &walker->most.candidates);
     keep_largest(walker->of_group.runs, &walker->most.runs);
     return status;

@@ -16,12 +16,12 @@
 typedef struct hs_walker hs_walker;
 
 /*
- * The decided hits of points [first, first + rows->n) in cell order against the present block, as
+ * The decided hits of points [first, first + hits->n) in cell order against the present block, as
  * entries of walker->block: point numbers, or places when walker->use says so. Anything but HS_OK
  * ends the walk with that status.
  */
 typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
-                                 const hs_rows *rows);
+                                 const hs_hits *hits);
 
 /* How large the neighbourhood of a group is. */
 typedef struct hs_neighbourhood {

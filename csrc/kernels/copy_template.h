@@ -61,14 +61,14 @@ gather(hs_gather *gather, const hs_run *runs, int32_t n)
 }
 
 HS_ALWAYS_INLINE void
-emit(const hs_rows *rows, void *i, void *j, const bool wide)
+emit(const hs_hits *hits, void *i, void *j, const bool wide)
 {
     int32_t h = 0;
-    for (int32_t row = 0; row < rows->n; row++) {
-        const integers point = broadcast_integer(rows->point[row]);
-        const int32_t  end = rows->end[row];
+    for (int32_t t = 0; t < hits->n; t++) {
+        const integers point = broadcast_integer(hits->point[t]);
+        const int32_t  end = hits->end[t];
         for (int32_t at = h; at < end; at += LANES) {
-            const integers hit = load_integers(rows->hits + at);
+            const integers hit = load_integers(hits->label + at);
             if (i != NULL && wide) {
                 store_wide((int64_t *)i + at, smaller(hit, point));
             } else if (i != NULL) {
@@ -85,25 +85,25 @@ emit(const hs_rows *rows, void *i, void *j, const bool wide)
 }
 
 static void
-emit_int32(const hs_rows *rows, void *i, void *j)
+emit_int32(const hs_hits *hits, void *i, void *j)
 {
     if (i != NULL && j != NULL) {
-        emit(rows, i, j, false);
+        emit(hits, i, j, false);
     } else if (i != NULL) {
-        emit(rows, i, NULL, false);
+        emit(hits, i, NULL, false);
     } else {
-        emit(rows, NULL, j, false);
+        emit(hits, NULL, j, false);
     }
 }
 
 static void
-emit_int64(const hs_rows *rows, void *i, void *j)
+emit_int64(const hs_hits *hits, void *i, void *j)
 {
     if (i != NULL && j != NULL) {
-        emit(rows, i, j, true);
+        emit(hits, i, j, true);
     } else if (i != NULL) {
-        emit(rows, i, NULL, true);
+        emit(hits, i, NULL, true);
     } else {
-        emit(rows, NULL, j, true);
+        emit(hits, NULL, j, true);
     }
 }

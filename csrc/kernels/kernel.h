@@ -105,17 +105,18 @@ typedef struct hs_gather {
  * overwritten. */
 typedef void (*hs_gather_fn)(hs_gather *gather, const hs_run *runs, int32_t n);
 
-/* The hits of some points, as point numbers; all arrays borrowed. */
-typedef struct hs_rows {
+/* The hits of some points; all arrays borrowed. */
+typedef struct hs_hits {
     int32_t        n;     /* points */
     const int32_t *point; /* their numbers */
     const int32_t *end;   /* where their hits end; the first one's begin at 0 */
-    const int32_t *hits;  /* HS_PADDING more may be read */
-} hs_rows;
+    const int32_t *label; /* what the hits are listed as; HS_PADDING more may be read */
+} hs_hits;
 
-/* For each hit the lower of the two point numbers to i and the higher to j. Either may be NULL;
- * each has room for all hits and HS_PADDING more, which may be overwritten. */
-typedef void (*hs_emit_fn)(const hs_rows *rows, void *i, void *j);
+/* For hits that are listed as point numbers: the lower of the two numbers of each to i, the higher
+ * to j. Either may be NULL; each has room for all hits and HS_PADDING more, which may be
+ * overwritten. */
+typedef void (*hs_emit_fn)(const hs_hits *hits, void *i, void *j);
 
 typedef struct hs_kernel {
     const char *name;

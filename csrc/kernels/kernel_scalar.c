@@ -173,32 +173,32 @@ put(void *array, int32_t h, int32_t value, const bool wide)
 }
 
 HS_ALWAYS_INLINE void
-emit(const hs_rows *rows, void *i, void *j, const bool wide)
+emit(const hs_hits *hits, void *i, void *j, const bool wide)
 {
-    const int32_t *hits = rows->hits;
+    const int32_t *label = hits->label;
     int32_t        begin = 0;
-    for (int32_t row = 0; row < rows->n; row++) {
-        const int32_t point = rows->point[row], end = rows->end[row];
+    for (int32_t t = 0; t < hits->n; t++) {
+        const int32_t point = hits->point[t], end = hits->end[t];
         for (int32_t h = begin; i != NULL && h < end; h++) {
-            put(i, h, hits[h] < point ? hits[h] : point, wide);
+            put(i, h, label[h] < point ? label[h] : point, wide);
         }
         for (int32_t h = begin; j != NULL && h < end; h++) {
-            put(j, h, hits[h] < point ? point : hits[h], wide);
+            put(j, h, label[h] < point ? point : label[h], wide);
         }
         begin = end;
     }
 }
 
 static void
-emit_int32(const hs_rows *rows, void *i, void *j)
+emit_int32(const hs_hits *hits, void *i, void *j)
 {
-    emit(rows, i, j, false);
+    emit(hits, i, j, false);
 }
 
 static void
-emit_int64(const hs_rows *rows, void *i, void *j)
+emit_int64(const hs_hits *hits, void *i, void *j)
 {
-    emit(rows, i, j, true);
+    emit(hits, i, j, true);
 }
 
 static bool

@@ -3,24 +3,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _inputs
 
+# What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
+# shape; periodic bits.
+Scene = tuple[_inputs.PointArray, float, _inputs.FloatArray | None, int]
 
-class Batch(NamedTuple):
-    """Systems, and what each has of its own."""
-
-    points: _inputs.PointArray
-    cutoff: float  # of all, or 0
-    box: _inputs.FloatArray | None  # of all, or any of the right shape
-    periodic: int
-    numbers: npt.NDArray[np.int64]
-    cutoffs: _inputs.FloatArray | None  # one a system
-    boxes: _inputs.FloatArray | None  # one a system
+# What each system has of its own: numbers, one a point; cutoffs and boxes, one a system.
+Systems = tuple[npt.NDArray[np.int64], _inputs.FloatArray | None, _inputs.FloatArray | None]
 
 
 def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
@@ -82,8 +77,10 @@ def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
     return 0.0, np.ascontiguousarray(array, dtype=np.float64)
 
 
-def of(points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any) -> Batch:
-    """Everything that makes up the systems."""
+def of(
+    points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any
+) -> tuple[Scene, Systems]:
+    """Everything that makes up the systems, in the order of the core's arguments."""
     array, vectors, bits, boxes = _scene(points, box, periodic)
     numbers = as_numbers(batch, array.shape[0])
     one, cutoffs = _as_cutoffs(cutoff)
@@ -92,4 +89,4 @@ def of(points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any) -> Batch:
             "box and cutoff must be given for the same number of systems, got "
             f"{len(boxes)} and {len(cutoffs)}"
         )
-    return Batch(array, one, vectors, bits, numbers, cutoffs, boxes)
+    return (array, one, vectors, bits), (numbers, cutoffs, boxes)

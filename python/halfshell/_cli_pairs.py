@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell import _api, _core
+from halfshell import _core, _pairs
 from halfshell._cli_scene import (
     describe_box,
     load_scene,
@@ -130,7 +130,8 @@ def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[
             if advance is None:
                 found = hs.pairs(scene.points, cutoff, **options)
             else:
-                found = _api._pairs_with_progress(scene.points, cutoff, progress=advance, **options)
+                search = _pairs._pairs_with_progress
+                found = search(scene.points, cutoff, progress=advance, **options)
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise InputError(f"{scene.source}: {one_line(error)}") from None
     return dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
-from halfshell._api import Precision
+from halfshell._options import Precision
 
 
 @dataclass(frozen=True)

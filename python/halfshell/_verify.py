@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _inputs
-from halfshell._api import pairs as find_pairs
+from halfshell._pairs import pairs as find_pairs
 
 IntArray = npt.NDArray[np.int64]
 _CONFIRMED = 1000  # differences of each kind that are confirmed by rational arithmetic

@@ -192,17 +192,17 @@ element(const void *array, int bytes, int32_t h)
 }
 
 static void
-check_emit(const hs_kernel *kernel, const hs_rows *rows, int bytes, int which, bool at_end)
+check_emit(const hs_kernel *kernel, const hs_hits *hits, int bytes, int which, bool at_end)
 {
     const hs_emit_fn emit = bytes == 8 ? kernel->emit_int64 : kernel->emit_int32;
-    const int32_t    n = rows->n > 0 ? rows->end[rows->n - 1] : 0;
+    const int32_t    n = hits->n > 0 ? hits->end[hits->n - 1] : 0;
     void *i = guarded_place(i_pages, n + HS_PADDING, (size_t)bytes, at_end);
     void *j = guarded_place(j_pages, n + HS_PADDING, (size_t)bytes, at_end);
     bool  same = true;
-    emit(rows, which & 1 ? i : NULL, which & 2 ? j : NULL);
-    for (int32_t row = 0, h = 0; row < rows->n; row++) {
-        for (; h < rows->end[row]; h++) {
-            const int32_t a = rows->point[row], b = rows->hits[h];
+    emit(hits, which & 1 ? i : NULL, which & 2 ? j : NULL);
+    for (int32_t t = 0, h = 0; t < hits->n; t++) {
+        for (; h < hits->end[t]; h++) {
+            const int32_t a = hits->point[t], b = hits->label[h];
             same = same && (!(which & 1) || element(i, bytes, h) == (a < b ? a : b));
             same = same && (!(which & 2) || element(j, bytes, h) == (a < b ? b : a));
         }
@@ -218,23 +218,23 @@ emitting_puts_the_lower_number_first(void)
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         for (int trial = 0; trial < 400; trial++) {
             int32_t   point[HS_GROUP_POINTS], end[HS_GROUP_POINTS];
-            hs_rows   rows = {.point = point, .end = end};
+            hs_hits   hits = {.point = point, .end = end};
             const int most = trial % 4 == 0 ? 2 : trial % 4 == 1 ? 20 : 128;
             int32_t   n = 0;
-            rows.n = (int32_t)(random_bits(&random) % (HS_GROUP_POINTS + 1));
-            for (int32_t row = 0; row < rows.n; row++) {
+            hits.n = (int32_t)(random_bits(&random) % (HS_GROUP_POINTS + 1));
+            for (int32_t t = 0; t < hits.n; t++) {
                 n += (int32_t)(random_bits(&random) % (unsigned)(most + 1)); /* or none */
-                end[row] = n;
-                point[row] = trial % 2 ? (int32_t)(random_bits(&random) >> 33) : row;
+                end[t] = n;
+                point[t] = trial % 2 ? (int32_t)(random_bits(&random) >> 33) : t;
             }
-            int32_t *hits = guarded_place(hits_pages, n + HS_PADDING, sizeof(int32_t), trial & 8);
+            int32_t *label = guarded_place(hits_pages, n + HS_PADDING, sizeof(int32_t), trial & 8);
             for (int32_t h = 0; h < n + HS_PADDING; h++) {
-                hits[h] = trial % 2 ? (int32_t)(random_bits(&random) >> 33) : h % 64;
+                label[h] = trial % 2 ? (int32_t)(random_bits(&random) >> 33) : h % 64;
             }
-            rows.hits = hits;
+            hits.label = label;
             for (int which = 0; which < 4; which++) { /* neither, i, j, both */
-                check_emit(kernel, &rows, 4, which, trial & 8);
-                check_emit(kernel, &rows, 8, which, trial & 8);
+                check_emit(kernel, &hits, 4, which, trial & 8);
+                check_emit(kernel, &hits, 8, which, trial & 8);
             }
         }
     }
@@ -247,11 +247,11 @@ nothing_else_is_written(void)
     const hs_kernel *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         const int32_t point = 7, end = 5;
-        int32_t       hits[5 + HS_PADDING] = {9, 3, 7, 1, 8};
-        const hs_rows rows = {.n = 1, .point = &point, .end = &end, .hits = hits};
+        int32_t       label[5 + HS_PADDING] = {9, 3, 7, 1, 8};
+        const hs_hits hits = {.n = 1, .point = &point, .end = &end, .label = label};
         int64_t       array[5 + HS_PADDING + 8];
         memset(array, 0x5a, sizeof array);
-        kernel->emit_int64(&rows, array, NULL);
+        kernel->emit_int64(&hits, array, NULL);
         CHECK(array[0] == 7 && array[1] == 3 && array[2] == 7 && array[3] == 1 && array[4] == 7);
         for (int e = 5 + HS_PADDING; e < 5 + HS_PADDING + 8; e++) {
             CHECK(array[e] == INT64_C(0x5a5a5a5a5a5a5a5a));

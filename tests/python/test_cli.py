@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _api, _cli_pairs, _cli_peers, _cli_scene, _cli_verify, cli, selftest
+from halfshell import _cli_pairs, _cli_peers, _cli_scene, _cli_verify, _pairs, cli, selftest
 from halfshell._files import InputError, Scene, read_scene, replacing
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
@@ -771,7 +771,7 @@ class Terminal(io.StringIO):
 
 def searching(seconds, clock):
     """A search that takes some seconds of a clock and tells its progress every 10 ms."""
-    search = _api._pairs_with_progress
+    search = _pairs._pairs_with_progress
 
     def pairs(*args, progress, **options):
         for k in range(round(seconds * 100)):
@@ -802,7 +802,7 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
     screen = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setattr(_cli_pairs, "time", time)
-    monkeypatch.setattr(_api, "_pairs_with_progress", searching(seconds, clock))
+    monkeypatch.setattr(_pairs, "_pairs_with_progress", searching(seconds, clock))
     monkeypatch.setenv("TERM", "xterm")
     assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
     assert ("searching" in screen.getvalue()) == shown
@@ -810,6 +810,6 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
 
 def test_progress_comes_from_the_search(monkeypatch, npz):
     told = []
-    i, j = _api._pairs_with_progress(POINTS, 3.0, progress=told.append, box=BOX)
+    i, j = _pairs._pairs_with_progress(POINTS, 3.0, progress=told.append, box=BOX)
     np.testing.assert_array_equal([i, j], hs.pairs(POINTS, 3.0, box=BOX))
     assert all(0 <= fraction <= 1 for fraction in told)

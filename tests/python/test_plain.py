@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _api, _core
+from halfshell import _core, _pairs
 
 POINTS = np.random.default_rng(31).random((40, 3)) * 4.0
 LENGTHS = np.array([4.0, 4.5, 5.0])
@@ -45,7 +45,7 @@ def test_same_answer_as_converted_arguments(box, periodic, real, index_dtype):
     options = {"box": box, "periodic": periodic, "quantities": "ijdDSP", "sort": True}
     options["index_dtype"] = index_dtype
     direct = plain(points, **options)
-    converted = _api._pairs_with_progress(points, 1.5, progress=None, **options)
+    converted = _pairs._pairs_with_progress(points, 1.5, progress=None, **options)
     public = hs.pairs(points, 1.5, **options)
     for a, b, c in zip(direct, converted, public, strict=True):
         assert a.dtype == b.dtype == c.dtype
@@ -107,7 +107,7 @@ def test_box_object_is_plain_to_the_public_functions(monkeypatch):
         raise AssertionError("arguments were converted")
 
     expected = hs.pairs(POINTS, 1.5, box=LENGTHS.tolist(), quantities="P")
-    monkeypatch.setattr(_api._inputs, "scene", refuse)
+    monkeypatch.setattr(_pairs._inputs, "scene", refuse)
     assert (hs.pairs(POINTS, 1.5, box=hs.Box(LENGTHS), quantities="P") == expected).all()
     assert hs.count_pairs(POINTS, 1.5, box=hs.Box(LENGTHS)) == len(expected)
 

@@ -1,45 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The public functions: signatures, defaults and documentation; the work is done in C."""
+"""`pairs`: signature, defaults and documentation; the work is done in C."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, TypedDict, Unpack, cast, overload
+from collections.abc import Callable
+from typing import Any, Literal, Unpack, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _batch, _core, _inputs
 from halfshell._box import Box
+from halfshell._options import Precision, SearchOptions
 
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 Letter = Literal["i", "j", "d", "D", "S", "P"]
-Precision = Literal["exact", "double", "single"]
 
 
-class _SearchOptions(TypedDict, total=False):
-    """For type checkers: the keywords that all searches share."""
-
-    box: Any
-    periodic: Any
-    inclusive: bool
-    precision: Precision
-    kernel: str | None
-    threads: int | None
-    memory_limit: float | None
-
-
-class _CountOptions(_SearchOptions, total=False):
-    """The keywords of `count_pairs`, as far as its type does not depend on them."""
-
-    batch: None
-
-
-class _PairOptions(_SearchOptions, total=False):
+class _PairOptions(SearchOptions, total=False):
     """The keywords of `pairs`, without `quantities`, on which the type of the result depends."""
 
     batch: npt.ArrayLike | None
-
     sort: bool
     index_dtype: npt.DTypeLike
     out: Any
@@ -211,47 +192,15 @@ def pairs(
     """
     if type(box) is Box:
         box = box.vectors
-    if batch is not None:
-        systems = _batch.of(points, cutoff, box, periodic, batch)
-        return _core.batch_pairs(
-            systems.points,
-            systems.cutoff,
-            systems.box,
-            systems.periodic,
-            _inputs.as_flag(inclusive, "inclusive"),
-            precision,
-            kernel,
-            memory_limit,
-            None,
-            threads,
-            quantities,
-            _inputs.as_flag(sort, "sort"),
-            _inputs.as_index_bytes(index_dtype),
-            out,
-            systems.numbers,
-            systems.cutoffs,
-            systems.boxes,
+    if batch is None:
+        # A small search takes as long as a handful of Python operations: none are made where the
+        # arguments need no conversion.
+        result: Any = _core.plain_pairs(
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None,
+            threads, quantities, sort, index_dtype, out,
         )
-    # A small search takes as long as a handful of Python operations: none are made where the
-    # arguments need no conversion.
-    result: Any = _core.plain_pairs(
-        points,
-        cutoff,
-        box,
-        periodic,
-        inclusive,
-        precision,
-        kernel,
-        memory_limit,
-        None,
-        threads,
-        quantities,
-        sort,
-        index_dtype,
-        out,
-    )
-    if result is not NotImplemented:
-        return cast(Arrays, result)
+        if result is not NotImplemented:
+            return cast(Arrays, result)
     return _pairs_with_progress(
         points,
         cutoff,
@@ -267,12 +216,13 @@ def pairs(
         kernel=kernel,
         threads=threads,
         memory_limit=memory_limit,
+        batch=batch,
     )
 
 
 def _pairs_with_progress(
     points: Any,
-    cutoff: float,
+    cutoff: Any,
     *,
     progress: Callable[[float], object] | None,
     box: Any = None,
@@ -286,144 +236,18 @@ def _pairs_with_progress(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
 ) -> Arrays:
-    """`pairs`, calling ``progress(fraction)`` now and then; for the command line."""
-    array, vectors, bits = _inputs.scene(points, box, periodic)
-    return _core.pairs(
-        array,
-        _inputs.as_cutoff(cutoff),
-        vectors,
-        bits,
-        _inputs.as_flag(inclusive, "inclusive"),
-        precision,
-        kernel,
-        memory_limit,
-        progress,
-        threads,
-        quantities,
-        _inputs.as_flag(sort, "sort"),
-        _inputs.as_index_bytes(index_dtype),
+    """`pairs` of what must be converted, calling ``progress(fraction)`` now and then."""
+    own = None
+    if batch is None:
+        array, vectors, bits = _inputs.scene(points, box, periodic)
+        scene = array, _inputs.as_cutoff(cutoff), vectors, bits
+    else:
+        scene, own = _batch.of(points, cutoff, box, periodic, batch)
+    shared = (
+        *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress,
+        threads, quantities, _inputs.as_flag(sort, "sort"), _inputs.as_index_bytes(index_dtype),
         out,
     )
-
-
-@overload
-def count_pairs(
-    points: Any,
-    cutoff: float | np.floating[Any] | np.integer[Any],
-    **options: Unpack[_CountOptions],
-) -> int: ...
-@overload
-def count_pairs(
-    points: Any, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
-) -> npt.NDArray[np.int64]: ...
-@overload
-def count_pairs(
-    points: Any, cutoff: Any, *, batch: npt.ArrayLike, **options: Unpack[_SearchOptions]
-) -> npt.NDArray[np.int64]: ...
-@overload
-def count_pairs(
-    points: Any, cutoff: Any, **options: Unpack[_CountOptions]
-) -> int | npt.NDArray[np.int64]: ...
-def count_pairs(
-    points: Any,
-    cutoff: Any,
-    *,
-    box: Any = None,
-    periodic: Any = None,
-    inclusive: bool = True,
-    precision: Precision = "exact",
-    kernel: str | None = None,
-    threads: int | None = None,
-    memory_limit: float | None = None,
-    batch: npt.ArrayLike | None = None,
-) -> int | npt.NDArray[np.int64]:
-    """Count the pairs of points within one or several cutoffs.
-
-    Parameters
-    ----------
-    points, box, periodic, inclusive, precision, kernel, threads
-        As in `pairs`.
-    cutoff : float or array_like of float, shape (k,)
-        One cutoff, or several in ascending order. k cutoffs cost k searches. With `batch`: one
-        for all systems, or one for each.
-    memory_limit : float, optional
-        Bytes that the search may take.
-    batch : array_like of int, shape (n,), optional
-        Count many systems in one call, as in `pairs`.
-
-    Returns
-    -------
-    int or ndarray of int64, shape (k,)
-        The number of pairs of the half list for each cutoff; with `batch`, for each system: those
-        that `box` or `cutoff` is given for, or up to the largest number in `batch`.
-
-    Raises
-    ------
-    TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`; ValueError also if several cutoffs are not ascending. MemoryError only if the
-        search itself would not fit: no pair is stored.
-
-    See Also
-    --------
-    pairs : the pairs themselves.
-
-    Examples
-    --------
-    >>> import halfshell as hs
-    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
-    >>> hs.count_pairs(points, 1.5)
-    1
-    >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
-    [0, 1, 2]
-    >>> hs.count_pairs(points, 1.5, batch=[0, 0, 2]).tolist()
-    [1, 0, 0]
-    """
-    if type(box) is Box:
-        box = box.vectors
-    if batch is not None:
-        systems = _batch.of(points, cutoff, box, periodic, batch)
-        return _core.batch_count(
-            systems.points,
-            systems.cutoff,
-            systems.box,
-            systems.periodic,
-            _inputs.as_flag(inclusive, "inclusive"),
-            precision,
-            kernel,
-            memory_limit,
-            None,
-            threads,
-            systems.numbers,
-            systems.cutoffs,
-            systems.boxes,
-        )
-    result: Any = _core.plain_count(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
-    )
-    if result is not NotImplemented:
-        return cast(int, result)
-    inclusive = _inputs.as_flag(inclusive, "inclusive")
-    array, vectors, bits = _inputs.scene(points, box, periodic)
-
-    def count(one: float) -> int:
-        return _core.count_pairs(
-            array, one, vectors, bits, inclusive, precision, kernel, memory_limit, None, threads
-        )
-
-    cutoffs = _inputs.as_cutoffs(cutoff)
-    if isinstance(cutoffs, float):
-        return count(cutoffs)
-    return np.array([count(one) for one in cutoffs.tolist()], dtype=np.int64)
-
-
-def kernels() -> list[str]:
-    """Names of the kernels that this CPU can run, the best one first.
-
-    Examples
-    --------
-    >>> import halfshell as hs
-    >>> "scalar" in hs.kernels()
-    True
-    """
-    return list(_core.kernels())
+    return _core.pairs(*shared) if own is None else _core.batch_pairs(*(*shared, *own))

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`count_pairs`: signature, defaults and documentation; the work is done in C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Unpack, cast, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _batch, _core, _inputs
+from halfshell._box import Box
+from halfshell._options import Precision, SearchOptions
+
+
+class _CountOptions(SearchOptions, total=False):
+    """The keywords of `count_pairs`, as far as its type does not depend on them."""
+
+    batch: None
+
+
+@overload
+def count_pairs(
+    points: Any,
+    cutoff: float | np.floating[Any] | np.integer[Any],
+    **options: Unpack[_CountOptions],
+) -> int: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
+) -> npt.NDArray[np.int64]: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Any, *, batch: npt.ArrayLike, **options: Unpack[SearchOptions]
+) -> npt.NDArray[np.int64]: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Any, **options: Unpack[_CountOptions]
+) -> int | npt.NDArray[np.int64]: ...
+def count_pairs(
+    points: Any,
+    cutoff: Any,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
+) -> int | npt.NDArray[np.int64]:
+    """Count the pairs of points within one or several cutoffs.
+
+    Parameters
+    ----------
+    points, box, periodic, inclusive, precision, kernel, threads
+        As in `pairs`.
+    cutoff : float or array_like of float, shape (k,)
+        One cutoff, or several in ascending order. k cutoffs cost k searches. With `batch`: one
+        for all systems, or one for each.
+    memory_limit : float, optional
+        Bytes that the search may take.
+    batch : array_like of int, shape (n,), optional
+        Count many systems in one call, as in `pairs`.
+
+    Returns
+    -------
+    int or ndarray of int64, shape (k,)
+        The number of pairs of the half list for each cutoff; with `batch`, for each system: those
+        that `box` or `cutoff` is given for, or up to the largest number in `batch`.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pairs`; ValueError also if several cutoffs are not ascending. MemoryError only if the
+        search itself would not fit: no pair is stored.
+
+    See Also
+    --------
+    pairs : the pairs themselves.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> hs.count_pairs(points, 1.5)
+    1
+    >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
+    [0, 1, 2]
+    >>> hs.count_pairs(points, 1.5, batch=[0, 0, 2]).tolist()
+    [1, 0, 0]
+    """
+    if type(box) is Box:
+        box = box.vectors
+    if batch is None:
+        result: Any = _core.plain_count(
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
+        )
+        if result is not NotImplemented:
+            return cast(int, result)
+    rest = (
+        _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None, threads,
+    )
+    if batch is not None:
+        scene, own = _batch.of(points, cutoff, box, periodic, batch)
+        return _core.batch_count(*(*scene, *rest, *own))
+    array, vectors, bits = _inputs.scene(points, box, periodic)
+    cutoffs = _inputs.as_cutoffs(cutoff)
+    if isinstance(cutoffs, float):
+        return _core.count_pairs(array, cutoffs, vectors, bits, *rest)
+    counts = [_core.count_pairs(array, one, vectors, bits, *rest) for one in cutoffs.tolist()]
+    return np.array(counts, dtype=np.int64)
