@@ -194,8 +194,8 @@ hs_status hs_pairs_count(const hs_points *points, const hs_box *box, const hs_op
 
 /*
  * Find all neighbours of each query among the points, row after row: pairs (i in queries, j in
- * points, S) with the vector D = points[j] - queries[i] + S * box. queries NULL: of each point among
- * the points, itself left out where S = 0, so that each pair is there twice, as (i, j, S) and
+ * points, S) with the vector D = points[j] - queries[i] + S * box. queries NULL: of each point
+ * among the points, itself left out where S = 0, so that each pair is there twice, as (i, j, S) and
  * (j, i, -S). With queries nothing is left out: an identical point is a neighbour at distance 0.
  *
  * Rows are in the order of the queries, each ascending by (j, S); options->sorted is ignored.

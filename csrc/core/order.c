@@ -9,7 +9,7 @@
 
 #define DIGIT_BITS 9 /* of a digit, at most: two kB of counts stay in the nearest cache */
 #define FEW 24       /* candidates that are quicker sorted by insertion */
-#define CROWD 12     /* entries that agree in their leading digit, from which insertion does not pay */
+#define CROWD 12     /* entries with the same leading digit, beyond which insertion does not pay */
 
 hs_status
 hs_order_init(hs_account *account, hs_block *block, hs_order *order)
@@ -18,8 +18,8 @@ hs_order_init(hs_account *account, hs_block *block, hs_order *order)
     order->entries = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
     order->spare = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(uint64_t));
     order->column = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(float));
-    order->shifts = hs_alloc(account, HS_FOR_CANDIDATES, ((int64_t)block->most_runs + 1) * HS_MAX_DIM,
-                             sizeof(int64_t));
+    order->shifts = hs_alloc(account, HS_FOR_CANDIDATES,
+                             ((int64_t)block->most_runs + 1) * HS_MAX_DIM, sizeof(int64_t));
     block->origin = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
     const bool complete = order->entries != NULL && order->spare != NULL &&
                           order->column != NULL && order->shifts != NULL && block->origin != NULL;
@@ -94,7 +94,8 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
         return;
     }
     /* The leading digit alone tells nearly all apart, when keys are spread evenly. */
-    const int lead = bits < DIGIT_BITS ? bits : n < 1 << (DIGIT_BITS - 1) ? DIGIT_BITS - 1 : DIGIT_BITS;
+    const int most = n < 1 << (DIGIT_BITS - 1) ? DIGIT_BITS - 1 : DIGIT_BITS;
+    const int lead = bits < most ? bits : most;
     if (sort_digit(order, n, 32 + bits - lead, lead) <= CROWD) {
         sort_few(order->entries, n);
         return;

@@ -158,7 +158,8 @@ hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *opt
     counting.want = 0;
     counting.sorted = false;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(&(hs_sets){.points = points}, box, &counting, &search, failure);
+    const hs_sets  sets = {.points = points};
+    hs_status      status = hs_search_open(&sets, box, &counting, &search, failure);
     if (status == HS_OK) {
         status = hs_parallel_count(&search, &found, failure);
         hs_search_report(&search, found);

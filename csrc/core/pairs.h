@@ -9,7 +9,7 @@
 struct hs_pairs {
     hs_search search;  /* closed: kept for its account, options and scene */
     hs_output output;
-    hs_output offsets; /* one column of int64: where rows of hs_neighbors_find begin, else nothing */
+    hs_output offsets; /* int64, where the rows of hs_neighbors_find begin; else nothing */
 };
 
 /* One that holds nothing yet; hs_search_begin comes first. NULL when memory is short. */

@@ -43,7 +43,8 @@ hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *optio
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(&(hs_sets){.points = points}, box, options, &search, failure);
+    const hs_sets  sets = {.points = points};
+    hs_status      status = hs_search_open(&sets, box, options, &search, failure);
     if (status == HS_OK) {
         fill_plan(&search, plan);
         hs_search_close(&search);

@@ -55,8 +55,8 @@ hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *poi
 
 /*
  * The same for two sets of points in one box: each becomes a scene of its own, with one scale, one
- * lattice and bounds that hold for both. asking: that of the queries, NULL when there are none; only
- * its arrays and what they are like are its own.
+ * lattice and bounds that hold for both. asking: that of the queries, NULL when there are none;
+ * only its arrays and what they are like are its own.
  */
 hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
                              const hs_box *box, const hs_options *options, hs_scene *scene,

@@ -94,8 +94,9 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
     search->has_queries = asking != NULL;
     search->is_full = sets->is_full || asking != NULL;
     search->pairs_per_half = !search->is_full      ? 1.0
-                             : sets->points->n > 0 ? 2.0 * (double)n_asking / (double)sets->points->n
-                                                   : 0.0;
+                             : sets->points->n == 0
+                                 ? 0.0
+                                 : 2.0 * (double)n_asking / (double)sets->points->n;
     hs_status status = hs_scene_init_sets(&search->account, search->team, sets, box, options,
                                           &search->scene, asking, failure);
     if (status == HS_OK) {

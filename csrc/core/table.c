@@ -73,7 +73,8 @@ typedef struct stretch {
     const int32_t *numbers; /* of the hits, from that one on */
 } stretch;
 
-/* numbers[0 ... n - 1], or where that is NULL n times `same`, to every `step`-th entry from `at`. */
+/* numbers[0 ... n - 1], or where that is NULL n times `same`, to every `step`-th entry from `at`
+ * on. */
 HS_ALWAYS_INLINE void
 put_numbers(void *column, int index_bytes, int64_t at, const int32_t *numbers, int32_t same,
             int32_t n, const int step)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * test_neighbors.c: rows of all neighbours, of points and of queries. The half list, which other
- * tests hold against a brute force, says what they must be, to the last bit: each pair both ways, or
- * from one part of the points to the other.
+ * tests hold against a brute force, says what they must be, to the last bit: each pair both ways,
+ * or from one part of the points to the other.
  */
 #include "harness.h"
 #include "pair_checks.h"
@@ -54,7 +54,7 @@ entry_of(const found_pairs *found, int64_t e, bool reversed)
     return of;
 }
 
-/* From the half list: both ways, or with a split those from points before it to those from it on. */
+/* From the half list: both ways, or with a split from points before it to those from it on. */
 static entries
 expected_entries(const found_pairs *half, int64_t split)
 {
