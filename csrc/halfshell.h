@@ -239,6 +239,36 @@ void hs_array_free(void *array);
 void hs_pairs_free(hs_pairs *pairs);
 
 /*
+ * Points that are sorted into cells once and asked many times. Immutable: any number of calls may
+ * use it at once. Opaque, owned by the caller.
+ */
+typedef struct hs_cells hs_cells;
+
+/*
+ * points, box, options are borrowed for this call only: the points are copied. options->cutoff is
+ * the largest cutoff that the cells are made for; larger ones, and queries much further away than
+ * the points or the box reach, are answered as well, by cells that are made for that call.
+ */
+hs_status hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
+                         hs_cells **cells, hs_failure *failure);
+
+/* NULL-safe. */
+void hs_cells_free(hs_cells *cells);
+
+/* As hs_pairs_find, hs_pairs_count or, with queries that are not NULL, hs_between_count,
+ * hs_neighbors_find and hs_neighbors_count for these points. counters tell what the call took, not
+ * what the cells hold. */
+hs_status hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
+                         hs_failure *failure);
+hs_status hs_cells_count(const hs_cells *cells, const hs_points *queries,
+                         const hs_options *options, int64_t *count, hs_failure *failure);
+hs_status hs_cells_neighbors(const hs_cells *cells, const hs_points *queries,
+                             const hs_options *options, hs_pairs **rows, hs_failure *failure);
+hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
+                                   const hs_options *options, int64_t *counts,
+                                   hs_failure *failure);
+
+/*
  * Several systems, searched in one call: system s has points first[s] to first[s + 1] and no pair
  * with another. All arrays are borrowed.
  */

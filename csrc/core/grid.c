@@ -8,17 +8,13 @@
  */
 #include "grid.h"
 
-#include "doubleword.h"
-#include "rounding.h"
-
 #include <math.h>
 #include <string.h>
 
 #define UNIT 0x1p-53
-/* Relative room for the few roundings between a bound and its use. */
-#define SLACK 0x1p-40
-/* Cells per axis that int32 windows and doubles tell apart, and in all: cell ids are uint32. */
-#define MOST_CELLS_PER_AXIS 0x1p31
+#define SLACK HS_GRID_SLACK
+#define MOST_CELLS_PER_AXIS HS_GRID_CELLS_PER_AXIS
+/* In all: cell ids are uint32. */
 #define MOST_CELLS 4294967295.0
 /* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
  * more; walks put cells together where these are fewer. */
@@ -203,79 +199,6 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
     return HS_OK;
 }
 
-/* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
-static bool
-faces_hold(const hs_scene *scene, const hs_grid *grid, int k, double least)
-{
-    double from = hs_grid_face(grid, k, 0.0);
-    if (from != scene->lower[k]) {
-        return false;
-    }
-    for (int64_t cell = 0; cell < grid->shape[k]; cell++) {
-        const double to = cell + 1 < grid->shape[k] ? hs_grid_face(grid, k, (double)(cell + 1))
-                                                     : scene->upper[k];
-        const hs_dw  width = hs_two_difference(to, from);
-        if (!(width.hi > least || (width.hi == least && width.lo >= 0.0))) {
-            return false;
-        }
-        from = to;
-    }
-    return true;
-}
-
-/* Does a point lie on the far face? There the last cell is closed, not half open. */
-static bool
-touches_end(const hs_scene *scene, int k)
-{
-    const double *x = scene->cloud.x[k], end = scene->upper[k];
-    int           any = 0;
-    for (int64_t i = 0; i < scene->n; i++) {
-        any |= x[i] >= end;
-    }
-    return any != 0;
-}
-
-/*
- * Tries one cell more along each axis, each a whole part of the radius wide and no wider: boxes are
- * often whole multiples of the cutoff. There is no room for rounding then, so points are told apart
- * by the faces between cells, which are numbers: two points with `part` whole cells between their
- * cells are more than the radius apart, also across a periodic face unless one lies on it.
- */
-static void
-cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid)
-{
-    double cells = (double)grid->n_cells;
-    for (int k = 0; k < scene->ndim; k++) {
-        const double extent = scene->upper[k] - scene->lower[k];
-        const double part = scene->radius / parts[k]; /* exact but for thirds */
-        const double least = parts[k] == 3.0 ? hs_next_up(part) : part;
-        const double count = (double)grid->shape[k] + 1.0;
-        const double reach = hs_larger(fabs(scene->lower[k]), fabs(scene->upper[k]));
-        if (scene->t_error[k] != 0.0 || reach > 16.0 * extent || count < 4.0 || !(least > 0.0) ||
-            !(least * count <= extent * (1.0 + SLACK)) || count > MOST_CELLS_PER_AXIS) {
-            continue;
-        }
-        const double  more = cells / (count - 1.0) * count;
-        const hs_grid before = *grid;
-        grid->shape[k] = (int64_t)count;
-        grid->cell_size[k] = extent / count;
-        grid->cells_per_length[k] = count / extent;
-        grid->reach[k] = (int64_t)parts[k];
-        grid->by_faces[k] = more <= cap && faces_hold(scene, grid, k, least) &&
-                            (scene->lattice.row_of_axis[k] < 0 || !touches_end(scene, k));
-        if (grid->by_faces[k]) {
-            cells = more;
-        } else {
-            *grid = before;
-        }
-    }
-    grid->n_cells = 1;
-    for (int k = 0; k < scene->ndim; k++) {
-        grid->stride[k] = grid->n_cells;
-        grid->n_cells *= grid->shape[k];
-    }
-}
-
 static hs_status
 set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
 {
@@ -336,7 +259,7 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     const bool capped = cap_counts(scene->ndim, cap, counts);
     hs_status  status = set_shape(scene, counts, grid);
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
-        cut_by_faces(scene, parts, cap, grid);
+        hs_grid_cut_by_faces(scene, parts, cap, grid);
     }
     if (single_cost < INFINITY &&
         (status != HS_OK || single_cost <= cost_per_point(scene, grid))) {
@@ -349,24 +272,39 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     return status;
 }
 
-hs_status
-hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+/* How far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more images
+ * than can be counted. */
+static hs_status
+set_ranges(const hs_scene *scene, hs_grid *grid)
 {
     double images[HS_MAX_DIM], drift[HS_MAX_DIM];
-    /* Of the periodic part, times the open extents. */
-    double volume = hs_lattice_volume(&scene->lattice, 0);
-    *grid = (hs_grid){.ndim = scene->ndim};
     bound_drift(scene, images, drift);
     for (int k = 0; k < scene->ndim; k++) {
         const int r = scene->lattice.row_of_axis[k];
         grid->range[k] = (scene->radius + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
         if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
-            failure->expected_pairs = failure->expected_bytes = INFINITY;
             return HS_ERR_MEMORY;
         }
-        volume *= r >= 0 ? 1.0 : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
     }
     grid->shift_error = bound_shift_error(scene, images);
+    return HS_OK;
+}
+
+hs_status
+hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+{
+    /* Of the periodic part, times the open extents. */
+    double volume = hs_lattice_volume(&scene->lattice, 0);
+    *grid = (hs_grid){.ndim = scene->ndim};
+    if (set_ranges(scene, grid) != HS_OK) {
+        failure->expected_pairs = failure->expected_bytes = INFINITY;
+        return HS_ERR_MEMORY;
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        volume *= scene->lattice.row_of_axis[k] >= 0
+                      ? 1.0
+                      : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
+    }
 
     const double density = (double)scene->n / volume;
     const double ball = ball_volume(scene->ndim, scene->cutoff);
@@ -375,4 +313,23 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
     }
     return choose_shape(scene, density, density * ball, grid, failure);
+}
+
+hs_status
+hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_grid *grid)
+{
+    const double ratio = cutoff_before > 0.0 ? scene->cutoff / cutoff_before : 1.0;
+    if (set_ranges(scene, grid) != HS_OK) {
+        return HS_ERR_MEMORY;
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        HS_ASSERT(!grid->by_faces[k]);
+        const double cells = grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) +
+                             0x1p-50 * (double)grid->shape[k];
+        if (!is_sparse && cells < (double)grid->reach[k]) {
+            grid->reach[k] = (int64_t)cells + 1;
+        }
+        grid->expected_pairs *= ratio;
+    }
+    return HS_OK;
 }

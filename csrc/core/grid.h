@@ -33,6 +33,23 @@ hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure
  * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
 hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
 
+/*
+ * Tries one cell more along each axis, each a whole part of the radius wide (one of parts[k]) and
+ * no wider. Not for scenes that others ask: the points alone are looked at. grid_faces.c.
+ */
+void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
+
+/* The same cells, not cut by faces, for a scene whose cutoff was `cutoff_before` and is smaller
+ * now. HS_ERR_MEMORY as above. */
+hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before,
+                         hs_grid *grid);
+
+/* Relative room for the few roundings between a bound and its use. */
+#define HS_GRID_SLACK 0x1p-40
+
+/* Cells per axis that int32 windows and doubles tell apart. */
+#define HS_GRID_CELLS_PER_AXIS 0x1p31
+
 /* Added to places, times the number of cells, where axes are cut by faces: more than their
  * rounding, so that the cell found is the right one or the next. */
 #define HS_GRID_BIAS 0x1p-44

@@ -63,7 +63,14 @@ hs_status
 hs_neighbors_find(const hs_points *points, const hs_points *queries, const hs_box *box,
                   const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
-    const hs_sets    sets = {.points = points, .queries = queries, .is_full = true};
+    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
+    return hs_neighbors_find_in(&sets, box, options, result, failure);
+}
+
+hs_status
+hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                     hs_pairs **result, hs_failure *failure)
+{
     const hs_options of_rows = options_of_rows(options);
     hs_failure       ignored;
     *result = NULL;
@@ -75,11 +82,11 @@ hs_neighbors_find(const hs_points *points, const hs_points *queries, const hs_bo
     }
     hs_search     *search = &rows->search;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(&sets, box, &of_rows, search, failure);
+    hs_status      status = hs_search_open(sets, box, &of_rows, search, failure);
     if (status == HS_OK) {
-        hs_output_init(&search->account, points->ndim, options->want, options->index_bytes,
+        hs_output_init(&search->account, sets->points->ndim, options->want, options->index_bytes,
                        &rows->output);
-        hs_output_init(&search->account, points->ndim, HS_WANT_I, 8, &rows->offsets);
+        hs_output_init(&search->account, sets->points->ndim, HS_WANT_I, 8, &rows->offsets);
         if (options->out != NULL) {
             hs_output_fix(&rows->output, options->out);
         }
@@ -132,7 +139,14 @@ hs_neighbors_count(const hs_points *points, const hs_points *queries, const hs_b
                    const hs_options *options, int64_t *counts, hs_failure *failure)
 {
     const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    return count_with(&sets, box, options, count_rows, counts, failure);
+    return hs_neighbors_count_in(&sets, box, options, counts, failure);
+}
+
+hs_status
+hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                      int64_t *counts, hs_failure *failure)
+{
+    return count_with(sets, box, options, count_rows, counts, failure);
 }
 
 hs_status
@@ -140,7 +154,14 @@ hs_between_count(const hs_points *points, const hs_points *queries, const hs_box
                  const hs_options *options, int64_t *count, hs_failure *failure)
 {
     const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    return count_with(&sets, box, options, hs_parallel_count, count, failure);
+    return hs_between_count_in(&sets, box, options, count, failure);
+}
+
+hs_status
+hs_between_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                    int64_t *count, hs_failure *failure)
+{
+    return count_with(sets, box, options, hs_parallel_count, count, failure);
 }
 
 int64_t

@@ -112,6 +112,14 @@ hs_status
 hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
               hs_pairs **result, hs_failure *failure)
 {
+    const hs_sets sets = {.points = points};
+    return hs_pairs_find_in(&sets, box, options, result, failure);
+}
+
+hs_status
+hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                 hs_pairs **result, hs_failure *failure)
+{
     hs_failure ignored;
     *result = NULL;
     failure = failure != NULL ? failure : &ignored;
@@ -122,9 +130,9 @@ hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *opti
     }
     hs_search     *search = &pairs->search;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status status = hs_search_open(&(hs_sets){.points = points}, box, options, search, failure);
+    hs_status status = hs_search_open(sets, box, options, search, failure);
     if (status == HS_OK) {
-        hs_output_init(&search->account, points->ndim, options->want, options->index_bytes,
+        hs_output_init(&search->account, sets->points->ndim, options->want, options->index_bytes,
                        &pairs->output);
         if (options->out != NULL) {
             hs_output_fix(&pairs->output, options->out);
@@ -149,6 +157,14 @@ hs_status
 hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
                int64_t *count, hs_failure *failure)
 {
+    const hs_sets sets = {.points = points};
+    return hs_pairs_count_in(&sets, box, options, count, failure);
+}
+
+hs_status
+hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                  int64_t *count, hs_failure *failure)
+{
     hs_failure ignored;
     hs_options counting = *options;
     hs_search  search;
@@ -158,8 +174,7 @@ hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *opt
     counting.want = 0;
     counting.sorted = false;
     const hs_fpenv saved = hs_fpenv_enter();
-    const hs_sets  sets = {.points = points};
-    hs_status      status = hs_search_open(&sets, box, &counting, &search, failure);
+    hs_status      status = hs_search_open(sets, box, &counting, &search, failure);
     if (status == HS_OK) {
         status = hs_parallel_count(&search, &found, failure);
         hs_search_report(&search, found);

@@ -15,4 +15,16 @@ struct hs_pairs {
 /* One that holds nothing yet; hs_search_begin comes first. NULL when memory is short. */
 hs_pairs *hs_pairs_new(void);
 
+/* The functions of halfshell.h of these names, for sets of points. */
+hs_status hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                           hs_pairs **pairs, hs_failure *failure);
+hs_status hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                            int64_t *count, hs_failure *failure);
+hs_status hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                               hs_pairs **rows, hs_failure *failure);
+hs_status hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                                int64_t *counts, hs_failure *failure);
+hs_status hs_between_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                              int64_t *count, hs_failure *failure);
+
 #endif

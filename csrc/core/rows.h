@@ -48,8 +48,8 @@ void hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_gro
 bool hs_row_next(const hs_search *search, hs_row *row, hs_row_group *group);
 
 /*
- * Settles which rows neighbour this one, for half lists its own first; returns how many. links: room
- * for search->stencil.n_rows; hints: as many, zero at first, for sparse grids only.
+ * Settles which rows neighbour this one, for half lists its own first; returns how many. links:
+ * room for search->stencil.n_rows; hints: as many, zero at first, for sparse grids only.
  */
 int64_t hs_row_links(const hs_search *search, const hs_row *row, hs_link *links, int64_t *hints);
 

@@ -12,9 +12,6 @@
 #define ORDINARY_EXPONENT 20
 /* Scaled coordinates stay below 2^900, so that sums of a few of them are finite. */
 #define LARGEST_EXPONENT 900
-/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
-#define SCALING_LOSS 0x1p-1000
-#define UNIT 0x1p-53 /* unit roundoff of float64 */
 
 /* x = m 2^e with 1 <= m < 2: e; for 0 the smallest int there is. */
 static int
@@ -75,95 +72,6 @@ choose_exponent(const hs_cloud *cloud, const hs_cloud *asking, const hs_box *box
         *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
     }
     return exponent;
-}
-
-/* Range of the grid coordinates: the points' own where open, one period where periodic. */
-static void
-settle_ranges(hs_scene *scene)
-{
-    for (int k = 0; k < scene->ndim; k++) {
-        if (scene->lattice.row_of_axis[k] >= 0) {
-            const double half = 0.5 * scene->lattice.period[k];
-            /* Points that rounding left outside are binned on the face: an error of t. */
-            scene->t_error[k] += hs_larger(
-                hs_larger(scene->upper[k] - half, -half - scene->lower[k]), 0.0);
-            scene->lower[k] = -half;
-            scene->upper[k] = half;
-        }
-    }
-}
-
-static void
-bound_errors(hs_scene *scene, double magnitude)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    double            largest = 0.0;
-    for (int k = 0; k < scene->ndim; k++) {
-        largest = hs_larger(scene->x_largest[k], largest);
-    }
-    scene->x_error = scene->extreme ? SCALING_LOSS : 0.0;
-    if (!lattice->aligned) {
-        const double terms = 2 * lattice->n_periodic + 2;
-        scene->x_error += 2.0 * UNIT * largest + terms * terms * 0x1p-104 * magnitude;
-    }
-    for (int k = 0; k < scene->ndim; k++) {
-        /* |normal| is 1 to rounding, so the error of a dot product is at most sqrt(d) x_error, plus
-         * its own rounding. */
-        scene->t_error[k] = lattice->aligned
-                                ? scene->x_error
-                                : 3.0 * scene->x_error + 4.0 * (scene->ndim + 2) * UNIT * largest;
-    }
-}
-
-/*
- * precision="double" computes D in float64 from the points as given: each of its m + 2 terms is
- * rounded to within 2^-53 of the largest partial sum. Candidates must be sought that much further
- * out.
- */
-static double
-bound_formula(const hs_scene *scene)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    double            total = 2.0 * hs_scale_apply(scene->scale, scene->cloud.largest);
-    if (lattice->n_periodic == 0) {
-        /* Differences of floats have a relative error only. */
-        return 4.0 * UNIT * scene->cutoff * scene->ndim;
-    }
-    double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B of any pair in reach */
-    for (int k = 0; k < scene->ndim; k++) {
-        const int b = lattice->row_of_axis[k];
-        if (b >= 0) {
-            turns[b] = (2.0 * scene->ndim * total + scene->cutoff) / lattice->period[k] + 4.0;
-        }
-    }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        double given_turns = 0.0, largest = 0.0;
-        for (int b = 0; b < lattice->n_periodic; b++) {
-            given_turns += turns[b] * fabs((double)lattice->U[b][r]);
-        }
-        for (int c = 0; c < scene->ndim; c++) {
-            largest = fmax(largest, fabs(lattice->scaled[r][c]));
-        }
-        total += given_turns * largest;
-    }
-    return (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
-}
-
-/* What decides: X and B where they hold every digit, else the points and rows as given. */
-static void
-init_metric(hs_scene *scene, const hs_options *options)
-{
-    const hs_lattice *lattice = &scene->lattice;
-    const double(*rows)[HS_MAX_DIM] = (const double(*)[HS_MAX_DIM])lattice->rows;
-    double cutoff = hs_scale_apply(scene->scale, options->cutoff);
-    if (scene->extreme) {
-        rows = (const double(*)[HS_MAX_DIM])lattice->given;
-        cutoff = options->cutoff;
-    } else if (scene->keeps_originals) {
-        rows = (const double(*)[HS_MAX_DIM])lattice->scaled;
-    }
-    hs_metric_init(&scene->metric, scene->ndim, lattice->n_periodic, rows, cutoff,
-                   options->inclusive);
 }
 
 /* Columns for the originals and the turns, as far as these are kept, in this order. */
@@ -296,12 +204,19 @@ fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_sce
     if (status != HS_OK) {
         return status;
     }
+    magnitude = hs_larger(magnitude, of_asking);
     if (asking != NULL) {
         hs_scene_join_wrapped(scene, asking);
     }
-    bound_errors(scene, hs_larger(magnitude, of_asking));
-    settle_ranges(scene);
-    init_metric(scene, options);
+    if (scene->is_kept) {
+        hs_scene_make_room(scene, &magnitude);
+    }
+    hs_scene_bound_errors(scene, magnitude);
+    hs_scene_settle_ranges(scene);
+    if (scene->is_kept) {
+        hs_scene_widen_errors(scene);
+    }
+    hs_scene_init_metric(scene, options);
     return HS_OK;
 }
 
@@ -311,10 +226,41 @@ start_scene(const hs_points *points, hs_scene *scene)
 {
     scene->ndim = points->ndim;
     scene->n = points->n;
-    scene->keeps_originals = scene->x_is_beside = scene->is_asked = false;
+    scene->keeps_originals = scene->x_is_beside = scene->is_asked = scene->is_kept = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
     memset(scene->x_largest, 0, sizeof scene->x_largest);
+}
+
+hs_status
+hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs_points *queries,
+              const hs_options *options, hs_scene *asking, hs_failure *failure)
+{
+    double     magnitude = 0.0;
+    hs_options as_kept = *options;
+    start_scene(queries, asking);
+    if (kept->turns.known) {
+        as_kept.want |= HS_WANT_SHIFT;
+    }
+    hs_status status =
+        hs_cloud_load(account, team, queries, options, &asking->cloud, failure);
+    if (status == HS_OK && !hs_scene_takes(kept, &asking->cloud)) {
+        status = HS_STATUS_END;
+    }
+    if (status == HS_OK) {
+        hs_scene_share(kept, asking);
+        status = wrap_points(account, team, &as_kept, asking, &magnitude, failure);
+    }
+    failure->in_queries = status != HS_OK;
+    if (status == HS_OK) {
+        hs_scene_bound_errors(asking, magnitude);
+        hs_scene_settle_ranges(asking);
+        status = hs_scene_covers(kept, asking) ? HS_OK : HS_STATUS_END;
+    }
+    if (status != HS_OK) {
+        hs_scene_free(account, asking);
+    }
+    return status;
 }
 
 /* Reads both clouds, the other one if there is one. */
@@ -347,15 +293,13 @@ settle_unit(const hs_box *box, const hs_options *options, hs_scene *scene,
     scene->cutoff_low = scene->cutoff;
     if (scene->extreme && options->cutoff > 0.0) {
         /* The scaled cutoff may have been rounded or flushed: take bounds. */
-        scene->cutoff_low -= SCALING_LOSS;
-        scene->cutoff += SCALING_LOSS;
+        scene->cutoff_low -= HS_SCALING_LOSS;
+        scene->cutoff += HS_SCALING_LOSS;
     }
     /* Without points nothing has an image, however small the box is. */
     const bool empty = scene->n == 0 || (asking != NULL && asking->n == 0);
     hs_lattice_init(empty ? NULL : box, scene->ndim, scene->scale, &scene->lattice);
-    scene->formula_error =
-        options->precision == HS_DOUBLE ? bound_formula(scene) : 0.0;
-    scene->radius = scene->cutoff + scene->formula_error;
+    hs_scene_set_radius(scene, options, hs_scale_apply(scene->scale, scene->cloud.largest));
 }
 
 hs_status
@@ -364,6 +308,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
                    hs_failure *failure)
 {
     start_scene(sets->points, scene);
+    scene->is_kept = scene->is_asked = sets->is_kept;
     if (asking != NULL) {
         start_scene(sets->queries, asking);
     }

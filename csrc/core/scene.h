@@ -35,12 +35,15 @@ typedef struct hs_scene {
     double     t_error[HS_MAX_DIM]; /* and each computed t_k of the true one, clamping included */
     double     formula_error; /* precision="double": its |D| against the true one */
     bool       is_asked;      /* by queries: the bounds above hold for these too */
+    bool       is_kept;       /* and for others that come later */
 } hs_scene;
 
 /* Who looks for neighbours among whom; borrowed. */
 typedef struct hs_sets {
     const hs_points *points;
     const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
+    bool             is_kept; /* queries come later: bounds with room for them */
+    const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
 } hs_sets;
@@ -71,10 +74,49 @@ void hs_scene_share(const hs_scene *scene, hs_scene *asking);
 /* The scene's x_largest, lower and upper cover what wrapping found in both. */
 void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
 
+/* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
+ * its scale would round. */
+bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
+
+/* And whether its bounds hold for what wrapping has made of it. */
+bool hs_scene_covers(const hs_scene *kept, const hs_scene *asking);
+
+/* Bounds on what was wrapped, with room for queries that come later. Before and after they are
+ * settled. */
+void hs_scene_make_room(hs_scene *scene, double *magnitude);
+void hs_scene_widen_errors(hs_scene *scene);
+
+/*
+ * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
+ * HS_STATUS_END when its bounds do not hold for them: they need another one. On failure it holds
+ * nothing.
+ */
+hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept,
+                        const hs_points *queries, const hs_options *options, hs_scene *asking,
+                        hs_failure *failure);
+
+/* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
+void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
+
 /* Wraps the points into the box; scene_wrap.c. Sets x_largest, the range of t_k of the points in
  * lower and upper, and *magnitude as hs_wrap_point says. */
 hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
                         double *magnitude, hs_failure *failure);
+
+/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
+#define HS_SCALING_LOSS 0x1p-1000
+
+/* Steps of scene_bounds.c. x_error and t_error, from x_largest and what wrapping says. */
+void hs_scene_bound_errors(hs_scene *scene, double magnitude);
+
+/* Range of the grid coordinates: the points' own where open, one period where periodic. */
+void hs_scene_settle_ranges(hs_scene *scene);
+
+/* formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
+void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
+
+/* What decides: X and B where they hold every digit, else the points and rows as given. */
+void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
 
 /* t_k of point i, as hs_lattice_coordinate. */
 HS_ALWAYS_INLINE double

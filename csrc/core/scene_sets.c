@@ -1,9 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * scene_sets.c: two sets of points in one scene: what is known of one must hold for both. See
- * scene.h.
+ * scene_sets.c: two sets of points in one scene, at once or one after the other: what is known of
+ * one must hold for both. See scene.h.
  */
 #include "scene.h"
+
+#include <math.h>
+
+/* How much further from the box than the points queries may be that come later, and how many box
+ * vectors at least, before they need bounds of their own. Bounds that are so much wider cost next
+ * to nothing: they are some units in the last place. */
+#define FURTHER 4.0
+#define BOX_VECTORS 1024.0
 
 void
 hs_scene_join_clouds(hs_scene *scene, hs_scene *asking)
@@ -44,4 +52,63 @@ hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
                 points ? hs_larger(scene->upper[k], asking->upper[k]) : asking->upper[k];
         }
     }
+}
+
+static double
+largest_entry(const hs_lattice *lattice)
+{
+    double largest = 0.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int k = 0; k < lattice->ndim; k++) {
+            largest = hs_larger(largest, fabs(lattice->rows[r][k]));
+        }
+    }
+    return largest;
+}
+
+void
+hs_scene_make_room(hs_scene *scene, double *magnitude)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const double      away = BOX_VECTORS * largest_entry(lattice);
+    scene->cloud.largest = hs_larger(FURTHER * scene->cloud.largest, away);
+    *magnitude = hs_larger(FURTHER * *magnitude, away);
+    for (int k = 0; k < scene->ndim; k++) {
+        double across = 0.0; /* what is wrapped lies within half of each row */
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            across += 0.5 * fabs(lattice->rows[r][k]);
+        }
+        scene->x_largest[k] = 2.0 * hs_larger(scene->x_largest[k], across);
+    }
+}
+
+void
+hs_scene_widen_errors(hs_scene *scene)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        scene->t_error[k] *= 2.0; /* queries may be rounded to beyond another face */
+    }
+}
+
+bool
+hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
+{
+    const hs_scale scale = kept->scale;
+    if (kept->extreme || !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
+        return false;
+    }
+    /* Scaling down must not reach the subnormal numbers. */
+    return scale.exponent == 0 || cloud->largest == 0.0 ||
+           hs_scale_apply(scale, hs_cloud_smallest(cloud)) >= 0x1p-1022;
+}
+
+bool
+hs_scene_covers(const hs_scene *kept, const hs_scene *asking)
+{
+    bool covers = asking->x_error <= kept->x_error;
+    for (int k = 0; k < kept->ndim; k++) {
+        covers = covers && asking->x_largest[k] <= kept->x_largest[k] &&
+                 asking->t_error[k] <= kept->t_error[k];
+    }
+    return covers;
 }

@@ -51,9 +51,8 @@ build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse,
                : hs_bins_build(account, search->team, &search->options, scene, grid, bins);
 }
 
-/* The queries into cells of the same grid; their scene gives up its arrays. */
-static hs_status
-build_query_bins(hs_search *search, hs_scene *asking)
+hs_status
+hs_search_bin_queries(hs_search *search, hs_scene *asking)
 {
     hs_grid grid = search->grid; /* of which occupied cells are counted anew */
     return build_bins(search, asking, &grid, &search->query_sparse, &search->query_bins);
@@ -76,9 +75,28 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
         status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);
     }
     if (status == HS_OK && asking != NULL) {
-        status = build_query_bins(search, asking);
+        status = hs_search_bin_queries(search, asking);
     }
     return status;
+}
+
+void
+hs_search_set_asking(const hs_sets *sets, hs_search *search)
+{
+    const int64_t n = sets->points->n;
+    search->has_queries = sets->queries != NULL;
+    search->is_full = sets->is_full || search->has_queries;
+    search->n_in_all = search->has_queries ? sets->queries->n : n;
+    search->pairs_per_half = !search->is_full ? 1.0
+                             : n == 0         ? 0.0
+                                              : 2.0 * (double)search->n_in_all / (double)n;
+}
+
+void
+hs_search_settle(hs_search *search)
+{
+    search->filter_error = search->scene.x_error + search->grid.shift_error +
+                           search->scene.formula_error;
 }
 
 hs_status
@@ -90,13 +108,7 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
     if (search->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
-    const int64_t n_asking = asking != NULL ? sets->queries->n : sets->points->n;
-    search->has_queries = asking != NULL;
-    search->is_full = sets->is_full || asking != NULL;
-    search->pairs_per_half = !search->is_full      ? 1.0
-                             : sets->points->n == 0
-                                 ? 0.0
-                                 : 2.0 * (double)n_asking / (double)sets->points->n;
+    hs_search_set_asking(sets, search);
     hs_status status = hs_scene_init_sets(&search->account, search->team, sets, box, options,
                                           &search->scene, asking, failure);
     if (status == HS_OK) {
@@ -106,9 +118,7 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
         }
     }
     if (status == HS_OK) {
-        search->n_in_all = n_asking;
-        search->filter_error = search->scene.x_error + search->grid.shift_error +
-                               search->scene.formula_error;
+        hs_search_settle(search);
     }
     return status;
 }
@@ -143,6 +153,12 @@ hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                hs_search *search, hs_failure *failure)
 {
+    if (sets->built != NULL) {
+        const hs_status status = hs_search_reuse(sets, options, search, failure);
+        if (status != HS_STATUS_END) {
+            return status;
+        }
+    }
     hs_search_begin(options, search);
     const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
     search->team = hs_team_create(hs_search_threads(sets->points->n + n_queries, options));
@@ -184,10 +200,12 @@ void
 hs_search_close(hs_search *search)
 {
     hs_account *account = &search->account;
-    hs_scene_free(account, &search->scene);
     hs_stencil_free(account, &search->stencil);
-    hs_bins_free(account, &search->bins);
-    hs_sparse_free(account, &search->sparse);
+    if (!search->is_borrowed) {
+        hs_scene_free(account, &search->scene);
+        hs_bins_free(account, &search->bins);
+        hs_sparse_free(account, &search->sparse);
+    }
     if (search->has_queries) {
         hs_bins_free(account, &search->query_bins);
         hs_sparse_free(account, &search->query_sparse);

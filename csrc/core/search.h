@@ -23,6 +23,7 @@ typedef struct hs_search {
     hs_bins          bins;
     hs_sparse        sparse;  /* when is_sparse: the rows and cells that bins follows */
     bool             is_full; /* every asking point meets all its neighbours, not the half list */
+    bool             is_borrowed; /* the cells and all of the scene belong to another search */
     bool             has_queries;  /* then these ask, in the cells of the same grid: */
     hs_bins          query_bins;
     hs_sparse        query_sparse;
@@ -39,8 +40,8 @@ typedef struct hs_search {
 } hs_search;
 
 /*
- * Everything up to the first group: hs_search_begin, the team, hs_search_build. On failure nothing
- * is held but the account, which the caller closes in any case. The options are copied; what they
+ * Everything up to the first group: hs_search_begin, the team, hs_search_build; or what can be
+ * reused of sets->built. On failure nothing is held but the account, which the caller closes in any case. The options are copied; what they
  * point to is borrowed until hs_search_close; the points are not needed any more.
  */
 hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
@@ -64,6 +65,21 @@ hs_search_asking(const hs_search *search)
 {
     return search->has_queries ? &search->query_bins : &search->bins;
 }
+
+/*
+ * A search among the points of another one, which was made to be kept, stays as it is and must
+ * outlive this one; reuse.c. The queries of the sets ask, or the points. HS_STATUS_END when it
+ * cannot serve them: the cutoff is larger than its own, or its bounds do not hold for the queries.
+ * Else as hs_search_open.
+ */
+hs_status hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *search,
+                          hs_failure *failure);
+
+/* Steps that builds share: who asks; the queries into cells, their scene giving up its arrays; what
+ * follows from scene and grid. */
+void      hs_search_set_asking(const hs_sets *sets, hs_search *search);
+hs_status hs_search_bin_queries(hs_search *search, hs_scene *asking);
+void      hs_search_settle(hs_search *search);
 
 /* How many threads these options mean for so many points. */
 int hs_search_threads(int64_t n_points, const hs_options *options);

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
+#include "fpenv.h"
+#include "pairs.h"
+#include "poll.h"
+
+#include <string.h>
+
+struct hs_cells {
+    hs_search search; /* open, never walked itself: calls borrow from it */
+    hs_points points; /* of `copy` */
+    hs_box    box;
+    bool      has_box;
+    double   *copy;   /* owned; points as given, for cutoffs and queries that need other cells */
+};
+
+static void
+copy_points(const hs_points *points, double *copy)
+{
+    for (int64_t i = 0; i < points->n; i++) {
+        const char *row = (const char *)points->data + i * points->row_stride;
+        for (int k = 0; k < points->ndim; k++) {
+            const char *entry = row + k * points->column_stride;
+            if (points->real == HS_FLOAT32) {
+                float value;
+                memcpy(&value, entry, sizeof value);
+                *copy++ = value;
+            } else {
+                memcpy(copy++, entry, sizeof *copy);
+            }
+        }
+    }
+}
+
+/* The points in memory of our own: nobody changes them while they are asked. */
+static hs_status
+keep_points(const hs_points *points, hs_cells *cells, hs_failure *failure)
+{
+    const int64_t width = points->ndim * (int64_t)sizeof(double);
+    if (points->n > INT32_MAX) {
+        failure->value = (double)points->n;
+        return HS_ERR_TOO_MANY;
+    }
+    cells->copy = hs_alloc(&cells->search.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
+    if (cells->copy == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    copy_points(points, cells->copy);
+    cells->points = (hs_points){.data = cells->copy,
+                                .n = points->n,
+                                .ndim = points->ndim,
+                                .real = HS_FLOAT64,
+                                .row_stride = (ptrdiff_t)width,
+                                .column_stride = sizeof(double)};
+    return HS_OK;
+}
+
+/* The options that cells are built with: whatever may be asked for later is kept. */
+static hs_options
+options_of_cells(const hs_options *options)
+{
+    hs_options of_cells = *options;
+    of_cells.want = HS_WANT_SHIFT;
+    of_cells.sorted = false;
+    of_cells.out = NULL;
+    return of_cells;
+}
+
+static hs_status
+build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
+            hs_failure *failure)
+{
+    const hs_options of_cells = options_of_cells(options);
+    hs_search       *search = &cells->search;
+    hs_search_begin(&of_cells, search);
+    hs_status status = keep_points(points, cells, failure);
+    if (status == HS_OK) {
+        const hs_sets sets = {.points = &cells->points, .is_kept = true};
+        search->team = hs_team_create(hs_search_threads(points->n, options));
+        status = hs_search_build(&sets, cells->has_box ? &cells->box : NULL, search, failure);
+        hs_team_free(search->team);
+        search->team = NULL;
+    }
+    /* What they point to is the caller's again. */
+    hs_search_report(search, 0);
+    search->options.poll = NULL;
+    search->options.counters = NULL;
+    search->options.kernel = NULL;
+    return status;
+}
+
+hs_status
+hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
+               hs_cells **result, hs_failure *failure)
+{
+    hs_failure ignored;
+    *result = NULL;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
+    if (cells == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    cells->copy = NULL;
+    cells->has_box = box != NULL;
+    if (box != NULL) {
+        cells->box = *box;
+    }
+    const hs_fpenv  saved = hs_fpenv_enter();
+    const hs_status status = build_cells(points, options, cells, failure);
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_cells_free(cells);
+        return status;
+    }
+    *result = cells;
+    return HS_OK;
+}
+
+void
+hs_cells_free(hs_cells *cells)
+{
+    if (cells == NULL) {
+        return;
+    }
+    hs_search_close(&cells->search);
+    hs_free(&cells->search.account, cells->copy);
+    hs_account_close(&cells->search.account);
+    hs_free(NULL, cells);
+}
+
+/* Queries, or NULL, among the points of the cells. */
+static hs_sets
+sets_of(const hs_cells *cells, const hs_points *queries, bool is_full)
+{
+    return (hs_sets){.points = &cells->points,
+                     .queries = queries,
+                     .is_full = is_full,
+                     .built = &cells->search};
+}
+
+static const hs_box *
+box_of(const hs_cells *cells)
+{
+    return cells->has_box ? &cells->box : NULL;
+}
+
+hs_status
+hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
+               hs_failure *failure)
+{
+    const hs_sets sets = sets_of(cells, NULL, false);
+    return hs_pairs_find_in(&sets, box_of(cells), options, pairs, failure);
+}
+
+hs_status
+hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+               int64_t *count, hs_failure *failure)
+{
+    const hs_sets sets = sets_of(cells, queries, queries != NULL);
+    return queries != NULL
+               ? hs_between_count_in(&sets, box_of(cells), options, count, failure)
+               : hs_pairs_count_in(&sets, box_of(cells), options, count, failure);
+}
+
+hs_status
+hs_cells_neighbors(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+                   hs_pairs **rows, hs_failure *failure)
+{
+    const hs_sets sets = sets_of(cells, queries, true);
+    return hs_neighbors_find_in(&sets, box_of(cells), options, rows, failure);
+}
+
+hs_status
+hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
+                         const hs_options *options, int64_t *counts, hs_failure *failure)
+{
+    const hs_sets sets = sets_of(cells, queries, true);
+    return hs_neighbors_count_in(&sets, box_of(cells), options, counts, failure);
+}

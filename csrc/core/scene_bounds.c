@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * scene_bounds.c: how far what the search computes with can be from the numbers that were given,
+ * and what decides then. See scene.h.
+ */
+#include "scene.h"
+
+#include <math.h>
+
+#define UNIT 0x1p-53 /* unit roundoff of float64 */
+
+void
+hs_scene_settle_ranges(hs_scene *scene)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0) {
+            const double half = 0.5 * scene->lattice.period[k];
+            /* Points that rounding left outside are binned on the face: an error of t. */
+            scene->t_error[k] += hs_larger(
+                hs_larger(scene->upper[k] - half, -half - scene->lower[k]), 0.0);
+            scene->lower[k] = -half;
+            scene->upper[k] = half;
+        }
+    }
+}
+
+void
+hs_scene_bound_errors(hs_scene *scene, double magnitude)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    double            largest = 0.0;
+    for (int k = 0; k < scene->ndim; k++) {
+        largest = hs_larger(scene->x_largest[k], largest);
+    }
+    scene->x_error = scene->extreme ? HS_SCALING_LOSS : 0.0;
+    if (!lattice->aligned) {
+        const double terms = 2 * lattice->n_periodic + 2;
+        scene->x_error += 2.0 * UNIT * largest + terms * terms * 0x1p-104 * magnitude;
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        /* |normal| is 1 to rounding, so the error of a dot product is at most sqrt(d) x_error, plus
+         * its own rounding. */
+        scene->t_error[k] = lattice->aligned
+                                ? scene->x_error
+                                : 3.0 * scene->x_error + 4.0 * (scene->ndim + 2) * UNIT * largest;
+    }
+}
+
+/*
+ * precision="double" computes D in float64 from the points as given: each of its m + 2 terms is
+ * rounded to within 2^-53 of the largest partial sum. Candidates must be sought that much further
+ * out.
+ */
+static double
+bound_formula(const hs_scene *scene, double farthest)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    double            total = 2.0 * farthest;
+    if (lattice->n_periodic == 0) {
+        /* Differences of floats have a relative error only. */
+        return 4.0 * UNIT * scene->cutoff * scene->ndim;
+    }
+    double turns[HS_MAX_DIM]; /* bound on |shift| over row b of B of any pair in reach */
+    for (int k = 0; k < scene->ndim; k++) {
+        const int b = lattice->row_of_axis[k];
+        if (b >= 0) {
+            turns[b] = (2.0 * scene->ndim * total + scene->cutoff) / lattice->period[k] + 4.0;
+        }
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        double given_turns = 0.0, largest = 0.0;
+        for (int b = 0; b < lattice->n_periodic; b++) {
+            given_turns += turns[b] * fabs((double)lattice->U[b][r]);
+        }
+        for (int c = 0; c < scene->ndim; c++) {
+            largest = fmax(largest, fabs(lattice->scaled[r][c]));
+        }
+        total += given_turns * largest;
+    }
+    return (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
+}
+
+void
+hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest)
+{
+    scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene, largest) : 0.0;
+    scene->radius = scene->cutoff + scene->formula_error;
+}
+
+void
+hs_scene_init_metric(hs_scene *scene, const hs_options *options)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const double(*rows)[HS_MAX_DIM] = (const double(*)[HS_MAX_DIM])lattice->rows;
+    double cutoff = hs_scale_apply(scene->scale, options->cutoff);
+    if (scene->extreme) {
+        rows = (const double(*)[HS_MAX_DIM])lattice->given;
+        cutoff = options->cutoff;
+    } else if (scene->keeps_originals) {
+        rows = (const double(*)[HS_MAX_DIM])lattice->scaled;
+    }
+    hs_metric_init(&scene->metric, scene->ndim, lattice->n_periodic, rows, cutoff,
+                   options->inclusive);
+}
+
+void
+hs_scene_set_cutoff(hs_scene *scene, const hs_options *options)
+{
+    HS_ASSERT(!scene->extreme);
+    scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, options->cutoff);
+    hs_scene_set_radius(scene, options, scene->cloud.largest);
+    hs_scene_init_metric(scene, options);
+}

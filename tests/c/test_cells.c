@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * test_cells.c: cells that are kept give the answers of searches of their own, for any cutoff and
+ * any queries, and stay as they are.
+ */
+#include "harness.h"
+#include "pair_checks.h"
+#include "random_scenes.h"
+
+#include "../../csrc/core/memory.h"
+
+void test_cells(void);
+
+static bool
+same_array(const hs_pairs *a, const hs_pairs *b, unsigned which, size_t width)
+{
+    const int64_t n = hs_pairs_length(a);
+    return n == hs_pairs_length(b) &&
+           memcmp(hs_pairs_array(a, which), hs_pairs_array(b, which), (size_t)n * width) == 0;
+}
+
+static bool
+same_pairs(const hs_pairs *a, const hs_pairs *b, int ndim)
+{
+    const size_t d = (size_t)ndim;
+    return same_array(a, b, HS_WANT_I, 8) && same_array(a, b, HS_WANT_J, 8) &&
+           same_array(a, b, HS_WANT_DISTANCE, 8) && same_array(a, b, HS_WANT_VECTOR, 8 * d) &&
+           same_array(a, b, HS_WANT_SHIFT, 4 * d);
+}
+
+/* The half list; or rows, of queries that may be NULL. */
+static void
+compare_lists(const hs_cells *cells, const brute_scene *scene, const hs_options *options)
+{
+    const hs_points points = points_of(scene);
+    hs_pairs       *kept = NULL, *fresh = NULL;
+    hs_options      sorted = *options;
+    sorted.sorted = true;
+    const hs_status status = hs_pairs_find(&points, scene->box, &sorted, &fresh, NULL);
+    CHECK(hs_cells_pairs(cells, &sorted, &kept, NULL) == status);
+    if (status == HS_OK) {
+        int64_t count = -1;
+        CHECK(same_pairs(kept, fresh, scene->ndim));
+        CHECK(hs_cells_count(cells, NULL, options, &count, NULL) == HS_OK);
+        CHECK(count == hs_pairs_length(fresh));
+    }
+    hs_pairs_free(kept);
+    hs_pairs_free(fresh);
+}
+
+static void
+compare_rows(const hs_cells *cells, const brute_scene *scene, const hs_points *queries,
+             const hs_options *options)
+{
+    const hs_points points = points_of(scene);
+    hs_pairs       *kept = NULL, *fresh = NULL;
+    const hs_status status =
+        hs_neighbors_find(&points, queries, scene->box, options, &fresh, NULL);
+    CHECK(hs_cells_neighbors(cells, queries, options, &kept, NULL) == status);
+    if (status == HS_OK) {
+        const int64_t n = hs_pairs_rows(fresh);
+        CHECK(hs_pairs_rows(kept) == n);
+        CHECK(memcmp(hs_pairs_offsets(kept), hs_pairs_offsets(fresh),
+                     (size_t)(n + 1) * sizeof(int64_t)) == 0);
+        CHECK(same_pairs(kept, fresh, scene->ndim));
+    }
+    hs_pairs_free(kept);
+    hs_pairs_free(fresh);
+}
+
+static void
+any_cutoff_and_any_queries(void)
+{
+    harness_random      random = {20261121};
+    static random_scene s, other;
+    for (int trial = 0; trial < 480; trial++) {
+        const int ndim = 1 + trial / SCENE_KINDS % 5;
+        const int n = random_below(&random, ndim <= 3 ? 50 : 10);
+        hs_cells *cells = NULL;
+        make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, trial % 13 ? 0 : 200, &s);
+        make_scene(&random, SCENE_OPEN, ndim, n, trial % 3 ? 4.0 : 4000.0,
+                   trial % 13 ? 0 : 200, &other);
+        const hs_points points = points_of(&s.scene), queries = points_of(&other.scene);
+        hs_options      options = options_of(&s.scene);
+        options.precision = trial % 9 == 0 ? HS_DOUBLE : HS_EXACT;
+        CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
+        const double cutoffs[] = {s.scene.cutoff, 0.5 * s.scene.cutoff, 0.01 * s.scene.cutoff,
+                                  0.0, 1.25 * s.scene.cutoff};
+        options.want = WANT_ALL;
+        options.threads = 1 + trial % 2;
+        for (int c = 0; c < 5; c++) {
+            options.cutoff = cutoffs[c];
+            compare_lists(cells, &s.scene, &options);
+            compare_rows(cells, &s.scene, NULL, &options);
+            compare_rows(cells, &s.scene, &queries, &options);
+        }
+        hs_cells_free(cells);
+    }
+}
+
+/* Clusters a long way apart, where only occupied cells are stored. */
+static void
+cells_that_are_few_and_far_between(void)
+{
+    enum { N = 3000 };
+    static double  x[3 * N], y[3 * N];
+    harness_random random = {8};
+    brute_scene    scene = {.ndim = 3, .n = N, .x = x, .inclusive = true, .cutoff = 0.1};
+    brute_scene    asking = {.ndim = 3, .n = N, .x = y};
+    hs_cells      *cells = NULL;
+    for (int e = 0; e < 3 * N; e++) {
+        const double away = e / 3 % 2 ? 1e9 : 0.0;
+        x[e] = random_unit(&random) + away;
+        y[e] = 1.2 * random_unit(&random) + (e / 3 % 3 ? away : -2e9);
+    }
+    const hs_points points = points_of(&scene), queries = points_of(&asking);
+    hs_options      options = options_of(&scene);
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+    options.want = WANT_ALL;
+    for (int c = 0; c < 3; c++) {
+        options.cutoff = c == 0 ? 0.1 : c == 1 ? 0.05 : 0.11;
+        compare_lists(cells, &scene, &options);
+        compare_rows(cells, &scene, NULL, &options);
+        compare_rows(cells, &scene, &queries, &options);
+    }
+    hs_cells_free(cells);
+}
+
+static void
+points_may_change_once_they_are_in_cells(void)
+{
+    double      x[4] = {0.0, 0.25, 0.5, 0.75};
+    brute_scene scene = {.ndim = 1, .n = 4, .x = x, .inclusive = true, .cutoff = 0.25};
+    hs_points   points = points_of(&scene);
+    hs_options  options = options_of(&scene);
+    hs_cells   *cells = NULL;
+    int64_t     count = -1;
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+    x[0] = x[1] = NAN;
+    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 3);
+    options.cutoff = 1.0; /* by cells that are made for this call */
+    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 6);
+    hs_cells_free(cells);
+}
+
+static void
+failures_leave_nothing_behind(void)
+{
+    static random_scene s;
+    harness_random      random = {99};
+    hs_cells           *cells = NULL;
+    make_scene(&random, SCENE_TRICLINIC, 3, 40, 4.0, 0, &s);
+    const hs_points points = points_of(&s.scene);
+    hs_options      options = options_of(&s.scene);
+    const int64_t   before = hs_test_live_blocks();
+    hs_status       status = HS_ERR_MEMORY;
+    for (int64_t nth = 1; status == HS_ERR_MEMORY && nth < 1000; nth++) {
+        hs_pairs *rows = NULL;
+        hs_test_fail_allocation(nth);
+        status = hs_cells_build(&points, s.scene.box, &options, &cells, NULL);
+        if (status == HS_OK) {
+            status = hs_cells_neighbors(cells, &points, &options, &rows, NULL);
+        }
+        hs_test_fail_allocation(0);
+        hs_pairs_free(rows);
+        hs_cells_free(cells);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(status == HS_OK);
+}
+
+void
+test_cells(void)
+{
+    RUN(any_cutoff_and_any_queries);
+    RUN(cells_that_are_few_and_far_between);
+    RUN(points_may_change_once_they_are_in_cells);
+    RUN(failures_leave_nothing_behind);
+}
