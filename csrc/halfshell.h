@@ -269,6 +269,42 @@ hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queri
                                    hs_failure *failure);
 
 /*
+ * The layout of cells: points order[start[c]] to order[start[c + 1] - 1] are in cell c, ascending.
+ * Cell ids run along the first axis fastest; in dense layouts that is all there is to them, in
+ * those of occupied cells only hs_cells_indices tells where each one lies. Arrays are borrowed from
+ * the cells.
+ */
+typedef struct hs_layout {
+    int            ndim;
+    int64_t        n_points;
+    int64_t        n_cells;
+    int64_t        shape[HS_MAX_DIM];     /* cells along each axis, occupied or not */
+    double         cell_size[HS_MAX_DIM]; /* extent across the faces of that axis */
+    bool           occupied_only;         /* cells that hold no point have no id */
+    const int32_t *start;                 /* n_cells + 1 */
+    const int32_t *order;                 /* n_points */
+} hs_layout;
+
+void hs_cells_layout(const hs_cells *cells, hs_layout *layout);
+
+/* Indices of each cell along the axes. indices: n_cells * ndim. */
+void hs_cells_indices(const hs_cells *cells, int64_t *indices);
+
+/* The cell that each point would be in, wrapped into the box; those beyond an open face count as on
+ * it. -1 where only occupied cells have ids and this one is not. cell: n. */
+hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell,
+                        hs_failure *failure);
+
+/*
+ * The raw block of cells around each query (NULL: each point), without a distance test: ranges of
+ * `order` that hold at least all points within the cutoff, images included, as HS_WANT_I (first)
+ * and HS_WANT_J (end, not included) of rows as of hs_neighbors_find. A range may come more than
+ * once, for several images. HS_ERR_CUTOFF for a cutoff or queries that the cells cannot serve.
+ */
+hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
+                              const hs_options *options, hs_pairs **ranges, hs_failure *failure);
+
+/*
  * Several systems, searched in one call: system s has points first[s] to first[s + 1] and no pair
  * with another. All arrays are borrowed.
  */

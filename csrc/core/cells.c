@@ -1,18 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
+#include "cells.h"
 #include "fpenv.h"
-#include "pairs.h"
 #include "poll.h"
 
 #include <string.h>
-
-struct hs_cells {
-    hs_search search; /* open, never walked itself: calls borrow from it */
-    hs_points points; /* of `copy` */
-    hs_box    box;
-    bool      has_box;
-    double   *copy;   /* owned; points as given, for cutoffs and queries that need other cells */
-};
 
 static void
 copy_points(const hs_points *points, double *copy)
@@ -129,9 +121,8 @@ hs_cells_free(hs_cells *cells)
     hs_free(NULL, cells);
 }
 
-/* Queries, or NULL, among the points of the cells. */
-static hs_sets
-sets_of(const hs_cells *cells, const hs_points *queries, bool is_full)
+hs_sets
+hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full)
 {
     return (hs_sets){.points = &cells->points,
                      .queries = queries,
@@ -149,7 +140,7 @@ hs_status
 hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
                hs_failure *failure)
 {
-    const hs_sets sets = sets_of(cells, NULL, false);
+    const hs_sets sets = hs_cells_sets(cells, NULL, false);
     return hs_pairs_find_in(&sets, box_of(cells), options, pairs, failure);
 }
 
@@ -157,7 +148,7 @@ hs_status
 hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options *options,
                int64_t *count, hs_failure *failure)
 {
-    const hs_sets sets = sets_of(cells, queries, queries != NULL);
+    const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
     return queries != NULL
                ? hs_between_count_in(&sets, box_of(cells), options, count, failure)
                : hs_pairs_count_in(&sets, box_of(cells), options, count, failure);
@@ -167,7 +158,7 @@ hs_status
 hs_cells_neighbors(const hs_cells *cells, const hs_points *queries, const hs_options *options,
                    hs_pairs **rows, hs_failure *failure)
 {
-    const hs_sets sets = sets_of(cells, queries, true);
+    const hs_sets sets = hs_cells_sets(cells, queries, true);
     return hs_neighbors_find_in(&sets, box_of(cells), options, rows, failure);
 }
 
@@ -175,6 +166,6 @@ hs_status
 hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
                          const hs_options *options, int64_t *counts, hs_failure *failure)
 {
-    const hs_sets sets = sets_of(cells, queries, true);
+    const hs_sets sets = hs_cells_sets(cells, queries, true);
     return hs_neighbors_count_in(&sets, box_of(cells), options, counts, failure);
 }

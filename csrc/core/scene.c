@@ -263,6 +263,23 @@ hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs
     return status;
 }
 
+hs_status
+hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
+                      const hs_options *options, hs_scene *scene, hs_failure *failure)
+{
+    double magnitude = 0.0;
+    start_scene(points, scene);
+    hs_status status = hs_cloud_load(account, NULL, points, options, &scene->cloud, failure);
+    if (status == HS_OK) {
+        hs_scene_share(kept, scene);
+        status = wrap_points(account, NULL, options, scene, &magnitude, failure);
+    }
+    if (status != HS_OK) {
+        hs_scene_free(account, scene);
+    }
+    return status;
+}
+
 /* Reads both clouds, the other one if there is one. */
 static hs_status
 load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_options *options,

@@ -95,6 +95,12 @@ hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept
                         const hs_points *queries, const hs_options *options, hs_scene *asking,
                         hs_failure *failure);
 
+/* Points wrapped as those of a scene that was kept, however far away they are: for their cells
+ * alone. On failure it holds nothing. */
+hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept,
+                                const hs_points *points, const hs_options *options,
+                                hs_scene *scene, hs_failure *failure);
+
 /* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 

@@ -126,6 +126,80 @@ cells_that_are_few_and_far_between(void)
     hs_cells_free(cells);
 }
 
+/* Every neighbour of a query is in one of its ranges. */
+static bool
+ranges_hold_rows(const hs_layout *layout, const hs_pairs *ranges, const hs_pairs *rows)
+{
+    const int64_t *range_of = hs_pairs_offsets(ranges), *row_of = hs_pairs_offsets(rows);
+    const int64_t *first = hs_pairs_array(ranges, HS_WANT_I);
+    const int64_t *end = hs_pairs_array(ranges, HS_WANT_J);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    for (int64_t q = 0; q < hs_pairs_rows(rows); q++) {
+        for (int64_t e = row_of[q]; e < row_of[q + 1]; e++) {
+            bool found = false;
+            for (int64_t r = range_of[q]; r < range_of[q + 1]; r++) {
+                for (int64_t si = first[r]; si < end[r]; si++)
+                    found = found || layout->order[si] == j[e];
+            }
+            if (!found)
+                return false;
+        }
+    }
+    return true;
+}
+
+/* The layout is what it says: a permutation, in ascending cells, each point in its own. */
+static void
+check_layout(const hs_cells *cells, const hs_points *points, const hs_layout *layout)
+{
+    int64_t *cell = array_of(points->n, sizeof(int64_t));
+    bool    *met = array_of(points->n, sizeof(bool));
+    memset(met, 0, (size_t)points->n);
+    CHECK(layout->n_points == points->n && layout->start[0] == 0);
+    CHECK(layout->start[layout->n_cells] == points->n);
+    CHECK(hs_cells_find(cells, points, cell, NULL) == HS_OK);
+    for (int64_t c = 0; c < layout->n_cells; c++) {
+        for (int64_t si = layout->start[c]; si < layout->start[c + 1]; si++) {
+            const int32_t i = layout->order[si];
+            CHECK(i >= 0 && i < points->n && !met[i]);
+            CHECK(si == layout->start[c] || layout->order[si - 1] < i);
+            CHECK(cell[i] == c);
+            met[i] = true;
+        }
+    }
+    free(met);
+    free(cell);
+}
+
+static void
+the_layout_is_visible_and_holds_all_neighbours(void)
+{
+    harness_random      random = {314};
+    static random_scene s, other;
+    for (int trial = 0; trial < 120; trial++) {
+        const int ndim = 1 + trial / SCENE_KINDS % 4, n = 1 + random_below(&random, 120);
+        hs_cells *cells = NULL;
+        hs_pairs *ranges = NULL, *rows = NULL;
+        hs_layout layout;
+        make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, 0, &s);
+        make_scene(&random, SCENE_OPEN, ndim, 20, 4.0, 0, &other);
+        const hs_points points = points_of(&s.scene), queries = points_of(&other.scene);
+        const hs_points *asking = trial % 2 ? &queries : NULL;
+        hs_options       options = options_of(&s.scene);
+        options.cutoff *= 0.5;
+        CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
+        hs_cells_layout(cells, &layout);
+        check_layout(cells, &points, &layout);
+        options.want = HS_WANT_J;
+        CHECK(hs_cells_neighbors(cells, asking, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_cells_candidates(cells, asking, &options, &ranges, NULL) == HS_OK);
+        CHECK(ranges_hold_rows(&layout, ranges, rows));
+        hs_pairs_free(rows);
+        hs_pairs_free(ranges);
+        hs_cells_free(cells);
+    }
+}
+
 static void
 points_may_change_once_they_are_in_cells(void)
 {
@@ -174,6 +248,7 @@ test_cells(void)
 {
     RUN(any_cutoff_and_any_queries);
     RUN(cells_that_are_few_and_far_between);
+    RUN(the_layout_is_visible_and_holds_all_neighbours);
     RUN(points_may_change_once_they_are_in_cells);
     RUN(failures_leave_nothing_behind);
 }
