@@ -19,13 +19,33 @@ raise_with_number(PyObject *type, const char *format, double value)
     return NULL;
 }
 
+/* The argument that a failure's row is of. */
+static const char *
+set_of(const hs_failure *failure)
+{
+    return failure->in_queries ? "queries" : "points";
+}
+
 static PyObject *
-raise_at(const char *format, const hs_failure *failure)
+raise_not_finite(const hs_failure *failure)
 {
     PyObject *number = PyFloat_FromDouble(failure->value);
     if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, format, (long long)failure->row,
+        PyErr_Format(PyExc_ValueError, "%s must be finite, got %s[%lld, %lld] = %R",
+                     set_of(failure), set_of(failure), (long long)failure->row,
                      (long long)failure->column, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_box(const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError, "box must be finite, got box[%lld, %lld] = %R",
+                     (long long)failure->row, (long long)failure->column, number);
         Py_DECREF(number);
     }
     return NULL;
@@ -158,12 +178,9 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
         return raise_with_number(PyExc_ValueError,
                                  "cutoff must be finite and not negative, got %R",
                                  failure->value);
-    case HS_ERR_NOT_FINITE:
-        return raise_at("points must be finite, got points[%lld, %lld] = %R", failure);
+    case HS_ERR_NOT_FINITE: return raise_not_finite(failure);
     case HS_ERR_BOX_FINITE:
-        return failure->system >= 0
-                   ? raise_box_of_system(failure)
-                   : raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
+        return failure->system >= 0 ? raise_box_of_system(failure) : raise_box(failure);
     case HS_ERR_BOX_DEPENDENT: return raise_dependent(failure);
     case HS_ERR_TOO_MANY:
         return raise_with_number(PyExc_OverflowError,
@@ -171,9 +188,9 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                                  failure->value);
     case HS_ERR_SHIFT_RANGE:
         PyErr_Format(PyExc_OverflowError,
-                     "points[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
+                     "%s[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
                      "and S holds 2**31; wrap the points first",
-                     (long long)failure->row);
+                     set_of(failure), (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
     case HS_ERR_CAPACITY: return raise_capacity(failure);
