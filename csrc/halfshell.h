@@ -37,6 +37,7 @@ typedef enum hs_status {
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_KERNEL,        /* no kernel of that name on this CPU */
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
+    HS_ERR_FAR,           /* queries lie too far away for cells that were made without them */
     HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
     HS_STATUS_END         /* number of codes, not a code */
 } hs_status;
@@ -255,6 +256,10 @@ hs_status hs_cells_build(const hs_points *points, const hs_box *box, const hs_op
 /* NULL-safe. */
 void hs_cells_free(hs_cells *cells);
 
+/* The points of the cells, as float64, and their box, or NULL; borrowed from the cells. */
+void          hs_cells_points(const hs_cells *cells, hs_points *points);
+const hs_box *hs_cells_box(const hs_cells *cells);
+
 /* As hs_pairs_find, hs_pairs_count or, with queries that are not NULL, hs_between_count,
  * hs_neighbors_find and hs_neighbors_count for these points. counters tell what the call took, not
  * what the cells hold. */
@@ -299,7 +304,8 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * The raw block of cells around each query (NULL: each point), without a distance test: ranges of
  * `order` that hold at least all points within the cutoff, images included, as HS_WANT_I (first)
  * and HS_WANT_J (end, not included) of rows as of hs_neighbors_find. A range may come more than
- * once, for several images. HS_ERR_CUTOFF for a cutoff or queries that the cells cannot serve.
+ * once, for several images. HS_ERR_CUTOFF for a cutoff that the cells cannot serve, HS_ERR_FAR for
+ * queries that they cannot: some four times further away than the points and 1024 box vectors.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);

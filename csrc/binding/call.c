@@ -113,6 +113,24 @@ hs_call_init(hs_call *call, PyObject *const *arguments)
     return hs_call_init_sets(call, arguments, Py_None);
 }
 
+/* Points and box: arrays, or what cells hold. */
+static bool
+take_scene(PyObject *points, PyObject *box, PyObject *periodic, hs_call *call)
+{
+    call->cells = hs_cells_of(points);
+    if (call->cells != NULL) {
+        const hs_box *of_cells = hs_cells_box(call->cells);
+        hs_cells_points(call->cells, &call->points);
+        call->has_box = of_cells != NULL;
+        if (call->has_box) {
+            call->box = *of_cells;
+        }
+        return true;
+    }
+    return hs_points_of(points, "points", &call->points) &&
+           hs_box_of(box, periodic, call->points.ndim, &call->box, &call->has_box);
+}
+
 bool
 hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries)
 {
@@ -120,10 +138,8 @@ hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries)
     call->thread = NULL;
     hs_options *options = &call->options;
     const int   inclusive = PyObject_IsTrue(arguments[4]);
-    if (inclusive < 0 || !hs_points_of(arguments[0], "points", &call->points) ||
-        !take_queries(queries, call) ||
-        !hs_cutoff_of(arguments[1], &options->cutoff) ||
-        !hs_box_of(arguments[2], arguments[3], call->points.ndim, &call->box, &call->has_box) ||
+    if (inclusive < 0 || !take_scene(arguments[0], arguments[2], arguments[3], call) ||
+        !take_queries(queries, call) || !hs_cutoff_of(arguments[1], &options->cutoff) ||
         !hs_precision_of(arguments[5], &options->precision) ||
         !hs_kernel_of(arguments[6], &options->kernel) ||
         !take_memory_limit(arguments[7], options) ||
@@ -152,4 +168,45 @@ hs_call_acquire(hs_call *call)
         PyEval_RestoreThread(call->thread);
         call->thread = NULL;
     }
+}
+
+hs_status
+hs_call_find_pairs(hs_call *call, hs_pairs **pairs, hs_failure *failure)
+{
+    return call->cells != NULL
+               ? hs_cells_pairs(call->cells, &call->options, pairs, failure)
+               : hs_pairs_find(&call->points, hs_call_box(call), &call->options, pairs, failure);
+}
+
+hs_status
+hs_call_find_rows(hs_call *call, hs_pairs **rows, hs_failure *failure)
+{
+    const hs_points *queries = hs_call_queries(call);
+    return call->cells != NULL
+               ? hs_cells_neighbors(call->cells, queries, &call->options, rows, failure)
+               : hs_neighbors_find(&call->points, queries, hs_call_box(call), &call->options, rows,
+                                   failure);
+}
+
+hs_status
+hs_call_count(hs_call *call, int64_t *count, hs_failure *failure)
+{
+    const hs_points  *queries = hs_call_queries(call);
+    const hs_box     *box = hs_call_box(call);
+    const hs_options *options = &call->options;
+    if (call->cells != NULL) {
+        return hs_cells_count(call->cells, queries, options, count, failure);
+    }
+    return queries != NULL ? hs_between_count(&call->points, queries, box, options, count, failure)
+                           : hs_pairs_count(&call->points, box, options, count, failure);
+}
+
+hs_status
+hs_call_count_rows(hs_call *call, int64_t *counts, hs_failure *failure)
+{
+    const hs_points *queries = hs_call_queries(call);
+    return call->cells != NULL
+               ? hs_cells_neighbors_count(call->cells, queries, &call->options, counts, failure)
+               : hs_neighbors_count(&call->points, queries, hs_call_box(call), &call->options,
+                                    counts, failure);
 }

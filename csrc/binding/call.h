@@ -10,18 +10,20 @@
 /* The arguments of a search, as views; the Python arguments that they borrow from must stay
  * alive. */
 typedef struct hs_call {
-    hs_points      points;
-    hs_points      queries;  /* when has_queries */
-    bool           has_queries;
-    hs_box         box;
-    bool           has_box;
-    hs_options     options;
-    PyObject      *progress; /* borrowed; called with the fraction done, or NULL */
-    PyThreadState *thread;   /* saved while the GIL is released, else NULL */
+    hs_points       points;
+    const hs_cells *cells;    /* borrowed: points and box are theirs; or NULL */
+    hs_points       queries;  /* when has_queries */
+    bool            has_queries;
+    hs_box          box;
+    bool            has_box;
+    hs_options      options;
+    PyObject       *progress; /* borrowed; called with the fraction done, or NULL */
+    PyThreadState  *thread;   /* saved while the GIL is released, else NULL */
 } hs_call;
 
 /*
- * Positional arguments of every search, in this order: points, cutoff, box, periodic, inclusive,
+ * Positional arguments of every search, in this order: points (or cells of cells_build, with None
+ * as box and 0 as periodic), cutoff, box, periodic, inclusive,
  * precision, kernel, memory_limit (None: ask the machine), progress (None: no calls), threads
  * (None: as many as pay). Returns false with an exception set.
  */
@@ -35,6 +37,12 @@ bool hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *quer
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_call_release(hs_call *call);
 void hs_call_acquire(hs_call *call);
+
+/* The searches of one set or two, in cells where the call has some. */
+hs_status hs_call_find_pairs(hs_call *call, hs_pairs **pairs, hs_failure *failure);
+hs_status hs_call_find_rows(hs_call *call, hs_pairs **rows, hs_failure *failure);
+hs_status hs_call_count(hs_call *call, int64_t *count, hs_failure *failure);
+hs_status hs_call_count_rows(hs_call *call, int64_t *counts, hs_failure *failure);
 
 /* The box, or NULL for open space. */
 static inline const hs_box *

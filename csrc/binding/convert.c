@@ -39,6 +39,13 @@ hs_points_of(PyObject *object, const char *name, hs_points *points)
     return true;
 }
 
+hs_cells *
+hs_cells_of(PyObject *object)
+{
+    return PyCapsule_IsValid(object, HS_CELLS_NAME) ? PyCapsule_GetPointer(object, HS_CELLS_NAME)
+                                                    : NULL;
+}
+
 bool
 hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given)
 {

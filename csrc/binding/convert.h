@@ -14,6 +14,10 @@
  * the argument, for messages. */
 bool hs_points_of(PyObject *object, const char *name, hs_points *points);
 
+/* The cells in an object of _core.cells_build, borrowed; NULL, without an exception, for others. */
+hs_cells *hs_cells_of(PyObject *object);
+#define HS_CELLS_NAME "halfshell.cells"
+
 /*
  * box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). periodic: int, bit
  * l set when box vector l repeats. *given tells whether there is a box at all.

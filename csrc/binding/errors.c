@@ -193,6 +193,11 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                      set_of(failure), (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
+    case HS_ERR_FAR:
+        PyErr_SetString(PyExc_ValueError,
+                        "queries lie too far from the points and the box for cells that were made "
+                        "without them: query() or pairs_between() have no such limit");
+        return NULL;
     case HS_ERR_CAPACITY: return raise_capacity(failure);
     case HS_ERR_INTERRUPTED:
         if (!PyErr_Occurred()) {

@@ -24,6 +24,16 @@ PyObject *hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize
 /* The arguments of call.h, queries or None. */
 PyObject *hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
+/* py_cells.c. The arguments of call.h -> cells, which stand for points and box afterwards. */
+PyObject *hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+/* cells -> dict of what is visible of them; the arrays are read-only and borrow from the cells. */
+PyObject *hs_py_cells_layout(PyObject *module, PyObject *cells);
+/* cells, points -> the cell of each point. */
+PyObject *hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+/* The arguments of call.h with cells, queries or None -> (offsets, (first, end)). */
+PyObject *hs_py_cells_candidates(PyObject *module, PyObject *const *arguments,
+                                 Py_ssize_t n_arguments);
+
 /* py_batch.c. The arguments of call.h (where each system has a box of its own, any one of that
  * shape), quantities, sort, index_bytes, out; batch, cutoffs or None, boxes or None. */
 PyObject *hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);

@@ -37,8 +37,7 @@ find_rows(hs_call *call)
     hs_failure failure;
     hs_pairs  *rows = NULL;
     hs_call_release(call);
-    const hs_status status = hs_neighbors_find(&call->points, hs_call_queries(call),
-                                               hs_call_box(call), &call->options, &rows, &failure);
+    const hs_status status = hs_call_find_rows(call, &rows, &failure);
     hs_call_acquire(call);
     if (status != HS_OK) {
         (void)hs_raise(status, &failure, &call->options);
@@ -77,8 +76,7 @@ hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
         return NULL;
     }
     hs_call_release(&call);
-    const hs_status status = hs_between_count(&call.points, hs_call_queries(&call),
-                                              hs_call_box(&call), &call.options, &count, &failure);
+    const hs_status status = hs_call_count(&call, &count, &failure);
     hs_call_acquire(&call);
     return status == HS_OK ? PyLong_FromLongLong(count)
                            : hs_raise(status, &failure, &call.options);
@@ -124,9 +122,8 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
         return NULL;
     }
     hs_call_release(&call);
-    const hs_status status = hs_neighbors_count(
-        &call.points, hs_call_queries(&call), hs_call_box(&call), &call.options,
-        PyArray_DATA((PyArrayObject *)counts), &failure);
+    const hs_status status =
+        hs_call_count_rows(&call, PyArray_DATA((PyArrayObject *)counts), &failure);
     hs_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(counts);

@@ -23,8 +23,7 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
         return NULL;
     }
     hs_call_release(&call);
-    const hs_status status =
-        hs_pairs_find(&call.points, hs_call_box(&call), &call.options, &pairs, &failure);
+    const hs_status status = hs_call_find_pairs(&call, &pairs, &failure);
     hs_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
@@ -49,8 +48,7 @@ hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         return NULL;
     }
     hs_call_release(&call);
-    const hs_status status =
-        hs_pairs_count(&call.points, hs_call_box(&call), &call.options, &count, &failure);
+    const hs_status status = hs_call_count(&call, &count, &failure);
     hs_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);

@@ -258,7 +258,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
         hs_search_close(search);
     } else if (status == HS_STATUS_END) {
         hs_search_begin(options, search); /* for hs_pairs_free */
-        status = HS_ERR_CUTOFF;
+        status = options->cutoff == cells->search.options.cutoff ? HS_ERR_FAR : HS_ERR_CUTOFF;
     }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {

@@ -121,6 +121,18 @@ hs_cells_free(hs_cells *cells)
     hs_free(NULL, cells);
 }
 
+void
+hs_cells_points(const hs_cells *cells, hs_points *points)
+{
+    *points = cells->points;
+}
+
+const hs_box *
+hs_cells_box(const hs_cells *cells)
+{
+    return cells->has_box ? &cells->box : NULL;
+}
+
 hs_sets
 hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full)
 {
@@ -130,18 +142,12 @@ hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full)
                      .built = &cells->search};
 }
 
-static const hs_box *
-box_of(const hs_cells *cells)
-{
-    return cells->has_box ? &cells->box : NULL;
-}
-
 hs_status
 hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
                hs_failure *failure)
 {
     const hs_sets sets = hs_cells_sets(cells, NULL, false);
-    return hs_pairs_find_in(&sets, box_of(cells), options, pairs, failure);
+    return hs_pairs_find_in(&sets, hs_cells_box(cells), options, pairs, failure);
 }
 
 hs_status
@@ -150,8 +156,8 @@ hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options
 {
     const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
     return queries != NULL
-               ? hs_between_count_in(&sets, box_of(cells), options, count, failure)
-               : hs_pairs_count_in(&sets, box_of(cells), options, count, failure);
+               ? hs_between_count_in(&sets, hs_cells_box(cells), options, count, failure)
+               : hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
 }
 
 hs_status
@@ -159,7 +165,7 @@ hs_cells_neighbors(const hs_cells *cells, const hs_points *queries, const hs_opt
                    hs_pairs **rows, hs_failure *failure)
 {
     const hs_sets sets = hs_cells_sets(cells, queries, true);
-    return hs_neighbors_find_in(&sets, box_of(cells), options, rows, failure);
+    return hs_neighbors_find_in(&sets, hs_cells_box(cells), options, rows, failure);
 }
 
 hs_status
@@ -167,5 +173,5 @@ hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
                          const hs_options *options, int64_t *counts, hs_failure *failure)
 {
     const hs_sets sets = hs_cells_sets(cells, queries, true);
-    return hs_neighbors_count_in(&sets, box_of(cells), options, counts, failure);
+    return hs_neighbors_count_in(&sets, hs_cells_box(cells), options, counts, failure);
 }

@@ -4,6 +4,7 @@
 from halfshell._between import pairs_between
 from halfshell._box import Box
 from halfshell._cache import clear_cache, set_cache_limit
+from halfshell._cells import CellList
 from halfshell._count import count_pairs
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
@@ -18,6 +19,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Box",
     "CapacityError",
+    "CellList",
     "Explanation",
     "NeighborTable",
     "Verdict",

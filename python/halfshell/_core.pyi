@@ -188,6 +188,35 @@ def plain_neighbors(
     queries: Any,
     /,
 ) -> Any: ...  # as neighbors, or NotImplemented
+def cells_build(
+    points: npt.NDArray[Any],
+    cutoff: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    /,
+) -> Any: ...  # a capsule, which stands for points and box in the searches above
+def cells_layout(cells: Any, /) -> dict[str, Any]: ...
+def cells_find(cells: Any, points: npt.NDArray[Any], /) -> npt.NDArray[np.int64]: ...
+def cells_candidates(
+    cells: Any,
+    cutoff: float,
+    box: None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    queries: npt.NDArray[Any] | None,
+    /,
+) -> tuple[npt.NDArray[np.int64], ...]: ...
 def batch_pairs(
     points: npt.NDArray[Any],
     cutoff: float,

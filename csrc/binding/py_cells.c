@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_cells.c: cells that are kept: building them, looking at them. Searches take them in place of
+ * points. */
+#include "py_functions.h"
+
+#include "call.h"
+#include "convert.h"
+#include "errors.h"
+#include "outputs.h"
+
+static void
+free_cells(PyObject *capsule)
+{
+    hs_cells_free(hs_cells_of(capsule));
+}
+
+PyObject *
+hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call    call;
+    hs_failure failure;
+    hs_cells  *cells = NULL;
+    (void)module;
+    if (n_arguments != HS_CALL_ARGUMENTS) {
+        PyErr_Format(PyExc_TypeError, "cells_build takes %d arguments", HS_CALL_ARGUMENTS);
+        return NULL;
+    }
+    if (!hs_call_init(&call, arguments)) {
+        return NULL;
+    }
+    hs_call_release(&call);
+    const hs_status status =
+        hs_cells_build(&call.points, hs_call_box(&call), &call.options, &cells, &failure);
+    hs_call_acquire(&call);
+    if (status != HS_OK) {
+        return hs_raise(status, &failure, &call.options);
+    }
+    PyObject *capsule = PyCapsule_New(cells, HS_CELLS_NAME, free_cells);
+    if (capsule == NULL) {
+        hs_cells_free(cells);
+    }
+    return capsule;
+}
+
+/* A read-only array of int32 that borrows from the cells and keeps them alive. */
+static PyObject *
+view_of(PyObject *capsule, const int32_t *data, int64_t n)
+{
+    npy_intp  shape = (npy_intp)n;
+    PyObject *array = PyArray_SimpleNewFromData(1, &shape, NPY_INT32, (void *)(uintptr_t)data);
+    if (array == NULL) {
+        return NULL;
+    }
+    PyArray_CLEARFLAGS((PyArrayObject *)array, NPY_ARRAY_WRITEABLE);
+    Py_INCREF(capsule);
+    if (PyArray_SetBaseObject((PyArrayObject *)array, capsule) < 0) {
+        Py_DECREF(array);
+        return NULL;
+    }
+    return array;
+}
+
+/* Indices of occupied cells along the axes; None where all cells have an id. */
+static PyObject *
+indices_of(const hs_cells *cells, const hs_layout *layout)
+{
+    npy_intp shape[2] = {(npy_intp)layout->n_cells, layout->ndim};
+    if (!layout->occupied_only) {
+        Py_RETURN_NONE;
+    }
+    PyObject *array = PyArray_SimpleNew(2, shape, NPY_INT64);
+    if (array != NULL) {
+        hs_cells_indices(cells, PyArray_DATA((PyArrayObject *)array));
+        PyArray_CLEARFLAGS((PyArrayObject *)array, NPY_ARRAY_WRITEABLE);
+    }
+    return array;
+}
+
+static PyObject *
+tuple_of_integers(const int64_t *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        PyObject *value = PyLong_FromLongLong(values[k]);
+        if (value == NULL) {
+            Py_CLEAR(tuple);
+            break;
+        }
+        PyTuple_SET_ITEM(tuple, k, value);
+    }
+    return tuple;
+}
+
+static PyObject *
+tuple_of_reals(const double *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        PyObject *value = PyFloat_FromDouble(values[k]);
+        if (value == NULL) {
+            Py_CLEAR(tuple);
+            break;
+        }
+        PyTuple_SET_ITEM(tuple, k, value);
+    }
+    return tuple;
+}
+
+static bool
+expect_cells(const hs_cells *cells)
+{
+    if (cells == NULL) {
+        PyErr_SetString(PyExc_TypeError, "expected what cells_build returns");
+    }
+    return cells != NULL;
+}
+
+PyObject *
+hs_py_cells_layout(PyObject *module, PyObject *capsule)
+{
+    const hs_cells *cells = hs_cells_of(capsule);
+    hs_layout       layout;
+    (void)module;
+    if (!expect_cells(cells)) {
+        return NULL;
+    }
+    hs_cells_layout(cells, &layout);
+    return Py_BuildValue("{s:N,s:N,s:N,s:N,s:N}", /* takes the references */
+                         "shape", tuple_of_integers(layout.shape, layout.ndim),
+                         "cell_sizes", tuple_of_reals(layout.cell_size, layout.ndim),
+                         "cell_start", view_of(capsule, layout.start, layout.n_cells + 1),
+                         "order", view_of(capsule, layout.order, layout.n_points),
+                         "cell_ids", indices_of(cells, &layout));
+}
+
+PyObject *
+hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    const hs_cells *cells = n_arguments == 2 ? hs_cells_of(arguments[0]) : NULL;
+    hs_points       points, own;
+    hs_failure      failure;
+    (void)module;
+    if (!expect_cells(cells) || !hs_points_of(arguments[1], "points", &points)) {
+        return NULL;
+    }
+    hs_cells_points(cells, &own);
+    if (points.ndim != own.ndim) {
+        PyErr_Format(PyExc_ValueError, "points must have %d columns, got %d", own.ndim,
+                     points.ndim);
+        return NULL;
+    }
+    npy_intp  n = (npy_intp)points.n;
+    PyObject *found = PyArray_SimpleNew(1, &n, NPY_INT64);
+    if (found == NULL) {
+        return NULL;
+    }
+    hs_status status;
+    Py_BEGIN_ALLOW_THREADS
+    status = hs_cells_find(cells, &points, PyArray_DATA((PyArrayObject *)found), &failure);
+    Py_END_ALLOW_THREADS
+    if (status != HS_OK) {
+        Py_DECREF(found);
+        return hs_raise(status, &failure, NULL);
+    }
+    return found;
+}
+
+PyObject *
+hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call    call;
+    hs_failure failure;
+    hs_pairs  *ranges = NULL;
+    (void)module;
+    if (n_arguments != HS_CALL_ARGUMENTS + 1) {
+        PyErr_Format(PyExc_TypeError, "cells_candidates takes %d arguments",
+                     HS_CALL_ARGUMENTS + 1);
+        return NULL;
+    }
+    if (!hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS]) ||
+        !expect_cells(call.cells)) {
+        return NULL;
+    }
+    hs_call_release(&call);
+    const hs_status status = hs_cells_candidates(call.cells, hs_call_queries(&call), &call.options,
+                                                 &ranges, &failure);
+    hs_call_acquire(&call);
+    if (status != HS_OK) {
+        return hs_raise(status, &failure, &call.options);
+    }
+    PyObject *table = hs_table_of(ranges, "ij", call.points.ndim, 8);
+    hs_pairs_free(ranges);
+    return table;
+}
