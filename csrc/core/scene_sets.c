@@ -94,6 +94,9 @@ bool
 hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
 {
     const hs_scale scale = kept->scale;
+    if (kept->n == 0) { /* nobody is found, wherever queries are */
+        return true;
+    }
     if (kept->extreme || !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
         return false;
     }
@@ -105,8 +108,8 @@ hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
 bool
 hs_scene_covers(const hs_scene *kept, const hs_scene *asking)
 {
-    bool covers = asking->x_error <= kept->x_error;
-    for (int k = 0; k < kept->ndim; k++) {
+    bool covers = kept->n == 0 || asking->x_error <= kept->x_error;
+    for (int k = 0; kept->n > 0 && k < kept->ndim; k++) {
         covers = covers && asking->x_largest[k] <= kept->x_largest[k] &&
                  asking->t_error[k] <= kept->t_error[k];
     }
