@@ -2,78 +2,17 @@
 /* scene.c: see scene.h. */
 #include "scene.h"
 
+#include "condense.h"
+#include "scale.h"
 #include "slabs.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
-#define ORDINARY_EXPONENT 20
-/* Scaled coordinates stay below 2^900, so that sums of a few of them are finite. */
-#define LARGEST_EXPONENT 900
 /* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
 #define SCALING_LOSS 0x1p-1000
 #define UNIT 0x1p-53 /* unit roundoff of float64 */
-
-/* x = m 2^e with 1 <= m < 2: e; for 0 the smallest int there is. */
-static int
-exponent_of(double x)
-{
-    return x == 0.0 ? INT32_MIN / 2 : ilogb(x);
-}
-
-/* Sizes of the periodic box entries. */
-typedef struct magnitudes {
-    double largest;
-    double smallest;  /* not counting zeros */
-    double short_row; /* the least of the rows' largest entries; infinity without rows */
-} magnitudes;
-
-static magnitudes
-box_magnitudes(const hs_box *box)
-{
-    magnitudes found = {0.0, INFINITY, INFINITY};
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        double row_largest = 0.0;
-        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            const double size = fabs(box->rows[l][k]);
-            row_largest = hs_larger(size, row_largest);
-            found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
-        }
-        found.largest = hs_larger(row_largest, found.largest);
-        if (box->periodic[l]) {
-            found.short_row = hs_smaller(row_largest, found.short_row);
-        }
-    }
-    return found;
-}
-
-/* The exponent to scale by, and whether that loses digits. */
-static int
-choose_exponent(const hs_cloud *cloud, const hs_box *box, double cutoff, bool *extreme)
-{
-    const magnitudes found = box_magnitudes(box);
-    /* With cutoff 0 the scene has another length to go by: its box, or where its points are. */
-    const double unit = cutoff > 0.0                   ? cutoff
-                        : found.short_row != INFINITY ? found.short_row
-                                                      : cloud->largest;
-    int exponent = exponent_of(unit);
-    if (unit == 0.0 || abs(exponent) <= ORDINARY_EXPONENT) {
-        exponent = 0;
-    }
-    const int largest = exponent_of(hs_larger(found.largest, cloud->largest));
-    if (largest - exponent > LARGEST_EXPONENT) {
-        exponent = largest - LARGEST_EXPONENT;
-    }
-    *extreme = false;
-    if (exponent > 0) {
-        double smallest = fmin(found.smallest, hs_cloud_smallest(cloud));
-        smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
-        *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
-    }
-    return exponent;
-}
 
 /* Range of the grid coordinates: the points' own where open, one period where periodic. */
 static void
@@ -122,7 +61,7 @@ static double
 bound_formula(const hs_scene *scene)
 {
     const hs_lattice *lattice = &scene->lattice;
-    double            total = 2.0 * hs_scale_apply(scene->scale, scene->cloud.largest);
+    double            total = 2.0 * hs_scale_apply(scene->pending, scene->cloud.largest);
     if (lattice->n_periodic == 0) {
         /* Differences of floats have a relative error only. */
         return 4.0 * UNIT * scene->cutoff * scene->ndim;
@@ -153,10 +92,10 @@ init_metric(hs_scene *scene, const hs_options *options)
 {
     const hs_lattice *lattice = &scene->lattice;
     const double(*rows)[HS_MAX_DIM] = (const double(*)[HS_MAX_DIM])lattice->rows;
-    double cutoff = hs_scale_apply(scene->scale, options->cutoff);
+    double cutoff = hs_scale_apply(scene->scale, scene->sought);
     if (scene->extreme) {
         rows = (const double(*)[HS_MAX_DIM])lattice->given;
-        cutoff = options->cutoff;
+        cutoff = scene->sought;
     } else if (scene->keeps_originals) {
         rows = (const double(*)[HS_MAX_DIM])lattice->scaled;
     }
@@ -214,8 +153,8 @@ scale_slab(void *context, int slab, int64_t first, int64_t last)
         if (doing->copies && !doing->copies_scaled) {
             memcpy(scene->originals[k] + first, x + first, n_bytes);
         }
-        for (int64_t i = first; scene->scale.exponent != 0 && i < last; i++) {
-            x[i] = hs_scale_apply(scene->scale, x[i]);
+        for (int64_t i = first; scene->pending.exponent != 0 && i < last; i++) {
+            x[i] = hs_scale_apply(scene->pending, x[i]);
         }
         if (doing->copies && doing->copies_scaled) {
             memcpy(scene->originals[k] + first, x + first, n_bytes);
@@ -234,16 +173,16 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
         scene->extreme || (m > 0 && (!scene->lattice.aligned || options->precision == HS_DOUBLE));
     scene->turns.known = m > 0 && (scene->keeps_originals || (options->want & HS_WANT_SHIFT));
     for (int k = 0; k < scene->ndim; k++) {
-        cloud->lower[k] = hs_scale_apply(scene->scale, cloud->lower[k]);
-        cloud->upper[k] = hs_scale_apply(scene->scale, cloud->upper[k]);
+        cloud->lower[k] = hs_scale_apply(scene->pending, cloud->lower[k]);
+        cloud->upper[k] = hs_scale_apply(scene->pending, cloud->upper[k]);
     }
-    cloud->largest = hs_scale_apply(scene->scale, cloud->largest);
+    cloud->largest = hs_scale_apply(scene->pending, cloud->largest);
     if (!allocate_beside(account, scene)) {
         return HS_ERR_MEMORY;
     }
     scene->x_is_beside = scene->keeps_originals && !scene->extreme && !scene->lattice.aligned;
     const bool copies = scene->keeps_originals && !scene->x_is_beside;
-    if (copies || scene->scale.exponent != 0) {
+    if (copies || scene->pending.exponent != 0) {
         scaling          doing = {scene, copies, !scene->extreme};
         const hs_options silent = {.poll = NULL}; /* a copy of what was asked about already */
         (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, &doing);
@@ -290,6 +229,71 @@ fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_sce
     return HS_OK;
 }
 
+/* Of points, lengths and the cutoff. */
+static void
+set_scale(const hs_condensed *condensed, int unit, hs_scene *scene)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    int               exponent = unit;
+    scene->extreme = false;
+    if (!condensed->is_scaled) {
+        exponent =
+            hs_choose_exponent(&scene->cloud, &size, scene->sought, unit, &scene->extreme);
+    }
+    scene->scale = hs_scale_of(exponent);
+    scene->unscale = hs_scale_of(-exponent);
+    scene->pending = condensed->is_scaled ? hs_scale_of(0) : scene->scale;
+    scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, scene->sought);
+    if (scene->extreme && scene->sought > 0.0) {
+        /* The scaled cutoff may have been rounded or flushed: take bounds. */
+        scene->cutoff_low -= SCALING_LOSS;
+        scene->cutoff += SCALING_LOSS;
+    }
+}
+
+/* The turns that condensing made, added to those that wrapping made after it. */
+static void
+add_turns(const hs_condensed *condensed, hs_scene *scene)
+{
+    for (int k = 0; condensed->has_turns && k < scene->ndim; k++) {
+        const int64_t *more = condensed->turns[k];
+        const int      row = scene->lattice.row_of_axis[k];
+        for (int64_t i = 0; more != NULL && i < scene->n; i++) {
+            hs_turns_set(&scene->turns, row, i, hs_turns_get(&scene->turns, row, i) + more[i]);
+        }
+    }
+}
+
+/* Chooses the scale of a scene whose points are as given, and fills it. */
+static hs_status
+scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
+            hs_scene *scene, hs_failure *failure)
+{
+    hs_condensed      condensed;
+    hs_cloud         *cloud = &scene->cloud;
+    const hs_box_size size = hs_box_size_of(box);
+    scene->sought = hs_enough_cutoff(cloud, &size, options->cutoff);
+    const int unit = hs_unit_exponent(cloud, &size, scene->sought);
+    hs_status status = hs_condense(account, options, box, unit, cloud, &condensed, failure);
+    if (status == HS_OK) {
+        set_scale(&condensed, unit, scene);
+        if (condensed.has_turns) { /* more than the points themselves tell */
+            cloud->largest = INFINITY;
+        }
+        /* Without points nothing has an image, however small the box is. */
+        hs_lattice_init(scene->n > 0 ? condensed.box : NULL, scene->ndim, scene->pending,
+                        &scene->lattice);
+        scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene) : 0.0;
+        scene->radius = scene->cutoff + scene->formula_error;
+        status = fill_scene(account, team, options, scene, failure);
+    }
+    if (status == HS_OK) {
+        add_turns(&condensed, scene);
+    }
+    hs_condensed_free(account, &condensed);
+    return status;
+}
+
 /* Clears what is added to or freed. The rest is large, and set before it is read. */
 static void
 start_scene(const hs_points *points, hs_scene *scene)
@@ -318,23 +322,7 @@ hs_scene_init(hs_account *account, hs_team *team, const hs_points *points, const
     if (status != HS_OK) {
         return status;
     }
-    const int exponent =
-        choose_exponent(&scene->cloud, box, options->cutoff, &scene->extreme);
-    scene->scale = hs_scale_of(exponent);
-    scene->unscale = hs_scale_of(-scene->scale.exponent);
-    scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
-    scene->cutoff_low = scene->cutoff;
-    if (scene->extreme && options->cutoff > 0.0) {
-        /* The scaled cutoff may have been rounded or flushed: take bounds. */
-        scene->cutoff_low -= SCALING_LOSS;
-        scene->cutoff += SCALING_LOSS;
-    }
-    /* Without points nothing has an image, however small the box is. */
-    hs_lattice_init(points->n > 0 ? box : NULL, points->ndim, scene->scale, &scene->lattice);
-    scene->formula_error =
-        options->precision == HS_DOUBLE ? bound_formula(scene) : 0.0;
-    scene->radius = scene->cutoff + scene->formula_error;
-    status = fill_scene(account, team, options, scene, failure);
+    status = scale_scene(account, team, options, box, scene, failure);
     if (status != HS_OK) {
         hs_scene_free(account, scene);
     }

@@ -3,6 +3,7 @@
 #include "walk.h"
 
 #include "decide.h"
+#include "fpenv.h"
 #include "poll.h"
 
 #include <math.h>
@@ -93,6 +94,33 @@ set_scan(const hs_walker *walker, hs_scan *scan)
     scan->most_unsure = block->capacity;
 }
 
+/* The filter alone may flush; precision="single" is decided by it. */
+static void
+set_flushing(const hs_walker *walker, bool on)
+{
+    if (walker->flushes) {
+        hs_fpenv_flush(on);
+    }
+}
+
+static int32_t
+run_scan(const hs_walker *walker, hs_scan *scan, int32_t first)
+{
+    set_flushing(walker, true);
+    const int32_t next = walker->scan(scan, first);
+    set_flushing(walker, false);
+    return next;
+}
+
+static void
+gather_block(hs_walker *walker)
+{
+    set_flushing(walker, true);
+    hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first,
+                    &walker->block, &walker->group);
+    set_flushing(walker, false);
+}
+
 /* Test every point of the group against the block, then empty the block. */
 static hs_status
 scan_block(hs_walker *walker)
@@ -100,8 +128,7 @@ scan_block(hs_walker *walker)
     hs_block *block = &walker->block;
     int32_t   end[HS_GROUP_POINTS];
     hs_scan   scan;
-    hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
-                    &walker->group);
+    gather_block(walker);
     hs_trace_reset(&walker->trace);
     set_form(walker);
     set_scan(walker, &scan);
@@ -109,7 +136,7 @@ scan_block(hs_walker *walker)
     const int64_t skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
     scan.end = end;
     for (int32_t first = 0, next; first < scan.n_points; first = next) {
-        next = walker->scan(&scan, first);
+        next = run_scan(walker, &scan, first);
         hs_status status = HS_OK;
         if (scan.n_unsure > 0 && walker->options.precision != HS_SINGLE) {
             status = hs_decide(walker, &scan, first, next);
@@ -132,6 +159,9 @@ scan_block(hs_walker *walker)
     block->n = 0;
     block->n_runs = 0;
     walker->block_is_first = false;
+    if (!walker->flushes && hs_fpenv_met_subnormal()) {
+        walker->flushes = walker->options.precision != HS_SINGLE;
+    }
     if (walker->n_candidates > walker->candidate_limit) {
         return HS_STATUS_END;
     }

@@ -44,6 +44,7 @@ struct hs_walker {
     hs_thresholds    direct;
     hs_expanded      expanded;
     double           extent;
+    bool             flushes;  /* the filter has met subnormal numbers: it goes on without them */
     bool             block_is_first; /* of its group: candidate t is group point t */
     int64_t          n_found;
     int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
