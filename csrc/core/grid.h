@@ -33,6 +33,9 @@ hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure
  * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
 hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
 
+/* Of a ball in so many dimensions. */
+double hs_ball_volume(int ndim, double radius);
+
 /* Added to places, times the number of cells, where axes are cut by faces: more than their
  * rounding, so that the cell found is the right one or the next. */
 #define HS_GRID_BIAS 0x1p-44

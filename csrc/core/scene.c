@@ -12,6 +12,8 @@
 
 /* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
 #define SCALING_LOSS 0x1p-1000
+/* Error of precision="double", in heights of the box, up to which candidates are few. */
+#define NOISE 0x1p-6
 #define UNIT 0x1p-53 /* unit roundoff of float64 */
 
 /* Range of the grid coordinates: the points' own where open, one period where periodic. */
@@ -84,6 +86,38 @@ bound_formula(const hs_scene *scene)
         total += given_turns * largest;
     }
     return (lattice->n_periodic + 4) * scene->ndim * UNIT * (total + scene->cutoff);
+}
+
+/* The first of the points that are farthest from zero along some axis. */
+static int64_t
+farthest_point(const hs_cloud *cloud)
+{
+    int64_t farthest = 0;
+    double  largest = -1.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        for (int64_t i = 0; i < cloud->n; i++) {
+            const double size = fabs(cloud->x[k][i]);
+            if (size > largest || (size == largest && i < farthest)) {
+                largest = size;
+                farthest = i;
+            }
+        }
+    }
+    return farthest;
+}
+
+/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
+ * that it might call near are too many to try, and its answer is noise. */
+static bool
+is_drowned(const hs_scene *scene)
+{
+    double shortest = INFINITY;
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0) {
+            shortest = hs_smaller(scene->lattice.period[k], shortest);
+        }
+    }
+    return scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest);
 }
 
 /* What decides: X and B where they hold every digit, else the points and rows as given. */
@@ -285,7 +319,12 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
                         &scene->lattice);
         scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene) : 0.0;
         scene->radius = scene->cutoff + scene->formula_error;
-        status = fill_scene(account, team, options, scene, failure);
+        if (is_drowned(scene)) {
+            failure->row = farthest_point(cloud);
+            status = HS_ERR_ROUNDING;
+        } else {
+            status = fill_scene(account, team, options, scene, failure);
+        }
     }
     if (status == HS_OK) {
         add_turns(&condensed, scene);
