@@ -35,6 +35,7 @@ typedef enum hs_status {
     HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent */
     HS_ERR_TOO_MANY,      /* 2^31 points or more, or more pairs than int64 counts */
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
+    HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */
     HS_ERR_KERNEL,        /* no kernel of that name on this CPU */
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
     HS_ERR_FAR,           /* queries lie too far away for cells that were made without them */
@@ -54,6 +55,7 @@ typedef struct hs_failure {
     double  value;          /* the offending number */
     double  expected_pairs; /* HS_ERR_MEMORY: pairs that were expected, or 0; HS_ERR_CAPACITY */
     double  expected_bytes; /* HS_ERR_MEMORY: bytes that they would need, or 0 */
+    double  search_bytes;   /* HS_ERR_MEMORY: bytes that the search takes besides; 0: it had them */
     double  limit_bytes;    /* HS_ERR_MEMORY: bytes that were allowed, or 0 */
 } hs_failure;
 

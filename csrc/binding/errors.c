@@ -92,29 +92,45 @@ raise_dependent(const hs_failure *failure)
     return NULL;
 }
 
+/* Bytes in the largest unit of which there is one. */
+static const char *
+format_bytes(double bytes, char *text, size_t size)
+{
+    static const char *const units[] = {"bytes", "kB", "MB", "GB"};
+    int                      unit = 0;
+    for (; unit < 3 && bytes >= 999.5; unit++) {
+        bytes /= 1e3;
+    }
+    snprintf(text, size, "%.3g %s", bytes, units[unit]);
+    return text;
+}
+
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
-    char text[256];
+    char text[320], needed[32], search[32], limit[32] = "no more";
+    format_bytes(failure->expected_bytes, needed, sizeof needed);
+    const bool stored = failure->expected_bytes > 0.0; /* and not only counted */
+    format_bytes(failure->search_bytes, search, sizeof search);
+    if (!isinf(failure->limit_bytes)) {
+        format_bytes(failure->limit_bytes, limit, sizeof limit);
+    }
     if (isinf(failure->expected_bytes)) {
         snprintf(text, sizeof text,
                  "the result would not fit: the cutoff spans more images of the box than any "
                  "memory holds pairs; use a smaller cutoff");
-    } else if (failure->expected_bytes > 0.0) {
+    } else if (failure->search_bytes > 0.0) {
         snprintf(text, sizeof text,
-                 "the result would not fit: about %.3g pairs (%.3g GB) are expected, %.3g GB are "
-                 "allowed; use a smaller cutoff, fewer quantities, or count_pairs",
-                 failure->expected_pairs, failure->expected_bytes / 1e9,
-                 failure->limit_bytes / 1e9);
-    } else if (failure->expected_pairs > 0.0) {
-        snprintf(text, sizeof text,
-                 "out of memory after %.0f pairs; use a smaller cutoff, fewer quantities, or "
-                 "count_pairs",
-                 failure->expected_pairs);
+                 "the search would not fit: about %.3g pairs%s%s%s are expected and the search "
+                 "itself takes about %s, but %s %s",
+                 failure->expected_pairs, stored ? " (" : "", stored ? needed : "",
+                 stored ? ")" : "", search, limit,
+                 isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
     } else {
         snprintf(text, sizeof text,
-                 "not enough memory for the search itself, before any pair: %.3g bytes are allowed",
-                 failure->limit_bytes);
+                 "the result would not fit: about %.3g pairs (%s) are expected, %s are allowed; "
+                 "use a smaller cutoff, fewer quantities, or count_pairs",
+                 failure->expected_pairs, needed, limit);
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
@@ -191,6 +207,13 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                      "%s[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
                      "and S holds 2**31; wrap the points first",
                      set_of(failure), (long long)failure->row);
+        return NULL;
+    case HS_ERR_ROUNDING:
+        PyErr_Format(PyExc_OverflowError,
+                     "points[%lld] lies so far from the box, or the box is so skewed, that rounding "
+                     "errors of precision='double' pass the cutoff; wrap the points first, or use "
+                     "precision='exact'",
+                     (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
     case HS_ERR_FAR:

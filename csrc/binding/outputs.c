@@ -227,6 +227,42 @@ hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair
     return true;
 }
 
+/* The bytes that an array reaches over, whatever its strides; false if it has none. */
+static bool
+range_of(PyArrayObject *array, const char **first, const char **end)
+{
+    *first = PyArray_BYTES(array);
+    *end = *first + PyArray_ITEMSIZE(array);
+    for (int k = 0; k < PyArray_NDIM(array); k++) {
+        const npy_intp steps = PyArray_DIM(array, k) - 1, stride = PyArray_STRIDE(array, k);
+        if (steps < 0) {
+            return false;
+        }
+        *first += stride < 0 ? steps * stride : 0;
+        *end += stride > 0 ? steps * stride : 0;
+    }
+    return true;
+}
+
+bool
+hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char *name)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    const char      *first, *end, *out_first, *out_end;
+    if (!PyArray_Check(input) || !range_of((PyArrayObject *)input, &first, &end)) {
+        return true;
+    }
+    for (Py_ssize_t k = 0; k < n; k++) {
+        if (range_of((PyArrayObject *)item_of(out, k, n), &out_first, &out_end) &&
+            out_first < end && first < out_end) {
+            PyErr_Format(PyExc_ValueError, "out for '%c' must not share memory with %s",
+                         letters[k], name);
+            return false;
+        }
+    }
+    return true;
+}
+
 PyObject *
 hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
 {

@@ -15,6 +15,10 @@
 bool hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes,
                hs_pair_arrays *arrays);
 
+/* Whether the memory of these arrays lies apart from that of an input, which may be None or no
+ * array: else false with an exception set that names it. Compares where they begin and end. */
+bool hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char *name);
+
 /* The filled parts of these arrays, in the same form; a new reference or NULL. */
 PyObject *hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs);
 

@@ -203,6 +203,11 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     }
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
     if (!hs_call_init(&call, arguments) || !hs_result_init(&result, more, &call) ||
+        !hs_result_is_apart(&result, arguments[0], "points") ||
+        !hs_result_is_apart(&result, arguments[2], "box") ||
+        !hs_result_is_apart(&result, more[4], "batch") ||
+        !hs_result_is_apart(&result, more[5], "cutoff") ||
+        !hs_result_is_apart(&result, more[6], "box") ||
         !take_batch(more + 4, &call, &given)) {
         return NULL;
     }

@@ -54,7 +54,10 @@ hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     (void)module;
     if (!expect_arguments("pairs_between", n_arguments, HS_CALL_ARGUMENTS + 5) ||
         !expect_queries(more[4]) ||
-        !hs_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call)) {
+        !hs_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call) ||
+        !hs_result_is_apart(&result, more[4], "queries") ||
+        !hs_result_is_apart(&result, arguments[0], "points") ||
+        !hs_result_is_apart(&result, arguments[2], "box")) {
         return NULL;
     }
     hs_pairs *rows = find_rows(&call);

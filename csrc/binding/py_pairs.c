@@ -19,7 +19,9 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
         return NULL;
     }
     if (!hs_call_init(&call, arguments) ||
-        !hs_result_init(&result, arguments + HS_CALL_ARGUMENTS, &call)) {
+        !hs_result_init(&result, arguments + HS_CALL_ARGUMENTS, &call) ||
+        !hs_result_is_apart(&result, arguments[0], "points") ||
+        !hs_result_is_apart(&result, arguments[2], "box")) {
         return NULL;
     }
     hs_call_release(&call);

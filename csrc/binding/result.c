@@ -27,6 +27,12 @@ hs_result_init(hs_result *result, PyObject *const *arguments, hs_call *call)
     return true;
 }
 
+bool
+hs_result_is_apart(const hs_result *result, PyObject *input, const char *name)
+{
+    return result->out == NULL || hs_out_is_apart(result->out, result->letters, input, name);
+}
+
 PyObject *
 hs_result_of(const hs_result *result, hs_pairs *pairs, const hs_call *call)
 {

@@ -4,6 +4,7 @@
 
 #include "exact_float.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Takes the first n of scan->unsure from the hits of points [first, next). */
@@ -41,17 +42,44 @@ decide_pair(hs_walker *walker, int32_t e, bool others_failed)
                          : hs_metric_within(metric, p, q, shift, &walker->stages);
 }
 
+/*
+ * Where squares would leave float64's range, by the components alone: rounding is monotone, so one
+ * that is rounded to more than the cutoff is more than it, and where all are zero so is |D|. Pairs
+ * without a shift only.
+ */
+static void
+judge_components(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict,
+                 hs_stages *stages)
+{
+    const uint8_t zero = metric->cutoff > 0.0 || metric->inclusive ? HS_WITHIN : HS_BEYOND;
+    double        largest[HS_BATCH] = {0.0};
+    for (int k = 0; k < metric->ndim; k++) {
+        for (int32_t e = 0; e < trace->n; e++) {
+            const double size = fabs(trace->q[k][e] - trace->p[k][e]);
+            largest[e] = size > largest[e] ? size : largest[e];
+        }
+    }
+    for (int32_t e = 0; e < trace->n; e++) {
+        verdict[e] = largest[e] == 0.0              ? zero
+                     : largest[e] > metric->cutoff ? (uint8_t)HS_BEYOND
+                                                    : (uint8_t)HS_UNDECIDED;
+        stages->by_float64 += verdict[e] != HS_UNDECIDED;
+    }
+}
+
 /* Whether each pair of the batch is within the cutoff. */
 static void
 decide_batch(hs_walker *walker, uint8_t *within)
 {
-    const hs_trace *trace = &walker->trace;
-    const bool      by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
-    uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
-    if (by_batch) {
+    const hs_metric *metric = &walker->search->scene.metric;
+    const hs_trace  *trace = &walker->trace;
+    const bool       by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
+    uint8_t          verdict[HS_BATCH + HS_BATCH_PADDING];
+    if (by_batch && !metric->floats_usable && !trace->is_shifted) {
+        judge_components(metric, trace, verdict, &walker->stages);
+    } else if (by_batch) {
         const hs_batch batch = hs_trace_batch(trace);
-        walker->search->kernel->judge(&walker->search->scene.metric, &batch, verdict,
-                                      &walker->stages);
+        walker->search->kernel->judge(metric, &batch, verdict, &walker->stages);
     }
     for (int32_t e = 0; e < trace->n; e++) {
         within[e] = by_batch && verdict[e] != HS_UNDECIDED ? verdict[e] == HS_WITHIN

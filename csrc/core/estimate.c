@@ -7,6 +7,11 @@
 
 #include <math.h>
 
+/* What a search takes, about: order, cells and keys; a column and the copy that sorting makes; one
+ * neighbourhood. */
+#define BYTES_PER_POINT 24.0
+#define BYTES_PER_COORDINATE 8.0
+#define BYTES_OF_WALK 4e5
 #define SAMPLES 64         /* points that are counted: an error of some per cent */
 #define SAMPLE_WORK 4.0e6  /* candidates and rows that sampling may cost, some milliseconds */
 #define MOST_PAIRS 0x1p62  /* more than int64 should be asked to count */
@@ -60,6 +65,58 @@ find_bytes_per_pair(const hs_options *options, int ndim)
         bytes += hs_output_bytes_per_pair(&columns) + (int64_t)sizeof(int64_t);
     }
     return (double)bytes;
+}
+
+/* Volume of the region that a search has to do with: of the periodic part, times the extents along
+ * the coordinate axes that have none. */
+static double
+occupied_volume(const hs_points *points, const hs_box *box, double cutoff)
+{
+    hs_lattice lattice;
+    double     lower[HS_MAX_DIM], upper[HS_MAX_DIM];
+    hs_lattice_init(box, points->ndim, hs_scale_of(0), &lattice);
+    hs_points_range(points, lower, upper);
+    double volume = hs_lattice_volume(&lattice, 0);
+    for (int k = 0; k < points->ndim; k++) {
+        volume *= lattice.row_of_axis[k] >= 0 ? 1.0 : hs_larger(upper[k] - lower[k], cutoff);
+    }
+    return volume;
+}
+
+void
+hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff, hs_shortage *shortage)
+{
+    const double n = (double)points->n, all = 0.5 * n * (n - 1.0);
+    hs_failure   ignored;
+    if (points->n == 0 || !(cutoff >= 0.0) || hs_box_check(box, &ignored) != HS_OK) {
+        return;
+    }
+    const double volume = occupied_volume(points, box, cutoff);
+    const double pairs = 0.5 * n * n * hs_ball_volume(points->ndim, cutoff) / volume;
+    /* Numbers near the ends of the range leave no volume: all pairs then. */
+    shortage->pairs += box == NULL && !(pairs < all) ? all : isfinite(pairs) ? pairs : all;
+    shortage->bytes += n * (BYTES_PER_POINT + BYTES_PER_COORDINATE * points->ndim);
+}
+
+void
+hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim, double limit,
+                 hs_failure *failure)
+{
+    failure->limit_bytes = limit;
+    if (failure->expected_bytes == 0.0) {
+        failure->expected_pairs = hs_larger(shortage->pairs, failure->expected_pairs);
+        failure->expected_bytes = failure->expected_pairs * find_bytes_per_pair(options, ndim);
+        failure->search_bytes = shortage->bytes + BYTES_OF_WALK;
+    }
+}
+
+void
+hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
+                      hs_failure *failure)
+{
+    hs_shortage shortage = {0.0, 0.0};
+    hs_shortage_add(points, box, search->options.cutoff, &shortage);
+    hs_shortage_tell(&shortage, &search->options, points->ndim, search->account.limit, failure);
 }
 
 static hs_status

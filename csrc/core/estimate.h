@@ -5,6 +5,23 @@
 
 #include "search.h"
 
+/* What a search that was refused memory would have taken. HS_ERR_MEMORY only, and nothing where the
+ * failure says it already. */
+typedef struct hs_shortage {
+    double pairs; /* by the density of the points in the region that they occupy */
+    double bytes; /* of the search itself */
+} hs_shortage;
+
+/* Adds one system, from the caller's numbers: nothing else need have been read yet. */
+void hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff,
+                     hs_shortage *shortage);
+void hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim,
+                      double limit, hs_failure *failure);
+
+/* Both, for one search. */
+void hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
+                           hs_failure *failure);
+
 /*
  * Before any work: a fully periodic box has at least so many pairs as its density says, less what a
  * cell's diameter can hide. HS_ERR_MEMORY when even these pass the limit, HS_ERR_TOO_MANY when

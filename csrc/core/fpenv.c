@@ -8,6 +8,9 @@
 
 /* Power-on value: round to nearest, every exception masked, no flag set, no flushing. */
 #define MXCSR_DEFAULT 0x1f80u
+#define MXCSR_FLUSH 0x8040u     /* results and operands that are subnormal count as zero */
+#define MXCSR_SUBNORMAL 0x0012u /* flags: an operand was subnormal, a result was too small */
+#define CAN_FLUSH 1
 
 hs_fpenv
 hs_fpenv_enter(void)
@@ -21,6 +24,18 @@ void
 hs_fpenv_leave(hs_fpenv saved)
 {
     _mm_setcsr((unsigned)saved.control);
+}
+
+void
+hs_fpenv_flush(bool on)
+{
+    _mm_setcsr(on ? MXCSR_DEFAULT | MXCSR_FLUSH : MXCSR_DEFAULT);
+}
+
+bool
+hs_fpenv_met_subnormal(void)
+{
+    return (_mm_getcsr() & MXCSR_SUBNORMAL) != 0;
 }
 
 #elif defined(__aarch64__)
@@ -85,4 +100,18 @@ hs_fpenv_leave(hs_fpenv saved)
     feraiseexcept((int)(uint32_t)(saved.control >> 32));
 }
 
+#endif
+
+#ifndef CAN_FLUSH
+void
+hs_fpenv_flush(bool on)
+{
+    (void)on;
+}
+
+bool
+hs_fpenv_met_subnormal(void)
+{
+    return false;
+}
 #endif

@@ -50,6 +50,9 @@ hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_be
 /* Cells per axis that int32 windows and doubles tell apart. */
 #define HS_GRID_CELLS_PER_AXIS 0x1p31
 
+/* Of a ball in so many dimensions. */
+double hs_ball_volume(int ndim, double radius);
+
 /* Added to places, times the number of cells, where axes are cut by faces: more than their
  * rounding, so that the cell found is the right one or the next. */
 #define HS_GRID_BIAS 0x1p-44

@@ -31,7 +31,6 @@ make_room(hs_pairs *rows, int64_t n_entries, hs_failure *failure)
         failure->expected_pairs = (double)n_entries;
         failure->expected_bytes = failure->expected_pairs *
                                   (double)hs_output_bytes_per_pair(output);
-        failure->limit_bytes = rows->search.account.limit;
         return HS_ERR_MEMORY;
     }
     output->n_pairs = n_entries;
@@ -94,6 +93,9 @@ hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *o
         hs_search_report(search, rows->output.n_pairs);
         hs_search_close(search);
     }
+    if (status == HS_ERR_MEMORY) {
+        hs_shortage_of_search(sets->points, box, search, failure);
+    }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
         hs_pairs_free(rows);
@@ -122,6 +124,9 @@ count_with(const hs_sets *sets, const hs_box *box, const hs_options *options, co
         status = count(&search, counts, failure);
         hs_search_report(&search, search.walked.pairs);
         hs_search_close(&search);
+    }
+    if (status == HS_ERR_MEMORY) {
+        hs_shortage_of_search(sets->points, box, &search, failure);
     }
     hs_account_close(&search.account);
     hs_fpenv_leave(saved);

@@ -88,7 +88,6 @@ find_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
-        failure->limit_bytes = search->account.limit;
     }
     if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
         failure->expected_pairs = (double)output->n_pairs;
@@ -144,6 +143,9 @@ hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *optio
         hs_search_report(search, pairs->output.n_pairs);
         hs_search_close(search);
     }
+    if (status == HS_ERR_MEMORY) {
+        hs_shortage_of_search(sets->points, box, search, failure);
+    }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
         hs_pairs_free(pairs);
@@ -179,6 +181,9 @@ hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
         status = hs_parallel_count(&search, &found, failure);
         hs_search_report(&search, found);
         hs_search_close(&search);
+    }
+    if (status == HS_ERR_MEMORY) {
+        hs_shortage_of_search(sets->points, box, &search, failure);
     }
     hs_account_close(&search.account);
     hs_fpenv_leave(saved);

@@ -2,6 +2,7 @@
 /* plan.c: what a search of a scene would do, read off the same structures that would do it. */
 #include "../halfshell.h"
 
+#include "estimate.h"
 #include "fpenv.h"
 #include "poll.h"
 #include "search.h"
@@ -48,6 +49,9 @@ hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *optio
     if (status == HS_OK) {
         fill_plan(&search, plan);
         hs_search_close(&search);
+    }
+    if (status == HS_ERR_MEMORY) {
+        hs_shortage_of_search(points, box, &search, failure);
     }
     hs_account_close(&search.account);
     hs_fpenv_leave(saved);

@@ -209,6 +209,29 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
     return status;
 }
 
+void
+hs_points_range(const hs_points *points, double *lower, double *upper)
+{
+    for (int k = 0; k < points->ndim; k++) {
+        lower[k] = INFINITY;
+        upper[k] = -INFINITY;
+        for (int64_t i = 0; i < points->n; i++) {
+            const char *entry = (const char *)points->data + i * points->row_stride +
+                                k * points->column_stride;
+            float  narrow;
+            double x;
+            if (points->real == HS_FLOAT32) {
+                memcpy(&narrow, entry, sizeof narrow);
+                x = (double)narrow;
+            } else {
+                memcpy(&x, entry, sizeof x);
+            }
+            lower[k] = hs_smaller(x, lower[k]);
+            upper[k] = hs_larger(x, upper[k]);
+        }
+    }
+}
+
 double
 hs_cloud_smallest(const hs_cloud *cloud)
 {

@@ -3,6 +3,7 @@
 #include "scan.h"
 
 #include "decide.h"
+#include "fpenv.h"
 #include "poll.h"
 
 #include <math.h>
@@ -94,6 +95,24 @@ set_scan(const hs_walker *walker, hs_scan *scan)
     scan->most_unsure = block->capacity;
 }
 
+/* The filter alone may flush; precision="single" is decided by it. */
+static void
+set_flushing(const hs_walker *walker, bool on)
+{
+    if (walker->flushes) {
+        hs_fpenv_flush(on);
+    }
+}
+
+static int32_t
+run_scan(const hs_walker *walker, hs_scan *scan, int32_t first)
+{
+    set_flushing(walker, true);
+    const int32_t next = walker->scan(scan, first);
+    set_flushing(walker, false);
+    return next;
+}
+
 /* Hands the hits of points [first, next) of the group to the visitor. */
 static hs_status
 visit_hits(hs_walker *walker, const hs_scan *scan, int32_t first, int32_t next)
@@ -113,8 +132,10 @@ fill_block(hs_walker *walker)
     hs_block *block = &walker->block;
     walker->of_group.candidates += block->n;
     walker->of_group.runs += block->n_runs;
+    set_flushing(walker, true);
     hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
                     &walker->group);
+    set_flushing(walker, false);
     hs_trace_reset(&walker->trace);
     set_form(walker);
     return walker->is_ordered ? hs_order_block(&walker->search->scene.lattice, walker->use, block,
@@ -133,6 +154,9 @@ finish_block(hs_walker *walker, int64_t n_points)
     block->n = 0;
     block->n_runs = 0;
     walker->block_is_first = false;
+    if (!walker->flushes && hs_fpenv_met_subnormal()) {
+        walker->flushes = walker->options.precision != HS_SINGLE;
+    }
     if (walker->n_candidates > walker->candidate_limit) {
         return HS_STATUS_END;
     }
@@ -152,7 +176,7 @@ hs_scan_block(hs_walker *walker)
     set_scan(walker, &scan);
     scan.end = end;
     for (int32_t first = 0, next; status == HS_OK && first < scan.n_points; first = next) {
-        next = walker->scan(&scan, first);
+        next = run_scan(walker, &scan, first);
         if (scan.n_unsure > 0 && walker->options.precision != HS_SINGLE) {
             status = hs_decide(walker, &scan, first, next);
         }

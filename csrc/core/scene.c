@@ -2,77 +2,15 @@
 /* scene.c: see scene.h. */
 #include "scene.h"
 
+#include "condense.h"
+#include "scale.h"
 #include "slabs.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-/* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
-#define ORDINARY_EXPONENT 20
-/* Scaled coordinates stay below 2^900, so that sums of a few of them are finite. */
-#define LARGEST_EXPONENT 900
-
-/* x = m 2^e with 1 <= m < 2: e; for 0 the smallest int there is. */
-static int
-exponent_of(double x)
-{
-    return x == 0.0 ? INT32_MIN / 2 : ilogb(x);
-}
-
-/* Sizes of the periodic box entries. */
-typedef struct magnitudes {
-    double largest;
-    double smallest;  /* not counting zeros */
-    double short_row; /* the least of the rows' largest entries; infinity without rows */
-} magnitudes;
-
-static magnitudes
-box_magnitudes(const hs_box *box)
-{
-    magnitudes found = {0.0, INFINITY, INFINITY};
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        double row_largest = 0.0;
-        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            const double size = fabs(box->rows[l][k]);
-            row_largest = hs_larger(size, row_largest);
-            found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
-        }
-        found.largest = hs_larger(row_largest, found.largest);
-        if (box->periodic[l]) {
-            found.short_row = hs_smaller(row_largest, found.short_row);
-        }
-    }
-    return found;
-}
-
-/* The exponent to scale by, and whether that loses digits. asking: the other cloud, or NULL. */
-static int
-choose_exponent(const hs_cloud *cloud, const hs_cloud *asking, const hs_box *box, double cutoff,
-                bool *extreme)
-{
-    const magnitudes found = box_magnitudes(box);
-    /* With cutoff 0 the scene has another length to go by: its box, or where its points are. */
-    const double unit = cutoff > 0.0                   ? cutoff
-                        : found.short_row != INFINITY ? found.short_row
-                                                      : cloud->largest;
-    int exponent = exponent_of(unit);
-    if (unit == 0.0 || abs(exponent) <= ORDINARY_EXPONENT) {
-        exponent = 0;
-    }
-    const int largest = exponent_of(hs_larger(found.largest, cloud->largest));
-    if (largest - exponent > LARGEST_EXPONENT) {
-        exponent = largest - LARGEST_EXPONENT;
-    }
-    *extreme = false;
-    if (exponent > 0) {
-        double smallest = fmin(found.smallest, hs_cloud_smallest(cloud));
-        smallest = asking != NULL ? fmin(smallest, hs_cloud_smallest(asking)) : smallest;
-        smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
-        *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
-    }
-    return exponent;
-}
+/* Error of precision="double", in heights of the box, up to which candidates are few. */
+#define NOISE 0x1p-6
 
 /* Columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
@@ -124,8 +62,8 @@ scale_slab(void *context, int slab, int64_t first, int64_t last)
         if (doing->copies && !doing->copies_scaled) {
             memcpy(scene->originals[k] + first, x + first, n_bytes);
         }
-        for (int64_t i = first; scene->scale.exponent != 0 && i < last; i++) {
-            x[i] = hs_scale_apply(scene->scale, x[i]);
+        for (int64_t i = first; scene->pending.exponent != 0 && i < last; i++) {
+            x[i] = hs_scale_apply(scene->pending, x[i]);
         }
         if (doing->copies && doing->copies_scaled) {
             memcpy(scene->originals[k] + first, x + first, n_bytes);
@@ -144,16 +82,16 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
         scene->extreme || (m > 0 && (!scene->lattice.aligned || options->precision == HS_DOUBLE));
     scene->turns.known = m > 0 && (scene->keeps_originals || (options->want & HS_WANT_SHIFT));
     for (int k = 0; k < scene->ndim; k++) {
-        cloud->lower[k] = hs_scale_apply(scene->scale, cloud->lower[k]);
-        cloud->upper[k] = hs_scale_apply(scene->scale, cloud->upper[k]);
+        cloud->lower[k] = hs_scale_apply(scene->pending, cloud->lower[k]);
+        cloud->upper[k] = hs_scale_apply(scene->pending, cloud->upper[k]);
     }
-    cloud->largest = hs_scale_apply(scene->scale, cloud->largest);
+    cloud->largest = hs_scale_apply(scene->pending, cloud->largest);
     if (!allocate_beside(account, scene)) {
         return HS_ERR_MEMORY;
     }
     scene->x_is_beside = scene->keeps_originals && !scene->extreme && !scene->lattice.aligned;
     const bool copies = scene->keeps_originals && !scene->x_is_beside;
-    if (copies || scene->scale.exponent != 0) {
+    if (copies || scene->pending.exponent != 0) {
         scaling          doing = {scene, copies, !scene->extreme};
         const hs_options silent = {.poll = NULL}; /* a copy of what was asked about already */
         (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, &doing);
@@ -297,26 +235,126 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     return status;
 }
 
-/* Scale, cutoff and lattice. */
-static void
-settle_unit(const hs_box *box, const hs_options *options, hs_scene *scene,
-            const hs_scene *asking)
+/* The first of the points that are farthest from zero along some axis. */
+static int64_t
+farthest_point(const hs_cloud *cloud)
 {
-    const int exponent = choose_exponent(&scene->cloud, asking != NULL ? &asking->cloud : NULL,
-                                         box, options->cutoff, &scene->extreme);
+    int64_t farthest = 0;
+    double  largest = -1.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        for (int64_t i = 0; i < cloud->n; i++) {
+            const double size = fabs(cloud->x[k][i]);
+            if (size > largest || (size == largest && i < farthest)) {
+                largest = size;
+                farthest = i;
+            }
+        }
+    }
+    return farthest;
+}
+
+/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
+ * that it might call near are too many to try, and its answer is noise. */
+static bool
+is_drowned(const hs_scene *scene)
+{
+    double shortest = INFINITY;
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0) {
+            shortest = hs_smaller(scene->lattice.period[k], shortest);
+        }
+    }
+    return scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest);
+}
+
+/* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. */
+static void
+set_scale(const hs_condensed *condensed, int unit, hs_scene *scene, const hs_scene *asking)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    int               exponent = unit;
+    bool              also_extreme = false;
+    scene->extreme = false;
+    if (!condensed->is_scaled) {
+        exponent =
+            hs_choose_exponent(&scene->cloud, &size, scene->sought, unit, &scene->extreme);
+        if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
+            (void)hs_choose_exponent(&asking->cloud, &size, scene->sought, unit, &also_extreme);
+        }
+    }
+    scene->extreme = scene->extreme || also_extreme;
     scene->scale = hs_scale_of(exponent);
-    scene->unscale = hs_scale_of(-scene->scale.exponent);
-    scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
-    scene->cutoff_low = scene->cutoff;
-    if (scene->extreme && options->cutoff > 0.0) {
+    scene->unscale = hs_scale_of(-exponent);
+    scene->pending = condensed->is_scaled ? hs_scale_of(0) : scene->scale;
+    scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, scene->sought);
+    if (scene->extreme && scene->sought > 0.0) {
         /* The scaled cutoff may have been rounded or flushed: take bounds. */
         scene->cutoff_low -= HS_SCALING_LOSS;
         scene->cutoff += HS_SCALING_LOSS;
     }
+}
+
+/* The turns that condensing made, added to those that wrapping made after it. */
+static void
+add_turns(const hs_condensed *condensed, hs_scene *scene)
+{
+    for (int k = 0; condensed->has_turns && k < scene->ndim; k++) {
+        const int64_t *more = condensed->turns[k];
+        const int      row = scene->lattice.row_of_axis[k];
+        for (int64_t i = 0; more != NULL && i < scene->n; i++) {
+            hs_turns_set(&scene->turns, row, i, hs_turns_get(&scene->turns, row, i) + more[i]);
+        }
+    }
+}
+
+/* Lattice and radius, then the points. */
+static hs_status
+fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
+            const hs_condensed *condensed, hs_scene *scene, hs_scene *asking, hs_failure *failure)
+{
     /* Without points nothing has an image, however small the box is. */
     const bool empty = scene->n == 0 || (asking != NULL && asking->n == 0);
-    hs_lattice_init(empty ? NULL : box, scene->ndim, scene->scale, &scene->lattice);
-    hs_scene_set_radius(scene, options, hs_scale_apply(scene->scale, scene->cloud.largest));
+    if (condensed->has_turns) { /* more than the points themselves tell */
+        scene->cloud.largest = INFINITY;
+    }
+    hs_lattice_init(empty ? NULL : condensed->box, scene->ndim, scene->pending, &scene->lattice);
+    hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
+    if (is_drowned(scene)) {
+        failure->row = farthest_point(&scene->cloud);
+        return HS_ERR_ROUNDING;
+    }
+    if (asking != NULL) {
+        hs_scene_share(scene, asking);
+    }
+    return fill_scene(account, team, options, scene, asking, failure);
+}
+
+/* Chooses the scale of a scene whose points are as given, and fills it. Condensing is for points
+ * alone: what is far apart from them may be near to queries. */
+static hs_status
+scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
+            hs_scene *scene, hs_scene *asking, hs_failure *failure)
+{
+    hs_condensed      condensed = {.box = box};
+    hs_cloud         *cloud = &scene->cloud;
+    const hs_box_size size = hs_box_size_of(box);
+    const bool        alone = asking == NULL && !scene->is_kept;
+    hs_status         status = HS_OK;
+    scene->sought =
+        scene->is_kept ? options->cutoff : hs_enough_cutoff(cloud, &size, options->cutoff);
+    const int unit = hs_unit_exponent(cloud, &size, scene->sought);
+    if (alone) {
+        status = hs_condense(account, options, box, unit, cloud, &condensed, failure);
+    }
+    if (status == HS_OK) {
+        set_scale(&condensed, unit, scene, asking);
+        status = fill_scaled(account, team, options, &condensed, scene, asking, failure);
+    }
+    if (status == HS_OK) {
+        add_turns(&condensed, scene);
+    }
+    hs_condensed_free(account, &condensed);
+    return status;
 }
 
 hs_status
@@ -338,11 +376,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
         status = load_clouds(account, team, sets, options, scene, asking, failure);
     }
     if (status == HS_OK) {
-        settle_unit(box, options, scene, asking);
-        if (asking != NULL) {
-            hs_scene_share(scene, asking);
-        }
-        status = fill_scene(account, team, options, scene, asking, failure);
+        status = scale_scene(account, team, options, box, scene, asking, failure);
     }
     if (status != HS_OK) {
         hs_scene_free(account, scene);

@@ -16,7 +16,10 @@ typedef struct hs_scene {
     int64_t    n;
     hs_scale   scale;
     hs_scale   unscale;       /* the way back */
+    hs_scale   pending;       /* scale, but for what condensing the points has done of it */
     hs_lattice lattice;
+    double     sought;        /* the caller's cutoff, not scaled; less if no two points are so far
+                               * apart */
     double     cutoff;        /* scaled; the true one, or an upper bound when `extreme` */
     double     cutoff_low;    /* at most the true one */
     double     radius;        /* candidates are sought up to here; cutoff, or a little more */

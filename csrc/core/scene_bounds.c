@@ -92,10 +92,10 @@ hs_scene_init_metric(hs_scene *scene, const hs_options *options)
 {
     const hs_lattice *lattice = &scene->lattice;
     const double(*rows)[HS_MAX_DIM] = (const double(*)[HS_MAX_DIM])lattice->rows;
-    double cutoff = hs_scale_apply(scene->scale, options->cutoff);
+    double cutoff = hs_scale_apply(scene->scale, scene->sought);
     if (scene->extreme) {
         rows = (const double(*)[HS_MAX_DIM])lattice->given;
-        cutoff = options->cutoff;
+        cutoff = scene->sought;
     } else if (scene->keeps_originals) {
         rows = (const double(*)[HS_MAX_DIM])lattice->scaled;
     }
@@ -107,6 +107,7 @@ void
 hs_scene_set_cutoff(hs_scene *scene, const hs_options *options)
 {
     HS_ASSERT(!scene->extreme);
+    scene->sought = options->cutoff;
     scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, options->cutoff);
     hs_scene_set_radius(scene, options, scene->cloud.largest);
     hs_scene_init_metric(scene, options);

@@ -30,6 +30,8 @@ hs_scene_share(const hs_scene *scene, hs_scene *asking)
 {
     asking->scale = scene->scale;
     asking->unscale = scene->unscale;
+    asking->pending = scene->pending;
+    asking->sought = scene->sought;
     asking->lattice = scene->lattice;
     asking->cutoff = scene->cutoff;
     asking->cutoff_low = scene->cutoff_low;

@@ -14,6 +14,7 @@ hs_status_text(hs_status status)
     case HS_ERR_BOX_DEPENDENT: return "periodic box vectors must be linearly independent";
     case HS_ERR_TOO_MANY: return "too many points or pairs";
     case HS_ERR_SHIFT_RANGE: return "a shift does not fit its integer type";
+    case HS_ERR_ROUNDING: return "too far from the box for precision=\"double\"";
     case HS_ERR_KERNEL: return "no such kernel on this CPU";
     case HS_ERR_FAR: return "queries lie too far from the points that are in cells";
     case HS_ERR_CAPACITY: return "the arrays that were given are too small";

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* systems.c: the public searches of many systems: find and count. Threads take ranges of them. */
+#include "estimate.h"
 #include "fpenv.h"
 #include "pairs.h"
 #include "poll.h"
@@ -75,6 +76,22 @@ share_limit(hs_options *options, int n_threads)
     options->memory_limit /= n_threads;
 }
 
+/* What a search that was refused memory would have taken, all systems together. */
+static void
+tell_shortage(const hs_systems_crew *crew, const hs_search *total, hs_failure *failure)
+{
+    hs_shortage shortage = {0.0, 0.0};
+    for (int64_t s = 0; s < crew->systems->n; s++) {
+        hs_box        own_box;
+        hs_points     points;
+        const hs_box *box = hs_systems_take(crew, s, &points, &own_box);
+        const double  cutoff = crew->systems->cutoffs != NULL ? crew->systems->cutoffs[s]
+                                                              : total->options.cutoff;
+        hs_shortage_add(&points, box, cutoff, &shortage);
+    }
+    hs_shortage_tell(&shortage, &total->options, crew->points->ndim, total->account.limit, failure);
+}
+
 /* The whole of both functions. `total`: where the account and the counts are kept. */
 static hs_status
 search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
@@ -92,7 +109,7 @@ search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
     if (status == HS_ERR_MEMORY) {
         const double found = crew->output != NULL ? (double)crew->output->n_pairs : 0.0;
         failure->expected_pairs = fmax(failure->expected_pairs, found);
-        failure->limit_bytes = total->account.limit;
+        tell_shortage(crew, total, failure);
     }
     return status;
 }

@@ -12,25 +12,35 @@
 #define POLL_WORK   (INT64_C(1) << 21)
 #define SYSTEM_WORK 1024
 
+const hs_box *
+hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points, hs_box *own_box)
+{
+    const hs_systems *systems = crew->systems;
+    const int64_t     first = systems->first[s];
+    const int         d = crew->points->ndim;
+    *points = *crew->points;
+    points->n = systems->first[s + 1] - first;
+    points->data = (const char *)points->data + first * points->row_stride;
+    if (systems->box == NULL || systems->rows == NULL) {
+        return systems->box;
+    }
+    for (int l = 0; l < d; l++) {
+        own_box->periodic[l] = systems->box->periodic[l];
+        memcpy(own_box->rows[l], systems->rows + (s * d + l) * d, (size_t)d * sizeof(double));
+    }
+    own_box->ndim = d;
+    return own_box;
+}
+
 /* Makes the scene of system s ready, its points numbered among all. */
 static hs_status
 build_system(hs_systems_worker *worker, int64_t s)
 {
     const hs_systems_crew *crew = worker->crew;
-    const hs_systems *systems = crew->systems;
-    const int64_t     first = systems->first[s];
-    const hs_box     *box = systems->box;
-    hs_points         points = *crew->points;
-    points.n = systems->first[s + 1] - first;
-    points.data = (const char *)points.data + first * points.row_stride;
-    if (box != NULL && systems->rows != NULL) {
-        const int     d = points.ndim;
-        const double *rows = systems->rows + s * d * d;
-        for (int l = 0; l < d; l++) {
-            memcpy(worker->box.rows[l], rows + l * d, (size_t)d * sizeof(double));
-        }
-        box = &worker->box;
-    }
+    const hs_systems      *systems = crew->systems;
+    const int64_t          first = systems->first[s];
+    hs_points              points;
+    const hs_box          *box = hs_systems_take(crew, s, &points, &worker->box);
     if (systems->cutoffs != NULL) {
         worker->search.options.cutoff = systems->cutoffs[s];
     }
@@ -38,7 +48,8 @@ build_system(hs_systems_worker *worker, int64_t s)
                                              &worker->failure);
     if (status == HS_OK) {
         hs_search_renumber(first, crew->points->n, &worker->search);
-    } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE) {
+    } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE ||
+               status == HS_ERR_ROUNDING) {
         worker->failure.row += first;
     }
     return status;

@@ -36,6 +36,10 @@ struct hs_systems_crew {
     bool               is_direct; /* the one thread writes to the output itself */
 };
 
+/* The points of system s and its box: own_box, if each has its own. */
+const hs_box *hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points,
+                              hs_box *own_box);
+
 /* Cannot fail: memory is taken as it is needed. */
 void hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options,
                             hs_systems_worker *worker);

@@ -52,6 +52,7 @@ struct hs_walker {
     hs_thresholds    direct;
     hs_expanded      expanded;
     double           extent;
+    bool             flushes;  /* the filter has met subnormal numbers: it goes on without them */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;

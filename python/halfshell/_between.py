@@ -127,6 +127,7 @@ def pairs_between(
     )
     if result is not NotImplemented:
         return cast(Arrays, result)
+    _inputs.check_apart(out, queries=queries, points=points, box=box)
     asking, array, vectors, bits = _inputs.two_sets(queries, points, box, periodic)
     return _core.pairs_between(
         array, _inputs.as_cutoff(cutoff), vectors, bits, _inputs.as_flag(inclusive, "inclusive"),

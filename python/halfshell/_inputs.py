@@ -20,6 +20,22 @@ FloatArray = npt.NDArray[np.float64]
 PointArray = npt.NDArray[np.float32] | FloatArray
 
 
+def check_apart(out: Any, **inputs: Any) -> None:
+    """Raise ValueError if an array of `out` may share memory with an input, which it names.
+
+    For inputs as they were given: the core checks what they were converted to.
+    """
+    outputs = out if isinstance(out, tuple) else (out,)
+    for name, values in inputs.items():
+        for array in outputs:
+            if (
+                isinstance(array, np.ndarray)
+                and isinstance(values, np.ndarray)
+                and np.may_share_memory(array, values)
+            ):
+                raise ValueError(f"out must not share memory with {name}")
+
+
 def as_real_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
     """An array of native float32 or float64 with exactly the given values.
 

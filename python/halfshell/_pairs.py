@@ -84,8 +84,8 @@ def pairs(
         Type of i, j and P.
     out : ndarray or tuple of ndarray, optional
         Where to write: one array for each letter of `quantities`, of the type and, but for its
-        length, the shape of the result, C-contiguous and not overlapping. They may be longer than
-        the result; what lies beyond it keeps its values.
+        length, the shape of the result, C-contiguous, apart from each other and from all inputs.
+        They may be longer than the result; what lies beyond it keeps its values.
     precision : {"exact", "double", "single"}, default "exact"
         "exact" decides by the real numbers that the inputs are. The others decide by one rounded
         comparison, as most libraries do, and exist to be compared with: "double" by a fixed
@@ -142,7 +142,8 @@ def pairs(
     OverflowError
         If there are 2**31 points or more, a number is too large for float64, or a shift that was
         asked for does not fit int32; also if a point lies more than 2**51 box vectors away in a
-        box that is not axis-aligned, or in any box when S is asked for.
+        box that is not axis-aligned, or in any box when S is asked for; and if, with `precision`
+        "double", points lie so many boxes away that rounding errors pass the cutoff.
     MemoryError
         If the result would not fit `memory_limit`: as a rule decided from a sample before the
         search, otherwise during the search.
@@ -240,6 +241,7 @@ def _pairs_with_progress(
 ) -> Arrays:
     """`pairs` of what must be converted, calling ``progress(fraction)`` now and then."""
     own = None
+    _inputs.check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch)
     if batch is None:
         array, vectors, bits = _inputs.scene(points, box, periodic)
         scene = array, _inputs.as_cutoff(cutoff), vectors, bits

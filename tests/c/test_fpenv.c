@@ -137,9 +137,33 @@ decisions_ignore_the_callers_environment(void)
     }
 }
 
+/* For the filter alone, and only where it helps. */
+static void
+flushing_is_switched_on_and_off(void)
+{
+    volatile float small = 0x1.2468acp-100f, product;
+    const hs_fpenv saved = hs_fpenv_enter();
+    CHECK(!hs_fpenv_met_subnormal());
+    product = small * 0x1.13579cp-40f;
+    const bool met = hs_fpenv_met_subnormal();
+    CHECK(product > 0.0f);
+    hs_fpenv_flush(true);
+    product = small * 0x1.13579cp-40f;
+    const bool flushed = product == 0.0f;
+    hs_fpenv_flush(false);
+    CHECK(rounds_to_nearest_without_flushing());
+#if defined(__SSE2__)
+    CHECK(met && flushed);
+#else
+    CHECK(!met && !flushed);
+#endif
+    hs_fpenv_leave(saved);
+}
+
 void
 test_fpenv(void)
 {
+    RUN(flushing_is_switched_on_and_off);
     RUN(entering_sets_and_leaving_restores);
     RUN(decisions_ignore_the_callers_environment);
 }

@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* scale.c: see scale.h. */
+#include "scale.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
+#define ORDINARY_EXPONENT 20
+/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
+ * in float32. What condense.h takes care of does; what remains, coupled by a skewed box, is known
+ * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
+#define LARGEST_EXPONENT 56
+/* Points of a skewed box may be 2^51 box vectors away; others are refused. */
+#define FARTHEST 0x1p52
+/* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
+ * and a binary order apart. */
+#define WHOLE_EXPONENT 8
+/* Of zero. */
+#define NO_EXPONENT (INT32_MIN / 2)
+
+/* x = m 2^e with 1 <= m < 2: e. */
+static int
+exponent_of(double x)
+{
+    return x == 0.0 ? NO_EXPONENT : ilogb(x);
+}
+
+hs_box_size
+hs_box_size_of(const hs_box *box)
+{
+    hs_box_size found = {0.0, INFINITY, INFINITY};
+    for (int l = 0; box != NULL && l < box->ndim; l++) {
+        double row_largest = 0.0;
+        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
+            const double size = fabs(box->rows[l][k]);
+            row_largest = hs_larger(size, row_largest);
+            found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
+        }
+        found.largest = hs_larger(row_largest, found.largest);
+        if (box->periodic[l]) {
+            found.short_row = hs_smaller(row_largest, found.short_row);
+        }
+    }
+    return found;
+}
+
+double
+hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+{
+    if (!(cutoff > 64.0 * cloud->largest) || cloud->largest == 0.0 || box->largest > 0.0) {
+        return cutoff;
+    }
+    const int exponent = exponent_of(cloud->largest) + WHOLE_EXPONENT;
+    return exponent > 1023 ? cutoff : hs_smaller(ldexp(1.0, exponent), cutoff);
+}
+
+int
+hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+{
+    return exponent_of(cutoff > 0.0                 ? cutoff
+                       : box->short_row != INFINITY ? box->short_row
+                                                    : cloud->largest);
+}
+
+int
+hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
+                   bool *extreme)
+{
+    int       exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
+    const double reach = box->largest > 0.0 ? hs_smaller(FARTHEST * box->largest, cloud->largest)
+                                            : cloud->largest;
+    const int largest = exponent_of(hs_larger(box->largest, reach));
+    if (largest - exponent > LARGEST_EXPONENT) {
+        exponent = largest - LARGEST_EXPONENT;
+    }
+    *extreme = false;
+    if (exponent > 0) {
+        double smallest = fmin(box->smallest, hs_cloud_smallest(cloud));
+        smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
+        *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
+    }
+    return exponent;
+}
