@@ -10,7 +10,7 @@
 
 #include "../halfshell.h"
 
-/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. The name
+/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
  * is that of the argument, for messages. */
 bool hs_points_of(PyObject *object, const char *name, hs_points *points);
 

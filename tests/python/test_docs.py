@@ -51,6 +51,14 @@ def test_readme_notebook_example_runs(capsys):
     assert "algorithm" in capsys.readouterr().out
 
 
+def test_example_of_tables_runs():
+    text = (ROOT / "docs/neighbors.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "neighbors.md", "exec"), names)
+    assert len(names["table"]) == 1000 and len(names["first"]) == 100
+
+
 def test_readme_commands_create_what_they_need():
     text = (ROOT / "README.md").read_text()
     commands = re.findall(r"```bash\n(.*?)\n```", text)
