@@ -10,8 +10,8 @@
 
 #include "../halfshell.h"
 
-/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. name:
- * of the argument, for messages. */
+/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
+ * is that of the argument, for messages. */
 bool hs_points_of(PyObject *object, const char *name, hs_points *points);
 
 /* The cells in an object of _core.cells_build, borrowed; NULL, without an exception, for others. */

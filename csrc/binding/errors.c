@@ -204,16 +204,16 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                                  failure->value);
     case HS_ERR_SHIFT_RANGE:
         PyErr_Format(PyExc_OverflowError,
-                     "%s[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
-                     "and S holds 2**31; wrap the points first",
+                     "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
+                     "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
                      set_of(failure), (long long)failure->row);
         return NULL;
     case HS_ERR_ROUNDING:
         PyErr_Format(PyExc_OverflowError,
-                     "points[%lld] lies so far from the box, or the box is so skewed, that rounding "
+                     "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
                      "errors of precision='double' pass the cutoff; wrap the points first, or use "
                      "precision='exact'",
-                     (long long)failure->row);
+                     set_of(failure), (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
     case HS_ERR_FAR:

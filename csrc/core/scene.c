@@ -235,9 +235,9 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     return status;
 }
 
-/* The first of the points that are farthest from zero along some axis. */
+/* The first of the points that are farthest from zero along some axis; *far: how far. */
 static int64_t
-farthest_point(const hs_cloud *cloud)
+farthest_point(const hs_cloud *cloud, double *far)
 {
     int64_t farthest = 0;
     double  largest = -1.0;
@@ -250,7 +250,21 @@ farthest_point(const hs_cloud *cloud)
             }
         }
     }
+    *far = largest;
     return farthest;
+}
+
+/* The point or query to blame for a formula that drowns in rounding. */
+static void
+name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
+{
+    double of_points, of_queries;
+    failure->row = farthest_point(&scene->cloud, &of_points);
+    if (asking != NULL) {
+        const int64_t query = farthest_point(&asking->cloud, &of_queries);
+        failure->in_queries = of_queries > of_points;
+        failure->row = failure->in_queries ? query : failure->row;
+    }
 }
 
 /* Whether the formula's error passes both the cutoff and a small part of the box: then the images
@@ -320,7 +334,7 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     hs_lattice_init(empty ? NULL : condensed->box, scene->ndim, scene->pending, &scene->lattice);
     hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
     if (is_drowned(scene)) {
-        failure->row = farthest_point(&scene->cloud);
+        name_farthest(scene, asking, failure);
         return HS_ERR_ROUNDING;
     }
     if (asking != NULL) {
