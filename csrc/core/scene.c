@@ -9,9 +9,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Error of precision="double", in heights of the box, up to which candidates are few. */
-#define NOISE 0x1p-6
-
 /* Columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
@@ -235,52 +232,6 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     return status;
 }
 
-/* The first of the points that are farthest from zero along some axis; *far: how far. */
-static int64_t
-farthest_point(const hs_cloud *cloud, double *far)
-{
-    int64_t farthest = 0;
-    double  largest = -1.0;
-    for (int k = 0; k < cloud->ndim; k++) {
-        for (int64_t i = 0; i < cloud->n; i++) {
-            const double size = fabs(cloud->x[k][i]);
-            if (size > largest || (size == largest && i < farthest)) {
-                largest = size;
-                farthest = i;
-            }
-        }
-    }
-    *far = largest;
-    return farthest;
-}
-
-/* The point or query to blame for a formula that drowns in rounding. */
-static void
-name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
-{
-    double of_points, of_queries;
-    failure->row = farthest_point(&scene->cloud, &of_points);
-    if (asking != NULL) {
-        const int64_t query = farthest_point(&asking->cloud, &of_queries);
-        failure->in_queries = of_queries > of_points;
-        failure->row = failure->in_queries ? query : failure->row;
-    }
-}
-
-/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
- * that it might call near are too many to try, and its answer is noise. */
-static bool
-is_drowned(const hs_scene *scene)
-{
-    double shortest = INFINITY;
-    for (int k = 0; k < scene->ndim; k++) {
-        if (scene->lattice.row_of_axis[k] >= 0) {
-            shortest = hs_smaller(scene->lattice.period[k], shortest);
-        }
-    }
-    return scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest);
-}
-
 /* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. */
 static void
 set_scale(const hs_condensed *condensed, int unit, hs_scene *scene, const hs_scene *asking)
@@ -333,8 +284,8 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     }
     hs_lattice_init(empty ? NULL : condensed->box, scene->ndim, scene->pending, &scene->lattice);
     hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
-    if (is_drowned(scene)) {
-        name_farthest(scene, asking, failure);
+    if (hs_scene_is_drowned(scene)) {
+        hs_scene_name_farthest(scene, asking, failure);
         return HS_ERR_ROUNDING;
     }
     if (asking != NULL) {

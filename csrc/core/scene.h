@@ -124,6 +124,12 @@ void hs_scene_settle_ranges(hs_scene *scene);
 /* formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
 void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
 
+/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
+ * that it might call near are too many to try, and its answer is noise; and the point or query to
+ * blame for that. asking: NULL without queries. */
+bool hs_scene_is_drowned(const hs_scene *scene);
+void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
+
 /* What decides: X and B where they hold every digit, else the points and rows as given. */
 void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
 

@@ -8,6 +8,8 @@
 #include <math.h>
 
 #define UNIT 0x1p-53 /* unit roundoff of float64 */
+/* Error of precision="double", in heights of the box, up to which candidates are few. */
+#define NOISE 0x1p-6
 
 void
 hs_scene_settle_ranges(hs_scene *scene)
@@ -111,4 +113,47 @@ hs_scene_set_cutoff(hs_scene *scene, const hs_options *options)
     scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, options->cutoff);
     hs_scene_set_radius(scene, options, scene->cloud.largest);
     hs_scene_init_metric(scene, options);
+}
+
+/* The first of the points that are farthest from zero along some axis; *far: how far. */
+static int64_t
+farthest_point(const hs_cloud *cloud, double *far)
+{
+    int64_t farthest = 0;
+    double  largest = -1.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        for (int64_t i = 0; i < cloud->n; i++) {
+            const double size = fabs(cloud->x[k][i]);
+            if (size > largest || (size == largest && i < farthest)) {
+                largest = size;
+                farthest = i;
+            }
+        }
+    }
+    *far = largest;
+    return farthest;
+}
+
+void
+hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure)
+{
+    double of_points, of_queries;
+    failure->row = farthest_point(&scene->cloud, &of_points);
+    if (asking != NULL) {
+        const int64_t query = farthest_point(&asking->cloud, &of_queries);
+        failure->in_queries = of_queries > of_points;
+        failure->row = failure->in_queries ? query : failure->row;
+    }
+}
+
+bool
+hs_scene_is_drowned(const hs_scene *scene)
+{
+    double shortest = INFINITY;
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0) {
+            shortest = hs_smaller(scene->lattice.period[k], shortest);
+        }
+    }
+    return scene->formula_error > scene->cutoff && !(scene->formula_error <= NOISE * shortest);
 }

@@ -407,7 +407,7 @@ def test_what_would_not_fit_is_refused(rng):
     queries, points = rng.random((30_000, 3)), rng.random((20_000, 3))
     assert_refused(
         lambda: hs.pairs_between(queries, points, 2.0, memory_limit=1e8),
-        MemoryError, "6e\\+08 pairs", "0.1 GB",
+        MemoryError, "6e\\+08 pairs", "100 MB",
     )  # fmt: skip
 
 

@@ -333,7 +333,7 @@ def test_wrong_letters(letters):
 def test_what_would_not_fit_is_refused(rng):
     points = rng.random((20_000, 3))
     assert_refused(
-        lambda: hs.neighbors(points, 2.0, memory_limit=1e8), MemoryError, "4e\\+08 pairs", "0.1 GB"
+        lambda: hs.neighbors(points, 2.0, memory_limit=1e8), MemoryError, "4e\\+08 pairs", "100 MB"
     )
     # Counting them needs no such memory.
     assert (hs.coordination(points[:5000], 2.0, memory_limit=1e8) == 4999).all()
