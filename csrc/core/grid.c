@@ -121,9 +121,8 @@ bound_shift_error(const hs_scene *scene, const double *images)
     return error;
 }
 
-/* Volume of a ball in ndim dimensions. */
-static double
-ball_volume(int ndim, double radius)
+double
+hs_ball_volume(int ndim, double radius)
 {
     double volume = ndim % 2 == 0 ? 1.0 : 2.0 * radius;
     for (int k = 2 + ndim % 2; k <= ndim; k += 2) {
@@ -369,7 +368,7 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
     grid->shift_error = bound_shift_error(scene, images);
 
     const double density = (double)scene->n / volume;
-    const double ball = ball_volume(scene->ndim, scene->cutoff);
+    const double ball = hs_ball_volume(scene->ndim, scene->cutoff);
     grid->expected_pairs = 0.5 * (double)scene->n * density * ball;
     if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);

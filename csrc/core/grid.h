@@ -26,6 +26,9 @@ typedef struct hs_grid {
 
 #define HS_GRID_SPARE_CELLS 64
 
+/* Volume of a ball in ndim dimensions. */
+double hs_ball_volume(int ndim, double radius);
+
 /* HS_ERR_MEMORY when a cutoff spans more than 2^31 images. */
 hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
 

@@ -117,6 +117,9 @@ hs_search_open(const hs_points *points, const hs_box *box, const hs_options *opt
     hs_search_begin(options, search);
     search->team = hs_team_create(hs_search_threads(points->n, options));
     const hs_status status = hs_search_build(points, box, search, failure);
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
     if (status != HS_OK) {
         hs_search_report(search, 0);
         hs_search_close(search);
