@@ -2,6 +2,8 @@
 /* convert.c: see convert.h. */
 #include "convert.h"
 
+#include "foreign.h"
+
 #include <string.h>
 
 bool
@@ -81,20 +83,18 @@ _Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 &&
                    HS_WANT_VECTOR == 8 && HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32,
                "hs_quantities_of counts on this");
 
-/* "i j d", with spaces, for a message. */
+/* Names the letters that are known. */
 static void
 refuse_quantities(const char *known, PyObject *object)
 {
-    char   text[2 * sizeof HS_LETTERS];
-    size_t n = 0;
+    char   text[160] = "quantities must be some of the letters ";
+    size_t n = strlen(text);
     for (const char *letter = known; *letter != '\0'; letter++) {
         text[n++] = *letter;
-        text[n++] = ' ';
+        text[n++] = letter[1] != '\0' ? ' ' : ',';
     }
-    text[n - 1] = '\0';
-    PyErr_Format(PyExc_ValueError,
-                 "quantities must be some of the letters %s, each at most once, got %R", text,
-                 object);
+    memcpy(text + n, " each at most once", sizeof " each at most once");
+    hs_refuse(PyExc_ValueError, text, object);
 }
 
 bool
@@ -135,8 +135,8 @@ hs_precision_of(PyObject *object, hs_precision *precision)
             return true;
         }
     }
-    PyErr_Format(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError,
-                 "precision must be 'exact', 'double' or 'single', got %R", object);
+    hs_refuse(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError,
+              "precision must be 'exact', 'double' or 'single'", object);
     return false;
 }
 
@@ -154,6 +154,10 @@ hs_name_of(PyObject *object, const char *argument, const char **name)
     }
     Py_ssize_t length;
     *name = PyUnicode_AsUTF8AndSize(object, &length);
+    if (*name == NULL && PyErr_ExceptionMatches(PyExc_UnicodeError)) {
+        PyErr_Clear();
+        PyErr_Format(PyExc_ValueError, "%s must not contain lone surrogates", argument);
+    }
     if (*name != NULL && strlen(*name) != (size_t)length) {
         PyErr_Format(PyExc_ValueError, "%s must not contain null characters", argument);
         return false;

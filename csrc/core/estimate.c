@@ -15,6 +15,7 @@
 #define SAMPLES 64         /* points that are counted: an error of some per cent */
 #define SAMPLE_WORK 4.0e6  /* candidates and rows that sampling may cost, some milliseconds */
 #define MOST_PAIRS 0x1p62  /* more than int64 should be asked to count */
+#define ROUNDING 1e-9      /* relative; far more than the coordinates along the axes are rounded */
 #define SURE_ERRORS 3.0    /* standard errors below the mean at which a refusal is sure enough */
 
 static double
@@ -129,36 +130,46 @@ refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure 
 }
 
 /*
- * Pairs that a fully periodic box must have: a ball of radius R holds at least as many lattice
- * points as copies of the cell cover a ball of radius R less the cell's diameter.
+ * Pairs that a periodic box must have. Along the open axes no two points are further apart than the
+ * diagonal of what the points span there; what is left of the radius spans a ball in the space of
+ * the periodic axes. One of radius R holds at least as many lattice points as copies of the cell
+ * cover a ball of radius R less the cell's diameter.
  */
 static double
 least_pairs(const hs_search *search)
 {
-    const hs_scene *scene = &search->scene;
-    const double    n = (double)scene->n;
-    double          diameter = 0.0;
-    for (int r = 0; r < scene->lattice.n_periodic; r++) {
+    const hs_scene   *scene = &search->scene;
+    const hs_lattice *lattice = &scene->lattice;
+    const double      n = (double)scene->n;
+    double            diameter = 0.0, across = 0.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
         double square = 0.0;
         for (int k = 0; k < scene->ndim; k++) {
-            square += scene->lattice.rows[r][k] * scene->lattice.rows[r][k];
+            square += lattice->rows[r][k] * lattice->rows[r][k];
         }
         diameter += sqrt(square);
     }
-    const double covered = hs_larger(1.0 - diameter / scene->cutoff, 0.0);
-    double       least = search->grid.expected_pairs;
     for (int k = 0; k < scene->ndim; k++) {
-        least *= covered;
+        if (lattice->row_of_axis[k] < 0) {
+            const double extent = (scene->upper[k] - scene->lower[k]) / scene->cutoff;
+            across += extent * extent * (1.0 + ROUNDING);
+        }
     }
+    const double radius = sqrt(hs_larger(1.0 - across, 0.0)) * scene->cutoff - diameter;
+    if (!(radius > 0.0)) {
+        return 0.0;
+    }
+    const double ball = hs_ball_volume(lattice->n_periodic, radius);
+    const double around = n * ball / hs_lattice_volume(lattice, 0); /* points in that ball */
     /* Half a pair of each point would be the one with itself. */
-    return (least - (search->has_queries ? 0.0 : 0.5 * n)) * search->pairs_per_half;
+    return 0.5 * n * (around - (search->has_queries ? 0.0 : 1.0)) * search->pairs_per_half;
 }
 
 hs_status
 hs_estimate_by_density(hs_search *search, hs_failure *failure)
 {
     const double bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
-    if (search->scene.lattice.n_periodic < search->scene.ndim || search->scene.n == 0) {
+    if (search->scene.lattice.n_periodic == 0 || search->scene.n == 0) {
         return HS_OK;
     }
     const double least = least_pairs(search);
@@ -169,7 +180,9 @@ hs_estimate_by_density(hs_search *search, hs_failure *failure)
     if (!(least > 0.0) || hs_account_allows(&search->account, least * bytes_per_pair)) {
         return HS_OK;
     }
-    return refuse(search, search->grid.expected_pairs * search->pairs_per_half, bytes_per_pair,
+    const bool   has_density = search->scene.lattice.n_periodic == search->scene.ndim;
+    const double dense = search->grid.expected_pairs * search->pairs_per_half;
+    return refuse(search, has_density ? dense : least, bytes_per_pair,
                   failure);
 }
 

@@ -23,9 +23,9 @@ void hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_
                            hs_failure *failure);
 
 /*
- * Before any work: a fully periodic box has at least so many pairs as its density says, less what a
- * cell's diameter can hide. HS_ERR_MEMORY when even these pass the limit, HS_ERR_TOO_MANY when
- * int64 cannot count them.
+ * Before any work: a box has at least so many pairs as its density along the periodic axes says,
+ * less what a cell's diameter and the extent along the open axes can hide. HS_ERR_MEMORY when even
+ * these pass the limit, HS_ERR_TOO_MANY when int64 cannot count them.
  */
 hs_status hs_estimate_by_density(hs_search *search, hs_failure *failure);
 

@@ -26,6 +26,9 @@ typedef struct hs_grid {
 
 #define HS_GRID_SPARE_CELLS 64
 
+/* Volume of a ball in ndim dimensions. */
+double hs_ball_volume(int ndim, double radius);
+
 /* HS_ERR_MEMORY when a cutoff spans more than 2^31 images. */
 hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
 
@@ -49,9 +52,6 @@ hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_be
 
 /* Cells per axis that int32 windows and doubles tell apart. */
 #define HS_GRID_CELLS_PER_AXIS 0x1p31
-
-/* Of a ball in so many dimensions. */
-double hs_ball_volume(int ndim, double radius);
 
 /* Added to places, times the number of cells, where axes are cut by faces: more than their
  * rounding, so that the cell found is the right one or the next. */

@@ -163,6 +163,9 @@ hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options
     const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
     search->team = hs_team_create(hs_search_threads(sets->points->n + n_queries, options));
     const hs_status status = hs_search_build(sets, box, search, failure);
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
     if (status != HS_OK) {
         hs_search_report(search, 0);
         hs_search_close(search);

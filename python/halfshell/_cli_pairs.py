@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from argparse import Namespace
@@ -184,7 +185,7 @@ def _open_output(
         return None
     if not target.lower().endswith(suffixes):
         raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
-    if source is not None and Path(target).exists() and Path(target).samefile(source):
+    if source is not None and os.path.exists(target) and os.path.samefile(target, source):
         raise InputError(f"{target}: is the input; it is not overwritten")
     return stack.enter_context(replacing(target))
 

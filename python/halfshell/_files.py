@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import secrets
 import warnings
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,6 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = ["InputError", "Scene", "missing_extra", "one_line", "read_scene", "replacing"]
+
+
+MOST_CHARACTERS = 1000  # of a line that says what is wrong
 
 
 class InputError(Exception):
@@ -72,7 +74,10 @@ def one_line(error: BaseException) -> str:
         return error.strerror
     if isinstance(error, MemoryError) and not str(error):
         return "not enough memory"
-    return " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(str(error).split()) or type(error).__name__
+    # What was wrong stands at the beginning or at the end; between them may be a very long name.
+    half = MOST_CHARACTERS // 2
+    return text if len(text) <= MOST_CHARACTERS else f"{text[:half]} ... {text[-half:]}"
 
 
 def missing_extra(what: str, package: str) -> InputError:
@@ -144,15 +149,20 @@ def _read_numpy(file: str, index: int | None) -> Scene:
     if index is not None:
         raise InputError(f"{file}: --index is for files with several frames, not for NumPy's")
     try:
-        with open(file, "rb") as stream:
+        with open(file, "rb") as stream, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of headers that Python 2 wrote
             loaded = np.load(stream, allow_pickle=False)
             if isinstance(loaded, np.ndarray):
                 content = {"points": loaded}
             else:
                 content = {name: loaded[name] for name in loaded.files}
+                # Members that are no NumPy files come as bytes.
+                content = {k: v for k, v in content.items() if isinstance(v, np.ndarray)}
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
-    except (ValueError, EOFError, KeyError, TypeError, SyntaxError, zipfile.BadZipFile) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # a broken file may fail in any part of zipfile, zlib and NumPy
         reason = one_line(error)
         if "Object arrays" in reason:
             reason = "it holds Python objects"
@@ -296,6 +306,8 @@ def replacing(target: str) -> Iterator[IO[bytes]]:
     InputError
         If `target` cannot be written.
     """
+    if "\0" in target:
+        raise InputError(f"{target!r}: cannot be written: no file has such a name")
     path = os.path.realpath(target)  # a symbolic link keeps pointing to the file
     if os.path.exists(path) and not os.path.isfile(path):
         raise InputError(f"{target}: cannot be written: not a regular file")

@@ -38,6 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         The exit status.
     """
+    if argv is None and hasattr(sys.stdout, "reconfigure"):
+        # A name of a file may hold what the terminal cannot show, as on standard error.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         args = _parser().parse_args(argv)
         status = int(args.run(args))

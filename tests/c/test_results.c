@@ -328,6 +328,33 @@ memory_limit_refuses_or_is_kept(void)
     CHECK(refused > 3 && granted > 0);
 }
 
+/* A slab in whose plane the cutoff spans 1e5 boxes: neither the rows of the stencil nor a sample of
+ * the candidates are needed to know better. */
+static void
+a_slab_with_too_many_images_is_refused_at_once(void)
+{
+    double      x[6] = {0.0, 0.0, 0.0, 0.5, 0.25, 7.0};
+    hs_box      box = {.ndim = 3,
+                       .periodic = {true, false, true},
+                       .rows = {{1.0}, {0.0}, {0.5, 0.0, 1.0}}};
+    brute_scene scene = {.ndim = 3, .n = 2, .x = x, .box = &box, .cutoff = 1e5};
+    hs_options  options = options_of(&scene);
+    limit_state state = {.bytes = 1e9};
+    hs_failure  failure;
+    hs_pairs   *pairs = NULL;
+    hs_plan     plan;
+    const hs_points points = points_of(&scene);
+    options.find_limit = find_limit; /* 2 * pi * 1e10 pairs */
+    options.find_context = &state;
+    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs > 6.2e10 && failure.expected_pairs < 6.3e10);
+    CHECK(failure.limit_bytes > 0.9e9 && failure.limit_bytes < 1.1e9);
+    CHECK(hs_plan_make(&points, &box, &options, &plan, &failure) == HS_ERR_MEMORY);
+    options.cutoff = 30.0; /* few images, and the points span a part of the radius */
+    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_OK);
+    hs_pairs_free(pairs);
+}
+
 static void
 a_result_too_large_is_refused_before_it_is_found(void)
 {
@@ -364,5 +391,6 @@ test_results(void)
     RUN(sorted_pairs_ascend_strictly);
     RUN(poll_stops_the_search_whenever_it_says_so);
     RUN(memory_limit_refuses_or_is_kept);
+    RUN(a_slab_with_too_many_images_is_refused_at_once);
     RUN(a_result_too_large_is_refused_before_it_is_found);
 }
