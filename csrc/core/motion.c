@@ -35,8 +35,8 @@ typedef struct tracking {
     bool             has_base;
     double           base[HS_MAX_DIM];
     double           drift[HS_MAX_DIM];
-    hs_counts       *counts;
-    bool             jumped;  /* counts are set */
+    hs_counts       *jumps;
+    bool             jumped;  /* jumps are set */
     double           square;    /* largest |u|^2 ... */
     double           component; /* ... and |u_k| */
     double           magnitude; /* of the terms of wrapping */
@@ -128,19 +128,15 @@ take_jump(tracking *track, tile *t, int p, int64_t *given)
     return true;
 }
 
-/* The counts as they were when the list was built. */
+/* No jumps yet. */
 static bool
-start_counts(tracking *track)
+start_jumps(tracking *track)
 {
     const int64_t n = track->motion->now->points.n * track->m;
-    if (!hs_counts_make_room(track->counts, n)) {
+    if (!hs_counts_make_room(track->jumps, n)) {
         return false;
     }
-    if (track->motion->counts != NULL) {
-        memcpy(track->counts->of, track->motion->counts, (size_t)n * sizeof(int64_t));
-    } else {
-        memset(track->counts->of, 0, (size_t)n * sizeof(int64_t));
-    }
+    memset(track->jumps->of, 0, (size_t)n * sizeof(int64_t));
     track->jumped = true;
     return true;
 }
@@ -166,11 +162,11 @@ take_jumps(tracking *track, tile *t)
         for (int r = 0; r < m; r++) {
             any |= (uint64_t)given[r];
         }
-        if (any != 0 && !track->jumped && !start_counts(track)) {
+        if (any != 0 && !track->jumped && !start_jumps(track)) {
             return HS_ERR_MEMORY;
         }
         for (int r = 0; any != 0 && r < m; r++) {
-            track->counts->of[(t->first + p) * m + r] += given[r];
+            track->jumps->of[(t->first + p) * m + r] = given[r];
         }
     }
     return HS_OK;
@@ -351,12 +347,12 @@ find_margin(const tracking *track)
 }
 
 static hs_status
-start(const hs_motion *motion, hs_counts *counts, tracking *track)
+start(const hs_motion *motion, hs_counts *jumps, tracking *track)
 {
     int row[HS_MAX_DIM];
     memset(track, 0, sizeof *track);
     track->motion = motion;
-    track->counts = counts;
+    track->jumps = jumps;
     track->m = hs_frame_periodic(motion->now, row);
     track->jump = INFINITY;
     if (track->m == 0) {
@@ -399,10 +395,10 @@ measure_all(tracking *track, const hs_options *options)
 
 hs_status
 hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin, bool *jumped,
-                 hs_counts *counts)
+                 hs_counts *jumps)
 {
     tracking  track;
-    hs_status status = start(motion, counts, &track);
+    hs_status status = start(motion, jumps, &track);
     *margin = -1.0;
     *jumped = false;
     if (status == HS_OK) {
