@@ -25,6 +25,7 @@ typedef struct hs_refilter {
     int              vector_of_row[HS_MAX_DIM];
     hs_metric        given;  /* decides, on points and box vectors as given */
     int64_t         *counts; /* owned; m a point, as those of the list, jumps included; or NULL */
+    double           most_counts; /* the largest of them, of either sign */
     float           *y;      /* owned; sift.h */
     float           *offset; /* owned; one row for each image */
     hs_thresholds    plain, shifted; /* for pairs without and with an image */

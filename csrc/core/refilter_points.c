@@ -19,7 +19,7 @@ add_counts(hs_refilter *refilter)
     const hs_listing *listing = &list->listing;
     const int64_t     n = refilter->now->points.n;
     const int         m = refilter->m;
-    const int64_t *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now].of : NULL;
+    const int64_t *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now].data : NULL;
     if (listing->counts == NULL && jumps == NULL) {
         return HS_OK;
     }
@@ -29,10 +29,12 @@ add_counts(hs_refilter *refilter)
         return HS_ERR_MEMORY;
     }
     for (int64_t a = 0; a < n; a++) {
+        const int64_t *jump = jumps != NULL ? jumps + (int64_t)listing->order[a] * m : NULL;
         for (int r = 0; r < m; r++) {
-            refilter->counts[a * m + r] =
-                (listing->counts != NULL ? listing->counts[a * m + r] : 0) +
-                (jumps != NULL ? jumps[(int64_t)listing->order[a] * m + r] : 0);
+            const int64_t count = (listing->counts != NULL ? listing->counts[a * m + r] : 0) +
+                                  (jump != NULL ? jump[r] : 0);
+            refilter->counts[a * m + r] = count;
+            refilter->most_counts = hs_larger(fabs((double)count), refilter->most_counts);
         }
     }
     return HS_OK;
@@ -40,15 +42,16 @@ add_counts(hs_refilter *refilter)
 
 /* Point number `a` of the list in the frame of its images, in float64: r - count h. */
 HS_ALWAYS_INLINE void
-place_of(const hs_refilter *refilter, const hs_real real, int64_t a, const int d, double *z)
+place_of(const hs_refilter *refilter, const hs_real real, int64_t a, const int d, const int m,
+         double *z)
 {
     const int64_t i = refilter->list->listing.order[a];
     for (int k = 0; k < d; k++) {
         z[k] = hs_frame_entry(refilter->now->rows, real, i * d + k);
     }
-    for (int r = 0; refilter->counts != NULL && r < refilter->m; r++) {
-        const double count = (double)refilter->counts[a * refilter->m + r];
-        for (int k = 0; count != 0.0 && k < d; k++) {
+    for (int r = 0; r < m; r++) {
+        const double count = (double)refilter->counts[a * m + r];
+        for (int k = 0; k < d; k++) {
             z[k] -= count * refilter->given.rows[r][k];
         }
     }
@@ -58,13 +61,14 @@ place_of(const hs_refilter *refilter, const hs_real real, int64_t a, const int d
 static void
 find_centre(const hs_refilter *refilter, double *centre)
 {
+    const int     m = refilter->counts != NULL ? refilter->m : 0;
     const int64_t n = refilter->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     double        lower[HS_MAX_DIM], upper[HS_MAX_DIM], z[HS_MAX_DIM];
     for (int k = 0; k < refilter->d; k++) {
         lower[k] = upper[k] = 0.0;
     }
     for (int64_t a = 0; a < n; a += step) {
-        place_of(refilter, refilter->now->points.real, a, refilter->d, z);
+        place_of(refilter, refilter->now->points.real, a, refilter->d, m, z);
         for (int k = 0; k < refilter->d; k++) {
             lower[k] = a == 0 ? z[k] : hs_smaller(z[k], lower[k]);
             upper[k] = a == 0 ? z[k] : hs_larger(z[k], upper[k]);
@@ -78,40 +82,48 @@ find_centre(const hs_refilter *refilter, double *centre)
 /* Rows of floats; returns the largest, infinity or NaN included. */
 HS_ALWAYS_INLINE double
 put_floats(const hs_refilter *refilter, hs_scale scale, const double *centre, const hs_real real,
-           const int d)
+           const int d, const int m)
 {
     const int stride = hs_sift_stride(d);
-    double    largest = 0.0, poison = 0.0;
+    double    largest[HS_MAX_DIM] = {0.0}, poison[HS_MAX_DIM] = {0.0}, most = 0.0;
     for (int64_t a = 0; a < refilter->now->points.n; a++) {
         double z[HS_MAX_DIM];
         float *y = refilter->y + a * stride;
-        place_of(refilter, real, a, d, z);
+        place_of(refilter, real, a, d, m, z);
         for (int k = 0; k < stride; k++) {
             const float entry =
                 k < d ? (float)hs_scale_apply(scale, z[k] - centre[k]) : 0.0f;
             y[k] = entry;
-            largest = hs_larger(fabs((double)entry), largest);
-            poison += (double)(entry - entry);
+            largest[k] = hs_larger(fabs((double)entry), largest[k]);
+            poison[k] += (double)(entry - entry);
         }
     }
-    return largest + poison;
+    for (int k = 0; k < d; k++) {
+        most = hs_larger(largest[k], most) + poison[k];
+    }
+    return most;
 }
 
+/* put_floats, with constants where that pays. */
 static double
 put_points(const hs_refilter *refilter, hs_scale scale, const double *centre)
 {
     const hs_real real = refilter->now->points.real;
-    switch (4 * (real == HS_FLOAT32) + (refilter->d == 2 || refilter->d == 3 ? refilter->d : 0)) {
-    case 2: return put_floats(refilter, scale, centre, HS_FLOAT64, 2);
-    case 3: return put_floats(refilter, scale, centre, HS_FLOAT64, 3);
-    case 6: return put_floats(refilter, scale, centre, HS_FLOAT32, 2);
-    case 7: return put_floats(refilter, scale, centre, HS_FLOAT32, 3);
-    default: return put_floats(refilter, scale, centre, real, refilter->d);
+    const int     d = refilter->d, m = refilter->counts != NULL ? refilter->m : 0;
+    const bool    narrow = real == HS_FLOAT32;
+    if (d == 3 && m == 0) {
+        return narrow ? put_floats(refilter, scale, centre, HS_FLOAT32, 3, 0)
+                      : put_floats(refilter, scale, centre, HS_FLOAT64, 3, 0);
     }
+    if (d == 3 && m == 3) {
+        return narrow ? put_floats(refilter, scale, centre, HS_FLOAT32, 3, 3)
+                      : put_floats(refilter, scale, centre, HS_FLOAT64, 3, 3);
+    }
+    return put_floats(refilter, scale, centre, real, d, m);
 }
 
 /* Images as floats. *largest: their largest component; *size: at least the sum of absolute terms of
- * any. Both unscaled are at most infinite, never NaN. */
+ * any. */
 static void
 put_offsets(const hs_refilter *refilter, hs_scale scale, double *largest, double *size)
 {
@@ -140,12 +152,10 @@ put_offsets(const hs_refilter *refilter, hs_scale scale, double *largest, double
 static double
 bound_counts(const hs_refilter *refilter, hs_scale scale)
 {
-    double most = 0.0, size = 0.0;
+    const double most = refilter->most_counts;
+    double       size = 0.0;
     if (refilter->counts == NULL) {
         return 0.0;
-    }
-    for (int64_t e = 0; e < refilter->now->points.n * refilter->m; e++) {
-        most = hs_larger(fabs((double)refilter->counts[e]), most);
     }
     for (int r = 0; r < refilter->m; r++) {
         double longest = 0.0;

@@ -35,8 +35,8 @@ hs_verlet_free(hs_verlet *list)
     for (int f = 0; f < 3; f++) {
         hs_frame_free(&list->frames[f]);
     }
-    hs_counts_free(&list->jumps[0]);
-    hs_counts_free(&list->jumps[1]);
+    hs_store_free(&list->jumps[0]);
+    hs_store_free(&list->jumps[1]);
     hs_free(NULL, list);
 }
 
@@ -60,7 +60,7 @@ radius_of(double cutoff, double skin)
     return sum.lo > 0.0 ? hs_next_up(sum.hi) : sum.hi;
 }
 
-/* The frame and the counts that are not in use. */
+/* The frame that is not in use. */
 static int
 spare_frame(const hs_verlet *list)
 {

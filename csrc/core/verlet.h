@@ -18,12 +18,16 @@
  */
 typedef struct hs_listing {
     int64_t   n_pairs, n_plain;
-    int32_t  *i, *j;   /* owned: hs_array_free; the caller's numbers of them are i < j, or equal */
-    int32_t  *code;    /* owned; of pairs from n_plain on: the number of their image */
+    int32_t  *i, *j;   /* the caller's numbers of them are i < j, or equal */
+    int32_t  *code;    /* of pairs from n_plain on: the number of their image */
     hs_images images;
-    int32_t  *order;   /* owned; the caller's number of each place */
-    int64_t  *counts;  /* owned; m for each place, when it was built; NULL: all zero */
+    int32_t  *order;   /* the caller's number of each place */
+    int64_t  *counts;  /* m for each place, when it was built; NULL: all zero */
     double    radius;
+    /* Where these are. Pairs are written when nothing can fail any more; the others are made beside
+     * those in use, and `turn` says which are. */
+    hs_store  for_i, for_j, for_code, for_order[2], for_counts[2];
+    int       turn;
 } hs_listing;
 
 struct hs_verlet {
@@ -33,7 +37,7 @@ struct hs_verlet {
     double     margin;
     hs_frame   frames[3];    /* two are in use, one is for the next step */
     int        built, now;   /* numbers of frames: the step it was built for, the last step */
-    hs_counts  jumps[2];     /* since it was built: those of the last step and of the next */
+    hs_store   jumps[2];     /* since it was built: those of the last step and of the next */
     int        jumps_now;    /* which of them; -1: nothing has jumped */
 };
 

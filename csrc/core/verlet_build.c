@@ -8,31 +8,28 @@
 
 #include "estimate.h"
 #include "lattice.h"
-#include "parallel.h"
-#include "poll.h"
-#include "record.h"
+#include "pieces.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Pairs between two questions to the caller: a few milliseconds. */
-#define POLL_PAIRS (INT64_C(1) << 20)
-
-/* A search and what it finds: i and j in cell order, and images over all box vectors. */
+/* A search, and what it has found in cell order. */
 typedef struct building {
-    hs_search search;
-    hs_output output;
-    int32_t  *i, *j, *image; /* owned: hs_array_free; image is NULL where nothing repeats */
+    hs_search   search;
+    hs_pieces   pieces;
+    hs_listing *listing; /* borrowed: what it becomes; its stores are those of the list in use */
 } building;
 
 void
 hs_listing_free(hs_listing *listing)
 {
-    hs_array_free(listing->i);
-    hs_array_free(listing->j);
-    hs_free(NULL, listing->order);
-    hs_free(NULL, listing->counts);
-    hs_free(NULL, listing->code);
+    hs_store_free(&listing->for_i);
+    hs_store_free(&listing->for_j);
+    hs_store_free(&listing->for_code);
+    for (int turn = 0; turn < 2; turn++) {
+        hs_store_free(&listing->for_order[turn]);
+        hs_store_free(&listing->for_counts[turn]);
+    }
     hs_images_free(&listing->images);
     *listing = (hs_listing){0};
 }
@@ -63,7 +60,8 @@ take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
         return HS_OK;
     }
     HS_ASSERT(bins->turns.known);
-    listing->counts = hs_alloc(NULL, HS_FOR_WRAPS, bins->n * m, sizeof *listing->counts);
+    listing->counts = hs_store_reserve(&listing->for_counts[listing->turn], HS_FOR_WRAPS,
+                                       bins->n * m, sizeof *listing->counts);
     if (listing->counts == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -81,7 +79,6 @@ take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
         }
     }
     if (any == 0) {
-        hs_free(NULL, listing->counts);
         listing->counts = NULL;
     }
     return HS_OK;
@@ -92,7 +89,8 @@ static hs_status
 renumber(hs_search *search, hs_listing *listing)
 {
     hs_bins *bins = &search->bins;
-    listing->order = hs_alloc(NULL, HS_FOR_ORDER, bins->n, sizeof *listing->order);
+    listing->order = hs_store_reserve(&listing->for_order[listing->turn], HS_FOR_ORDER, bins->n,
+                                      sizeof *listing->order);
     if (listing->order == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -100,48 +98,19 @@ renumber(hs_search *search, hs_listing *listing)
         listing->order[si] = bins->order[si];
         bins->order[si] = (int32_t)si;
     }
-    search->options.want &= ~(unsigned)HS_WANT_SHIFT; /* shifts are kept as keys: images */
     if (!bins->keeps_originals) {
         bins->turns.known = false; /* nobody needs them any more */
     }
     return HS_OK;
 }
 
-static hs_status
-record(building *built, hs_failure *failure)
-{
-    hs_search  *search = &built->search;
-    hs_recorder recorder = {0};
-    hs_walker   walker;
-    if (search->team != NULL) {
-        return hs_parallel_record(search, &built->output, failure);
-    }
-    hs_status status = hs_walker_init(search, hs_record_use(built->output.columns),
-                                      hs_record_hits, &recorder, &walker);
-    if (status == HS_OK) {
-        status = hs_recorder_init(&search->account, &built->output, walker.block.most_hits,
-                                  &recorder);
-    }
-    if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)search->bins.n);
-    }
-    if (status == HS_ERR_SHIFT_RANGE) {
-        failure->row = walker.failed_point;
-    }
-    hs_recorder_free(&search->account, &recorder);
-    hs_walker_close(search, &walker);
-    return status;
-}
-
 /* All pairs within the radius; the search stays open. */
 static hs_status
-find(building *built, hs_listing *listing, hs_failure *failure)
+find(building *built, hs_failure *failure)
 {
-    hs_search *search = &built->search;
-    const bool has_images = search->bins.n_periodic > 0;
-    hs_output_init(&search->account, search->scene.ndim,
-                   HS_WANT_I | HS_WANT_J | (has_images ? HS_WANT_SHIFT : 0), 4, &built->output);
-    hs_status status = hs_estimate_by_sample(search, failure);
+    hs_search  *search = &built->search;
+    hs_listing *listing = built->listing;
+    hs_status   status = hs_estimate_by_sample(search, failure);
     if (status == HS_OK) {
         status = take_counts(search, listing, failure);
     }
@@ -149,113 +118,166 @@ find(building *built, hs_listing *listing, hs_failure *failure)
         status = renumber(search, listing);
     }
     if (status == HS_OK) {
-        hs_output_expect(&built->output, search->grid.expected_pairs);
-        status = record(built, failure);
+        status = hs_pieces_find(search, &built->pieces, failure);
         if (failure->row >= 0) {
             failure->row = listing->order[failure->row];
         }
     }
-    if (status == HS_OK) {
-        status = hs_output_reserve(&built->output, 0, 1.0); /* arrays also without pairs */
-    }
     return status;
 }
 
-/* Pair e the way the caller's numbers have it: i < j. Returns whether its image, over the box
- * vectors that repeat, is not zero. */
+/* Where a piece's pairs go, and its first pair with an image among all of these. */
+typedef struct placing {
+    const building *built;
+    int64_t        *plain, *shifted; /* owned, one for each piece */
+} placing;
+
+/* A pair the way the caller's numbers have it: i < j. Returns whether it had to be turned. */
 HS_ALWAYS_INLINE bool
-turn_pair(const building *built, const int32_t *order, int64_t e, int32_t *i, int32_t *j,
-          int32_t *image)
+put_pair(const int32_t *order, int32_t a, int32_t b, hs_listing *listing, int64_t to)
 {
-    const hs_lattice *lattice = &built->search.scene.lattice;
-    const int32_t     a = built->i[e], b = built->j[e];
-    const bool        turned = order[a] > order[b];
-    uint32_t          any = 0;
-    *i = turned ? b : a;
-    *j = turned ? a : b;
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        const int32_t shift = built->image[e * lattice->ndim + lattice->vector_of_row[r]];
-        image[r] = turned ? -shift : shift; /* not INT32_MIN: recording has refused it */
-        any |= (uint32_t)image[r];
-    }
-    return any != 0;
+    const bool turned = order[a] > order[b];
+    listing->i[to] = turned ? b : a;
+    listing->j[to] = turned ? a : b;
+    return turned;
 }
 
-static int64_t
-count_shifted(const building *built, int64_t n_pairs)
+/* A hs_task_fn: the pairs of one piece to the listing, those with an image behind all others. */
+static void
+place_piece(void *context, int64_t p)
 {
-    const int64_t d = built->search.scene.ndim;
-    int64_t       n = 0;
-    for (int64_t e = 0; built->image != NULL && e < n_pairs; e++) {
-        int32_t any = 0;
-        for (int64_t k = 0; k < d; k++) {
-            any |= built->image[e * d + k];
+    const placing  *place = context;
+    const hs_piece *piece = &place->built->pieces.of[p];
+    hs_listing     *listing = place->built->listing;
+    const int32_t  *i = hs_output_column(&piece->pairs, HS_WANT_I);
+    const int32_t  *j = hs_output_column(&piece->pairs, HS_WANT_J);
+    int64_t         plain = place->plain[p], e = 0;
+    for (int64_t s = 0; s <= piece->n_shifted; s++) {
+        const int64_t end = s < piece->n_shifted ? piece->at[s] : piece->pairs.n_pairs;
+        for (; e < end; e++) {
+            put_pair(listing->order, i[e], j[e], listing, plain++);
         }
-        n += any != 0;
-    }
-    return n;
-}
-
-/* Turns all pairs, and moves those with an image behind the others, each kind in the order in which
- * it was, through `aside`, which has room for their i and j; listing->code for their images. */
-static hs_status
-part_pairs(building *built, int64_t n_shifted, int32_t *aside, hs_listing *listing)
-{
-    const int64_t n_pairs = listing->n_pairs;
-    int64_t       n_plain = 0, n = 0;
-    for (int64_t e = 0; e < n_pairs; e++) {
-        int32_t i, j, image[HS_MAX_DIM];
-        if (!turn_pair(built, listing->order, e, &i, &j, image)) {
-            built->i[n_plain] = i;
-            built->j[n_plain++] = j;
-        } else {
-            aside[n] = i;
-            aside[n_shifted + n] = j;
-            listing->code[n] = hs_images_number(&listing->images, image);
-            if (listing->code[n++] < 0) {
-                return HS_ERR_MEMORY;
-            }
-        }
-        if (e % POLL_PAIRS == POLL_PAIRS - 1 &&
-            hs_poll(&built->search.options, 1.0) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
+        if (s < piece->n_shifted) {
+            const int64_t to = place->shifted[p] + s;
+            put_pair(listing->order, i[e], j[e], listing, listing->n_plain + to);
+            listing->code[to] = piece->shift[s];
+            e++;
         }
     }
-    HS_ASSERT(n == n_shifted && n_plain + n == n_pairs);
-    memcpy(built->i + n_plain, aside, (size_t)n * sizeof *aside);
-    memcpy(built->j + n_plain, aside + n, (size_t)n * sizeof *aside);
-    listing->n_plain = n_plain;
-    return HS_OK;
 }
 
-/* From what was found to the listing's arrays. */
-static hs_status
-settle_pairs(building *built, hs_listing *listing)
+/* Shifts of one piece, of m numbers each, to numbers of images, one each, in the same array. */
+static bool
+number_images(hs_piece *piece, hs_listing *listing)
 {
-    hs_account   *account = &built->search.account;
-    hs_output    *output = &built->output;
-    hs_status     status = HS_ERR_MEMORY;
-    const int64_t n = output->n_pairs;
-    listing->n_pairs = n;
-    built->i = hs_output_take(output, HS_WANT_I);
-    built->j = hs_output_take(output, HS_WANT_J);
-    built->image = hs_output_take(output, HS_WANT_SHIFT);
-    const int64_t n_shifted = count_shifted(built, n);
-    int32_t *aside = hs_alloc(account, HS_FOR_SORTING, 2 * n_shifted, sizeof(int32_t));
-    hs_images_init(built->search.scene.lattice.n_periodic, &listing->images);
-    if (hs_account_allows(account, (double)n_shifted * sizeof(int32_t))) {
-        listing->code = hs_alloc(NULL, HS_FOR_SHIFTS, n_shifted, sizeof(int32_t));
+    const int      m = listing->images.width;
+    const int32_t *i = hs_output_column(&piece->pairs, HS_WANT_I);
+    const int32_t *j = hs_output_column(&piece->pairs, HS_WANT_J);
+    for (int64_t s = 0; s < piece->n_shifted; s++) {
+        const int64_t e = piece->at[s];
+        const bool    turned = listing->order[i[e]] > listing->order[j[e]];
+        int32_t       image[HS_MAX_DIM];
+        for (int r = 0; r < m; r++) {
+            image[r] = turned ? -piece->shift[s * m + r] : piece->shift[s * m + r];
+        }
+        piece->shift[s] = hs_images_number(&listing->images, image);
+        if (piece->shift[s] < 0) {
+            return false;
+        }
     }
-    if (aside != NULL && listing->code != NULL) {
-        status = part_pairs(built, n_shifted, aside, listing);
+    return true;
+}
+
+/* A larger store in *renewed, if the present one is too small for n numbers. */
+static bool
+renew(const hs_store *store, int64_t n, hs_store *renewed)
+{
+    return (store->data != NULL && n * (int64_t)sizeof(int32_t) <= store->capacity) ||
+           hs_store_reserve(renewed, HS_FOR_INDICES, n, sizeof(int32_t)) != NULL;
+}
+
+/* The renewed store in place of the other, if there is one. */
+static int32_t *
+take(hs_store *store, hs_store *renewed)
+{
+    if (renewed->data != NULL) {
+        hs_store_free(store);
+        *store = *renewed;
     }
-    hs_free(account, aside);
-    return status;
+    return store->data;
+}
+
+/* Counts the pairs, and how many come before each piece. */
+static bool
+count_pairs(building *built, placing *place)
+{
+    hs_account *account = &built->search.account;
+    hs_listing *listing = built->listing;
+    int64_t     n_shifted = 0;
+    place->plain = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof(int64_t));
+    place->shifted = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof(int64_t));
+    if (place->plain == NULL || place->shifted == NULL) {
+        return false;
+    }
+    for (int64_t p = 0; p < built->pieces.n; p++) {
+        const hs_piece *piece = &built->pieces.of[p];
+        place->plain[p] = listing->n_pairs - n_shifted;
+        place->shifted[p] = n_shifted;
+        listing->n_pairs += piece->pairs.n_pairs;
+        n_shifted += piece->n_shifted;
+    }
+    listing->n_plain = listing->n_pairs - n_shifted;
+    /* The pieces, which nobody has counted, and the listing. */
+    if (!hs_account_allows(account, 16.0 * (double)listing->n_pairs + 32.0 * (double)n_shifted)) {
+        return false;
+    }
+    return true;
+}
+
+/* Room for the pairs: the last thing that can fail, for it may be that of the list in use, ... */
+static bool
+make_room(hs_listing *listing)
+{
+    const int64_t n = listing->n_pairs;
+    hs_store      i = {0}, j = {0}, code = {0};
+    bool          complete = true;
+    /* ... which must lose none of its arrays if another one cannot be had. */
+    complete = complete && renew(&listing->for_i, n, &i);
+    complete = complete && renew(&listing->for_j, n, &j);
+    complete = complete && renew(&listing->for_code, n - listing->n_plain, &code);
+    if (!complete) {
+        hs_store_free(&i);
+        hs_store_free(&j);
+        return false;
+    }
+    listing->i = take(&listing->for_i, &i);
+    listing->j = take(&listing->for_j, &j);
+    listing->code = take(&listing->for_code, &code);
+    return true;
+}
+
+/* From what was found to the listing. */
+static hs_status
+settle_pairs(building *built)
+{
+    hs_search *search = &built->search;
+    placing    place = {.built = built};
+    hs_images_init(search->scene.lattice.n_periodic, &built->listing->images);
+    bool complete = count_pairs(built, &place);
+    for (int64_t p = 0; p < built->pieces.n && complete; p++) {
+        complete = number_images(&built->pieces.of[p], built->listing);
+    }
+    complete = complete && make_room(built->listing);
+    if (complete) {
+        hs_team_run(search->team, built->pieces.n, place_piece, &place);
+    }
+    hs_free(&search->account, place.shifted);
+    hs_free(&search->account, place.plain);
+    return complete ? HS_OK : HS_ERR_MEMORY;
 }
 
 static hs_status
-build(const hs_frame *frame, building *built, hs_listing *listing, const hs_options *options,
-      hs_failure *failure)
+build(const hs_frame *frame, building *built, const hs_options *options, hs_failure *failure)
 {
     hs_search *search = &built->search;
     hs_status  status =
@@ -263,16 +285,16 @@ build(const hs_frame *frame, building *built, hs_listing *listing, const hs_opti
     if (status != HS_OK) {
         return status;
     }
-    status = find(built, listing, failure);
+    status = find(built, failure);
     if (status == HS_OK) {
-        status = settle_pairs(built, listing);
+        status = settle_pairs(built);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs =
-            fmax(failure->expected_pairs, (double)built->output.n_pairs);
+            fmax(failure->expected_pairs, (double)built->listing->n_pairs);
         failure->limit_bytes = search->account.limit;
     }
-    hs_output_free(&built->output);
+    hs_pieces_free(&search->account, &built->pieces);
     hs_search_close(search);
     return status;
 }
@@ -282,29 +304,30 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
                  hs_listing *listing, hs_failure *failure)
 {
     int              row[HS_MAX_DIM];
-    const hs_options building_options =
+    const hs_options searching =
         options_of_build(options, radius, hs_frame_periodic(frame, row));
-    hs_listing listing_built = {.radius = radius};
+    hs_listing next = *listing; /* with its stores */
     building  *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
     if (built == NULL) {
         return HS_ERR_MEMORY;
     }
-    memset(&built->output, 0, sizeof built->output);
-    built->i = built->j = built->image = NULL;
-    const hs_status status =
-        build(frame, built, &listing_built, &building_options, failure);
+    next.n_pairs = next.n_plain = 0;
+    next.radius = radius;
+    next.counts = NULL;
+    hs_images_init(0, &next.images);
+    next.turn = 1 - listing->turn;
+    built->listing = &next;
+    built->pieces = (hs_pieces){0};
+    const hs_status status = build(frame, built, &searching, failure);
     hs_account_close(&built->search.account);
-    hs_array_free(built->image);
-    if (status == HS_OK) {
-        listing_built.i = built->i;
-        listing_built.j = built->j;
-        hs_listing_free(listing);
-        *listing = listing_built;
-    } else {
-        hs_array_free(built->i);
-        hs_array_free(built->j);
-        hs_listing_free(&listing_built);
-    }
     hs_free(NULL, built);
+    if (status == HS_OK) {
+        hs_images_free(&listing->images);
+        *listing = next;
+    } else { /* stores that are not in use may have grown */
+        hs_images_free(&next.images);
+        listing->for_order[next.turn] = next.for_order[next.turn];
+        listing->for_counts[next.turn] = next.for_counts[next.turn];
+    }
     return status;
 }
