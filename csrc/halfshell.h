@@ -267,6 +267,8 @@ typedef struct hs_verlet_state {
     double  cutoff;
     double  radius;   /* cutoff + skin, rounded up */
     double  margin;   /* by how much pairs may yet come closer before the list is built again */
+    double  tried;    /* the margin of the last step with the list of the one before; -infinity:
+                         unknown. Below 0: the list was built again */
 } hs_verlet_state;
 
 hs_verlet_state hs_verlet_look(const hs_verlet *list);
