@@ -57,6 +57,10 @@ class VerletList:
     needed (other points, another number or type of them, a box that deformed too much), it is
     built; that is no error.
 
+    A search is so fast that a list saves less than elsewhere: nothing for the indices of many
+    neighbours in three dimensions, something where there are few, or more dimensions, or d and D
+    are wanted. ``docs/verlet.md`` has measurements.
+
     Several threads may use one list, one at a time: the others wait. It cannot be copied or
     pickled.
 

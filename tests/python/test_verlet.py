@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles import BOX_KINDS, random_box, rotation, same_arrays
 
 import halfshell as hs
 from halfshell._skin import MOST_CHANGES, AutoSkin
+from oracles import BOX_KINDS, random_box, same_arrays
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -335,8 +335,8 @@ def test_a_box_that_collapses_is_an_error_of_the_box_alone(rng):
 
 def test_another_number_or_type_of_points(rng):
     pair_list = hs.VerletList(0.3, 0.2, box=[1.0] * 3)
-    for n, dtype in ((50, float), (51, float), (51, np.float32), (0, float), (1, float), (2, float)):
-        points = rng.random((n, 3)).astype(dtype)
+    for n, narrow in ((50, False), (51, False), (51, True), (0, False), (1, False), (2, False)):
+        points = rng.random((n, 3)).astype(np.float32 if narrow else np.float64)
         assert pair_list.update(points)
         check(pair_list, points, [1.0] * 3)
         assert not pair_list.update(points)
@@ -401,7 +401,8 @@ def test_points_are_copied_and_inputs_unchanged(rng):
 
 def test_any_kind_of_points(rng):
     points = rng.random((40, 3))
-    for given in (points.tolist(), points[::-1][::-1], np.asfortranarray(points), points.astype(">f8")):
+    turned = np.asfortranarray(points), points[::-1].copy()[::-1]
+    for given in (points.tolist(), points.astype(">f8"), *turned):
         pair_list = hs.VerletList(0.3, 0.1, box=hs.Box(np.eye(3)))
         pair_list.update(given)
         check(pair_list, points, np.eye(3))
