@@ -303,7 +303,7 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     hs_condensed      condensed = {.box = box};
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
-    const bool        alone = asking == NULL && !scene->is_kept;
+    const bool        alone = asking == NULL && !scene->is_kept && !scene->is_plain;
     hs_status         status = HS_OK;
     scene->sought =
         scene->is_kept ? options->cutoff : hs_enough_cutoff(cloud, &size, options->cutoff);
@@ -329,6 +329,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
 {
     start_scene(sets->points, scene);
     scene->is_kept = scene->is_asked = sets->is_kept;
+    scene->is_plain = sets->is_plain;
     if (asking != NULL) {
         start_scene(sets->queries, asking);
     }

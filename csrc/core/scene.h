@@ -39,6 +39,7 @@ typedef struct hs_scene {
     double     formula_error; /* precision="double": its |D| against the true one */
     bool       is_asked;      /* by queries: the bounds above hold for these too */
     bool       is_kept;       /* and for others that come later */
+    bool       is_plain;      /* as hs_sets says */
 } hs_scene;
 
 /* Who looks for neighbours among whom; borrowed. */
@@ -46,6 +47,8 @@ typedef struct hs_sets {
     const hs_points *points;
     const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
     bool             is_kept; /* queries come later: bounds with room for them */
+    bool             is_plain; /* points are not drawn together (condense.h): images are those of
+                                * the points as given */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */

@@ -13,6 +13,7 @@ from halfshell._options import kernels
 from halfshell._pairs import pairs
 from halfshell._table import NeighborTable
 from halfshell._verify import Verdict, verify
+from halfshell._verlet import VerletList
 
 __version__ = "0.1.0"
 
@@ -23,6 +24,7 @@ __all__ = [
     "Explanation",
     "NeighborTable",
     "Verdict",
+    "VerletList",
     "clear_cache",
     "coordination",
     "count_pairs",
