@@ -78,7 +78,8 @@ take_threads(PyObject *object, int64_t n_points, hs_options *options)
                      object);
         return false;
     }
-    options->threads = (int)n;
+    const int most = hs_most_threads();
+    options->threads = n > most ? most : (int)n;
     return true;
 }
 

@@ -193,9 +193,9 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
         return NULL;
     case HS_ERR_ROUNDING:
         PyErr_Format(PyExc_OverflowError,
-                     "points[%lld] lies so far from the box, or the box is so skewed, that rounding "
-                     "errors of precision='double' pass the cutoff; wrap the points first, or use "
-                     "precision='exact'",
+                     "points[%lld] lies so far from the box, or the box is so skewed, that "
+                     "rounding errors of precision='double' pass the cutoff; wrap the points "
+                     "first, or use precision='exact'",
                      (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);

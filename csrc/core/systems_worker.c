@@ -202,6 +202,9 @@ hs_systems_work(void *context, int64_t task)
     hs_status          status = HS_OK;
     hs_turn_join(crew->turns, &worker->options, &worker->stage.pairs, &worker->turn);
     hs_search_begin(&worker->options, &worker->search);
+    /* What asks the caller has been made to count already; the rest is not to be counted. */
+    worker->search.options.poll = worker->options.poll;
+    worker->search.options.poll_context = worker->options.poll_context;
     while (status == HS_OK && hs_turn_next(&worker->turn)) {
         const int64_t first = worker->turn.range * crew->in_range;
         const int64_t left = n - first;
@@ -249,7 +252,6 @@ hs_systems_close_worker(hs_systems_worker *worker, hs_search *total)
     sum->by_float64 += walked->by_float64;
     sum->by_double_word += walked->by_double_word;
     sum->by_integers += walked->by_integers;
-    sum->polls += walked->polls;
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += account->total.bytes[p];
     }

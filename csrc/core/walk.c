@@ -112,15 +112,6 @@ run_scan(const hs_walker *walker, hs_scan *scan, int32_t first)
     return next;
 }
 
-static void
-gather_block(hs_walker *walker)
-{
-    set_flushing(walker, true);
-    hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first,
-                    &walker->block, &walker->group);
-    set_flushing(walker, false);
-}
-
 /* Test every point of the group against the block, then empty the block. */
 static hs_status
 scan_block(hs_walker *walker)
@@ -128,7 +119,10 @@ scan_block(hs_walker *walker)
     hs_block *block = &walker->block;
     int32_t   end[HS_GROUP_POINTS];
     hs_scan   scan;
-    gather_block(walker);
+    set_flushing(walker, true);
+    hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
+                    &walker->group);
+    set_flushing(walker, false);
     hs_trace_reset(&walker->trace);
     set_form(walker);
     set_scan(walker, &scan);
