@@ -9,8 +9,9 @@
  * point[i] + S * box.
  *
  * Rules: nothing here prints, reads the environment or, but for hs_pool_*, keeps state between
- * calls. Every function may be called from several threads at once. On failure outputs are
- * untouched or NULL, and `hs_failure` says what was wrong.
+ * calls. Every function may be called from several threads at once. On failure a result is NULL and
+ * a number is untouched, but arrays that the caller provides (options->out, counts, wrapped, shift)
+ * may hold anything; `hs_failure` says what was wrong.
  */
 #ifndef HALFSHELL_H
 #define HALFSHELL_H

@@ -65,7 +65,8 @@ take_threads(PyObject *object, hs_options *options)
         hs_refuse(PyExc_ValueError, THREADS_MUST_BE, object);
         return false;
     }
-    options->threads = (int)n;
+    const int most = hs_most_threads();
+    options->threads = n > most ? most : (int)n;
     return true;
 }
 

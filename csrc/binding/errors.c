@@ -211,8 +211,8 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
     case HS_ERR_ROUNDING:
         PyErr_Format(PyExc_OverflowError,
                      "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
-                     "errors of precision='double' pass the cutoff; wrap the points first, or use "
-                     "precision='exact'",
+                     "errors of precision='double' pass the cutoff; wrap the points first, or "
+                     "use precision='exact'",
                      set_of(failure), (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);

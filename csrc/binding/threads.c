@@ -16,6 +16,9 @@
 #endif
 
 #define MOST_THREADS 256 /* more would only wait for their turn to write */
+/* Threads for each core at most: more of them make nothing quicker, and would keep the caller's own
+ * from the processor, which is the one that sees Ctrl-C. */
+#define PER_CORE 4
 
 static long
 count_cores(void)
@@ -31,6 +34,14 @@ count_cores(void)
 }
 
 int
+hs_most_threads(void)
+{
+    const long cores = count_cores();
+    const long most = PER_CORE * (cores < 1 ? 1 : cores);
+    return most > MOST_THREADS ? MOST_THREADS : (int)most;
+}
+
+int
 hs_default_threads(void)
 {
     const char *text = getenv("OMP_NUM_THREADS");
@@ -39,5 +50,6 @@ hs_default_threads(void)
     if (n < 1 || end == text) {
         n = count_cores();
     }
-    return n < 1 ? 1 : n > MOST_THREADS ? MOST_THREADS : (int)n;
+    const int most = hs_most_threads();
+    return n < 1 ? 1 : n > most ? most : (int)n;
 }

@@ -7,4 +7,7 @@
  * run on; at least 1. */
 int hs_default_threads(void);
 
+/* What more of them would only make slower: a few for each core. */
+int hs_most_threads(void);
+
 #endif

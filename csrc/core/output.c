@@ -13,6 +13,8 @@
 #define MOST_GROWTH 8.0
 /* Pairs that the account is charged for at a time. */
 #define CHARGE_STEP (INT64_C(1) << 20)
+/* Of one column: half the address space. */
+#define MOST_BYTES (0.5 * (double)SIZE_MAX)
 
 static const hs_purpose purposes[HS_COLUMNS] = {HS_FOR_INDICES, HS_FOR_INDICES, HS_FOR_DISTANCES,
                                                 HS_FOR_VECTORS, HS_FOR_SHIFTS,  HS_FOR_INDICES};
@@ -97,15 +99,17 @@ undo_resize(hs_output *output)
 static bool
 resize(hs_output *output, double pairs)
 {
-    if (!(pairs < 0x1p56)) {
-        return false;
-    }
     for (int k = 0; k < HS_COLUMNS; k++) {
         hs_region *column = &output->column[k];
         if (!(output->columns >> k & 1u)) {
             continue;
         }
         const size_t width = hs_output_width(output, 1u << k);
+        /* As numbers first: size_t may have 32 bits. */
+        if (!((pairs + HS_PADDING) * (double)width < MOST_BYTES)) {
+            undo_resize(output);
+            return false;
+        }
         const size_t bytes = ((size_t)pairs + HS_PADDING) * width;
         column->used = (size_t)output->n_pairs * width;
         if (column->data == NULL ? !hs_region_reserve(column, bytes)

@@ -169,7 +169,8 @@ hs_pool_clear(void)
     if (!lock_patiently()) {
         return;
     }
-    const int n = remove_oldest(SIZE_MAX, 0, removed);
+    /* Room for as many chunks as there can be: those without touched memory go as well. */
+    const int n = remove_oldest(0, HS_POOL_CHUNKS, removed);
     unlock();
     free_all(removed, n);
 }

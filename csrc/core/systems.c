@@ -131,8 +131,6 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
     hs_output     *output = &pairs->output;
     hs_systems_crew crew = {.points = points, .systems = systems, .output = output};
     hs_search_begin(options, total);
-    total->options.poll = options->poll; /* the workers' searches count the calls */
-    total->options.poll_context = options->poll_context;
     hs_output_init(&total->account, points->ndim, options->want, options->index_bytes, output);
     if (options->out != NULL) {
         hs_output_fix(output, options->out);
@@ -170,8 +168,6 @@ hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_op
     counting.sorted = false;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_search_begin(&counting, &total);
-    total.options.poll = options->poll;
-    total.options.poll_context = options->poll_context;
     const hs_status status = search_systems(&crew, &total, failure);
     for (int64_t s = 0; s < systems->n && status == HS_OK; s++) {
         found += counts[s];

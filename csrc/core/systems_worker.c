@@ -195,6 +195,9 @@ hs_systems_work(void *context, int64_t task)
     hs_systems_worker *worker = &crew->workers[task];
     hs_commits_join(crew->commits, &worker->options, &worker->backlog.pairs, &worker->committer);
     hs_search_begin(&worker->options, &worker->search);
+    /* What asks the caller has been made to count already; the rest is not to be counted. */
+    worker->search.options.poll = worker->options.poll;
+    worker->search.options.poll_context = worker->options.poll_context;
     hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
 }
 

@@ -96,9 +96,10 @@ def pairs(
         One of ``kernels()``; for tests and timing. All give identical arrays. Default: what the
         environment variable HALFSHELL_KERNEL said when halfshell was imported, otherwise the best.
     threads : int, optional
-        Threads to use. Default: one for small scenes, else the number in the environment variable
-        ``OMP_NUM_THREADS``, or as many as there are cores that this process may run on. The arrays
-        are the same for any number. Threads end before the call returns.
+        Threads to use, at most four for each core. Default: one for small scenes, else the number
+        in the environment variable ``OMP_NUM_THREADS``, or as many as there are cores that this
+        process may run on. The arrays are the same for any number. Threads end before the call
+        returns.
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.

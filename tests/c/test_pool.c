@@ -114,6 +114,22 @@ scratch_is_always_found(void)
     hs_pool_clear();
 }
 
+/* Chunks that nothing was written to take no memory, but they take address space. */
+static void
+clearing_takes_untouched_chunks_too(void)
+{
+    reset_pool();
+    hs_pool_set_limit(SIZE_MAX);
+    for (int k = 0; k < 3; k++) {
+        hs_region region = {0};
+        CHECK(hs_region_reserve(&region, 20 * MB, 20 * MB));
+        hs_region_release(&region);
+    }
+    hs_pool_clear();
+    CHECK(hs_pool_take(20 * MB) == NULL);
+    reset_pool();
+}
+
 static void
 the_limit_holds(void)
 {
@@ -362,6 +378,7 @@ test_pool(void)
     RUN(results_are_recycled);
     RUN(recycled_memory_gets_more_room);
     RUN(scratch_is_always_found);
+    RUN(clearing_takes_untouched_chunks_too);
     RUN(the_limit_holds);
     RUN(few_blocks_are_kept);
     RUN(the_best_fit_is_taken);

@@ -133,6 +133,82 @@ failures_name_system_and_point(void)
     CHECK(failure.row == row && failure.column == 2);
 }
 
+static bool
+count_poll(void *context, double fraction)
+{
+    int64_t *calls = context;
+    CHECK(fraction >= 0.0 && fraction <= 1.0);
+    ++*calls;
+    return true;
+}
+
+/* Also those that a thread makes while it waits for its turn, and no others. */
+static void
+polls_are_counted(void)
+{
+    enum { N = 6, POINTS = 1500 };
+    static double x[N * POINTS];
+    harness_random random = {11};
+    int64_t        first[N + 1], most = 0;
+    for (int e = 0; e < N * POINTS; e++)
+        x[e] = random_unit(&random);
+    for (int s = 0; s <= N; s++)
+        first[s] = s * POINTS;
+    const hs_points  points = {x, N * POINTS, 1, HS_FLOAT64, sizeof(double), sizeof(double)};
+    const hs_systems systems = {N, first, NULL, NULL, NULL};
+    for (int threads = 1; threads <= 4; threads++) {
+        for (int trial = 0; trial < 4; trial++) {
+            hs_counters counters;
+            int64_t     calls = 0, counts[N];
+            hs_options  options = hs_options_default();
+            hs_pairs   *pairs = NULL;
+            options.cutoff = 2.0;
+            options.threads = threads;
+            options.poll = count_poll;
+            options.poll_context = &calls;
+            options.counters = &counters;
+            if (trial % 2) {
+                CHECK(hs_systems_find(&points, &systems, &options, &pairs, NULL) == HS_OK);
+            } else {
+                CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_OK);
+            }
+            CHECK(counters.polls == calls);
+            CHECK(counters.pairs == (int64_t)N * POINTS * (POINTS - 1) / 2);
+            most = calls > most ? calls : most;
+            hs_pairs_free(pairs);
+        }
+    }
+    CHECK(most > 0);
+}
+
+/* The message of a refusal names what was expected, also before anything was read. */
+static void
+a_shortage_is_told_in_pairs_and_bytes(void)
+{
+    static batch made;
+    hs_failure   failure;
+    make_batch(3, &made);
+    const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs};
+    for (int kind = 0; kind < 4; kind++) {
+        hs_options options = hs_options_default();
+        hs_pairs  *pairs = NULL;
+        int64_t    counts[N_SYSTEMS];
+        options.memory_limit = 100.0;
+        options.cutoff = 1.0;
+        options.threads = 1 + kind / 2;
+        const hs_status status =
+            kind % 2 ? hs_systems_find(&points, &systems, &options, &pairs, &failure)
+                     : hs_systems_count(&points, &systems, &options, counts, &failure);
+        CHECK(status == HS_ERR_MEMORY && pairs == NULL);
+        CHECK(failure.expected_pairs > 100.0 && failure.expected_pairs < 1e6);
+        CHECK(failure.expected_bytes == (kind % 2 ? 16.0 : 0.0) * failure.expected_pairs);
+        CHECK(failure.search_bytes > 100.0 && failure.limit_bytes <= 100.0);
+        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, &failure) == HS_ERR_MEMORY);
+        CHECK(failure.expected_bytes > 0.0 && failure.limit_bytes == 100.0);
+    }
+}
+
 /* Every allocation fails once; nothing is left behind. */
 static void
 nothing_is_lost_when_memory_is_short(void)
@@ -168,5 +244,7 @@ test_systems(void)
 {
     RUN(the_same_as_single_calls);
     RUN(failures_name_system_and_point);
+    RUN(polls_are_counted);
+    RUN(a_shortage_is_told_in_pairs_and_bytes);
     RUN(nothing_is_lost_when_memory_is_short);
 }

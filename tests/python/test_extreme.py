@@ -1,0 +1,282 @@
+"""Scenes at the ends of float64: the same answers, in time that follows points and pairs."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell._reference import reference_pairs
+from oracles import check, check_large
+
+LARGEST = 1.7e308
+SMALLEST = 5e-324
+
+
+def scales(rng, n, ndim, lowest, highest):
+    """Numbers of all sizes between two powers of ten, of both signs."""
+    return 10.0 ** rng.uniform(lowest, highest, (n, ndim)) * rng.choice([-1, 1], (n, ndim))
+
+
+def near_points(rng, points, cutoff):
+    """Half of the coordinates become those of other points, about a cutoff away."""
+    n = len(points)
+    for row in range(1, n):
+        for k in range(points.shape[1]):
+            x = points[rng.integers(row), k]
+            step = rng.choice([0.0, cutoff, -cutoff, cutoff * rng.uniform(-2, 2)])
+            choices = [x, np.nextafter(x, np.inf), x + step, -x, points[row, k]]
+            choice = choices[rng.integers(5)]
+            points[row, k] = choice if math.isfinite(choice) else x
+    return points
+
+
+# ---- pairs, exactly ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cutoff", [SMALLEST, 1e-310, 1e-200, 1e-9, 0.5, 1e9, 1e200, 1e307, 0.0])
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_open_scenes_of_all_scales(rng, kernel, cutoff, ndim):
+    for lowest, highest in [(-320, 308), (-3, 300), (-323, -300), (0, 0.1)]:
+        points = scales(rng, 25, ndim, lowest, highest)
+        check(near_points(rng, points, cutoff), cutoff, kernel=kernel)
+
+
+@pytest.mark.parametrize("cutoff", [SMALLEST, 1e-300, 1e-17, 0.4, 1e200, 0.0])
+@pytest.mark.parametrize("length", [1.0, 1e-300, 1e300, 3 * SMALLEST])
+def test_periodic_scenes_of_all_scales(rng, kernel, cutoff, length):
+    if cutoff > 3 * length:
+        return  # more images than there is room for
+    for outside in (0, 3):
+        points = rng.uniform(-outside, outside + 1, (20, 2)) * length
+        points[:4, 0] = [length / 2, -length / 2, 0, np.nextafter(length / 2, 0)]
+        near_points(rng, points, cutoff)
+        check(points, cutoff, [length, 2 * length], kernel=kernel)
+        check(points, cutoff, [[0, -length], [length, 0]], [True, False], kernel=kernel)
+
+
+def test_boxes_of_very_different_lengths(rng, kernel):
+    box = [1e-300, 1.0, 1e300]
+    points = rng.random((20, 3)) * box
+    points[:, 0] = points[rng.integers(20, size=20), 0]
+    near_points(rng, points, 1e-300)
+    check(points, 1e-300, box, kernel=kernel)
+    check(points, 0.0, box, kernel=kernel)
+    for open_axis in range(3):
+        check(points, 1e-300, box, [k != open_axis for k in range(3)], kernel=kernel)
+
+
+def test_tilted_boxes_with_tiny_cutoffs(rng, kernel):
+    box = np.array([[1.0, 0, 0], [0.3, 1, 0], [0, 0, 1]])
+    points = rng.random((30, 3)) @ box
+    points[15:] = points[:15]
+    points[20:25, 2] = [1e300, -1e300, 0, LARGEST, -LARGEST]
+    for cutoff in (0.0, SMALLEST, 1e-200):
+        found = check(points, cutoff, box, [True, True, False], kernel=kernel)
+        assert len(found) >= 10
+        points[:, 2] %= 1.0
+        assert len(check(points, cutoff, box, kernel=kernel)) >= 10
+
+
+@pytest.mark.parametrize("box", [None, [1.0, 1.0, 1.0]])
+def test_distances_and_vectors_beside_outliers(rng, box):
+    points = rng.random((40, 3))
+    points[7, 0], points[8, 1], points[9, 2] = 1e300, -LARGEST, SMALLEST
+    shifts = "" if box else "S"
+    i, j, d, D, *_ = hs.pairs(points, 0.5, box=box, quantities="ijdD" + shifts, periodic=None)
+    vectors = np.where(box is None, points[j] - points[i], D)
+    assert np.all(np.abs(np.linalg.norm(vectors, axis=1) - d) <= 2 * np.spacing(d))
+    assert len(i) == len(reference_pairs(points, 0.5, box))
+
+
+def test_distances_of_subnormal_coordinates(rng):
+    points = rng.integers(0, 30, (60, 2)) * SMALLEST
+    points[0] = 1e300
+    i, j, d, D = hs.pairs(points, 9 * SMALLEST, quantities="ijdD")
+    assert np.array_equal(D, points[j] - points[i])
+    for a, b, distance in zip(i, j, d):
+        steps = [round((points[b, k] - points[a, k]) / SMALLEST) for k in range(2)]
+        assert abs(distance / SMALLEST - math.hypot(*steps)) <= 1
+    assert len(check(points, 9 * SMALLEST)) == len(i)
+
+
+def test_points_wrapped_from_far_away_count_their_turns(kernel):
+    # The box is far wider than the cutoff can tell, and points lie outside of it.
+    box = [1.0, 1.0]
+    points = np.array([[0.25, 0.5], [3.25, 0.5], [-2.75, 0.5], [0.25, 8.5], [0.5, 0.5]])
+    expected = {(0, 1, (-3, 0)), (0, 2, (3, 0)), (1, 2, (6, 0)), (0, 3, (0, -8))}
+    expected |= {(1, 3, (3, -8)), (2, 3, (-3, -8))}
+    for cutoff in (0.0, 1e-300, SMALLEST):
+        assert check(points, cutoff, box, kernel=kernel) == expected
+    points[4, 0] = 2.0**51
+    assert hs.count_pairs(points, 1e-300, box=box, kernel=kernel) == 6
+    with pytest.raises(OverflowError, match=r"points\[4\] lies too many box vectors away"):
+        hs.pairs(points * 4, 1e-300, box=box, quantities="S", kernel=kernel)
+
+
+def test_faces_of_a_condensed_box_meet(kernel):
+    half = 0.5
+    points = np.array([[half], [-half], [np.nextafter(half, 0)], [0.0]])
+    expected = {(0, 1, (1,))}
+    assert check(points, 1e-200, [1.0], kernel=kernel) == expected
+    assert check(points, 2.0**-54, [1.0], kernel=kernel) == expected | {(0, 2, (0,)), (1, 2, (-1,))}
+
+
+def test_a_cutoff_far_beyond_the_cloud(rng, kernel):
+    points = rng.random((50, 3)) * 1e-300
+    for cutoff in (1e-299, 1e-290, 1.0, 1e19, 1e300, LARGEST):
+        assert hs.count_pairs(points, cutoff, kernel=kernel) == 50 * 49 // 2
+        d = hs.pairs(points, cutoff, quantities="d", kernel=kernel)
+        expected = hs.pairs(points, 1e-299, quantities="d")
+        assert np.allclose(np.sort(d), np.sort(expected), rtol=1e-15)
+    assert hs.count_pairs(points * 0, 1.0, kernel=kernel) == 50 * 49 // 2
+
+
+def test_crowds_far_smaller_than_the_cutoff(rng, kernel):
+    # Differences underflow in float32 where the crowds are 1e-30 wide.
+    centres = rng.integers(0, 9, (300, 3)).astype(float)
+    centres[:100] = 0.0
+    points = centres + rng.uniform(-1, 1, (300, 3)) * 10.0 ** rng.uniform(-40, -12, (300, 1))
+    for cutoff in (1e-35, 1e-25, 1e-13, 1.0):
+        check_large(points, cutoff, kernel=kernel)
+
+
+# ---- work, counted -------------------------------------------------------------------------
+
+
+def work(points, cutoff, box=None):
+    """Candidates, decisions beyond float32 and in integers, a point and pair."""
+    n = len(points)
+    report = hs.explain(points, cutoff, box=box, measure=True, threads=1, memory_limit=1e12)
+    counts = report.measured
+    things = n + counts["pairs"]
+    return [counts[name] / things for name in ("candidates", "ambiguous", "by_integers")]
+
+
+WIDE = {
+    "outlier": lambda u: (np.concatenate([u, [[1e300] * u.shape[1]]]), 0.05, None),
+    "tiny cutoff": lambda u: (u, SMALLEST, None),
+    "tiny cutoff in a box": lambda u: (u, 1e-200, np.ones(u.shape[1])),
+    "huge spread": lambda u: ((u - 0.5) * 2e300, 1e-200, None),
+    "huge box": lambda u: ((u - 0.5) * 1e300, 1.0, np.full(u.shape[1], 1e300)),
+    "subnormal": lambda u: (u * 1e-310, 0.05 * 1e-310, None),
+    "exponential": lambda u: (10.0 ** (620 * u - 320), 1e-300, None),
+    "exponential, large cutoff": lambda u: (10.0 ** (303 * u - 3), 1e100, None),
+}
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+@pytest.mark.parametrize("scene", WIDE.values(), ids=WIDE)
+def test_work_follows_points_and_pairs(rng, scene, ndim):
+    points, cutoff, box = scene(rng.random((3000, ndim)))
+    candidates, ambiguous, by_integers = work(points, cutoff, box)
+    assert candidates < 100
+    assert ambiguous < 0.1
+    assert by_integers < 0.01
+
+
+def test_coincident_points_with_cutoff_zero_are_no_work_for_integers():
+    _, _, by_integers = work(np.full((500, 3), 0.3), 0.0)
+    assert by_integers == 0
+
+
+def test_many_coincident_points_are_refused_at_once():
+    points = np.full((100_000, 3), 0.3)
+    with pytest.raises(MemoryError, match=r"about 5e\+09 pairs \(80 GB\) are expected, 1 GB"):
+        hs.pairs(points, 0.1, memory_limit=1e9)
+
+
+# ---- refusals ------------------------------------------------------------------------------
+
+
+def test_double_refuses_what_rounding_drowns(rng):
+    points = rng.random((200, 3))
+    for box in ([1.0] * 3, [[1.0, 0, 0], [0.3, 1, 0], [0, 0.2, 1]]):
+        for far in (0.0, 1e6, 1e9):
+            points[5] = far + 0.5
+            count = hs.count_pairs(points, 0.2, box=box, precision="double")
+            assert abs(count - hs.count_pairs(points, 0.2, box=box)) <= 10
+        for far in (1e14, 1e15):
+            points[5] = far
+            with pytest.raises(OverflowError, match=r"points\[5\].*precision='double'"):
+                hs.count_pairs(points, 0.2, box=box, precision="double")
+        with pytest.raises(OverflowError, match=r"points\[205\].*precision='double'"):
+            twice = np.concatenate([points * 1e-9, points])
+            hs.pairs(twice, 0.2, box=box, precision="double", batch=np.arange(400) // 200)
+        for far in (1e17, 1e300):
+            points[5] = far
+            with pytest.raises(OverflowError, match=r"points\[5\]"):
+                hs.count_pairs(points, 0.2, box=box, precision="double")
+
+
+@pytest.mark.parametrize("limit", [0, 1000, 3e5])
+@pytest.mark.parametrize("options", [{}, {"box": [1.0] * 3}, {"sort": True}, {"threads": 2}])
+def test_a_refusal_says_what_was_expected(rng, limit, options):
+    points = rng.random((20_000, 3))
+    count = hs.count_pairs(points, 0.05)
+    for batch in (None, np.zeros(20_000, int)):
+        with pytest.raises(MemoryError, match="are expected") as caught:
+            hs.pairs(points, 0.05, memory_limit=limit, batch=batch, **options)
+        text = str(caught.value)
+        expected = float(text.split("about ")[1].split(" pairs")[0])
+        assert 0.8 * count < expected < 1.3 * count
+        assert f"{expected * 16 * (2 if 'sort' in options else 1) / 1e6:.2f}"[:2] in text
+        assert (" 0 bytes are allowed" in text) == (limit == 0)
+
+
+def test_a_refused_count_says_so_too(rng):
+    with pytest.raises(MemoryError, match=r"pairs are expected and the search itself takes .*MB"):
+        hs.count_pairs(rng.random((50_000, 3)), 0.05, memory_limit=1e4)
+
+
+def test_out_must_lie_apart_from_the_inputs(rng):
+    n = 50
+    points = rng.random((n, 2))
+    before = points.copy()
+    flat = points.reshape(-1)
+    room = np.empty(2000)
+    for part in (flat, flat[-1:], flat[:1], points[::-1].reshape(-1)[:0]):
+        if part.base is points and part.size:
+            with pytest.raises(ValueError, match="out for 'd' must not share memory with points"):
+                hs.pairs(points, 0.2, quantities="d", out=part)
+    with pytest.raises(ValueError, match="out for 'd' must not share memory with points"):
+        hs.pairs(points[::-1, ::-1], 0.2, quantities="d", out=flat)
+    with pytest.raises(ValueError, match="must not share memory with points"):
+        hs.pairs(points, 0.2, quantities="dD", out=(room, points), batch=np.arange(n) // 10)
+    assert np.array_equal(points, before)
+    box = np.ones(2)
+    with pytest.raises(ValueError, match="must not share memory with box"):
+        hs.pairs(points, 0.2, box=box, quantities="d", out=box)
+    batch = np.arange(n) // 10
+    with pytest.raises(ValueError, match="must not share memory with batch"):
+        hs.pairs(points, 0.2, quantities="i", out=batch, batch=batch)
+    cutoffs = np.full(5, 0.2)
+    with pytest.raises(ValueError, match="must not share memory with cutoff"):
+        hs.pairs(points, cutoffs, quantities="d", out=cutoffs, batch=batch)
+    boxes = np.tile(np.eye(2), (5, 1, 1))
+    with pytest.raises(ValueError, match="must not share memory with box"):
+        hs.pairs(points, 0.2, box=boxes, quantities="D", out=boxes.reshape(-1, 2), batch=batch)
+    # Also where it was converted first.
+    whole = np.arange(2 * n).reshape(n, 2)
+    with pytest.raises(ValueError, match="out must not share memory with points"):
+        hs.pairs(whole, 3.0, quantities="i", out=whole.reshape(-1))
+
+
+def test_out_may_lie_beside_the_inputs(rng):
+    memory = np.empty(1200)
+    points = memory[:150].reshape(50, 3)
+    points[:] = rng.random((50, 3))
+    found = hs.pairs(points, 0.3, quantities="d", out=memory[150:])
+    assert np.array_equal(found, hs.pairs(points, 0.3, quantities="d"))
+    none = np.empty((0, 3))
+    assert len(hs.pairs(none, 0.3, quantities="d", out=memory)) == 0
+
+
+def test_exactness_of_a_distance_in_a_condensed_scene():
+    points = np.array([[0.1, 0.0], [0.4, 1e-320], [1e300, 5.0], [1e300, 5.25]])
+    i, j, d = hs.pairs(points, 0.4, quantities="ijd", sort=True)
+    assert i.tolist() == [0, 2] and j.tolist() == [1, 3]
+    square = (Fraction(0.4) - Fraction(0.1)) ** 2 + Fraction(1e-320) ** 2
+    assert abs(Fraction(d[0]) ** 2 - square) <= 2 * Fraction(d[0]) * Fraction(math.ulp(d[0]))
+    assert d[1] == 0.25
