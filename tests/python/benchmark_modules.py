@@ -14,8 +14,9 @@ import pytest
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 MODULES = (
-    "scenes", "agreement", "contestant", "peers", "measure", "machine", "report", "results",
-    "runner", "run", "stages", "footprint", "check_scenes", "extreme", "compare", "plot",
+    "scenes", "agreement", "contestant", "peers", "full_peers", "measure", "machine", "report",
+    "results", "runner", "run", "stages", "footprint", "check_scenes", "extreme", "compare",
+    "plot",
     "fill_docs", "reproduce",
 )  # fmt: skip
 
