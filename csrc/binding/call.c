@@ -5,9 +5,11 @@
 #include "available.h"
 #include "convert.h"
 #include "environment.h"
+#include "foreign.h"
 #include "threads.h"
 
 #define MOST_THREADS 1024 /* an explicit wish, but not any */
+#define THREADS_MUST_BE "threads must be a whole number from 1 to 1024 or None"
 
 /* Points below which a search is expected to be over before another thread could take the GIL: it
  * is kept until the first poll. */
@@ -37,18 +39,11 @@ take_memory_limit(PyObject *object, hs_options *options)
         options->find_limit = hs_available_memory;
         return true;
     }
-    options->memory_limit = PyFloat_AsDouble(object);
-    if (PyErr_Occurred()) {
-        if (!PyErr_ExceptionMatches(PyExc_TypeError)) {
-            return false;
-        }
-        PyErr_Clear();
-        PyErr_Format(PyExc_TypeError, "memory_limit must be a number of bytes, got %s",
-                     Py_TYPE(object)->tp_name);
+    if (!hs_real_of(object, "memory_limit must be a number of bytes", &options->memory_limit)) {
         return false;
     }
     if (!(options->memory_limit >= 0.0)) {
-        PyErr_Format(PyExc_ValueError, "memory_limit must be a number of bytes, got %R", object);
+        hs_refuse(PyExc_ValueError, "memory_limit must be a number of bytes", object);
         return false;
     }
     return true;
@@ -57,25 +52,20 @@ take_memory_limit(PyObject *object, hs_options *options)
 /* Fewer points are not worth asking for; the core would not use more than one thread for them. */
 #define POINTS_FOR_THREADS 4096
 
+/* A number, or 0 for None: what that means depends on the points. */
 static bool
-take_threads(PyObject *object, int64_t n_points, hs_options *options)
+take_threads(PyObject *object, hs_options *options)
 {
+    options->threads = 0;
     if (object == Py_None) {
-        options->threads = n_points < POINTS_FOR_THREADS ? 1 : -hs_default_threads();
         return true;
     }
-    const long n = PyBool_Check(object) ? -1 : PyLong_AsLong(object);
-    if (n == -1 && PyErr_Occurred()) {
-        if (PyErr_ExceptionMatches(PyExc_TypeError)) {
-            PyErr_Format(PyExc_TypeError, "threads must be a whole number or None, got %s",
-                         Py_TYPE(object)->tp_name);
-        }
+    double n;
+    if (!hs_whole_of(object, THREADS_MUST_BE, &n)) {
         return false;
     }
-    if (n < 1 || n > MOST_THREADS) {
-        PyErr_Format(PyBool_Check(object) ? PyExc_TypeError : PyExc_ValueError,
-                     "threads must be a whole number from 1 to %d or None, got %R", MOST_THREADS,
-                     object);
+    if (!(n >= 1.0 && n <= MOST_THREADS)) {
+        hs_refuse(PyExc_ValueError, THREADS_MUST_BE, object);
         return false;
     }
     options->threads = (int)n;
@@ -89,14 +79,19 @@ hs_call_init(hs_call *call, PyObject *const *arguments)
     call->thread = NULL;
     hs_options *options = &call->options;
     const int   inclusive = PyObject_IsTrue(arguments[4]);
-    if (inclusive < 0 || !hs_points_of(arguments[0], &call->points) ||
+    /* Numbers may run code of their own, which may give an array another shape or other memory:
+     * views are taken after them. */
+    if (inclusive < 0 || !take_memory_limit(arguments[7], options) ||
+        !take_threads(arguments[9], options) ||
+        !hs_points_of(arguments[0], &call->points) ||
         !hs_cutoff_of(arguments[1], &options->cutoff) ||
         !hs_box_of(arguments[2], arguments[3], call->points.ndim, &call->box, &call->has_box) ||
         !hs_precision_of(arguments[5], &options->precision) ||
-        !hs_kernel_of(arguments[6], &options->kernel) ||
-        !take_memory_limit(arguments[7], options) ||
-        !take_threads(arguments[9], call->points.n, options)) {
+        !hs_kernel_of(arguments[6], &options->kernel)) {
         return false;
+    }
+    if (options->threads == 0) {
+        options->threads = call->points.n < POINTS_FOR_THREADS ? 1 : -hs_default_threads();
     }
     options->inclusive = inclusive != 0;
     call->progress = arguments[8] == Py_None ? NULL : arguments[8];

@@ -2,6 +2,8 @@
 /* convert.c: see convert.h. */
 #include "convert.h"
 
+#include "foreign.h"
+
 #include <string.h>
 
 bool
@@ -97,10 +99,8 @@ hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
     }
     *want = seen;
     if (seen == 0) {
-        PyErr_Format(PyExc_ValueError,
-                     "quantities must be some of the letters i j d D S P, each at most once, "
-                     "got %R",
-                     object);
+        hs_refuse(PyExc_ValueError,
+                  "quantities must be some of the letters i j d D S P, each at most once", object);
         return false;
     }
     return true;
@@ -116,8 +116,8 @@ hs_precision_of(PyObject *object, hs_precision *precision)
             return true;
         }
     }
-    PyErr_Format(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError,
-                 "precision must be 'exact', 'double' or 'single', got %R", object);
+    hs_refuse(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError,
+              "precision must be 'exact', 'double' or 'single'", object);
     return false;
 }
 
@@ -135,6 +135,10 @@ hs_name_of(PyObject *object, const char *argument, const char **name)
     }
     Py_ssize_t length;
     *name = PyUnicode_AsUTF8AndSize(object, &length);
+    if (*name == NULL && PyErr_ExceptionMatches(PyExc_UnicodeError)) {
+        PyErr_Clear();
+        PyErr_Format(PyExc_ValueError, "%s must not contain lone surrogates", argument);
+    }
     if (*name != NULL && strlen(*name) != (size_t)length) {
         PyErr_Format(PyExc_ValueError, "%s must not contain null characters", argument);
         return false;

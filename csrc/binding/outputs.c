@@ -186,13 +186,32 @@ hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair
     return true;
 }
 
+/* The first rows of an array, as a plain array: subclasses may have slices of their own. */
+static PyObject *
+front_of(PyArrayObject *array, npy_intp n_rows)
+{
+    npy_intp       shape[2] = {n_rows, PyArray_NDIM(array) > 1 ? PyArray_DIM(array, 1) : 0};
+    PyArray_Descr *type = PyArray_DESCR(array);
+    Py_INCREF(type); /* given away on the next line */
+    PyObject *view = PyArray_NewFromDescr(&PyArray_Type, type, PyArray_NDIM(array), shape, NULL,
+                                          PyArray_DATA(array), NPY_ARRAY_CARRAY, NULL);
+    if (view == NULL) {
+        return NULL;
+    }
+    Py_INCREF(array); /* given away too, also on failure */
+    if (PyArray_SetBaseObject((PyArrayObject *)view, (PyObject *)array) < 0) {
+        Py_CLEAR(view);
+    }
+    return view;
+}
+
 PyObject *
 hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     PyObject        *result = PyTuple_New(n);
     for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
-        PyObject *view = PySequence_GetSlice(item_of(out, k, n), 0, (Py_ssize_t)n_pairs);
+        PyObject *view = front_of((PyArrayObject *)item_of(out, k, n), (npy_intp)n_pairs);
         if (view == NULL) {
             Py_CLEAR(result);
         } else {

@@ -8,6 +8,7 @@
 
 #define FIRST_CAPACITY 1024             /* systems; doubled as needed */
 #define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */
+#define MOST_COUNTS (INT64_C(1) << 48) /* no memory holds them; NumPy cannot even say so */
 
 /*
  * The systems as the core takes them. Where all share box and cutoff, those without points are left
@@ -230,6 +231,14 @@ hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     }
     if (!hs_call_init(&call, arguments) ||
         !take_batch(arguments + HS_CALL_ARGUMENTS, &call, &given)) {
+        return NULL;
+    }
+    if (given.n_numbers > MOST_COUNTS) {
+        PyErr_Format(PyExc_MemoryError,
+                     "the result would not fit: batch asks for %lld counts, one for each number up "
+                     "to its largest",
+                     (long long)given.n_numbers);
+        free_batch(&given);
         return NULL;
     }
     npy_intp  length = (npy_intp)given.n_numbers;

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _inputs
+from halfshell._foreign import is_a
 
 
 class Batch(NamedTuple):
@@ -33,7 +34,7 @@ def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
     if array.dtype == np.uint64:
         for k in np.flatnonzero(array >= np.uint64(2**62)):
             raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
-    return np.ascontiguousarray(array, dtype=np.int64)
+    return _inputs.in_order(array, np.int64)
 
 
 def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
@@ -42,7 +43,8 @@ def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
             f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one a system "
             f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
         )
-    return np.ascontiguousarray(array, dtype=np.float64)
+    _inputs.refuse_large(8 * array.size, array, "box")
+    return _inputs.in_order(array, np.float64)
 
 
 def _scene(
@@ -50,10 +52,10 @@ def _scene(
 ) -> tuple[_inputs.PointArray, _inputs.FloatArray | None, int, _inputs.FloatArray | None]:
     """As `_inputs.scene`, and boxes of each system."""
     if box is not None:
-        array = _inputs.as_real_array(getattr(box, "vectors", box), "box")
+        array = _inputs.as_real_array(_inputs.vectors_of(box), "box")
         if array.ndim == 3:
             rows = np.eye(_inputs.MAX_DIM)
-            if not hasattr(points, "positions"):
+            if not _inputs.brings_its_box(points):
                 points = _inputs.as_points(points)
                 rows = rows[: points.shape[1], : points.shape[1]]
             # Any box will do for the axes that repeat; objects with a box of their own refuse it.
@@ -70,8 +72,8 @@ def _scene(
 
 def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
     """One cutoff, or one a system."""
-    if isinstance(value, float):
-        return value, None
+    if is_a(value, float):
+        return float.__float__(value), None
     array = _inputs.as_real_array(value, "cutoff", "be a number")
     if array.ndim == 0:
         return float(array), None
@@ -79,7 +81,8 @@ def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
         raise ValueError(
             f"cutoff must be a number or, one a system, have shape (s,), got {array.shape}"
         )
-    return 0.0, np.ascontiguousarray(array, dtype=np.float64)
+    _inputs.refuse_large(8 * array.size, array, "cutoff")
+    return 0.0, _inputs.in_order(array, np.float64)
 
 
 def of(points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any) -> Batch:

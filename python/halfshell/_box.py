@@ -53,8 +53,12 @@ class Box:
     __slots__ = ("_heights", "_vectors", "_volume")
 
     def __init__(self, vectors: Any) -> None:
-        array = _inputs.as_real_array(getattr(vectors, "vectors", vectors), "box")
-        if array.ndim not in (1, 2) or not 1 <= array.shape[0] <= _inputs.MAX_DIM:
+        array = _inputs.as_real_array(_inputs.vectors_of(vectors), "box")
+        if (
+            array.ndim not in (1, 2)
+            or not 1 <= array.shape[0] <= _inputs.MAX_DIM
+            or array.shape[0] != array.shape[-1]
+        ):
             raise ValueError(
                 f"box must have shape (d,) or (d, d) with 1 <= d <= {_inputs.MAX_DIM}, "
                 f"got {array.shape}"
@@ -239,6 +243,7 @@ class Box:
         ndim = self.vectors.shape[0]
         if array.shape[1] != ndim:
             raise ValueError(f"points must have shape (n, {ndim}) for this box, got {array.shape}")
+        _inputs.refuse_large(16 * array.size, array, "points")
         return _core.box_wrap(
             array, self.vectors, _inputs.as_periodic_bits(periodic, ndim, default=True)
         )
@@ -273,8 +278,9 @@ def _directions(angles: list[float]) -> list[list[float]]:
         raise ValueError(f"no cell has the angles {angles}")
     cos_alpha, cos_beta, cos_gamma = (_cosine(angle) for angle in angles)
     sin_gamma = math.sin(math.radians(angles[2]))
-    c_y = (cos_alpha - cos_beta * cos_gamma) / sin_gamma
-    square = 1.0 - cos_beta**2 - c_y**2
+    # The smallest angles have a sine of 0.
+    c_y = (cos_alpha - cos_beta * cos_gamma) / sin_gamma if sin_gamma else math.inf
+    square = 1.0 - cos_beta**2 - c_y * c_y
     if square <= 0.0:
         raise ValueError(f"no cell in float64 has the angles {angles}: it is too flat")
     return [

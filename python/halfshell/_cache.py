@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import operator
 from typing import SupportsIndex
 
 from halfshell import _core
+from halfshell._foreign import is_a, kind_of, shown, whole_number
 
 
 def clear_cache() -> None:
@@ -60,12 +60,9 @@ def set_cache_limit(limit: SupportsIndex) -> int:
     >>> hs.set_cache_limit(before)
     0
     """
-    if isinstance(limit, bool):
-        raise TypeError("limit must be a number of bytes, got bool")
-    try:
-        wanted = operator.index(limit)
-    except TypeError:
-        raise TypeError(f"limit must be a number of bytes, got {type(limit).__name__}") from None
+    wanted = None if is_a(limit, bool) else whole_number(limit, "limit")
+    if wanted is None:
+        raise TypeError(f"limit must be a number of bytes, got {kind_of(limit)}")
     if wanted < 0:
-        raise ValueError(f"limit must not be negative, got {wanted}")
+        raise ValueError(f"limit must not be negative, got {shown(wanted)}")
     return _core.set_cache_limit(min(wanted, 2**63 - 1))

@@ -13,8 +13,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _core
+from halfshell._foreign import (
+    attribute,
+    exact_number,
+    is_a,
+    kind_of,
+    refuse_deep_lists,
+    shown,
+    told,
+)
+
 MAX_DIM = 8
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
+_SMALL_COPY = 1 << 26  # bytes; what is left is not asked for below
+_MISSING = object()
 
 FloatArray = npt.NDArray[np.float64]
 PointArray = npt.NDArray[np.float32] | FloatArray
@@ -28,8 +41,12 @@ def as_real_array(values: Any, name: str, single: str = "hold real numbers") -> 
     """
     array = as_array(values, name, single)
     kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "f" and size in (4, 8) and array.dtype.isnative:
+        return array
+    if kind in "fbiu":
+        refuse_large(8 * array.size, array, name)
     if kind == "f" and size in (4, 8):
-        return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder("="))
+        return array.astype(array.dtype.newbyteorder("="))
     if kind == "b" or (kind == "f" and size == 2):
         return array.astype(np.float64)
     if kind in "iu":
@@ -49,28 +66,67 @@ def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.N
     What a conversion raises (a tensor on another device, or one that requires its gradient) is the
     cause of the TypeError.
     """
-    if isinstance(values, np.ma.MaskedArray):
-        if np.ma.getmaskarray(values).any():
-            where = np.argwhere(np.ma.getmaskarray(values))[0]
-            raise ValueError(f"{_element(name, where)} must not be masked")
-        return np.asarray(values.data)
-    if isinstance(values, np.ndarray):
+    if is_a(values, np.ma.MaskedArray):
+        return _unmasked(values, name)
+    if is_a(values, np.ndarray):
         return np.asarray(values)
-    if isinstance(values, (str, bytes)):
-        raise TypeError(f"{name} must {single}, got {type(values).__name__}")
+    if is_a(values, (str, bytes)):
+        raise TypeError(f"{name} must {single}, got {kind_of(values)}")
+    if is_a(values, (list, tuple)):
+        refuse_deep_lists(values, name)
+        _refuse_masked_items(values, name)
     try:
         if not hasattr(values, "__array__") and hasattr(values, "__dlpack__"):
-            return np.from_dlpack(values)
+            return np.asarray(np.from_dlpack(values))
         return np.asarray(values)
-    except MemoryError:
-        raise
+    except MemoryError as error:
+        if str(error):
+            raise
+        raise MemoryError(f"{name} cannot be converted to an array: too many items") from error
     except ValueError as error:
-        raise ValueError(f"{name} must be a rectangular array of numbers: {error}") from error
+        raise ValueError(f"{name} must be a rectangular array of numbers: {told(error)}") from error
     except Exception as error:
         raise TypeError(
             f"{name} cannot be converted to an array: "
-            f"{type(values).__name__} raised {type(error).__name__}: {error}"
+            f"{kind_of(values)} raised {kind_of(error)}: {told(error)}"
         ) from error
+
+
+def _unmasked(values: Any, name: str) -> npt.NDArray[Any]:
+    """The data of a masked array that masks nothing."""
+    mask = np.asarray(np.ma.getmaskarray(values))
+    if mask.dtype.kind == "b" and mask.any():  # structured ones are refused for their type
+        raise ValueError(f"{_element(name, np.argwhere(mask)[0])} must not be masked")
+    return np.asarray(values)
+
+
+def in_order(array: npt.NDArray[Any], dtype: type[Any]) -> npt.NDArray[Any]:
+    """The array as the core takes small ones: of this type, C-contiguous and aligned."""
+    array = np.ascontiguousarray(array, dtype)
+    return array if array.flags.aligned else array.copy()
+
+
+def _refuse_masked_items(values: list[Any] | tuple[Any, ...], name: str) -> None:
+    """ValueError for masked arrays in a list: NumPy would drop their masks."""
+    kind_of_list: Any = list if is_a(values, list) else tuple
+    items = kind_of_list.__iter__(values)  # not one of its own, which may be anything
+    kinds = set(map(type, items))
+    if kinds <= {list, tuple, float, int, np.ndarray} or not any(
+        issubclass(kind, np.ma.MaskedArray) for kind in kinds
+    ):
+        return
+    for k, item in enumerate(kind_of_list.__iter__(values)):
+        if is_a(item, np.ma.MaskedArray):
+            _unmasked(item, f"{name}[{k}]")
+
+
+def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
+    """MemoryError before a copy that would make the machine swap: views may be huge."""
+    if needed > _SMALL_COPY and needed > _core.available_memory():
+        raise MemoryError(
+            f"{name} of shape {array.shape} and dtype {array.dtype} must be copied, which takes "
+            f"{needed / 1e9:.3g} GB, more than there is"
+        )
 
 
 def _element(name: str, where: Iterable[Any]) -> str:
@@ -85,55 +141,67 @@ def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
     suspects = (array > _BIGGEST_INTEGER) | (array < -_BIGGEST_INTEGER)
     if not suspects.any():
         return
-    for where in np.argwhere(suspects):
-        value = int(array[tuple(where)])
-        if int(float(value)) != value:
-            raise ValueError(
-                f"{_element(name, where)} = {value} is not a float64; integers beyond 2**53 are "
-                "accepted only when float64 holds them exactly"
-            )
+    # An integer is a float64 when at most 53 bits are left without the zeros at its end.
+    size = array[suspects].astype(np.uint64)
+    if array.dtype.kind == "i":
+        size = np.where(array[suspects] < 0, ~size + np.uint64(1), size)
+    odd = size // (size & (~size + np.uint64(1)))
+    wrong = np.flatnonzero(odd > _BIGGEST_INTEGER)
+    if len(wrong):
+        where = np.argwhere(suspects)[wrong[0]]
+        raise ValueError(
+            f"{_element(name, where)} = {array[tuple(where)]} is not a float64; integers beyond "
+            "2**53 are accepted only when float64 holds them exactly"
+        )
 
 
 def _from_objects(array: npt.NDArray[Any], name: str, single: str) -> FloatArray:
     """Plain Python numbers in an object array: mixed, or integers too big for int64."""
+    result = np.empty(array.shape)
     for where in np.ndindex(array.shape):
-        value = array[where]
-        if isinstance(value, (bool, float, np.float64, np.float32, np.float16, np.bool_)):
-            continue
-        if not isinstance(value, (int, np.integer)):
-            kind = type(value).__name__
+        number = exact_number(array[where])
+        if number is None:
+            kind = kind_of(array[where])
             if not where:
                 raise TypeError(f"{name} must {single}, got {kind}")
             raise TypeError(f"{name} must hold real numbers, got {kind} at {list(where)}")
         try:
-            exact = int(float(value)) == int(value)
+            result[where] = float(number)
         except OverflowError:
-            power = f"{'-' if value < 0 else ''}2**{int(value).bit_length() - 1}"
+            power = f"{'-' if number < 0 else ''}2**{int(number).bit_length() - 1}"
             raise OverflowError(
                 f"{_element(name, where)} = about {power} is too large for float64"
             ) from None
-        if not exact:
-            raise ValueError(f"{_element(name, where)} = {value} is not a float64")
-    return array.astype(np.float64)
+        if is_a(number, int) and int(result[where]) != number:
+            raise ValueError(f"{_element(name, where)} = {number} is not a float64")
+    return result
 
 
 def as_points(values: Any) -> PointArray:
     """Points of shape (n, d); a list without elements counts as n = 0, d = 3."""
-    array = as_real_array(values, "points")
+    array = as_array(values, "points")
+    if array.ndim == 2 and array.shape[0] >= 2**31:  # before they are converted
+        raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
+    array = as_real_array(array, "points")
     if array.ndim != 2 or not 1 <= array.shape[1] <= MAX_DIM:
         if array.shape == (0,):
             return np.empty((0, 3))
         raise ValueError(
             f"points must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {array.shape}"
         )
-    if array.shape[0] >= 2**31:
-        raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
     return array
+
+
+def vectors_of(values: Any, name: str = "box") -> Any:
+    """The vectors of a Box, or of another object that has some; else the object itself."""
+    if type(values) in (np.ndarray, list, tuple):
+        return values
+    return attribute(values, "vectors", name, values)
 
 
 def as_box(values: Any, ndim: int) -> FloatArray:
     """Box vectors as the rows of a float64 array (ndim, ndim), from rows, lengths or a Box."""
-    array = as_real_array(getattr(values, "vectors", values), "box")
+    array = as_real_array(vectors_of(values), "box")
     if array.shape == (ndim,):
         return np.diag(array.astype(np.float64))
     if array.shape != (ndim, ndim):
@@ -141,33 +209,33 @@ def as_box(values: Any, ndim: int) -> FloatArray:
             f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} dimensions, "
             f"got {array.shape}"
         )
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return in_order(array, np.float64)
 
 
 def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
     """Which axes repeat, as an integer with bit l set for box vector l."""
     if values is None:
         return (1 << ndim) - 1 if default else 0
-    if isinstance(values, (bool, np.bool_)):
+    if is_a(values, (bool, np.bool_)):
         return (1 << ndim) - 1 if values else 0
-    if isinstance(values, (str, bytes)):
-        raise TypeError(f"periodic must be a bool or {ndim} bools, got {values!r}")
+    if is_a(values, (str, bytes)):
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {shown(values)}")
     array = as_array(values, "periodic")
+    if array.shape not in ((), (ndim,)) and array.dtype.kind in "biu":
+        raise ValueError(f"periodic must be a bool or {ndim} bools, got shape {array.shape}")
     if array.dtype.kind != "b" and not (
-        array.dtype.kind in "iu" and bool(np.isin(array, (0, 1)).all())
+        array.dtype.kind in "iu" and bool(((array == 0) | (array == 1)).all())
     ):
-        raise TypeError(f"periodic must be a bool or {ndim} bools, got {values!r}")
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {shown(values)}")
     if array.shape == ():
         return (1 << ndim) - 1 if array else 0
-    if array.shape != (ndim,):
-        raise ValueError(f"periodic must be a bool or {ndim} bools, got shape {array.shape}")
     return sum(1 << axis for axis in range(ndim) if array[axis])
 
 
 def as_cutoff(value: Any) -> float:
     """A plain number; anything that float64 would have to round is refused."""
-    if isinstance(value, float):
-        return value
+    if is_a(value, float):
+        return float.__float__(value)
     array = as_real_array(value, "cutoff", "be a number")
     if array.ndim != 0:
         raise TypeError(f"cutoff must be a number, got shape {array.shape}")
@@ -176,13 +244,15 @@ def as_cutoff(value: Any) -> float:
 
 def as_cutoffs(value: Any) -> float | FloatArray:
     """One cutoff, or several in ascending order, which are finite and not negative."""
-    if isinstance(value, float):
-        return value
-    array = as_real_array(value, "cutoff", "be a number").astype(np.float64)
+    if is_a(value, float):
+        return float.__float__(value)
+    array = as_real_array(value, "cutoff", "be a number")
     if array.ndim == 0:
         return float(array)
     if array.ndim != 1:
         raise ValueError(f"cutoff must be a number or have shape (k,), got {array.shape}")
+    refuse_large(8 * array.size, array, "cutoff")
+    array = array.astype(np.float64)
     for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
         raise ValueError(f"cutoff must be finite and not negative, got cutoff[{k}] = {array[k]}")
     for k in np.flatnonzero(array[1:] < array[:-1]):
@@ -195,22 +265,43 @@ def as_cutoffs(value: Any) -> float | FloatArray:
 
 def as_flag(value: Any, name: str) -> bool:
     """A bool; also one of NumPy's, and the integers 0 and 1."""
-    if isinstance(value, (bool, np.bool_)) or (
-        isinstance(value, (int, np.integer)) and value in (0, 1)
-    ):
-        return bool(value)
-    raise TypeError(f"{name} must be True or False, got {value!r}")
+    number = exact_number(value)
+    if is_a(number, int) and number in (0, 1):
+        return bool(number)
+    raise TypeError(f"{name} must be True or False, got {shown(value)}")
 
 
 def as_index_bytes(index_dtype: Any) -> int:
     """4 or 8, for int32 or int64."""
     try:
         dtype = np.dtype(index_dtype)
-    except TypeError:
-        raise TypeError(f"index_dtype must be int32 or int64, got {index_dtype!r}") from None
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise TypeError(
+            f"index_dtype must be int32 or int64, got {shown(index_dtype)}"
+        ) from error
     if dtype not in (np.dtype(np.int32), np.dtype(np.int64)):
         raise ValueError(f"index_dtype must be int32 or int64, got {dtype}")
     return int(dtype.itemsize)
+
+
+def brings_its_box(points: Any) -> bool:
+    """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms."""
+    return type(points) not in (np.ndarray, list) and all(
+        attribute(points, name, "points", _MISSING) is not _MISSING
+        for name in ("positions", "cell", "pbc")
+    )
+
+
+def _own_scene(atoms: Any) -> tuple[PointArray, FloatArray | None, int]:
+    """`scene` of an object that brings its box."""
+    array = as_points(attribute(atoms, "positions", "points"))
+    ndim = array.shape[1]
+    bits = as_periodic_bits(attribute(atoms, "pbc", "periodic"), ndim, default=False)
+    if not bits:
+        return array, None, 0
+    return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
 
 
 def scene(points: Any, box: Any, periodic: Any) -> tuple[PointArray, FloatArray | None, int]:
@@ -219,15 +310,13 @@ def scene(points: Any, box: Any, periodic: Any) -> tuple[PointArray, FloatArray 
     An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an
     error.
     """
-    if hasattr(points, "positions") and hasattr(points, "cell") and hasattr(points, "pbc"):
+    if brings_its_box(points):
         if box is not None or periodic is not None:
             given = "box" if box is not None else "periodic"
-            raise ValueError(f"{given} comes from the {type(points).__name__} object itself")
-        periodic = np.asarray(points.pbc, dtype=bool)
-        box = np.asarray(points.cell) if periodic.any() else None
-        points = points.positions
-        if box is None:
-            periodic = None
+            raise ValueError(
+                f"{given} comes from the {kind_of(points)} object itself that points are"
+            )
+        return _own_scene(points)
     array = as_points(points)
     ndim = array.shape[1]
     if box is None:

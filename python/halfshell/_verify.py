@@ -111,6 +111,7 @@ def verify(
     """
     full = _inputs.as_flag(full, "full")
     inclusive = _inputs.as_flag(inclusive, "inclusive")
+    cutoff = _inputs.as_cutoff(cutoff)
     array, vectors, bits = _inputs.scene(points, box, periodic)
     ndim = array.shape[1]
     given = _rows(i, j, S, len(array), ndim)

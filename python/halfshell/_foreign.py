@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Objects of strangers: asked for their type, their attributes and their text without surprises.
+
+Any of these may run code that is not ours. What it raises is put down as the cause of a TypeError
+that names the argument; only what is not the fault of the input passes: MemoryError, Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+
+_SHOWN = 80  # characters of a value in a message
+_MOST_LEVELS = 32  # of nested lists; points need two
+
+
+def is_a(value: Any, kinds: type | tuple[type, ...]) -> bool:
+    """`isinstance` that only the type decides, not what an object says of its class."""
+    return issubclass(type(value), kinds)
+
+
+def kind_of(value: Any) -> str:
+    """The name of its type."""
+    return type(value).__name__
+
+
+def shown(value: Any) -> str:
+    """Its repr, cut to what fits a message; the name of its type if it has none."""
+    try:
+        text = repr(value)
+    except MemoryError:
+        raise
+    except Exception:  # hostile, or an integer of more digits than Python writes
+        return f"a value of type {kind_of(value)}"
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
+
+
+def told(error: BaseException) -> str:
+    """What an exception says."""
+    try:
+        return str(error)
+    except Exception:
+        return "and does not say why"
+
+
+def attribute(value: Any, name: str, argument: str, default: Any = None) -> Any:
+    """An attribute, or `default` where there is none; TypeError if asking for it raises."""
+    try:
+        return getattr(value, name, default)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise TypeError(
+            f"{argument} cannot be read: {kind_of(value)}.{name} raised "
+            f"{kind_of(error)}: {told(error)}"
+        ) from error
+
+
+def exact_number(value: Any) -> int | float | bool | None:
+    """The plain number that an object is, whatever its methods say; None if it is none.
+
+    Python's int and float, NumPy's integers, bool, float64 and narrower, and subclasses of these.
+    """
+    if is_a(value, bool) or type(value) in (int, float):
+        return value  # type: ignore[no-any-return]
+    if is_a(value, np.timedelta64):  # one of NumPy's integers, by its type
+        return None
+    if is_a(value, (np.float64, np.float32, np.float16, np.integer, np.bool_)):
+        return np.generic.item(value)  # type: ignore[no-any-return]
+    if is_a(value, float):
+        return float.__float__(value)
+    if is_a(value, int):
+        return int.__index__(value)
+    return None
+
+
+def whole_number(value: Any, argument: str) -> int | None:
+    """The integer that an object is or stands for; None if it is none."""
+    number = exact_number(value)
+    if number is not None:
+        return number if isinstance(number, int) else None
+    try:
+        return operator.index(value)
+    except MemoryError:
+        raise
+    except TypeError:
+        return None
+    except Exception as error:
+        raise TypeError(
+            f"{argument} cannot be read: {kind_of(value)} raised {kind_of(error)}: {told(error)}"
+        ) from error
+
+
+def refuse_deep_lists(values: Any, name: str) -> None:
+    """Raise ValueError for lists in lists without end, on which NumPy would not come back.
+
+    The first items decide: NumPy looks into the others no deeper than into them.
+    """
+    for _ in range(_MOST_LEVELS):
+        if not is_a(values, (list, tuple)):
+            return
+        kind: Any = list if is_a(values, list) else tuple
+        if not kind.__len__(values):
+            return
+        values = kind.__getitem__(values, 0)
+    raise ValueError(
+        f"{name} must be a rectangular array of numbers: lists are nested more than "
+        f"{_MOST_LEVELS - 1} levels deep"
+    )

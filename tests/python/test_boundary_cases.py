@@ -1,0 +1,388 @@
+"""What fuzzing the arguments found, each by name; objects that change arrays; nothing is kept."""
+
+import decimal
+import gc
+import sys
+
+import numpy as np
+import pytest
+
+import boundary
+import halfshell as hs
+from boundary import CUBE, POINTS, answering, as_if_atoms, cyclic, laid_out, outcome, raising
+
+MINE = RuntimeError("mine")
+
+
+def refusal(kind, call, *arguments, **options):
+    """The message of an error of exactly this kind."""
+    result = outcome(call, *arguments, **options)
+    assert type(result.error) is kind, f"{type(result.error).__name__}: {result.message}"
+    return result.message
+
+
+# ---- wrong answers and refusals of what is right -------------------------------------------
+
+
+@pytest.mark.parametrize("layout", boundary.LAYOUTS)
+@pytest.mark.parametrize("order", "<>")
+def test_boxes_cutoffs_and_batches_anywhere_in_memory(layout, order):
+    numbers = np.array([1, 1, 1, 1], order + "i8")
+    box = np.array([2.0, 2.0, 2.0], order + "f8")
+    boxes = np.array([CUBE, CUBE], order + "f8")
+    cutoffs = np.array([0.5, 0.5], order + "f8")
+    expected = hs.count_pairs(POINTS, 0.5, box=CUBE)
+    assert hs.count_pairs(POINTS, 0.5, box=laid_out(box, layout)) == expected
+    assert hs.count_pairs(POINTS, 0.5, box=laid_out(boxes[0], "fortran")) == expected
+    several = {"batch": laid_out(numbers, layout), "box": laid_out(boxes, layout)}
+    assert hs.count_pairs(POINTS, laid_out(cutoffs, layout), **several).tolist() == [0, expected]
+
+
+def test_masked_rows_in_a_list_keep_their_masks():
+    rows = [np.ma.array([0.0, 0.0, 0.0], mask=[False, True, False])] * 2
+    assert "points[0][1] must not be masked" in refusal(ValueError, hs.pairs, rows, 1.0)
+    assert "cutoff[1]" in refusal(ValueError, hs.count_pairs, POINTS, [1.0, np.ma.masked])
+
+
+def test_points_of_an_object_that_has_positions_but_no_box():
+    points = answering(
+        positions=np.zeros((9, 9)), __array__=lambda self, dtype=None, copy=None: POINTS
+    )
+    boxes = np.array([CUBE] * 2)
+    expected = hs.count_pairs(POINTS, 0.5, box=boxes, batch=[0, 0, 1, 1]).tolist()
+    assert hs.count_pairs(points, 0.5, box=boxes, batch=[0, 0, 1, 1]).tolist() == expected
+
+
+def test_periodic_of_atoms_is_checked_like_any_other():
+    for pbc in ("TTT", [0.5, 1.0, 1.0], [True], None):
+        atoms = as_if_atoms(POINTS, CUBE, pbc)
+        result = outcome(hs.pairs, atoms, 0.5)
+        assert result.error is None if pbc is None else "periodic" in result.message
+
+
+def test_numbers_in_lists_are_what_they_are_and_not_what_they_say():
+    lying = answering(float, __float__=lambda self: 7.0)
+    assert hs.pairs([[lying], [2**70]], 0.5, quantities="d").tolist() == []
+    assert hs.pairs(np.array([[lying], [0]], object), 0.0, quantities="d").tolist() == [0.0]
+    assert hs.count_pairs(POINTS, answering(float, __float__=lambda self: 9.0)) == hs.count_pairs(
+        POINTS, 0.0
+    )
+
+
+def test_views_of_out_are_arrays_whatever_out_is():
+    out = np.zeros(20, np.int64).view(boundary.Subclass)  # which has no items
+    expected = hs.pairs(POINTS, 1.0, quantities="i")
+    found = hs.pairs(POINTS, 1.0, quantities="i", out=out)
+    assert type(found) is np.ndarray and found.base is not None
+    assert found.tolist() == expected.tolist()
+    assert np.shares_memory(found, out)
+    wide = np.zeros((20, 3))
+    found = hs.pairs(POINTS, 1.0, quantities="D", out=wide)
+    assert np.shares_memory(found, wide) and found.shape == (len(expected), 3)
+
+
+# ---- exceptions that were not documented ---------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["positions", "cell", "pbc", "vectors"])
+def test_attributes_that_raise(name):
+    good = {"positions": POINTS, "cell": CUBE, "pbc": True}
+    good.pop(name, None)
+    atoms = raising((name,), MINE, type("Atoms", (), good))
+    if name == "vectors":
+        assert "box" in refusal(TypeError, hs.pairs, POINTS, 1.0, box=atoms)
+        assert "box" in refusal(TypeError, hs.Box, atoms)
+    else:
+        message = refusal(TypeError, hs.pairs, atoms, 1.0)
+        assert "points" in message and name in message and "mine" in message
+
+
+@pytest.mark.parametrize("name", ["memory_limit", "threads"])
+def test_numbers_that_raise(name):
+    for method in ("__index__", "__float__"):
+        hostile = raising((method,), MINE)
+        assert name in refusal(TypeError, hs.pairs, POINTS, 1.0, **{name: hostile})
+    for kind in (KeyboardInterrupt, MemoryError):
+        with pytest.raises(kind):
+            hs.pairs(POINTS, 1.0, **{name: raising(("__index__",), kind("mine"))})
+    with pytest.raises(TypeError, match=name) as caught:
+        hs.pairs(POINTS, 1.0, **{name: raising(("__index__",), MINE)})
+    assert caught.value.__cause__ is MINE
+
+
+def test_memory_limits_are_plain_numbers():
+    for limit in (np.complex128(1e9), np.complex64(1e9), True, decimal.Decimal(10**9), b"1", "1"):
+        assert "memory_limit" in refusal(TypeError, hs.pairs, POINTS, 1.0, memory_limit=limit)
+    assert "memory_limit" in refusal(OverflowError, hs.pairs, POINTS, 1.0, memory_limit=10**400)
+    assert "memory_limit" in refusal(ValueError, hs.pairs, POINTS, 1.0, memory_limit=np.nan)
+    for limit in (1e9, 10**9, np.float32(1e9), np.int64(10**9), np.inf, 10**30):
+        assert len(hs.pairs(POINTS, 1.0, memory_limit=limit)) == 2
+
+
+def test_a_limit_below_the_search_itself_is_named():
+    message = refusal(MemoryError, hs.count_pairs, POINTS, 1.0, memory_limit=10)
+    assert "10 bytes are allowed" in message
+
+
+def test_too_many_threads_is_a_value():
+    for threads in (0, -1, 1025, 2**63, 10**400, -(10**5000)):
+        message = refusal(ValueError, hs.pairs, POINTS, 1.0, threads=threads)
+        assert "threads must be a whole number from 1 to 1024" in message
+
+
+@pytest.mark.parametrize("name", ["quantities", "kernel", "precision"])
+def test_lone_surrogates(name):
+    assert name in refusal(ValueError, hs.pairs, POINTS, 1.0, **{name: "\ud800"})
+
+
+@pytest.mark.parametrize(
+    "name", ["inclusive", "sort", "index_dtype", "periodic", "precision", "quantities", "threads"]
+)
+def test_messages_do_without_a_repr_and_stay_short(name):
+    hostile = raising(("__repr__", "__str__"), MINE)
+    wordless = raising(("__repr__", "__str__"), MINE, str)
+    for value in (hostile, wordless, 10**5000, "x" * 10**6, ["x"] * 10**5):
+        result = outcome(hs.pairs, POINTS, 1.0, box=CUBE, **{name: value})
+        assert result.error is not None
+        assert name in result.message and len(result.message) < 300
+
+
+def test_types_of_indices_that_numpy_cannot_parse():
+    for dtype in ("i4,(", {"names": 1}, raising(("dtype",), MINE), cyclic(1), "T" * 10**4):
+        assert "index_dtype" in refusal(TypeError, hs.pairs, POINTS, 1.0, index_dtype=dtype)
+
+
+def test_an_object_that_lies_about_its_class():
+    for kind in (float, np.ndarray, np.ma.MaskedArray, int, str, tuple):
+        liar = answering(__class__=kind)
+        assert "cutoff" in refusal(TypeError, hs.pairs, POINTS, liar)
+        assert "points" in refusal(TypeError, hs.pairs, liar, 1.0)
+        assert "out" in refusal(TypeError, hs.pairs, POINTS, 1.0, out=liar)
+    assert "box" in refusal(TypeError, hs.pairs, POINTS, 1.0, box=raising(("__class__",), MINE))
+
+
+def test_an_exception_without_words():
+    hostile = raising(("__array__",), boundary.WithoutWords())
+    assert "points" in refusal(TypeError, hs.pairs, hostile, 1.0)
+
+
+def test_the_smallest_angles_make_no_cell():
+    for angle in (5e-324, 1e-320, 1e-308, 1e-155):
+        message = refusal(ValueError, hs.Box.from_lengths_angles, [1.0] * 3, [angle] * 3)
+        assert "angles" in message
+
+
+def test_a_batch_with_too_many_systems_to_count():
+    for number in (2**50, 2**61, 2**62 - 1):
+        batch = np.full(4, number)
+        assert "batch" in refusal(MemoryError, hs.count_pairs, POINTS, 1.0, batch=batch)
+        assert len(hs.pairs(POINTS, 1.0, batch=batch)) == 2
+
+
+# ---- calls that took their time ------------------------------------------------------------
+
+
+def test_lists_without_end():
+    for width in (1, 2, 3):
+        for value in (cyclic(width), (cyclic(width), 0.0), [cyclic(width)] * 2):
+            assert "nested" in refusal(ValueError, hs.pairs, value, 1.0)
+            assert "box" in refusal(ValueError, hs.pairs, POINTS, 1.0, box=value)
+
+
+def test_views_too_large_to_convert_are_refused_before_they_are():
+    flat = np.broadcast_to(np.int8(1), (2**31 - 1, 8, 2**20))
+    assert "points" in refusal(MemoryError, hs.pairs, flat, 1.0)
+    many = np.broadcast_to(np.float32(1), (2**45,))
+    assert "cutoff" in refusal(MemoryError, hs.count_pairs, POINTS, many)
+    assert "cutoff" in refusal(MemoryError, hs.count_pairs, POINTS, many, batch=[0] * 4)
+    boxes = np.broadcast_to(CUBE, (2**45, 3, 3))
+    assert "box" in refusal(MemoryError, hs.pairs, POINTS, 1.0, box=boxes, batch=[0] * 4)
+    flags = np.broadcast_to(True, (2**40,))
+    assert "periodic" in refusal(ValueError, hs.pairs, POINTS, 1.0, box=CUBE, periodic=flags)
+
+
+@pytest.mark.parametrize("axes", [(0, 1), (0, 2), (1, 2), (2,), (0, 1, 2)])
+@pytest.mark.parametrize("cutoff", [1e8, 2.0**31, 1e12, 1e100])
+def test_a_cutoff_that_spans_any_number_of_boxes_is_refused_at_once(axes, cutoff):
+    box = np.array([[2.0, 0.0, 0.0], [0.5, 2.0, 0.0], [0.25, -0.5, 2.0]])
+    scene = {"box": box, "periodic": [axis in axes for axis in range(3)]}
+    for call in (hs.pairs, hs.explain):
+        if len(axes) > 1 or cutoff > 1e9:  # along a chain 10^9 pairs may well fit
+            refusal(MemoryError, call, POINTS, cutoff, **scene, memory_limit=1e10)
+        if len(axes) > 1:
+            refusal(MemoryError, call, POINTS, cutoff, **scene)
+    refusal(MemoryError, hs.verify, POINTS, 1e100, [], [], **scene)
+
+
+def test_the_extent_of_open_axes_does_not_refuse_what_fits():
+    points = np.zeros((200, 3))
+    points[:, 2] = np.arange(200.0) * 100.0  # each meets its own images only
+    found = hs.count_pairs(points, 60.0, box=[1.0, 1.0, 1.0], periodic=[True, True, False])
+    limit = 60 * found + 10**7
+    options = {"box": [1.0] * 3, "periodic": [True, True, False], "memory_limit": limit}
+    assert len(hs.pairs(points, 60.0, quantities="i", **options)) == found
+
+
+def test_many_large_integers_are_checked_at_once():
+    points = np.full((100_000, 3), 2**60)
+    points[:, 0] += np.arange(100_000) << 10
+    assert outcome(hs.count_pairs, points, 1.0).answer == 0
+    points[99_999, 1] = 2**60 + 1
+    assert "points[99999, 1] = " in refusal(ValueError, hs.pairs, points, 1.0)
+    for value, held in ((-(2**63), True), (2**63 - 1, False), (1 - 2**63, False)):
+        result = outcome(hs.count_pairs, np.full((2, 1), value, np.int64), 0.0)
+        assert result.answer == 1 if held else str(value) in result.message
+    for value, held in ((2**63, True), (2**64 - 1, False), (2**64 - 2048, True)):
+        result = outcome(hs.count_pairs, np.full((2, 1), value, np.uint64), 0.0)
+        assert result.answer == 1 if held else str(value) in result.message
+
+
+# ---- arrays that other arguments change ----------------------------------------------------
+
+
+def give_up_memory(array):
+    array.resize((0, 3), refcheck=False)
+
+
+def change_shape(array):
+    array.shape = (3, 4)
+
+
+def write(array):
+    array[:] = np.nan
+
+
+def change_dtype(array):
+    array.dtype = np.int64
+
+
+CHANGES = (give_up_memory, change_shape, write, change_dtype)
+TRIGGERS = {
+    "threads": lambda act: answering(__index__=lambda self: act() or 1),
+    "memory_limit": lambda act: answering(__index__=lambda self: act() or 10**9),
+    "cutoff": lambda act: answering(__array__=lambda self, *a, **k: act() or np.array(0.5)),
+    "box": lambda act: answering(__array__=lambda self, *a, **k: act() or CUBE),
+    "periodic": lambda act: answering(__array__=lambda self, *a, **k: act() or np.array(True)),
+    "batch": lambda act: answering(__array__=lambda self, *a, **k: act() or np.zeros(4, int)),
+    "kernel": lambda act: answering(str, __str__=lambda self: act() or "scalar"),
+}
+
+
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:Setting the dtype:DeprecationWarning")
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("name", TRIGGERS)
+def test_an_argument_that_changes_the_points(name, change):
+    for call in (hs.pairs, hs.count_pairs, hs.explain, hs.verify):
+        for batch in ([0, 0, 1, 1], None):
+            points = np.arange(12.0).reshape(4, 3) / 8
+            options = {"points": points, "cutoff": 0.5, "box": CUBE}
+            if call is hs.verify:
+                options |= {"i": [], "j": []}
+            elif call is not hs.explain:
+                options["batch"] = batch
+            if call is hs.verify and name not in ("cutoff", "box", "periodic"):
+                continue
+            if name == "batch" and call is hs.explain:
+                continue
+            options[name] = TRIGGERS[name](lambda points=points: change(points))
+            try:
+                call(**options)
+            except (TypeError, ValueError):
+                pass
+
+
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")
+@pytest.mark.parametrize("name", ["threads", "memory_limit", "cutoff", "periodic"])
+def test_an_argument_that_changes_out_or_the_box(name):
+    for victim in ("out", "box"):
+        out, box = np.zeros(100, np.int64), np.eye(3) * 2
+        array = {"out": out, "box": box}[victim]
+
+        def shrink(array=array):
+            array.resize((0,), refcheck=False)
+
+        options = {"cutoff": 0.5, "quantities": "i", "out": out, "box": box}
+        options[name] = TRIGGERS[name](shrink)
+        try:
+            hs.pairs(POINTS, **options)
+        except (TypeError, ValueError):
+            pass
+
+
+# ---- nothing is kept -----------------------------------------------------------------------
+
+FAILING = {
+    "points": lambda points, box: hs.pairs(points[0], 1.0),
+    "nan": lambda points, box: hs.pairs(points * np.nan, 1.0),
+    "cutoff": lambda points, box: hs.pairs(points, -1.0, box=box),
+    "no cutoff": lambda points, box: hs.pairs(points, "x", box=box),
+    "box": lambda points, box: hs.pairs(points, 1.0, box=box[:2]),
+    "dependent": lambda points, box: hs.pairs(points, 1.0, box=box * 0),
+    "periodic": lambda points, box: hs.pairs(points, 1.0, box=box, periodic="x"),
+    "quantities": lambda points, box: hs.pairs(points, 1.0, box=box, quantities="x"),
+    "surrogate": lambda points, box: hs.pairs(points, 1.0, box=box, quantities="\ud800"),
+    "kernel": lambda points, box: hs.pairs(points, 1.0, box=box, kernel="x"),
+    "precision": lambda points, box: hs.pairs(points, 1.0, box=box, precision=object()),
+    "threads": lambda points, box: hs.pairs(points, 1.0, threads=raising(("__index__",), MINE)),
+    "limit": lambda points, box: hs.count_pairs(points, 1.0, memory_limit=1),
+    "wordless": lambda points, box: hs.pairs(points, 1.0, precision=raising(("__repr__",), MINE)),
+    "capacity": lambda points, box: hs.pairs(points, 1.0, out=(np.zeros(1, int),) * 2),
+    "room": lambda points, box: hs.pairs(points, 1.0, out=np.zeros(1, int), quantities="i"),
+    "batch": lambda points, box: hs.pairs(points, 1.0, box=box, batch=[1, 0, 0, 0]),
+    "batch of boxes": lambda points, box: hs.pairs(points, 1.0, box=box[None], batch=[0, 0, 0, 1]),
+    "counts": lambda points, box: hs.count_pairs(points, 1.0, batch=[0, 0, 0, 2**61]),
+    "explain": lambda points, box: hs.explain(points, 1.0, box=box, kernel="x"),
+    "verify": lambda points, box: hs.verify(points, 1.0, [9], [0], box=box),
+    "wrap": lambda points, box: hs.Box(box).wrap(points * 1e300),
+}
+
+
+@pytest.mark.parametrize("name", FAILING)
+def test_a_call_that_fails_keeps_nothing(name):
+    points, box = POINTS.copy(), CUBE.copy()
+
+    def fail():
+        try:
+            FAILING[name](points, box)
+        except (TypeError, ValueError, OverflowError, MemoryError) as error:
+            error.__cause__ = error.__context__ = None
+            return
+        raise AssertionError("no error")
+
+    def kept():
+        MINE.__traceback__ = None  # it is raised again and again
+        gc.collect()
+        return sys.getrefcount(points), sys.getrefcount(box), sys.getallocatedblocks()
+
+    for _ in range(20):
+        fail()
+    before = kept()
+    for _ in range(300):
+        fail()
+    after = kept()
+    assert after[:2] == before[:2]
+    assert after[2] - before[2] < 100  # an object lost in each call would be 300
+
+
+def test_a_call_that_answers_keeps_nothing():
+    points, box, out = POINTS.copy(), CUBE.copy(), np.zeros(100, np.int64)
+
+    def kept():
+        gc.collect()
+        return [sys.getrefcount(x) for x in (points, box, out)], sys.getallocatedblocks()
+
+    def call():
+        hs.pairs(points, 1.0, box=box, quantities="i", out=out)
+        hs.pairs(points.tolist(), np.float32(1.0), box=box, quantities="ijdDSP", threads=np.int8(1))
+        hs.pairs(points, 1.0, box=box[None], batch=[0] * 4, memory_limit=10**9)
+        hs.explain(points, 1.0, box=box, measure=True)
+
+    for _ in range(20):
+        call()
+    before = kept()
+    for _ in range(300):
+        call()
+    after = kept()
+    assert after[0] == before[0]
+    assert after[1] - before[1] < 100
