@@ -29,7 +29,7 @@ def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
     if array.dtype == np.uint64:
         for k in np.flatnonzero(array >= np.uint64(2**62)):
             raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
-    return np.require(array, np.int64, ["C", "A"])
+    return _inputs.in_order(array, np.int64)
 
 
 def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
@@ -39,7 +39,7 @@ def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
             f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
         )
     _inputs.refuse_large(8 * array.size, array, "box")
-    return np.require(array, np.float64, ["C", "A"])
+    return _inputs.in_order(array, np.float64)
 
 
 def _scene(
@@ -77,7 +77,7 @@ def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
             f"cutoff must be a number or, one a system, have shape (s,), got {array.shape}"
         )
     _inputs.refuse_large(8 * array.size, array, "cutoff")
-    return 0.0, np.require(array, np.float64, ["C", "A"])
+    return 0.0, _inputs.in_order(array, np.float64)
 
 
 def of(

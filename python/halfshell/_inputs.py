@@ -116,11 +116,20 @@ def _unmasked(values: Any, name: str) -> npt.NDArray[Any]:
     return np.asarray(values)
 
 
+def in_order(array: npt.NDArray[Any], dtype: type[Any]) -> npt.NDArray[Any]:
+    """The array as the core takes small ones: of this type, C-contiguous and aligned."""
+    array = np.ascontiguousarray(array, dtype)
+    return array if array.flags.aligned else array.copy()
+
+
 def _refuse_masked_items(values: list[Any] | tuple[Any, ...], name: str) -> None:
     """ValueError for masked arrays in a list: NumPy would drop their masks."""
     kind_of_list: Any = list if is_a(values, list) else tuple
     items = kind_of_list.__iter__(values)  # not one of its own, which may be anything
-    if not any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, items))):
+    kinds = set(map(type, items))
+    if kinds <= {list, tuple, float, int, np.ndarray} or not any(
+        issubclass(kind, np.ma.MaskedArray) for kind in kinds
+    ):
         return
     for k, item in enumerate(kind_of_list.__iter__(values)):
         if is_a(item, np.ma.MaskedArray):
@@ -216,7 +225,7 @@ def as_box(values: Any, ndim: int) -> FloatArray:
             f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} dimensions, "
             f"got {array.shape}"
         )
-    return np.require(array, np.float64, ["C", "A"])
+    return in_order(array, np.float64)
 
 
 def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:

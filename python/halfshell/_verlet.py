@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
-from halfshell._api import Arrays, Letter
+from halfshell._pairs import Arrays, Letter
 from halfshell._skin import AutoSkin
 
 
