@@ -44,12 +44,17 @@ bound_pairs(const hs_search *search)
 }
 
 /* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
- * search still holds beside them. 0 when nothing is wanted but the count. */
+ * search still holds beside them. 0 when nothing is wanted but the count, or nothing is kept. */
 static double
-find_bytes_per_pair(const hs_options *options, int ndim)
+find_bytes_per_pair(const hs_search *search)
 {
-    int64_t   bytes = 0;
-    hs_output columns;
+    const hs_options *options = &search->options;
+    const int         ndim = search->scene.ndim;
+    int64_t           bytes = 0;
+    hs_output         columns;
+    if (search->keeps_none) {
+        return 0.0;
+    }
     if (options->out == NULL) {
         hs_output_init(NULL, ndim, options->want, options->index_bytes, &columns);
         bytes += hs_output_bytes_per_pair(&columns);
@@ -100,7 +105,7 @@ least_pairs(const hs_search *search)
 hs_status
 hs_estimate_by_density(hs_search *search, hs_failure *failure)
 {
-    const double bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
+    const double bytes_per_pair = find_bytes_per_pair(search);
     if (search->scene.lattice.n_periodic < search->scene.ndim || search->scene.n == 0) {
         return HS_OK;
     }
@@ -153,7 +158,7 @@ take_sample(hs_walker *walker, int64_t n, sample *taken)
 hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
-    const double  bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
+    const double  bytes_per_pair = find_bytes_per_pair(search);
     const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
     sample        taken;

@@ -44,6 +44,7 @@ typedef struct hs_sets {
     const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
     bool             is_kept; /* queries come later: bounds with room for them */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
+    bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
 } hs_sets;
