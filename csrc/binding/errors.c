@@ -83,13 +83,13 @@ raise_memory(const hs_failure *failure)
     } else if (failure->expected_bytes > 0.0) {
         snprintf(text, sizeof text,
                  "the result would not fit: about %.3g pairs (%.3g GB) are expected, %.3g GB are "
-                 "allowed; use a smaller cutoff, fewer quantities, or count_pairs",
+                 "allowed; use a smaller cutoff, fewer quantities, iter_pairs or count_pairs",
                  failure->expected_pairs, failure->expected_bytes / 1e9,
                  failure->limit_bytes / 1e9);
     } else if (failure->expected_pairs > 0.0) {
         snprintf(text, sizeof text,
-                 "out of memory after %.0f pairs; use a smaller cutoff, fewer quantities, or "
-                 "count_pairs",
+                 "out of memory after %.0f pairs; use a smaller cutoff, fewer quantities, "
+                 "iter_pairs or count_pairs",
                  failure->expected_pairs);
     } else {
         snprintf(text, sizeof text,

@@ -8,7 +8,9 @@ from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
 from halfshell._options import kernels
 from halfshell._pairs import pairs
+from halfshell._stream import iter_pairs
 from halfshell._verify import Verdict, verify
+from halfshell._visit import for_each_pair
 
 __version__ = "0.1.0"
 
@@ -20,6 +22,8 @@ __all__ = [
     "clear_cache",
     "count_pairs",
     "explain",
+    "for_each_pair",
+    "iter_pairs",
     "kernels",
     "pairs",
     "set_cache_limit",

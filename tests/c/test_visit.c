@@ -3,7 +3,6 @@
 #include "block_checks.h"
 #include "random_scenes.h"
 
-#include "../../csrc/core/fpenv.h"
 #include "../../csrc/core/memory.h"
 
 #include <fenv.h>
@@ -148,6 +147,14 @@ threads_see_each_pair_once(void)
     free(again);
 }
 
+/* Of the arithmetic that is used: fegetround may speak of another one. */
+static bool
+rounds_to_nearest(void)
+{
+    const volatile double one = 1.0, tiny = 0x1p-70;
+    return one + tiny == one && one - tiny == one;
+}
+
 /* A function that searches itself, and leaves the rounding as it should not. */
 static int
 search_again(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)
@@ -159,7 +166,7 @@ search_again(int64_t i, int64_t j, const int32_t *S, const double *D, double d2,
     (void)S;
     (void)D;
     (void)d2;
-    CHECK(i < j && fegetround() == FE_TONEAREST);
+    CHECK(i < j && rounds_to_nearest());
     CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) == HS_OK);
     CHECK(hs_pairs_length(pairs) > 0);
     hs_pairs_free(pairs);
@@ -178,7 +185,7 @@ a_function_may_search_itself(void)
     int64_t           n = 0, count = 0;
     fesetround(FE_DOWNWARD);
     (void)hs_pairs_visit(&points, NULL, &options, &visit, &n, NULL);
-    CHECK(fegetround() == FE_DOWNWARD);
+    CHECK(!rounds_to_nearest());
     fesetround(FE_TONEAREST);
     CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK && n == count && n > 0);
     free(x);
