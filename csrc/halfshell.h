@@ -238,27 +238,21 @@ void hs_array_free(void *array);
 /* NULL-safe. */
 void hs_pairs_free(hs_pairs *pairs);
 
-/*
- * The pairs of hs_pairs_find in blocks, in the same order, for results that fit no memory. Opaque,
- * owned by the caller; used by one thread at a time.
- */
+/* The pairs of hs_pairs_find in blocks, in the same order, for results that fit no memory. Opaque,
+ * owned by the caller; used by one thread at a time. */
 typedef struct hs_stream hs_stream;
 
 /*
- * points, box, options are borrowed for this call only: the points are copied, and may change
- * afterwards. max_pairs >= 1: pairs of a block. options->sorted, ->out and ->counters are ignored;
- * ->poll is asked during this call only; ->memory_limit and ->find_limit, whose context must stay,
- * hold for the search and two blocks at most. *stream is NULL on failure.
+ * All is borrowed for this call only: points may change afterwards. max_pairs >= 1: of a block.
+ * options->sorted, ->out and ->counters are ignored, ->poll is asked by this call; the limits,
+ * whose context must stay, hold for what the stream has. *stream is NULL on failure.
  */
 hs_status hs_stream_open(const hs_points *points, const hs_box *box, const hs_options *options,
                          int64_t max_pairs, hs_stream **stream, hs_failure *failure);
 
-/*
- * The next max_pairs pairs, or those that are left, to be freed with hs_pairs_free; *block is NULL
- * after the last ones. poll (NULL: never) is asked now and then. Threads end before the call
- * returns. On failure *block is NULL, and the stream is as it was before the call: it may be asked
- * again, or freed.
- */
+/* The next max_pairs pairs, or those that are left, for hs_pairs_free; *block is NULL after the
+ * last ones. poll may be NULL. No thread is left behind. On failure *block is NULL, and the stream
+ * as it was before: it may be asked again. */
 hs_status hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                          hs_failure *failure);
 
@@ -266,32 +260,26 @@ hs_status hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_p
 void hs_stream_free(hs_stream *stream);
 
 /*
- * Called for each pair: S and D have ndim entries and are borrowed for the call, S is zero where
- * the box does not repeat. d2 is d * d, rounded once, of the d that hs_pairs_find returns, so that
- * sqrt(d2) is d unless d * d overflows or is subnormal. Anything but 0 ends the search.
- * It must return: no longjmp, no C++ exception. It may search itself.
+ * Called for each pair. S and D have ndim entries, borrowed for the call. d2 is d * d, rounded
+ * once, of the d that hs_pairs_find returns: sqrt(d2) is d unless d * d overflows or is subnormal.
+ * Not 0: the search ends. It must return, without a C++ exception, and may search itself.
  */
 typedef int (*hs_pair_fn)(int64_t i, int64_t j, const int32_t *S, const double *D, double d2,
                           void *user);
-
-/* Called for some pairs at a time, which are borrowed: i, j (int64), distance, vector and shift are
- * there. *n_taken: how many it has looked at, n at first. Anything but 0 ends the search. */
+/* The same for n pairs: all but `both`. *n_taken, n at first: how many it has looked at. */
 typedef int (*hs_pairs_fn)(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user);
-
 typedef struct hs_visit {
     hs_pair_fn  pair;
     hs_pairs_fn pairs;       /* in place of `pair`, or NULL */
     void       *user;
-    bool        thread_safe; /* it may be called by several threads at once, in no order */
+    bool        thread_safe; /* several threads may call it at once, in no order */
 } hs_visit;
 
 /*
- * Hands each pair of hs_pairs_find to a function, in the same order unless that is thread_safe, and
- * stores none of them. options->want, ->sorted, ->index_bytes and ->out are ignored. The function
- * runs in the floating-point environment of the search: rounding to nearest, no flushing.
- * *n_visited, set also on failure: pairs that were looked at, the one that ended the search
- * included; that is no failure.
- * When it ends on threads, the others may still visit the pairs of a few hundred points each.
+ * Hands each pair of hs_pairs_find to a function, in the same order unless it is thread_safe, and
+ * stores none; it rounds to nearest. options->want, ->sorted, ->index_bytes and ->out are
+ * ignored. *n_visited, set also on failure: pairs looked at, the one that ended the search
+ * included, which is no failure; other threads may go on for some hundred points then.
  */
 hs_status hs_pairs_visit(const hs_points *points, const hs_box *box, const hs_options *options,
                          const hs_visit *visit, int64_t *n_visited, hs_failure *failure);

@@ -127,8 +127,11 @@ static void
 limit_crew(const hs_crew *crew)
 {
     const int64_t bytes = hs_output_bytes_per_pair(crew->output);
-    const int64_t slack = hs_team_size(crew->search->team) * HS_COMMIT_BYTES;
-    hs_commits_limit(crew->commits, crew->enough, crew->enough + slack / (bytes > 0 ? bytes : 1));
+    const int64_t slack =
+        hs_team_size(crew->search->team) * (int64_t)HS_COMMIT_BYTES / (bytes > 0 ? bytes : 1);
+    const bool    is_bounded = crew->enough <= INT64_MAX - slack;
+    hs_commits_limit(crew->commits, crew->enough,
+                     is_bounded ? crew->enough + slack : INT64_MAX);
 }
 
 static hs_status

@@ -43,8 +43,8 @@ typedef struct hs_search {
 /*
  * Everything up to the first group: hs_search_begin, the team, hs_search_build; or what can be
  * reused of sets->built. On failure nothing is held but the account, which the caller closes in any
- * case. The options are copied; what they point to is borrowed until hs_search_close; the points are
- * not needed any more.
+ * case. The options are copied; what they point to is borrowed until hs_search_close; the points
+ * are not needed any more.
  */
 hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                          hs_search *search, hs_failure *failure);
