@@ -242,6 +242,52 @@ void hs_array_free(void *array);
 /* NULL-safe. */
 void hs_pairs_free(hs_pairs *pairs);
 
+/* The pairs of hs_pairs_find in blocks, in the same order, for results that fit no memory. Opaque,
+ * owned by the caller; used by one thread at a time. */
+typedef struct hs_stream hs_stream;
+
+/*
+ * All is borrowed for this call only: points may change afterwards. max_pairs >= 1: of a block.
+ * options->sorted, ->out and ->counters are ignored, ->poll is asked by this call; the limits,
+ * whose context must stay, hold for what the stream has. *stream is NULL on failure.
+ */
+hs_status hs_stream_open(const hs_points *points, const hs_box *box, const hs_options *options,
+                         int64_t max_pairs, hs_stream **stream, hs_failure *failure);
+
+/* The next max_pairs pairs, or those that are left, for hs_pairs_free; *block is NULL after the
+ * last ones. poll may be NULL. No thread is left behind. On failure *block is NULL, and the stream
+ * as it was before: it may be asked again. */
+hs_status hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
+                         hs_failure *failure);
+
+/* NULL-safe. Blocks stay as they are. */
+void hs_stream_free(hs_stream *stream);
+
+/*
+ * Called for each pair. S and D have ndim entries, borrowed for the call. d2 is d * d, rounded
+ * once, of the d that hs_pairs_find returns: sqrt(d2) is d unless d * d overflows or is subnormal.
+ * Not 0: the search ends. It must return, without a C++ exception, and may search itself.
+ */
+typedef int (*hs_pair_fn)(int64_t i, int64_t j, const int32_t *S, const double *D, double d2,
+                          void *user);
+/* The same for n pairs: all but `both`. *n_taken, n at first: how many it has looked at. */
+typedef int (*hs_pairs_fn)(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user);
+typedef struct hs_visit {
+    hs_pair_fn  pair;
+    hs_pairs_fn pairs;       /* in place of `pair`, or NULL */
+    void       *user;
+    bool        thread_safe; /* several threads may call it at once, in no order */
+} hs_visit;
+
+/*
+ * Hands each pair of hs_pairs_find to a function, in the same order unless it is thread_safe, and
+ * stores none; it rounds to nearest. options->want, ->sorted, ->index_bytes and ->out are
+ * ignored. *n_visited, set also on failure: pairs looked at, the one that ended the search
+ * included, which is no failure; other threads may go on for some hundred points then.
+ */
+hs_status hs_pairs_visit(const hs_points *points, const hs_box *box, const hs_options *options,
+                         const hs_visit *visit, int64_t *n_visited, hs_failure *failure);
+
 /*
  * Points that are sorted into cells once and asked many times. Immutable: any number of calls may
  * use it at once. Opaque, owned by the caller.
@@ -275,6 +321,12 @@ hs_status hs_cells_neighbors(const hs_cells *cells, const hs_points *queries,
 hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
                                    const hs_options *options, int64_t *counts,
                                    hs_failure *failure);
+
+/* As hs_stream_open, whose stream must be freed before the cells, and hs_pairs_visit. */
+hs_status hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
+                          hs_stream **stream, hs_failure *failure);
+hs_status hs_cells_visit(const hs_cells *cells, const hs_options *options, const hs_visit *visit,
+                         int64_t *n_visited, hs_failure *failure);
 
 /*
  * The layout of cells: points order[start[c]] to order[start[c + 1] - 1] are in cell c, ascending.

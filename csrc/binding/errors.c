@@ -129,7 +129,7 @@ raise_memory(const hs_failure *failure)
     } else {
         snprintf(text, sizeof text,
                  "the result would not fit: about %.3g pairs (%s) are expected, %s are allowed; "
-                 "use a smaller cutoff, fewer quantities, or count_pairs",
+                 "use a smaller cutoff, fewer quantities, iter_pairs or count_pairs",
                  failure->expected_pairs, needed, limit);
     }
     PyErr_SetString(PyExc_MemoryError, text);

@@ -10,6 +10,9 @@
 static PyMethodDef methods[] = {
     {"pairs", FASTCALL(hs_py_pairs), METH_FASTCALL, "See halfshell.pairs."},
     {"count_pairs", FASTCALL(hs_py_count_pairs), METH_FASTCALL, "See halfshell.count_pairs."},
+    {"iter_pairs", FASTCALL(hs_py_iter_pairs), METH_FASTCALL, "See halfshell.iter_pairs."},
+    {"for_each_pair", FASTCALL(hs_py_for_each_pair), METH_FASTCALL,
+     "See halfshell.for_each_pair."},
     {"plain_pairs", FASTCALL(hs_py_plain_pairs), METH_FASTCALL,
      "pairs of plain arguments, or NotImplemented."},
     {"plain_count", FASTCALL(hs_py_plain_count), METH_FASTCALL,
@@ -57,9 +60,26 @@ static PyMethodDef methods[] = {
 static int
 module_exec(PyObject *module)
 {
-    (void)module;
+    PyObject **stream_type = PyModule_GetState(module);
     hs_environment_read();
-    return PyArray_ImportNumPyAPI();
+    *stream_type = hs_py_stream_type(module);
+    return *stream_type == NULL ? -1 : PyArray_ImportNumPyAPI();
+}
+
+static int
+module_traverse(PyObject *module, visitproc visit, void *arg)
+{
+    PyObject **stream_type = PyModule_GetState(module);
+    Py_VISIT(*stream_type);
+    return 0;
+}
+
+static int
+module_clear(PyObject *module)
+{
+    PyObject **stream_type = PyModule_GetState(module);
+    Py_CLEAR(*stream_type);
+    return 0;
 }
 
 static PyModuleDef_Slot slots[] = {
@@ -77,9 +97,11 @@ static struct PyModuleDef definition = {
     .m_base = PyModuleDef_HEAD_INIT,
     .m_name = "halfshell._core",
     .m_doc = "The C core of halfshell. Private: use the functions of halfshell.",
-    .m_size = 0, /* no state: no Python object outlives a call */
+    .m_size = sizeof(PyObject *), /* hs_py_stream_type */
     .m_methods = methods,
     .m_slots = slots,
+    .m_traverse = module_traverse,
+    .m_clear = module_clear,
 };
 
 PyMODINIT_FUNC PyInit__core(void);

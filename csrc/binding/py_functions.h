@@ -34,6 +34,16 @@ PyObject *hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssiz
 PyObject *hs_py_cells_candidates(PyObject *module, PyObject *const *arguments,
                                  Py_ssize_t n_arguments);
 
+/* py_stream.c. The arguments of call.h, then quantities, index_bytes, max_pairs -> an iterator. */
+PyObject *hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+/* The type of these, a new reference or NULL; the module keeps it as its state. */
+PyObject *hs_py_stream_type(PyObject *module);
+
+/* py_visit.c. The arguments of call.h, then what to call (a callable, or the address of a
+ * hs_pair_fn), the address of its data, and whether threads may call it -> pairs visited. */
+PyObject *hs_py_for_each_pair(PyObject *module, PyObject *const *arguments,
+                              Py_ssize_t n_arguments);
+
 /* py_batch.c. The arguments of call.h (where each system has a box of its own, any one of that
  * shape), quantities, sort, index_bytes, out; batch, cutoffs or None, boxes or None. */
 PyObject *hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);

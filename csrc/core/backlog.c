@@ -24,7 +24,10 @@ hs_backlog_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *
     const hs_status  status = hs_record_hits(&backlog->recorder, walker, first, hits);
     if (status == HS_OK &&
         pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
-        return hs_commit(backlog->committer, hs_walk_fraction(walker), false);
+        const hs_status committed =
+            hs_commit(backlog->committer, hs_walk_fraction(walker), false);
+        walker->leaves = backlog->committer->is_full;
+        return committed;
     }
     return status;
 }

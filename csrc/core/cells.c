@@ -3,6 +3,8 @@
 #include "cells.h"
 #include "fpenv.h"
 #include "poll.h"
+#include "stream.h"
+#include "visit.h"
 
 #include <string.h>
 
@@ -174,4 +176,20 @@ hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
 {
     const hs_sets sets = hs_cells_sets(cells, queries, true);
     return hs_neighbors_count_in(&sets, hs_cells_box(cells), options, counts, failure);
+}
+
+hs_status
+hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
+                hs_stream **stream, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, NULL, false);
+    return hs_stream_open_in(&sets, hs_cells_box(cells), options, max_pairs, stream, failure);
+}
+
+hs_status
+hs_cells_visit(const hs_cells *cells, const hs_options *options, const hs_visit *visit,
+               int64_t *n_visited, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, NULL, false);
+    return hs_pairs_visit_in(&sets, hs_cells_box(cells), options, visit, n_visited, failure);
 }

@@ -22,6 +22,9 @@ struct hs_commits {
     hs_status        status;
     hs_failure       failure;
     int64_t          failed_range;
+    int64_t          enough, most; /* pairs; as hs_commits_limit says */
+    bool             has_enough;
+    int64_t          full_range; /* the last one that is written, n_ranges at first */
 };
 
 hs_commits *
@@ -29,12 +32,29 @@ hs_commits_new(hs_account *account, hs_output *output, int64_t n_ranges)
 {
     hs_commits *commits = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *commits);
     if (commits != NULL) {
-        *commits = (hs_commits){.output = output, .n_ranges = n_ranges};
+        *commits = (hs_commits){.output = output,
+                                .n_ranges = n_ranges,
+                                .enough = INT64_MAX,
+                                .most = INT64_MAX,
+                                .full_range = n_ranges};
         commits->caller = hs_thread_self();
         hs_mutex_init(&commits->mutex);
         hs_condition_init(&commits->changed);
     }
     return commits;
+}
+
+void
+hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most)
+{
+    commits->enough = enough;
+    commits->most = most;
+}
+
+int64_t
+hs_commits_written(const hs_commits *commits)
+{
+    return commits->due;
 }
 
 hs_status
@@ -73,12 +93,16 @@ hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
     }
 }
 
-/* Takes the next range; false when there is none, or when somebody has failed. */
+/* Takes the next range; false when there is none, when somebody has failed, or when there are
+ * pairs enough. */
 static bool
 take_range(hs_committer *committer)
 {
     hs_commits *commits = committer->commits;
-    if (!goes_on(commits, 0.0)) {
+    hs_mutex_lock(&commits->mutex);
+    const bool more = commits->status == HS_OK && !commits->has_enough;
+    hs_mutex_unlock(&commits->mutex);
+    if (!more) {
         return false;
     }
     committer->range = hs_fetch_increment(&commits->next_range);
@@ -127,7 +151,9 @@ claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
         while (commits->n_copying > 0) { /* soon over */
             hs_condition_wait(&commits->changed, &commits->mutex);
         }
-        const hs_status status = hs_output_reserve(output, n, fraction);
+        /* One that is filled only so far is no larger in the end for what is still to do. */
+        const bool      is_limited = commits->enough < INT64_MAX;
+        const hs_status status = hs_output_reserve(output, n, is_limited ? 0.0 : fraction);
         if (status != HS_OK) {
             return status;
         }
@@ -135,6 +161,20 @@ claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
     *at = output->n_pairs;
     output->n_pairs += n;
     return HS_OK;
+}
+
+/* With the mutex held: is it enough, is it all that there may be? */
+static void
+heed_limits(hs_committer *committer, const hs_commit_part *part)
+{
+    hs_commits   *commits = committer->commits;
+    const int64_t n = commits->output->n_pairs;
+    commits->has_enough = commits->has_enough || n >= commits->enough;
+    if (n >= commits->most && commits->full_range == commits->n_ranges) {
+        commits->full_range = part->range;
+        committer->is_full = !part->is_last;
+        hs_condition_wake(&commits->changed);
+    }
 }
 
 /* With the mutex held, which it gives up while it copies: the part that is due. */
@@ -147,6 +187,7 @@ write_part(hs_committer *committer, const hs_commit_part *part)
     if (status != HS_OK) {
         return status;
     }
+    heed_limits(committer, part);
     commits->n_copying++;
     if (part->is_last) {
         commits->due++;
@@ -172,8 +213,8 @@ write_parts(hs_committer *committer, bool waits)
     hs_mutex_lock(&commits->mutex);
     while (done < committer->n_parts && status == HS_OK) {
         const hs_commit_part *part = &committer->parts[done];
-        if (commits->status != HS_OK) {
-            status = HS_STATUS_END; /* somebody else has failed */
+        if (commits->status != HS_OK || part->range > commits->full_range) {
+            status = HS_STATUS_END; /* somebody else has failed, or has filled the output */
         } else if (commits->due == part->range) {
             status = write_part(committer, part);
             done++;

@@ -37,6 +37,7 @@ typedef struct hs_committer {
     hs_output     *pairs;   /* borrowed: where the thread collects them; NULL when counting */
     int64_t        range;   /* that the thread is working on */
     int64_t        written; /* of the pairs, those that are in the output already */
+    bool           is_full; /* the output has most pairs, and the range goes on: leave it */
     int            n_parts;
     hs_commit_part parts[HS_COMMIT_PARTS]; /* that wait until earlier ranges are written */
 } hs_committer;
@@ -47,6 +48,13 @@ typedef hs_status (*hs_range_fn)(void *worker, int64_t range);
 /* output: borrowed; NULL when nothing is written. The thread that calls this is the only one that
  * may poll. NULL when memory is short. */
 hs_commits *hs_commits_new(hs_account *account, hs_output *output, int64_t n_ranges);
+
+/* Before any thread joins: from `enough` pairs in the output on no range is begun, and from `most`
+ * on none is ended but the one that is due, which is to be left (hs_committer.is_full). */
+void hs_commits_limit(hs_commits *commits, int64_t enough, int64_t most);
+
+/* After all threads are done: how many ranges have been written to their end, the first ones. */
+int64_t hs_commits_written(const hs_commits *commits);
 
 /* After all threads are done: HS_OK, or the failure of the earliest range that had one. Frees. */
 hs_status hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure);

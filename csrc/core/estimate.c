@@ -52,7 +52,7 @@ bound_pairs(const hs_search *search)
 /* Bytes that one pair of the result takes at the worst moment: the caller's arrays, and what the
  * search still holds beside them. 0 when nothing is wanted but the count. */
 static double
-find_bytes_per_pair(const hs_options *options, int ndim)
+bytes_per_pair_of(const hs_options *options, int ndim)
 {
     int64_t   bytes = 0;
     hs_output columns;
@@ -66,6 +66,13 @@ find_bytes_per_pair(const hs_options *options, int ndim)
         bytes += hs_output_bytes_per_pair(&columns) + (int64_t)sizeof(int64_t);
     }
     return (double)bytes;
+}
+
+/* The same, or 0 when nothing is kept. */
+static double
+find_bytes_per_pair(const hs_search *search)
+{
+    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->options, search->scene.ndim);
 }
 
 /* Volume of the region that a search has to do with: of the periodic part, times the extents along
@@ -106,7 +113,7 @@ hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndi
     failure->limit_bytes = limit;
     if (failure->expected_bytes == 0.0) {
         failure->expected_pairs = hs_larger(shortage->pairs, failure->expected_pairs);
-        failure->expected_bytes = failure->expected_pairs * find_bytes_per_pair(options, ndim);
+        failure->expected_bytes = failure->expected_pairs * bytes_per_pair_of(options, ndim);
         failure->search_bytes = shortage->bytes + BYTES_OF_WALK;
     }
 }
@@ -168,7 +175,7 @@ least_pairs(const hs_search *search)
 hs_status
 hs_estimate_by_density(hs_search *search, hs_failure *failure)
 {
-    const double bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
+    const double bytes_per_pair = find_bytes_per_pair(search);
     if (search->scene.lattice.n_periodic == 0 || search->scene.n == 0) {
         return HS_OK;
     }
@@ -223,7 +230,7 @@ take_sample(hs_walker *walker, int64_t n, sample *taken)
 hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
-    const double  bytes_per_pair = find_bytes_per_pair(&search->options, search->scene.ndim);
+    const double  bytes_per_pair = find_bytes_per_pair(search);
     const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
     sample        taken;

@@ -4,9 +4,6 @@
 
 #include <string.h>
 
-/* Hits held at a time, as a multiple of the candidates: those of a few points at least. */
-#define HITS_PER_CANDIDATE 2
-
 /* Every array begins on a cache line. */
 #define FLOATS_PER_LINE (HS_ALIGNMENT / (int64_t)sizeof(float))
 
@@ -15,7 +12,8 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
               hs_block *block)
 {
     *block = (hs_block){.capacity = most, .most_runs = most_runs};
-    block->most_hits = most < INT32_MAX / HITS_PER_CANDIDATE ? HITS_PER_CANDIDATE * most : most;
+    block->most_hits =
+        most < INT32_MAX / HS_HITS_PER_CANDIDATE ? HS_HITS_PER_CANDIDATE * most : most;
     const int64_t capacity = (int64_t)most + HS_PADDING;
     const int64_t room = (capacity + FLOATS_PER_LINE - 1) / FLOATS_PER_LINE * FLOATS_PER_LINE;
     block->y[0] = hs_alloc(account, HS_FOR_CANDIDATES, room * (ndim + 1), sizeof(float));

@@ -14,6 +14,9 @@
 
 #define HS_BLOCK_RUNS 1024 /* runs held at a time, at most */
 
+/* Hits held at a time, as a multiple of the candidates: those of a few points at least. */
+#define HS_HITS_PER_CANDIDATE 2
+
 /* One block of candidates at a time, and what scans say about it. The arrays have capacity +
  * HS_PADDING entries where nothing else is said, and are owned: y and norm as one block, by
  * y[0]. */

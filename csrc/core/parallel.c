@@ -26,6 +26,10 @@ typedef struct hs_worker {
 struct hs_crew {
     hs_search         *search;
     hs_output         *output;   /* NULL: nothing is recorded */
+    int64_t            enough;   /* pairs in it; 0: all */
+    hs_bookmark        start;    /* where the first range begins */
+    hs_bookmark        left;     /* set by the worker that has left its range */
+    bool               is_left;
     const hs_visitors *visitors; /* NULL: hits are recorded, or only counted */
     hs_worker         *workers;
     hs_commits        *commits;
@@ -33,18 +37,38 @@ struct hs_crew {
     int64_t            n_found;
 };
 
+/* The output is full: what the worker has is written, and its place is kept. */
+static hs_status
+leave_range(hs_worker *worker)
+{
+    hs_crew         *crew = worker->crew;
+    const hs_walker *walker = &worker->walker;
+    const hs_status  status = hs_commit(&worker->committer, hs_walk_fraction(walker), false);
+    if (status != HS_OK) {
+        return status;
+    }
+    crew->left = (hs_bookmark){.point = walker->group.first, .blocks = walker->blocks};
+    crew->is_left = true;
+    return HS_STATUS_END;
+}
+
 /* A hs_range_fn. */
 static hs_status
 search_range(void *context, int64_t range)
 {
     hs_worker     *worker = context;
     const hs_crew *crew = worker->crew;
-    const int64_t  n = hs_search_asking(crew->search)->n, first = range * RANGE_POINTS;
+    const int64_t  n = hs_search_asking(crew->search)->n;
+    const int64_t  first = crew->start.point + range * RANGE_POINTS;
     const int64_t  end = first + (n - first < RANGE_POINTS ? n - first : RANGE_POINTS);
-    hs_status      status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
+    worker->walker.blocks_to_skip = range == 0 ? crew->start.blocks : 0;
+    hs_status status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
     if (status == HS_ERR_SHIFT_RANGE) {
         worker->failure.row = worker->walker.failed_point;
         worker->failure.in_queries = crew->search->has_queries;
+    }
+    if (status == HS_STATUS_END && worker->walker.leaves) {
+        return leave_range(worker);
     }
     if (status == HS_OK && crew->output != NULL) {
         status = hs_commit(&worker->committer, (double)end / (double)n, true);
@@ -98,16 +122,36 @@ open_worker(hs_crew *crew, int w)
     return status;
 }
 
+/* Threads may end the ranges that they work on, as long as these are no longer than usual. */
+static void
+limit_crew(const hs_crew *crew)
+{
+    const int64_t bytes = hs_output_bytes_per_pair(crew->output);
+    const int64_t slack =
+        hs_team_size(crew->search->team) * (int64_t)HS_COMMIT_BYTES / (bytes > 0 ? bytes : 1);
+    const bool    is_bounded = crew->enough <= INT64_MAX - slack;
+    hs_commits_limit(crew->commits, crew->enough,
+                     is_bounded ? crew->enough + slack : INT64_MAX);
+}
+
 static hs_status
 run_crew(hs_crew *crew, hs_failure *failure)
 {
     hs_search    *search = crew->search;
-    const int64_t n_ranges = (hs_search_asking(search)->n + RANGE_POINTS - 1) / RANGE_POINTS;
+    const int64_t n = hs_search_asking(search)->n, n_left = n - crew->start.point;
+    const int64_t n_ranges = (n_left + RANGE_POINTS - 1) / RANGE_POINTS;
     crew->commits = hs_commits_new(&search->account, crew->output, n_ranges);
     if (crew->commits == NULL) {
         return HS_ERR_MEMORY;
     }
+    if (crew->enough > 0) {
+        limit_crew(crew);
+    }
     hs_team_run(search->team, hs_team_size(search->team), work, crew);
+    if (!crew->is_left) {
+        const int64_t done = hs_commits_written(crew->commits) * RANGE_POINTS;
+        crew->left = (hs_bookmark){.point = crew->start.point + (done < n_left ? done : n_left)};
+    }
     return hs_commits_end(&search->account, crew->commits, failure);
 }
 
@@ -158,6 +202,18 @@ hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_crew crew = {.search = search, .output = output};
     return walk_together(&crew, failure);
+}
+
+hs_status
+hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough, hs_bookmark *bookmark,
+                      hs_failure *failure)
+{
+    hs_crew crew = {.search = search, .output = output, .enough = enough, .start = *bookmark};
+    const hs_status status = walk_together(&crew, failure);
+    if (status == HS_OK) {
+        *bookmark = crew.left;
+    }
+    return status;
 }
 
 hs_status

@@ -22,6 +22,14 @@ typedef struct hs_visitors {
 /* Records all pairs in the output, by search->team. HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
 
+/*
+ * The same from the bookmark on, until the output has `enough` pairs or all have been found: then
+ * the bookmark says where to go on. The output has at most HS_COMMIT_BYTES a thread and one block
+ * of candidates more than that. A failure leaves the bookmark, and in the output what it may.
+ */
+hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough,
+                                hs_bookmark *bookmark, hs_failure *failure);
+
 /* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
 hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors,
                             hs_neighbourhood *most, hs_failure *failure);

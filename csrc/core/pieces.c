@@ -22,7 +22,7 @@ typedef struct worker {
     hs_committer committer;
     hs_failure   failure;
     /* Of the block that was looked at last: */
-    int64_t      block; /* candidates that had been tested before it: tells blocks apart; -1: none */
+    int64_t      block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool         has_images;
     bool        *is_shifted; /* owned; whether a run is in another image ... */
     int32_t     *shift;      /* owned; ... and which, over the rows as given: m numbers */

@@ -149,21 +149,28 @@ fill_block(hs_walker *walker)
     return status;
 }
 
+static void
+empty_block(hs_walker *walker)
+{
+    walker->block.n = 0;
+    walker->block.n_runs = 0;
+    walker->block_is_first = false;
+    walker->blocks++;
+}
+
 /* What was tested, and whether to go on. */
 static hs_status
 finish_block(hs_walker *walker, int64_t n_points)
 {
-    hs_block     *block = &walker->block;
-    const int64_t skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
+    const hs_block *block = &walker->block;
+    const int64_t   skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
     walker->n_candidates += n_points * block->n - skipped;
     walker->work_since_poll += n_points * block->n;
-    block->n = 0;
-    block->n_runs = 0;
-    walker->block_is_first = false;
+    empty_block(walker);
     if (!walker->flushes && hs_fpenv_met_subnormal()) {
         walker->flushes = walker->options.precision != HS_SINGLE;
     }
-    if (walker->n_candidates > walker->candidate_limit) {
+    if (walker->n_candidates > walker->candidate_limit || walker->leaves) {
         return HS_STATUS_END;
     }
     if (walker->work_since_poll > POLL_WORK) {
@@ -178,6 +185,10 @@ hs_scan_block(hs_walker *walker)
 {
     int32_t   end[HS_GROUP_POINTS];
     hs_scan   scan;
+    if (walker->blocks < walker->blocks_to_skip) {
+        empty_block(walker);
+        return HS_OK;
+    }
     hs_status status = fill_block(walker);
     set_scan(walker, &scan);
     scan.end = end;

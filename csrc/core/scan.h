@@ -8,8 +8,9 @@
 
 #include "walk.h"
 
-/* Tests every point of the group against what has been appended to the block, then empties it.
- * HS_STATUS_END past the candidate limit; what the visitor or the poll say. */
+/* Tests every point of the group against what has been appended to the block, unless it is one to
+ * skip, then empties it. HS_STATUS_END past the candidate limit, or when a visitor leaves; what the
+ * visitor or the poll say. */
 hs_status hs_scan_block(hs_walker *walker);
 
 #endif

@@ -50,6 +50,7 @@ typedef struct hs_sets {
     bool             is_plain; /* points are not drawn together (condense.h): images are those of
                                 * the points as given */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
+    bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
 } hs_sets;

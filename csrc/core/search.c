@@ -85,6 +85,7 @@ hs_search_set_asking(const hs_sets *sets, hs_search *search)
 {
     const int64_t n = sets->points->n;
     search->has_queries = sets->queries != NULL;
+    search->keeps_none = sets->keeps_none;
     search->is_full = sets->is_full || search->has_queries;
     search->n_in_all = search->has_queries ? sets->queries->n : n;
     search->pairs_per_half = !search->is_full ? 1.0
@@ -134,18 +135,22 @@ hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *sear
 }
 
 void
+hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search)
+{
+    search->callers_poll = poll;
+    search->callers_context = context;
+    search->options.poll = poll != NULL ? counted_poll : NULL;
+    search->options.poll_context = search;
+}
+
+void
 hs_search_begin(const hs_options *options, hs_search *search)
 {
     memset((char *)search + offsetof(hs_search, account), 0,
            sizeof *search - offsetof(hs_search, account));
     search->scene.cloud.block = search->scene.beside = NULL; /* freed also when never set */
     search->options = *options;
-    if (options->poll != NULL) {
-        search->callers_poll = options->poll;
-        search->callers_context = options->poll_context;
-        search->options.poll = counted_poll;
-        search->options.poll_context = search;
-    }
+    hs_search_set_poll(options->poll, options->poll_context, search);
     hs_account_init(&search->account, options);
 }
 

@@ -23,6 +23,7 @@ typedef struct hs_search {
     hs_bins          bins;
     hs_sparse        sparse;  /* when is_sparse: the rows and cells that bins follows */
     bool             is_full; /* every asking point meets all its neighbours, not the half list */
+    bool             keeps_none;  /* as in hs_sets */
     bool             is_borrowed; /* the cells and all of the scene belong to another search */
     bool             has_queries;  /* then these ask, in the cells of the same grid: */
     hs_bins          query_bins;
@@ -47,6 +48,10 @@ typedef struct hs_search {
  */
 hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                          hs_search *search, hs_failure *failure);
+
+/* Whom to ask whether to go on, in place of the options' poll; NULL: nobody. The search must not
+ * move any more. */
+void hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search);
 
 /* An account and options, no scene yet. */
 void hs_search_begin(const hs_options *options, hs_search *search);

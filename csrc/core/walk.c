@@ -68,12 +68,13 @@ visit_group(hs_walker *walker, const hs_row_group *group)
 {
     const hs_search *search = walker->search;
     walker->n_groups++;
+    walker->blocks = 0;
     walker->block.n = 0;
     walker->block.n_runs = 0;
     walker->block_is_first = !search->is_full;
     walker->of_group = (hs_neighbourhood){0, 0};
     hs_group_start(hs_search_asking(search), group->first, group->last, &walker->group);
-    if (search->is_full) {
+    if (search->is_full || walker->blocks_to_skip > 0) {
         hs_group_load(hs_search_asking(search), &walker->group);
     }
     for (int64_t l = 0; l < walker->n_links; l++) {
@@ -87,6 +88,7 @@ visit_group(hs_walker *walker, const hs_row_group *group)
         }
     }
     const hs_status status = hs_scan_block(walker);
+    walker->blocks_to_skip = 0;
     keep_largest(walker->of_group.candidates, &walker->most.candidates);
     keep_largest(walker->of_group.runs, &walker->most.runs);
     return status;

@@ -23,6 +23,13 @@ typedef struct hs_walker hs_walker;
 typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
                                  const hs_hits *hits);
 
+/* Where a walk was left and can be taken up: the group that begins at this point, or the first one
+ * behind it, when so many blocks of its candidates have been scanned. */
+typedef struct hs_bookmark {
+    int64_t point;
+    int32_t blocks;
+} hs_bookmark;
+
 /* How large the neighbourhood of a group is. */
 typedef struct hs_neighbourhood {
     int64_t candidates, runs;
@@ -56,12 +63,18 @@ struct hs_walker {
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;
+    bool             leaves;         /* set by a visitor: HS_STATUS_END once the block is done */
+    int32_t          blocks;         /* of the present group, scanned or skipped so far */
+    int32_t          blocks_to_skip; /* of the next group; they were scanned before */
     int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
     int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
     hs_stages        stages;
     int64_t          n_groups, n_candidates, n_ambiguous;
     int64_t          work_since_poll;
 };
+
+/* Hits of one visit at most, of walkers that hs_walker_init has opened. */
+#define HS_MOST_HITS (HS_HITS_PER_CANDIDATE * (HS_BLOCK_CANDIDATES + HS_GROUP_POINTS))
 
 /* `visit` NULL: hits are only counted, in n_found. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,

@@ -11,9 +11,11 @@ from halfshell._explain import Explanation, explain
 from halfshell._neighbors import coordination, neighbors
 from halfshell._options import kernels
 from halfshell._pairs import pairs
+from halfshell._stream import iter_pairs
 from halfshell._table import NeighborTable
 from halfshell._verify import Verdict, verify
 from halfshell._verlet import VerletList
+from halfshell._visit import for_each_pair
 
 __version__ = "0.1.0"
 
@@ -29,6 +31,8 @@ __all__ = [
     "coordination",
     "count_pairs",
     "explain",
+    "for_each_pair",
+    "iter_pairs",
     "kernels",
     "neighbors",
     "pairs",

@@ -34,6 +34,38 @@ def count_pairs(
     threads: int | None,
     /,
 ) -> int: ...
+def iter_pairs(
+    points: npt.NDArray[Any],
+    cutoff: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    quantities: str,
+    index_bytes: int,
+    max_pairs: int,
+    /,
+) -> Any: ...  # a PairBlocks
+def for_each_pair(
+    points: npt.NDArray[Any],
+    cutoff: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    callback: Callable[..., object] | int,
+    user_data: int,
+    thread_safe: bool,
+    /,
+) -> int: ...
 def plain_pairs(
     points: Any,
     cutoff: Any,

@@ -287,6 +287,15 @@ def as_flag(value: Any, name: str) -> bool:
     raise TypeError(f"{name} must be True or False, got {shown(value)}")
 
 
+def as_count(value: Any, name: str) -> int:
+    """A whole number from 1 on."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{name} must be a whole number, got {value!r}")
+    if value < 1:
+        raise ValueError(f"{name} must be 1 or more, got {value}")
+    return int(value)
+
+
 def as_index_bytes(index_dtype: Any) -> int:
     """4 or 8, for int32 or int64."""
     try:

@@ -152,6 +152,7 @@ def pairs(
     See Also
     --------
     count_pairs : the number of pairs, without storing them.
+    iter_pairs : the same pairs in blocks, where all of them would not fit.
     verify : check anybody's list of pairs.
 
     Notes

@@ -32,7 +32,8 @@ def test_public_functions_have_examples(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["coordination", "count_pairs", "explain", "neighbors", "pairs", "pairs_between", "verify"],
+    ["coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "neighbors", "pairs",
+     "pairs_between", "verify"],
 )
 def test_every_argument_is_documented(name):
     function = getattr(hs, name)
@@ -57,6 +58,21 @@ def test_example_of_tables_runs():
     names = {}
     exec(compile(ast.parse(code), "neighbors.md", "exec"), names)
     assert len(names["table"]) == 1000 and len(names["first"]) == 100
+
+
+def test_examples_of_streaming_run():
+    text = (ROOT / "docs/streaming.md").read_text()
+    blocks, calls, compiled = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(blocks), "streaming.md", "exec"), names)
+    d = hs.pairs(names["points"], 0.1, box=[1.0] * 3, quantities="d")
+    assert np.isclose(names["total"], d.sum(), rtol=1e-12)
+    exec(compile(ast.parse(calls), "streaming.md", "exec"), names)
+    assert names["visited"] == hs.count_pairs(names["points"], 0.05)
+    pytest.importorskip("numba")
+    exec(compile(ast.parse(compiled), "streaming.md", "exec"), names)
+    s = 1e-6 / d**6
+    assert np.isclose(names["total"][0], (s * s - s).sum(), rtol=1e-9)
 
 
 def test_readme_commands_create_what_they_need():

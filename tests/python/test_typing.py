@@ -33,6 +33,15 @@ i, j = hs.pairs(p, 1.0, index_dtype=np.int32, precision="double", kernel=None, m
 i, j, d, S = hs.pairs(p, 1.0, quantities="ijdS", inclusive=False)
 hs.pairs(p, 1.0, **options)
 
+for i, j in hs.iter_pairs(p, 1.0, max_pairs=10, progress=print):
+    i.sum()
+for d in hs.iter_pairs(p, 1.0, quantities="d"):
+    d.sum()
+blocks = hs.iter_pairs(p, 1.0, quantities=quantities)
+assert_type(next(blocks), npt.NDArray[Any] | tuple[npt.NDArray[Any], ...])
+blocks.close()
+m: int = hs.for_each_pair(p, 1.0, lambda i, j, S, D, d2: None, box=[1.0] * 3, thread_safe=True)
+
 n: int = hs.count_pairs(p, 1.0)
 assert_type(hs.count_pairs(p, 1), int)
 assert_type(hs.count_pairs(p, np.float32(1.0), precision="single"), int)
@@ -69,6 +78,8 @@ BAD = {
     "hs.neighbors(p, 1.0, sort=True)": "call-arg",
     "hs.neighbors(p, 1.0).indices = p": "misc",
     "hs.pairs_between(p, 1.0)": "call-overload",
+    "hs.iter_pairs(p, 1.0, sort=True)": "call-overload",
+    "hs.for_each_pair(p, 1.0, print, sort=True)": "call-arg",
     "hs.Box([1.0]).vectors = p": "misc",
 }
 

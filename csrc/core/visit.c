@@ -1,0 +1,156 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* visit.c: see visit.h. */
+#include "visit.h"
+
+#include "fpenv.h"
+#include "parallel.h"
+#include "poll.h"
+#include "record.h"
+
+#include <string.h>
+
+#define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
+
+/* A function that wants to stop: a status that nothing else here has. It stops all threads, as any
+ * failure does, and the caller is told that all went well. */
+#define STOPPED HS_ERR_CAPACITY
+
+/* Work of a call in candidates, for polling: functions take tens of nanoseconds and more. */
+#define CALL_WORK 32
+
+/* What one thread works with. */
+typedef struct visitor {
+    const hs_visit *visit;     /* borrowed */
+    hs_output       part;      /* owned; the pairs that are being visited */
+    hs_recorder     recorder;  /* owned; of the part */
+    int64_t         n_visited;
+} visitor;
+
+static int
+call_each(const hs_visit *visit, const hs_pair_arrays *pairs, int ndim, int64_t *n_taken)
+{
+    const int64_t *i = pairs->i, *j = pairs->j;
+    for (int64_t e = 0; e < pairs->capacity; e++) {
+        const double d = pairs->distance[e];
+        if (visit->pair(i[e], j[e], pairs->shift + e * ndim, pairs->vector + e * ndim, d * d,
+                        visit->user) != 0) {
+            *n_taken = e + 1;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* A hs_visit_fn. */
+static hs_status
+visit_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+{
+    visitor        *doing = context;
+    const hs_visit *visit = doing->visit;
+    hs_output      *part = &doing->part;
+    part->n_pairs = 0;
+    const hs_status status = hs_record_hits(&doing->recorder, walker, first, hits);
+    if (status != HS_OK) {
+        return status;
+    }
+    const hs_pair_arrays pairs = {.capacity = part->n_pairs,
+                                  .index_bytes = part->index_bytes,
+                                  .i = hs_output_column(part, HS_WANT_I),
+                                  .j = hs_output_column(part, HS_WANT_J),
+                                  .distance = hs_output_column(part, HS_WANT_DISTANCE),
+                                  .vector = hs_output_column(part, HS_WANT_VECTOR),
+                                  .shift = hs_output_column(part, HS_WANT_SHIFT)};
+    int64_t   n_taken = part->n_pairs;
+    const int stops = visit->pairs != NULL
+                          ? visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user)
+                          : call_each(visit, &pairs, part->ndim, &n_taken);
+    (void)hs_fpenv_enter(); /* whatever the function has done to it */
+    doing->n_visited += n_taken;
+    walker->work_since_poll += CALL_WORK * part->n_pairs;
+    return stops != 0 ? STOPPED : HS_OK;
+}
+
+static hs_status
+open_visitor(hs_search *search, const hs_visit *visit, visitor *doing)
+{
+    *doing = (visitor){.visit = visit};
+    hs_output_init(NULL, search->scene.ndim, WANTED, sizeof(int64_t), &doing->part);
+    return hs_recorder_init(&search->account, &doing->part, HS_MOST_HITS, &doing->recorder);
+}
+
+static void
+close_visitor(hs_search *search, visitor *doing)
+{
+    hs_recorder_free(&search->account, &doing->recorder);
+    hs_output_free(&doing->part);
+}
+
+/* Everybody visits what they find. */
+static hs_status
+visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+{
+    const int n_threads = hs_team_size(search->team);
+    visitor  *visitors = hs_alloc(&search->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
+    hs_status status = visitors != NULL ? HS_OK : HS_ERR_MEMORY;
+    int       opened = 0;
+    while (status == HS_OK && opened < n_threads) {
+        status = open_visitor(search, visit, &visitors[opened++]);
+    }
+    if (status == HS_OK) {
+        const hs_visitors all = {.use = HS_BLOCK_LISTS_PLACES,
+                                 .visit = visit_hits,
+                                 .contexts = visitors,
+                                 .context_size = sizeof *visitors};
+        status = hs_parallel_visit(search, &all, NULL, failure);
+    }
+    *n_visited = 0;
+    while (opened > 0) {
+        *n_visited += visitors[--opened].n_visited;
+        close_visitor(search, &visitors[opened]);
+    }
+    hs_free(&search->account, visitors);
+    return status == STOPPED ? HS_OK : status;
+}
+
+hs_status
+hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                  const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_options visiting = *options;
+    hs_sets    of_pairs = *sets;
+    hs_search  search;
+    int64_t    n = 0;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    visiting.want = WANTED;
+    visiting.sorted = false;
+    visiting.out = NULL;
+    of_pairs.keeps_none = true;
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_status      status = hs_search_open(&of_pairs, box, &visiting, &search, failure);
+    if (status == HS_OK) {
+        if (!visit->thread_safe) { /* threads only make the search ready */
+            hs_team_free(search.team);
+            search.team = NULL;
+        }
+        status = visit_all(&search, visit, &n, failure);
+        hs_search_report(&search, n);
+        hs_search_close(&search);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search.account.limit;
+    }
+    hs_account_close(&search.account);
+    hs_fpenv_leave(saved);
+    *n_visited = n;
+    return status;
+}
+
+hs_status
+hs_pairs_visit(const hs_points *points, const hs_box *box, const hs_options *options,
+               const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points};
+    return hs_pairs_visit_in(&sets, box, options, visit, n_visited, failure);
+}
