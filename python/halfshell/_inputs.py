@@ -351,8 +351,8 @@ def scene(
     if box is None:
         if as_periodic_bits(periodic, ndim, default=False):
             raise ValueError("periodic needs a box: give box, or leave periodic out")
-        return None, 0
-    return as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
+        return array, None, 0
+    return array, as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
 
 
 def two_sets(

@@ -122,7 +122,8 @@ clearing_takes_untouched_chunks_too(void)
     hs_pool_set_limit(SIZE_MAX);
     for (int k = 0; k < 3; k++) {
         hs_region region = {0};
-        CHECK(hs_region_reserve(&region, 20 * MB, 20 * MB));
+        CHECK(hs_region_reserve(&region, 20 * MB));
+        hs_region_expect(&region, 20 * MB);
         hs_region_release(&region);
     }
     hs_pool_clear();
