@@ -12,7 +12,6 @@ from halfshell._report.truth import exact_vectors, true_pairs
 from oracles import BOX_KINDS, lattice, random_scene, rotation
 
 
-
 def assert_true(points, cutoff, box=None, periodic=None):
     """Both rules give what rational arithmetic over all points gives; returns the truth."""
     truth = true_pairs(points, cutoff, box, periodic)

@@ -104,7 +104,7 @@ class Space:
         size = np.abs(self.near).max(axis=0, initial=0.0) + moves
         error = np.where(moved, 2.0 * (k + 3) * _V * size + 2.0**-180, 0.0)
         length = float(np.linalg.norm(error))
-        return 2.0 * (length + 2.0 * (ndim + 4) * _V * self.cutoff) + 2.0**-500
+        return float(2.0 * (length + 2.0 * (ndim + 4) * _V * self.cutoff) + 2.0**-500)
 
 
 def fold(scene: Scene) -> Space:
