@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The process in which other libraries run: ``python -m halfshell._report.worker NAME``.
+
+A library may raise, hang, abort or eat the memory; none of that may reach the report. Requests
+and replies are pickled dicts, each after its length in eight bytes. Replies go to what was
+standard output; whatever a library prints goes to standard error.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import struct
+import sys
+from typing import IO, Any
+
+import numpy as np
+
+__all__ = ["LENGTH", "main", "receive", "send"]
+
+LENGTH = struct.Struct("<Q")
+_MEMORY_SHARE = 0.6  # of what is available when the process starts
+
+
+def send(stream: IO[bytes], message: Any) -> None:
+    """Write one message."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(LENGTH.pack(len(data)))
+    stream.write(data)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> Any:
+    """Read one message; EOFError at the end of the stream."""
+    head = stream.read(LENGTH.size)
+    if len(head) < LENGTH.size:
+        raise EOFError
+    (size,) = LENGTH.unpack(head)
+    data = stream.read(size)
+    if len(data) < size:
+        raise EOFError
+    return pickle.loads(data)
+
+
+def _limit_memory() -> None:
+    """Make a library that asks for too much fail, before the system ends somebody."""
+    try:
+        import resource
+
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            free = next(line for line in lines if line.startswith("MemAvailable:"))
+        limit = int(_MEMORY_SHARE * int(free.split()[1]) * 1024)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    except (ImportError, OSError, StopIteration, ValueError):
+        return  # not on every system
+
+
+def _answer(library: Any, question: Any) -> dict[str, Any]:
+    """Ask for all that the library tells; return plain arrays, without distances if it fails."""
+    offered = "".join(letter for letter in "ijdDS" if letter in library.quantities)
+    result = library.prepare(question(offered))()
+    i, j = library.indices(result)
+    found: dict[str, Any] = {"i": np.array(i, np.int64), "j": np.array(j, np.int64)}
+    ndim = question("ij").dim
+    if "d" in offered:
+        found["d"] = np.array(library.distances(result))
+    if "D" in offered:
+        found["D"] = np.array(library.vectors(result))[:, :ndim]
+    if "S" in offered:
+        found["S"] = np.array(library.shifts(result)).astype(np.int64)[:, :ndim]
+    return found
+
+
+def _handle(library: Any, request: dict[str, Any]) -> dict[str, Any]:
+    """Carry out one request: the answer, and how long it takes."""
+    from halfshell._peers import Question, wrapped
+    from halfshell._report.timing import take_turns
+
+    points, rows, periodic = request["points"], request["rows"], request["periodic"]
+    asked = Question(points, request["cutoff"], rows, periodic)
+    folded = False
+    reason = library.refuses(asked)
+    if reason is not None:
+        return {"status": "not offered", "note": reason}
+    if library.inside:
+        asked, folded = wrapped(asked)
+
+    def question(quantities: str) -> Question:
+        return Question(asked.points, asked.cutoff, asked.rows, asked.periodic, quantities)
+
+    answer = _answer(library, question)
+    calls = {"ij": library.prepare(question("ij"))}
+    if "d" in answer or "D" in answer:
+        offered = "".join(letter for letter in "ijdD" if letter in library.quantities)
+        calls["with_d"] = library.prepare(question(offered))
+    return {
+        "status": "ok", "answer": answer, "folded": folded,
+        "timings": take_turns(calls, request["patience"]),
+    }  # fmt: skip
+
+
+def main(name: str) -> int:
+    """Answer requests until the other side closes; return the exit status."""
+    # To be set before any library is imported.
+    for variable in ("OMP", "RAYON", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "TBB"):
+        os.environ[f"{variable}_NUM_THREADS"] = "1"
+    replies = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    requests = sys.stdin.buffer
+    from halfshell._peers import LIBRARIES
+
+    library = LIBRARIES[name]
+    send(replies, {"version": library.version()})
+    _limit_memory()
+    while True:
+        try:
+            request = receive(requests)
+        except EOFError:
+            return 0
+        try:
+            reply = _handle(library, request)
+        except Exception as error:  # a library may refuse a scene in any way
+            text = " ".join(str(error).split())
+            reply = {"status": "failed", "note": f"{type(error).__name__}: {text}"[:200]}
+        send(replies, reply)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
