@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Named scenes that are hard to search: exact ties, far coordinates, thin boxes, stiff steps.
+
+Each scene is an input of `halfshell.pairs` and the reason why it is hard. It is made when it is
+asked for, and its numbers are the same bits on every machine: they come from the raw stream of
+PCG64 and from written constants by additions, multiplications, divisions and square roots
+alone, one number at a time and in a fixed order, which IEEE arithmetic rounds in one way only.
+
+Examples
+--------
+>>> import halfshell as hs
+>>> from halfshell import scenes
+>>> scene = scenes.load("fcc-shell", size="small")
+>>> scene.title
+'fcc crystal, cutoff on its eighth shell'
+>>> scene.n_points, scene.cutoff, scene.periodic
+(108, 8.0, (True, True, True))
+>>> hs.count_pairs(**scene.arguments)
+7560
+"""
+
+# In this order they are listed and run.
+from halfshell.scenes import (  # noqa: F401, I001
+    _uniform,
+    _crystals,
+    _ties,
+    _far,
+    _boxes,
+    _reach,
+    _density,
+    _coincident,
+    _magnitudes,
+    _order,
+    _dimensions,
+    _steps,
+)
+from halfshell.scenes._catalogue import load, names
+from halfshell.scenes._scene import SIZES, Motion, Scene, Size
+
+__all__ = ["SIZES", "Motion", "Scene", "Size", "load", "names"]
