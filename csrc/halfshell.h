@@ -229,6 +229,51 @@ hs_status hs_systems_find(const hs_points *points, const hs_systems *systems,
 hs_status hs_systems_count(const hs_points *points, const hs_systems *systems,
                            const hs_options *options, int64_t *counts, hs_failure *failure);
 
+/*
+ * A list of pairs that is used for many steps: built with a skin, kept as long as no pair within
+ * the cutoff can be missing from it, and decided anew for the points of each step. Opaque, owned by
+ * the caller. Not for two threads at once. docs/verlet.md
+ */
+typedef struct hs_verlet hs_verlet;
+
+/* An empty list; NULL when out of memory. */
+hs_verlet *hs_verlet_new(void);
+
+/*
+ * The next step. The points and the box are copied. The list is kept, or built again with
+ * options->cutoff + skin where it must be (the first step, another number or type of points, other
+ * axes that repeat, another cutoff, a margin that is used up) or `rebuild` says so. skin: finite,
+ * not negative; not looked at unless the list is built. Of the options only cutoff, kernel, threads,
+ * limits and poll count. On failure the list is as it was, with the points of the step before.
+ */
+hs_status hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
+                           const hs_options *options, double skin, bool rebuild, bool *rebuilt,
+                           hs_failure *failure);
+
+/*
+ * The pairs of the last step: the same set, with the same bits of d, D and S, that hs_pairs_find
+ * would find, in the order of the list: first those that were in one image when it was built, then
+ * the others, each as found then. It does not depend on kernel or threads. options->cutoff and
+ * ->precision are not looked at. Before the first step there are no points.
+ */
+hs_status hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **pairs,
+                         hs_failure *failure);
+
+typedef struct hs_verlet_state {
+    bool    has_list; /* some step was taken */
+    int     ndim;     /* of the last step, as are the next */
+    int64_t n_points;
+    int64_t n_listed; /* pairs within `radius` when the list was built */
+    double  cutoff;
+    double  radius;   /* cutoff + skin, rounded up */
+    double  margin;   /* by how much pairs may yet come closer before the list is built again */
+} hs_verlet_state;
+
+hs_verlet_state hs_verlet_look(const hs_verlet *list);
+
+/* NULL-safe. */
+void hs_verlet_free(hs_verlet *list);
+
 /* What a search of this scene would do, without doing it. */
 typedef struct hs_plan {
     int         ndim;

@@ -27,6 +27,12 @@ static PyMethodDef methods[] = {
     {"cache_held", hs_py_cache_held, METH_NOARGS, "Bytes that the cache holds."},
     {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, "See halfshell.Box."},
     {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, "See halfshell.Box.wrap."},
+    {"verlet_new", hs_py_verlet_new, METH_NOARGS, "See halfshell.VerletList."},
+    {"verlet_update", FASTCALL(hs_py_verlet_update), METH_FASTCALL,
+     "See halfshell.VerletList.update."},
+    {"verlet_pairs", FASTCALL(hs_py_verlet_pairs), METH_FASTCALL,
+     "See halfshell.VerletList.pairs."},
+    {"verlet_look", hs_py_verlet_look, METH_O, "What a list of halfshell.VerletList is like."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -35,4 +35,15 @@ PyObject *hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssi
 /* points, box, periodic -> (wrapped, shifts). */
 PyObject *hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
+/* py_verlet.c. A new list. */
+PyObject *hs_py_verlet_new(PyObject *module, PyObject *ignored);
+/* A list, the arguments of call.h, skin, rebuild -> whether it was built. */
+PyObject *hs_py_verlet_update(PyObject *module, PyObject *const *arguments,
+                              Py_ssize_t n_arguments);
+/* A list, the arguments of call.h with points of shape (0, d), quantities, sort, index_bytes, out. */
+PyObject *hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments,
+                             Py_ssize_t n_arguments);
+/* A list -> dict of its state. */
+PyObject *hs_py_verlet_look(PyObject *module, PyObject *list);
+
 #endif

@@ -7,6 +7,7 @@ from halfshell._cache import clear_cache, set_cache_limit
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
 from halfshell._verify import Verdict, verify
+from halfshell._verlet import VerletList
 
 __version__ = "0.1.0"
 
@@ -15,6 +16,7 @@ __all__ = [
     "CapacityError",
     "Explanation",
     "Verdict",
+    "VerletList",
     "clear_cache",
     "count_pairs",
     "explain",

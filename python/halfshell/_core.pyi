@@ -130,3 +130,39 @@ def box_wrap(
 def clear_cache() -> None: ...
 def set_cache_limit(bytes: int, /) -> int: ...
 def cache_held() -> int: ...
+def verlet_new() -> Any: ...  # a capsule
+def verlet_update(
+    list: Any,
+    points: npt.NDArray[Any],
+    cutoff: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    skin: float,
+    rebuild: bool,
+    /,
+) -> bool: ...
+def verlet_pairs(
+    list: Any,
+    points: npt.NDArray[Any],
+    cutoff: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    quantities: str,
+    sort: bool,
+    index_bytes: int,
+    out: Any,
+    /,
+) -> npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]: ...
+def verlet_look(list: Any, /) -> dict[str, Any]: ...

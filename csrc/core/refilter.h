@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * refilter.h: the pairs of a list that are within the cutoff now, decided as a search decides them:
+ * in float32 (sift.h), and what that cannot tell by core/exact.h. A slab of the list at a time; a
+ * team works on several, and what they find is written in the order of the list.
+ */
+#ifndef HS_REFILTER_H
+#define HS_REFILTER_H
+
+#include "output.h"
+#include "search.h"
+#include "sift.h"
+#include "verlet.h"
+
+/* Everything that slabs share, read only while they work. */
+typedef struct hs_refilter {
+    const hs_verlet  *list;   /* borrowed */
+    const hs_frame   *now;    /* the list's */
+    const int64_t    *counts; /* the list's; NULL: all zero */
+    hs_search        *search; /* borrowed: account, options, team, kernel; the scene if it measures */
+    hs_output        *output; /* borrowed */
+    int               d, m;
+    int               vector_of_row[HS_MAX_DIM];
+    hs_metric         given;  /* decides, on points and box vectors as given */
+    float            *y;      /* owned; sift.h */
+    float            *offset; /* owned; one row for each image */
+    hs_thresholds     plain, shifted; /* for pairs without and with an image */
+    bool              measures;       /* d or D are wanted: the scene is there */
+    bool              over_given;     /* the scene's metric is for points as given; else ... */
+    int64_t           to_reduced[HS_MAX_DIM][HS_MAX_DIM]; /* ... S over given rows to S over B */
+} hs_refilter;
+
+/* The hits of one slab. */
+typedef struct hs_sifted {
+    int64_t   first;  /* pair of the list */
+    int32_t   n;      /* pairs, all with or all without an image */
+    int32_t   n_hits;
+    int64_t   at;     /* their place in the output */
+    hs_status status;
+    int64_t   failed_point;
+    hs_stages stages;
+    uint16_t  hits[HS_SIFT + 4], unsure[HS_SIFT + 4];
+} hs_sifted;
+
+/* All that is within the cutoff, to the output. */
+hs_status hs_refilter_run(hs_refilter *refilter, hs_failure *failure);
+
+/* The points as floats and their thresholds. To be freed by hs_refilter_free, also on failure. */
+hs_status hs_refilter_prepare(hs_refilter *refilter);
+void      hs_refilter_free(hs_refilter *refilter);
+
+/* Finds the hits of a slab. */
+void hs_refilter_sift(const hs_refilter *refilter, hs_sifted *slab);
+
+/* Writes them; refilter_put.c. */
+void hs_refilter_put(const hs_refilter *refilter, hs_sifted *slab);
+
+/* Makes the scene ready that d and D are measured in, with the bits that a search finds. */
+hs_status hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure);
+
+/* S of pair e over the box vectors that repeat. */
+HS_ALWAYS_INLINE void
+hs_refilter_shift(const hs_refilter *refilter, int64_t e, int64_t *shift)
+{
+    const hs_listing *listing = &refilter->list->listing;
+    const int         m = refilter->m;
+    for (int r = 0; r < m; r++) {
+        shift[r] = e < listing->n_plain
+                       ? 0
+                       : listing->images.of[(int64_t)listing->code[e - listing->n_plain] * m + r];
+        if (refilter->counts != NULL) { /* modulo 2^64: exact, for the sum fits */
+            shift[r] = (int64_t)((uint64_t)shift[r] +
+                                 (uint64_t)refilter->counts[(int64_t)listing->i[e] * m + r] -
+                                 (uint64_t)refilter->counts[(int64_t)listing->j[e] * m + r]);
+        }
+    }
+}
+
+#endif
