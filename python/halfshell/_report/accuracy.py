@@ -69,12 +69,17 @@ def pair_errors(truth: Truth, answer: Answer) -> PairErrors:
     wanted = np.concatenate([2 * wanted_keys, 2 * wanted_keys[twice] + 1])
     directed = 2 * given_keys + (given.turned & both(given.columns[0], given.columns[1]))
     present, counts = np.unique(directed, return_counts=True)
-    known = np.isin(present, wanted, assume_unique=True)
-    missing = wanted[~np.isin(wanted, present, assume_unique=True)]
+    place = np.searchsorted(present, wanted)
+    hit = np.zeros(len(wanted), dtype=bool)
+    if len(present):
+        place = np.minimum(place, len(present) - 1)
+        hit = present[place] == wanted
+    known = np.zeros(len(present), dtype=bool)
+    known[place[hit]] = True
     return PairErrors(
         expected=len(pairs),
         given=len(answer),
-        missed=len(np.unique(missing >> 1)),
+        missed=len(np.unique(wanted[~hit] >> 1)),
         spurious=len(np.unique(present[~known] >> 1)),
         duplicate=int((counts[known] - 1).sum()),
     )

@@ -49,7 +49,7 @@ class EveryStep:
         """Search."""
         self.builds += 1
         i, j, d, D, S = hs.pairs(points, quantities="ijdDS", **self._options)
-        return Answer(i, j, S, d, D)
+        return Answer(i, j, S, d, D, inclusive=self._options["inclusive"])
 
 
 class Verlet:
@@ -59,7 +59,9 @@ class Verlet:
         self._list = hs.VerletList(
             scene.cutoff, skin, box=scene.box,
             periodic=scene.periodic if scene.box is not None else None,
+            inclusive=scene.inclusive, threads=1,
         )  # fmt: skip
+        self._inclusive = scene.inclusive
 
     @property
     def builds(self) -> int:
@@ -70,7 +72,7 @@ class Verlet:
         """Update, and return the pairs within the cutoff."""
         self._list.update(points)
         i, j, d, D, S = self._list.pairs("ijdDS")
-        return Answer(i, j, S, d, D)
+        return Answer(i, j, S, d, D, inclusive=self._inclusive)
 
 
 class Stale:
@@ -78,23 +80,25 @@ class Stale:
 
     def __init__(self, scene: Any, skin: float, every: int) -> None:
         self.builds = 0
-        self._scene = scene
         self._options = _search(scene) | {"cutoff": scene.cutoff + skin}
-        self._every = every
+        self._cutoff, self._inclusive, self._every = scene.cutoff, scene.inclusive, every
+        self._rows = np.zeros((scene.ndim,) * 2) if scene.box is None else scene.box
+        if self._rows.ndim == 1:
+            self._rows = np.diag(self._rows)
         self._steps = 0
+        self._listed: tuple[NDArray[Any], ...] = ()
 
     def pairs(self, points: Floats) -> Answer:
         """Take the list as it is, and of its pairs those within the cutoff."""
         if self._steps % self._every == 0:
             self.builds += 1
-            self._i, self._j, self._S = hs.pairs(points, quantities="ijS", **self._options)
-            box = np.zeros((points.shape[1],) * 2) if self._scene.box is None else self._scene.box
-            self._moves = self._S @ (np.diag(box) if np.ndim(box) == 1 else box)
+            self._listed = tuple(hs.pairs(points, quantities="ijS", **self._options))
         self._steps += 1
-        D = points[self._j] - points[self._i] + self._moves
+        i, j, S = self._listed
+        D = points[j] - points[i] + S @ self._rows
         d = np.sqrt((D * D).sum(axis=1))
-        near = d <= self._scene.cutoff
-        return Answer(self._i[near], self._j[near], self._S[near], d[near], D[near])
+        near = d <= self._cutoff if self._inclusive else d < self._cutoff
+        return Answer(i[near], j[near], S[near], d[near], D[near], inclusive=self._inclusive)
 
 
 def _search(scene: Any) -> dict[str, Any]:
@@ -102,6 +106,7 @@ def _search(scene: Any) -> dict[str, Any]:
         "cutoff": scene.cutoff,
         "box": scene.box,
         "periodic": scene.periodic if scene.box is not None else None,
+        "inclusive": scene.inclusive,
         "threads": 1,
     }
 

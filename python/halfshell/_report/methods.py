@@ -21,6 +21,10 @@ REUSE = ("verlet", "stale")
 #: Every method that can be asked for by name.
 METHODS = (*PRECISIONS, "float32", *REUSE)
 
+# Rounding a scene's coordinates may collapse it: then all points are pairs of each other, and
+# a list that passes this is no longer an answer to the question.
+_MOST_BYTES = 4e9
+
 
 def options_of(method: str, scene: Any) -> dict[str, Any]:
     """Return the arguments of `halfshell.pairs` for a method and a scene.
@@ -43,6 +47,7 @@ def options_of(method: str, scene: Any) -> dict[str, Any]:
         "inclusive": scene.inclusive,
         "precision": method if method in PRECISIONS else "exact",
         "threads": 1,
+        "memory_limit": _MOST_BYTES,
     }
 
 

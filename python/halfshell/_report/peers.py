@@ -120,10 +120,9 @@ class PeerProcess:
         process, self._process = self._process, None
         if process is None:
             return None
-        for stream in (process.stdin, process.stdout):
-            if stream is not None and stream is process.stdin:
-                with contextlib.suppress(OSError):
-                    stream.close()
+        if process.stdin is not None:
+            with contextlib.suppress(OSError):
+                process.stdin.close()  # the other side ends by itself, unless it is at work
         try:
             process.wait(timeout=0.2)
         except subprocess.TimeoutExpired:

@@ -19,7 +19,8 @@ import numpy as np
 __all__ = ["LENGTH", "main", "receive", "send"]
 
 LENGTH = struct.Struct("<Q")
-_MEMORY_SHARE = 0.6  # of what is available when the process starts
+_MEMORY_SHARE = 0.5  # of what is available when the process starts
+_MOST_ROWS = 40  # times the true pairs of both directions, and some: a list that is no answer
 
 
 def send(stream: IO[bytes], message: Any) -> None:
@@ -56,7 +57,7 @@ def _limit_memory() -> None:
 
 
 def _answer(library: Any, question: Any) -> dict[str, Any]:
-    """Ask for all that the library tells; return plain arrays, without distances if it fails."""
+    """Ask for all that the library tells; return plain arrays."""
     offered = "".join(letter for letter in "ijdDS" if letter in library.quantities)
     result = library.prepare(question(offered))()
     i, j = library.indices(result)
@@ -89,6 +90,9 @@ def _handle(library: Any, request: dict[str, Any]) -> dict[str, Any]:
         return Question(asked.points, asked.cutoff, asked.rows, asked.periodic, quantities)
 
     answer = _answer(library, question)
+    if len(answer["i"]) > _MOST_ROWS * (request["pairs"] + 100_000):
+        n_rows = len(answer["i"])
+        return {"status": "failed", "note": f"gave {n_rows:,} rows for {request['pairs']:,} pairs"}
     calls = {"ij": library.prepare(question("ij"))}
     if "d" in answer or "D" in answer:
         offered = "".join(letter for letter in "ijdD" if letter in library.quantities)
