@@ -6,6 +6,7 @@ from halfshell._box import Box
 from halfshell._cache import clear_cache, set_cache_limit
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
+from halfshell._report import report
 from halfshell._verify import Verdict, verify
 from halfshell._verlet import VerletList
 
@@ -22,6 +23,7 @@ __all__ = [
     "explain",
     "kernels",
     "pairs",
+    "report",
     "set_cache_limit",
     "verify",
 ]

@@ -31,10 +31,13 @@ _LOOKS = 8  # steps at which the list is held against the truth, the last one am
 class Lists(Protocol):
     """A way to have the pairs of moving points."""
 
-    builds: int
+    @property
+    def builds(self) -> int:
+        """How many lists were built."""
+        ...
 
     def pairs(self, points: Floats) -> Answer:
-        """Return i, j, D and d of the pairs within the cutoff."""
+        """Return i, j, d, D and S of the pairs within the cutoff."""
         ...
 
 
@@ -42,7 +45,7 @@ class EveryStep:
     """A new list for every step."""
 
     def __init__(self, scene: Any, precision: str) -> None:
-        self.builds = 0
+        self.builds: int = 0
         self._options = _search(scene) | {"precision": precision}
 
     def pairs(self, points: Floats) -> Answer:

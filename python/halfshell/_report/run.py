@@ -82,7 +82,7 @@ def plan_of(
         _named("scene", scenes, catalogue.names()),
         _named("method", chosen, methods.METHODS),
         _named("peer", peers, PEERS),
-        size,  # type: ignore[arg-type]
+        size,
     )
 
 

@@ -13,13 +13,17 @@ from halfshell._report.words import duration, in_short, methods_of, number
 __all__ = ["SUMMARY", "method_label", "scene_table", "summary_cells", "summary_table"]
 
 SUMMARY = (
-    "method", "version", "lists", "right", "wrong", "no answer", "missed", "spurious",
-    "duplicate", "d, ulp", "time / exact",
+    "method", "version", "right", "wrong", "none", "missed", "spurious", "duplicate", "d, ulp",
+    "time / exact",
 )  # fmt: skip
 
 
 def summary_cells(rows: Sequence[ReportRow]) -> list[list[str]]:
-    """One line a method over all scenes, under the heads of `SUMMARY`."""
+    """One line a method over all scenes, under the heads of `SUMMARY`.
+
+    Lists that are right, lists that are wrong, scenes without a list; pairs; the largest error
+    of a distance; the median of the time over that of precision "exact".
+    """
     exact = {
         row.scene: row.seconds for row in rows if row.kind == "halfshell" and row.method == "exact"
     }
@@ -27,49 +31,52 @@ def summary_cells(rows: Sequence[ReportRow]) -> list[list[str]]:
     for method in methods_of(rows, "halfshell", "peer"):
         mine = [row for row in rows if row.method == method and row.kind != "reuse"]
         done = [row for row in mine if row.status == "ok"]
-        broken = [row for row in mine if row.status in ("failed", "crashed", "timed out")]
         slower = [
             row.seconds / base
             for row in done
             if row.seconds and (base := exact.get(row.scene)) and method != "exact"
         ]
         ulps = [row.d_max_ulp for row in done if row.d_max_ulp is not None]
-        counts = (
-            [f"{sum(getattr(row, kind) or 0 for row in done):,}" for kind in
-             ("missed", "spurious", "duplicate")] if done else [""] * 3
-        )  # fmt: skip
-        states = dict.fromkeys(row.status for row in mine)
+        kinds = ("missed", "spurious", "duplicate")
+        counts = [number(sum(getattr(row, kind) or 0 for row in done)) for kind in kinds]
         lines.append([
             method, next((row.version for row in mine if row.version), ""),
-            f"{len(done)}" if done else ", ".join(states),
-            str(sum(1 for row in done if not row.wrong)) if done else "",
-            str(sum(1 for row in done if row.wrong)) if done else "",
-            str(len(broken)) if broken else "", *counts,
-            number(max(ulps)) if ulps else "", f"{median(slower):.2f}" if slower else "",
+            str(sum(1 for row in done if not row.wrong)),
+            str(sum(1 for row in done if row.wrong)), str(len(mine) - len(done)),
+            *(counts if done else [""] * 3), number(max(ulps)) if ulps else "",
+            f"{median(slower):.3g}" if slower else "",
         ])  # fmt: skip
     return lines
 
 
 def summary_table(rows: Sequence[ReportRow]) -> Any:
-    """Return a rich table of `summary_cells`."""
+    """Return a rich table of `summary_cells`, narrow enough for 80 columns."""
+    from rich import box
     from rich.table import Table
 
-    table = Table(title="All scenes", title_justify="left")
-    for k, head in enumerate(SUMMARY):
-        table.add_column(head, justify="left" if k < 2 else "right")
+    table = Table(
+        title="All scenes: lists right, lists wrong, scenes without a list; wrong pairs",
+        title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False,
+    )  # fmt: skip
+    heads = [head.replace("duplicate", "twice").replace(" / exact", "") for head in SUMMARY]
+    for k, head in enumerate(heads):
+        if k != 1:
+            table.add_column(head, justify="right" if k else "left", no_wrap=True)
     for line in summary_cells(rows):
-        table.add_row(*line, style="bold red" if line[4] not in ("", "0") else None)
+        table.add_row(line[0], *line[2:], style="bold red" if line[3] != "0" else None)
     return table
 
 
 def scene_table(rows: Sequence[ReportRow]) -> Any:
     """Return a rich table of one scene, a line a method."""
+    from rich import box
     from rich.table import Table
 
     first = rows[0]
     table = Table(
-        title=f"{first.scene}: {first.title} ({first.points:,} points)", title_justify="left"
-    )
+        title=f"{first.scene}: {first.title} ({first.points:,} points)", title_justify="left",
+        box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False,
+    )  # fmt: skip
     heads = ("method", "rule", "time", "pairs", "d, ulp", "D, ulp", "energy", "forces", "drift")
     for k, head in enumerate(heads):
         table.add_column(head, justify="left" if k in (0, 1, 3) else "right")

@@ -13,7 +13,8 @@ from typing import Any
 
 __all__ = ["Patience", "Timing", "take_turns"]
 
-_TURN = 2e-3  # seconds that a turn lasts at least: timers and interrupts then hardly show
+_TURN = 2e-3  # seconds that a turn lasts at least, so that short calls are made often
+_MOST = 100  # calls in a turn
 
 
 @dataclass(frozen=True)
@@ -26,23 +27,21 @@ class Patience:
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds of one call: median and least over the turns."""
+    """Seconds of one call: median and least over all calls, each timed by itself."""
 
     median: float
     least: float
     repeats: int
 
 
-def take_turns(
-    calls: Mapping[str, Callable[[], Any]], patience: Patience
-) -> dict[str, Timing]:
-    """Time calls against each other; each has been made before, and its result is dropped.
+def take_turns(calls: Mapping[str, Callable[[], Any]], patience: Patience) -> dict[str, Timing]:
+    """Time calls against each other; results are dropped.
 
-    Every call gets at least one turn, and no further one once `patience.seconds` are over.
+    Every call gets at least one turn, and no further one once `patience.seconds` for each call
+    are over.
     """
     order = random.Random(0)
     seconds: dict[str, list[float]] = {name: [] for name in calls}
-    often: dict[str, int] = {}
     begin = time.perf_counter()
     for turn in range(patience.repeats):
         names = list(calls)
@@ -50,27 +49,21 @@ def take_turns(
         for name in names:
             if turn and time.perf_counter() - begin > patience.seconds * len(calls):
                 continue
-            if name not in often:
-                often[name] = max(1, min(1000, int(_TURN / max(_once(calls[name]), 1e-7))))
-            seconds[name].append(_several(calls[name], often[name]))
+            seconds[name] += _one_turn(calls[name])
     return {name: Timing(median(some), min(some), len(some)) for name, some in seconds.items()}
 
 
-def _once(call: Callable[[], Any]) -> float:
-    start = time.perf_counter()
-    call()
-    return time.perf_counter() - start
-
-
-def _several(call: Callable[[], Any], times: int) -> float:
-    """Seconds for one call, without the garbage collector."""
+def _one_turn(call: Callable[[], Any]) -> list[float]:
+    """Seconds of each of some calls, without the garbage collector."""
     was_on = gc.isenabled()
     gc.disable()
     try:
-        start = time.perf_counter()
-        for _ in range(times):
+        spent: list[float] = []
+        while sum(spent) < _TURN and len(spent) < _MOST:
+            start = time.perf_counter()
             call()
-        return (time.perf_counter() - start) / times
+            spent.append(time.perf_counter() - start)
+        return spent
     finally:
         if was_on:
             gc.enable()

@@ -17,7 +17,7 @@ def number(value: float | None) -> str:
     """A figure with two or three digits, or nothing."""
     if value is None:
         return ""
-    if isinstance(value, int):
+    if isinstance(value, int) and abs(value) < 100_000:
         return f"{value:,}"
     return "0" if value == 0 else f"{value:.2g}" if abs(value) < 1000 else f"{value:.1e}"
 
@@ -38,11 +38,11 @@ def methods_of(rows: Iterable[ReportRow], *kinds: str) -> list[str]:
 
 
 def ratios(rows: Rows, method: str, over: str) -> dict[str, float]:
-    """Time of a method over that of another, by scene."""
+    """Least time of a method over that of another, by scene."""
     times = {
-        (row.scene, row.method): row.seconds
+        (row.scene, row.method): row.seconds_least
         for row in rows
-        if row.kind == "halfshell" and row.seconds
+        if row.kind == "halfshell" and row.seconds_least
     }
     found = {}
     for scene in dict.fromkeys(row.scene for row in rows):
@@ -96,8 +96,8 @@ def _about(rows: Rows, method: str) -> str:
         total = sum(row.wrong or 0 for row in wrong)
         worst = max(wrong, key=lambda row: row.wrong_share or 0.0)
         text += (
-            f"; {_times(len(wrong), 'list')} of them {'is' if len(wrong) == 1 else 'are'} wrong, "
-            f"by {_times(total, 'pair')}. Worst on {worst.scene}: {in_short(worst)} of "
+            f"; {len(wrong)} of the lists {'is' if len(wrong) == 1 else 'are'} wrong, by "
+            f"{_times(total, 'pair')}. Worst on {worst.scene}: {in_short(worst)} of "
             f"{_times(worst.pairs_true or 0, 'pair')}."
         )
     return text + _not_done(mine) + _distances(done)
