@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from statistics import median
 from typing import Any
 
@@ -56,7 +56,7 @@ def summary_table(rows: Sequence[ReportRow]) -> Any:
 
     table = Table(
         title="All scenes: lists right, lists wrong, scenes without a list; wrong pairs",
-        title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False,
+        title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False,
     )  # fmt: skip
     heads = [head.replace("duplicate", "twice").replace(" / exact", "") for head in SUMMARY]
     for k, head in enumerate(heads):
@@ -68,29 +68,58 @@ def summary_table(rows: Sequence[ReportRow]) -> Any:
 
 
 def scene_table(rows: Sequence[ReportRow]) -> Any:
-    """Return a rich table of one scene, a line a method."""
+    """Return what rich prints for one scene: a line a method, then why some have none."""
+    from rich.console import Group
+    from rich.text import Text
+
+    first = rows[0]
+    parts: list[Any] = [Text(f"{first.scene}: {first.title}; {first.points:,} points", "bold")]
+    plain = [row for row in rows if row.kind != "reuse" and row.status == "ok"]
+    parts.append(_lines(plain, {
+        "method": lambda row: row.method,
+        "": lambda row: row.rule,
+        "time": lambda row: duration(row.seconds),
+        "pairs": in_short,
+        "d, ulp": lambda row: number(row.d_max_ulp),
+        "D, ulp": lambda row: number(row.D_max_ulp),
+        "energy": lambda row: number(row.energy_error),
+        "forces": lambda row: number(row.force_error),
+    }))  # fmt: skip
+    parts += [
+        Text(f"{row.method}: {row.status}{': ' if row.note else ''}{row.note}", "dim")
+        for row in rows
+        if row.status != "ok"
+    ]
+    parts.append(_lines([row for row in rows if row.kind == "reuse"], {
+        "lists": lambda row: row.method,
+        "skin": lambda row: number(row.skin),
+        "every": lambda row: number(row.rebuild_every),
+        "built": lambda row: number(row.builds),
+        "a step": lambda row: duration(row.seconds),
+        "pairs": in_short,
+        "drift": lambda row: number(row.drift_kinetic),
+    }))  # fmt: skip
+    return Group(*(part for part in parts if part is not None), "")
+
+
+def _lines(
+    rows: Sequence[ReportRow], columns: dict[str, Callable[[ReportRow], str]]
+) -> Any | None:
+    """A rich table, without columns that are empty; None without rows."""
     from rich import box
     from rich.table import Table
 
-    first = rows[0]
-    table = Table(
-        title=f"{first.scene}: {first.title} ({first.points:,} points)", title_justify="left",
-        box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False,
-    )  # fmt: skip
-    heads = ("method", "rule", "time", "pairs", "d, ulp", "D, ulp", "energy", "forces", "drift")
-    for k, head in enumerate(heads):
-        table.add_column(head, justify="left" if k in (0, 1, 3) else "right")
-    for row in rows:
-        result = in_short(row)
-        if row.status != "ok" and row.note:
-            result += f" ({row.note})"
-        table.add_row(
-            method_label(row), row.rule, duration(row.seconds), result,
-            number(row.d_max_ulp), number(row.D_max_ulp), number(row.energy_error),
-            number(row.force_error), number(row.drift_kinetic),
-            style="bold red" if row.wrong else None,
-        )  # fmt: skip
-    return table
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    shown = []
+    for head, cell in columns.items():
+        cells = [cell(row) for row in rows]
+        if any(cells):
+            shown.append(cells)
+            left = head in ("method", "lists", "pairs", "")
+            table.add_column(head, justify="left" if left else "right", no_wrap=True)
+    for row, *line in zip(rows, *shown):
+        table.add_row(*line, style="bold red" if row.wrong else None)
+    return table if rows else None
 
 
 def method_label(row: ReportRow) -> str:

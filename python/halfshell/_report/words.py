@@ -118,7 +118,8 @@ def _distances(rows: Rows) -> str:
     if not worst.d_max_ulp:
         return " Every distance that was looked at is the true one, rounded once."
     return (
-        f" Distances are off by {number(worst.d_max_ulp)} units in the last place at worst "
+        f" Distances are off by {number(worst.d_max_ulp)} "
+        f"{'unit' if worst.d_max_ulp == 1 else 'units'} in the last place at worst "
         f"({worst.scene})."
     )
 
