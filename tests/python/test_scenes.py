@@ -4,6 +4,7 @@
 import dataclasses
 import importlib.util
 import inspect
+import re
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +66,13 @@ def test_every_scene_is_written_down():
 def test_the_page_has_the_table_of_the_docstrings():
     text = scene_files.PAGE.read_text()
     assert scene_files.page(text) == text, "python tests/scene_files.py --write"
+
+
+def test_the_code_of_the_page_runs(capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", scene_files.PAGE.read_text(), re.DOTALL)
+    exec(compile(code, "scenes.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(NAMES)
 
 
 def test_each_size_is_about_as_large_as_promised():

@@ -24,14 +24,10 @@ from halfshell.scenes import (  # noqa: F401, I001
     _uniform,
     _crystals,
     _ties,
-    _far,
+    _coordinates,
     _boxes,
     _reach,
     _density,
-    _coincident,
-    _magnitudes,
-    _order,
-    _dimensions,
     _steps,
 )
 from halfshell.scenes._catalogue import load, names

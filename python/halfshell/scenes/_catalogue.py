@@ -49,7 +49,7 @@ def names() -> tuple[str, ...]:
     --------
     >>> from halfshell import scenes
     >>> scenes.names()[:3]
-    ('uniform', 'sc-shell', 'fcc-shell')
+    ('uniform', 'order-random', 'order-sorted')
     """
     return tuple(_ENTRIES)
 

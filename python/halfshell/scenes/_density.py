@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Uneven density: cores, halos, clusters far apart, lines, surfaces, and dust."""
+"""Uneven density: cores, halos, clusters far apart, lines, dust, and many points at one place."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def sphere(size: Size) -> Scene:
 
 @add({"dense-core": ("a thin gas around a lump within one cutoff",)})
 def dense_core(size: Size) -> Scene:
-    """One cell in which every pair is a pair, among cells that hold hardly a point each."""
+    """One cell in which every pair counts, among cells that hold hardly a point each."""
     points, edge = cube(size, 51)
     lump = points[: len(points) // pick(size, 2, 10, 40)]
     lump[:] = 0.5 * edge + (0.02 / edge) * lump
@@ -130,3 +130,37 @@ def droplet(size: Size) -> Scene:
     points = 2.0 * stream(32)((2 * n + 100, 3)) - 1.0
     points = points[square(points) <= 1.0][:n] * radius
     return Scene(points, 5.0, np.full(3, edge), CUBE)
+
+
+@add({"coincident": ("all points at one place",)})
+def coincident(size: Size) -> Scene:
+    """Bounds of no extent, one cell, every pair at distance 0: the output is quadratic."""
+    return Scene(np.tile([0.1, 0.2, 0.3], (pick(size, 60, 1000, 4000), 1)), 1.0)
+
+
+@add({"twice": ("every point twice",)})
+def twice(size: Size) -> Scene:
+    """Coincident pairs among others: distance 0 is a pair, a point with itself is none."""
+    points, edge = cube(size, 33)
+    half = points[: len(points) // 2]
+    return Scene(np.concatenate([half, half]), 5.0, np.full(3, edge), CUBE)
+
+
+@add({"stacked": ("points in stacks of fifty at one place each",)})
+def stacked(size: Size) -> Scene:
+    """Crowded cells among empty ones: no cell size parts points at one place."""
+    points, edge = cube(size, 34)
+    places = points[: len(points) // 50]
+    return Scene(np.tile(places, (50, 1)), 1.0, np.full(3, edge), CUBE)
+
+
+@add({"one-cell": ("all points within one cutoff",)})
+def one_cell(size: Size) -> Scene:
+    """A grid that has nothing to select: every pair counts, and cells only cost."""
+    return Scene(stream(35)((pick(size, 100, 1000, 4000), 3)), 2.0)
+
+
+@add({"few-cells": ("cutoff half the extent of the points",)})
+def few_cells(size: Size) -> Scene:
+    """A grid that selects hardly anything: a quarter of all pairs count."""
+    return Scene(stream(36)((pick(size, 100, 1000, 6000), 3)) * 10.0, 5.0)

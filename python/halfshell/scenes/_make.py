@@ -24,7 +24,6 @@ __all__ = [
     "cell_order",
     "combine",
     "cube",
-    "cube_root",
     "directions",
     "exponential",
     "integers",
@@ -32,6 +31,7 @@ __all__ = [
     "sites",
     "square",
     "stream",
+    "wrapped",
 ]
 
 Draw = Callable[[tuple[int, ...]], Floats]
@@ -99,14 +99,6 @@ def exponential(exponent: Floats) -> Floats:
     return value
 
 
-def cube_root(value: Floats) -> Floats:
-    """Return cube roots of numbers from 1 to 1e6, by a fixed number of steps of Newton's."""
-    root = 1.0 + value / 3.0
-    for _ in range(60):
-        root = (2.0 * root + value / (root * root)) / 3.0
-    return root
-
-
 def combine(factors: NDArray[np.float64] | NDArray[np.int64], rows: Floats) -> Floats:
     """Return ``factors @ rows``, rounded in the order of the axes."""
     total: Floats = np.zeros((len(factors), rows.shape[1]))
@@ -141,6 +133,12 @@ def cube(size: Size, seed: int, quick: int = 3, full: int = 10) -> tuple[Floats,
 def cell_order(points: Floats, cell: float) -> NDArray[np.intp]:
     """Return the order of a grid of cells, along the first axis first."""
     return np.lexsort((points // cell).T)
+
+
+def wrapped(points: Floats, edge: float) -> Floats:
+    """Move points that stick out of a cube by less than its edge back into it."""
+    points = np.where(points < 0.0, points + edge, points)
+    return np.where(points >= edge, points - edge, points)
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> Floats:

@@ -47,9 +47,9 @@ def thirty(size: Size) -> Scene:
     return Scene(combine(fractions, rows), 30.0, rows, CUBE)
 
 
-@add({"cutoff-2-boxes": ("eight points, cutoff beyond two boxes",)})
+@add({"cutoff-2-boxes": ("a small cell, cutoff beyond two boxes",)})
 def cell(size: Size) -> Scene:
-    """A unit cell as simulations of crystals have it: some hundred neighbours, all images."""
+    """A unit cell as simulations of crystals have it: each pair in dozens of images."""
     n = pick(size, 8, 80, 200)
     return Scene(stream(20)((n, 3)) * 5.43, 12.0, np.full(3, 5.43), CUBE)
 

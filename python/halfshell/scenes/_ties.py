@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from halfshell.scenes._catalogue import add
-from halfshell.scenes._make import CUBE, Draw, integers, sites, stream
-from halfshell.scenes._scene import Floats, Scene, Size, pick
+from halfshell.scenes._make import CUBE, Draw, integers, sites, stream, wrapped
+from halfshell.scenes._scene import Scene, Size, pick
 
 # All integer vectors of length 3.
 _VECTORS = np.array([v for v in itertools.product(range(-3, 4), repeat=3) if np.dot(v, v) == 9])
@@ -27,7 +27,7 @@ def near_ties(size: Size, inclusive: bool) -> Scene:
     """Half of the points have a partner at the cutoff, give or take two units of a coordinate.
 
     Some are at exactly the cutoff, some inside or outside by less than float64 arithmetic can
-    tell, many of them across a face. The later stages of an exact decision do all the work.
+    tell, many of them across a face. Only the later stages of an exact decision know.
     """
     draw, edge = stream(2), pick(size, 16.0, 64.0, 128.0)
     # Multiples of the spacing of float64 below the edge: sums of them are exact.
@@ -35,7 +35,7 @@ def near_ties(size: Size, inclusive: bool) -> Scene:
     hair = integers(draw, -2, 2, points.shape) * (edge * 2.0**-53)
     partners = points + (_some(draw, _VECTORS, len(points)) + hair)
     return Scene(
-        np.concatenate([points, _wrapped(partners, edge)]),
+        np.concatenate([points, wrapped(partners, edge)]),
         3.0,
         np.full(3, edge),
         CUBE,
@@ -60,7 +60,7 @@ def float32(size: Size) -> Scene:
     """Differences from the cutoff that no float32 distance can show.
 
     Partners are 3 apart along one axis and off by a few units of float32 along the others, which
-    makes them farther than 3 by 1e-11 or less. The cutoff lies among these distances.
+    makes them farther than 3 by 2e-10 or less. The cutoff lies among these distances.
     """
     draw, edge = stream(3), pick(size, 16.0, 64.0, 128.0)
     unit = edge * 2.0**-24
@@ -91,9 +91,3 @@ def half_box(size: Size) -> Scene:
 def _some(draw: Draw, vectors: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """Draw n of these vectors."""
     return vectors[integers(draw, 0, len(vectors) - 1, (n,))]
-
-
-def _wrapped(points: Floats, edge: float) -> Floats:
-    """Move points that stick out of the box back into it, exactly."""
-    points = np.where(points < 0.0, points + edge, points)
-    return np.where(points >= edge, points - edge, points)
