@@ -2,7 +2,6 @@
 /* frame.c: see frame.h. */
 #include "frame.h"
 
-#include "memory.h"
 #include "poll.h"
 
 #include <math.h>
@@ -10,18 +9,6 @@
 
 /* Independent chains of the loop over all entries: one would wait for itself. */
 #define CHAINS 4
-
-static bool
-make_room(hs_frame *frame, size_t bytes)
-{
-    if (frame->rows != NULL && bytes <= frame->capacity) {
-        return true;
-    }
-    hs_free(NULL, frame->rows);
-    frame->rows = hs_alloc(NULL, HS_FOR_POINTS, (int64_t)bytes, 1);
-    frame->capacity = frame->rows != NULL ? bytes : 0;
-    return frame->rows != NULL;
-}
 
 /* Rows [first, last) without gaps. */
 static void
@@ -115,7 +102,9 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
         failure->value = (double)points->n;
         return HS_ERR_TOO_MANY;
     }
-    if (!make_room(frame, (size_t)points->n * row_size)) {
+    frame->rows = hs_store_reserve(&frame->store, HS_FOR_POINTS, points->n, row_size);
+    if (frame->rows == NULL) {
+        frame->points.n = 0;
         return HS_ERR_MEMORY;
     }
     frame->points = (hs_points){.data = frame->rows,
@@ -159,7 +148,6 @@ hs_frames_share_box(const hs_frame *one, const hs_frame *other)
 void
 hs_frame_free(hs_frame *frame)
 {
-    hs_free(NULL, frame->rows);
+    hs_store_free(&frame->store);
     frame->rows = NULL;
-    frame->capacity = 0;
 }

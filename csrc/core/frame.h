@@ -4,13 +4,12 @@
 #ifndef HS_FRAME_H
 #define HS_FRAME_H
 
-#include "../halfshell.h"
-#include "base.h"
+#include "store.h"
 
 typedef struct hs_frame {
     hs_points points;   /* rows without gaps, of the caller's type */
-    void     *rows;     /* owned; what points.data is */
-    size_t    capacity; /* bytes of it: kept for the next step */
+    hs_store  store;
+    void     *rows;     /* in it; what points.data is */
     double    largest;  /* largest |x| of all coordinates, 0 without points */
     bool      has_box;
     hs_box    box;

@@ -7,7 +7,6 @@
  */
 #include "motion.h"
 
-#include "memory.h"
 #include "poll.h"
 #include "rounding.h"
 #include "strain.h"
@@ -35,8 +34,8 @@ typedef struct tracking {
     bool             has_base;
     double           base[HS_MAX_DIM];
     double           drift[HS_MAX_DIM];
-    hs_counts       *counts;
-    bool             jumped;  /* counts are set */
+    hs_store        *jumps;
+    int64_t         *jump_of; /* in it, m a point; NULL: there is none yet */
     double           square;    /* largest |u|^2 ... */
     double           component; /* ... and |u_k| */
     double           magnitude; /* of the terms of wrapping */
@@ -48,25 +47,6 @@ typedef struct tile {
     int     n;
     double  u[HS_MAX_DIM][TILE];
 } tile;
-
-bool
-hs_counts_make_room(hs_counts *counts, int64_t n)
-{
-    if (counts->of != NULL && n <= counts->capacity) {
-        return true;
-    }
-    hs_counts_free(counts);
-    counts->of = hs_alloc(NULL, HS_FOR_WRAPS, n, sizeof *counts->of);
-    counts->capacity = counts->of != NULL ? n : 0;
-    return counts->of != NULL;
-}
-
-void
-hs_counts_free(hs_counts *counts)
-{
-    hs_free(NULL, counts->of);
-    *counts = (hs_counts){0};
-}
 
 HS_ALWAYS_INLINE void
 subtract(const tracking *track, tile *t, const hs_real real, const int d, const bool deformed)
@@ -128,21 +108,16 @@ take_jump(tracking *track, tile *t, int p, int64_t *given)
     return true;
 }
 
-/* The counts as they were when the list was built. */
+/* No jumps yet. */
 static bool
-start_counts(tracking *track)
+start_jumps(tracking *track)
 {
     const int64_t n = track->motion->now->points.n * track->m;
-    if (!hs_counts_make_room(track->counts, n)) {
-        return false;
+    track->jump_of = hs_store_reserve(track->jumps, HS_FOR_WRAPS, n, sizeof *track->jump_of);
+    if (track->jump_of != NULL) {
+        memset(track->jump_of, 0, (size_t)n * sizeof *track->jump_of);
     }
-    if (track->motion->counts != NULL) {
-        memcpy(track->counts->of, track->motion->counts, (size_t)n * sizeof(int64_t));
-    } else {
-        memset(track->counts->of, 0, (size_t)n * sizeof(int64_t));
-    }
-    track->jumped = true;
-    return true;
+    return track->jump_of != NULL;
 }
 
 /* Looks for jumps among the points of a tile. HS_STATUS_END: some point went too far to tell. */
@@ -166,11 +141,11 @@ take_jumps(tracking *track, tile *t)
         for (int r = 0; r < m; r++) {
             any |= (uint64_t)given[r];
         }
-        if (any != 0 && !track->jumped && !start_counts(track)) {
+        if (any != 0 && track->jump_of == NULL && !start_jumps(track)) {
             return HS_ERR_MEMORY;
         }
         for (int r = 0; any != 0 && r < m; r++) {
-            track->counts->of[(t->first + p) * m + r] += given[r];
+            track->jump_of[(t->first + p) * m + r] = given[r];
         }
     }
     return HS_OK;
@@ -323,7 +298,7 @@ bound_rounding(const tracking *track)
     for (int k = 0; track->has_base && k < d; k++) { /* two differences */
         bound += 2.0 * UNIT * (sizes + fabs(track->base[k]));
     }
-    if (track->jumped) { /* a difference, wrapped as wrap.h says */
+    if (track->jump_of != NULL) { /* a difference, wrapped as wrap.h says */
         const double terms = 2 * track->m + 2;
         bound += 2.0 * UNIT * (sizes + track->magnitude) +
                  terms * terms * 0x1p-104 * track->magnitude + 0x1p-1050;
@@ -351,12 +326,12 @@ find_margin(const tracking *track)
 }
 
 static hs_status
-start(const hs_motion *motion, hs_counts *counts, tracking *track)
+start(const hs_motion *motion, hs_store *jumps, tracking *track)
 {
     int row[HS_MAX_DIM];
     memset(track, 0, sizeof *track);
     track->motion = motion;
-    track->counts = counts;
+    track->jumps = jumps;
     track->m = hs_frame_periodic(motion->now, row);
     track->jump = INFINITY;
     if (track->m == 0) {
@@ -399,10 +374,10 @@ measure_all(tracking *track, const hs_options *options)
 
 hs_status
 hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin, bool *jumped,
-                 hs_counts *counts)
+                 hs_store *jumps)
 {
     tracking  track;
-    hs_status status = start(motion, counts, &track);
+    hs_status status = start(motion, jumps, &track);
     *margin = -1.0;
     *jumped = false;
     if (status == HS_OK) {
@@ -413,7 +388,7 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
     if (status == HS_OK) {
         const double found = find_margin(&track);
         *margin = found >= 0.0 ? found : -1.0; /* also for NaN */
-        *jumped = track.jumped;
+        *jumped = track.jump_of != NULL;
     }
     return status == HS_STATUS_END ? HS_OK : status;
 }

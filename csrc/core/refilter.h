@@ -12,22 +12,28 @@
 #include "sift.h"
 #include "verlet.h"
 
-/* Everything that slabs share, read only while they work. */
+/*
+ * Everything that slabs share, read only while they work. Points are those of the list: in the cell
+ * order of the step it was built for.
+ */
 typedef struct hs_refilter {
-    const hs_verlet  *list;   /* borrowed */
-    const hs_frame   *now;    /* the list's */
-    const int64_t    *counts; /* the list's; NULL: all zero */
-    hs_search        *search; /* borrowed: account, options, team, kernel; the scene if it measures */
-    hs_output        *output; /* borrowed */
-    int               d, m;
-    int               vector_of_row[HS_MAX_DIM];
-    hs_metric         given;  /* decides, on points and box vectors as given */
-    float            *y;      /* owned; sift.h */
-    float            *offset; /* owned; one row for each image */
-    hs_thresholds     plain, shifted; /* for pairs without and with an image */
-    bool              measures;       /* d or D are wanted: the scene is there */
-    bool              over_given;     /* the scene's metric is for points as given; else ... */
-    int64_t           to_reduced[HS_MAX_DIM][HS_MAX_DIM]; /* ... S over given rows to S over B */
+    const hs_verlet *list;   /* borrowed */
+    const hs_frame  *now;    /* the list's */
+    hs_search       *search; /* borrowed: account, options, team, kernel; the scene if it measures */
+    hs_output       *output; /* borrowed */
+    int              d, m;
+    int              vector_of_row[HS_MAX_DIM];
+    hs_metric        given;  /* decides, on points and box vectors as given */
+    int64_t         *counts; /* owned; m a point, as those of the list, jumps included; or NULL */
+    double           most_counts; /* the largest of them, of either sign */
+    float           *y;      /* owned; sift.h */
+    float           *offset; /* owned; one row for each image */
+    hs_thresholds    plain, shifted; /* for pairs without and with an image */
+    bool             measures;       /* d or D are wanted. Then: */
+    double          *x;       /* owned; d a point: what the scene's metric measures between */
+    int64_t         *image;   /* owned; m for each image: its shift is image + lag_j - lag_i */
+    int64_t         *lag;     /* owned; m a point */
+    uint8_t         *lagging; /* owned; whether those are not all zero */
 } hs_refilter;
 
 /* The hits of one slab. */
@@ -45,18 +51,29 @@ typedef struct hs_sifted {
 /* All that is within the cutoff, to the output. */
 hs_status hs_refilter_run(hs_refilter *refilter, hs_failure *failure);
 
-/* The points as floats and their thresholds. To be freed by hs_refilter_free, also on failure. */
+/* The points as floats, their counts and thresholds; refilter_points.c. */
 hs_status hs_refilter_prepare(hs_refilter *refilter);
-void      hs_refilter_free(hs_refilter *refilter);
 
-/* Finds the hits of a slab. */
-void hs_refilter_sift(const hs_refilter *refilter, hs_sifted *slab);
+/* Decides the unsure hits of a slab, of which there are some, and takes those that are beyond the
+ * cutoff from the hits; refilter_decide.c. */
+void hs_refilter_settle(const hs_refilter *refilter, int32_t n_unsure, hs_sifted *slab);
 
-/* Writes them; refilter_put.c. */
+/* Writes the hits; refilter_put.c. */
 void hs_refilter_put(const hs_refilter *refilter, hs_sifted *slab);
 
-/* Makes the scene ready that d and D are measured in, with the bits that a search finds. */
+/* Makes the scene ready that d and D are measured in, so that they have the bits that a search
+ * finds, and writes them; refilter_measure.c. */
 hs_status hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure);
+void      hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab);
+
+/* Room in the column of this HS_WANT_ bit for pair `at` of the output; NULL where not kept. */
+HS_ALWAYS_INLINE void *
+hs_refilter_column(const hs_refilter *refilter, unsigned bit, int64_t at)
+{
+    char *column = hs_output_column(refilter->output, bit);
+    return column == NULL ? NULL
+                          : column + (size_t)at * hs_output_width(refilter->output, bit);
+}
 
 /* S of pair e over the box vectors that repeat. */
 HS_ALWAYS_INLINE void

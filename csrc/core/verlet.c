@@ -19,7 +19,7 @@ hs_verlet_new(void)
     hs_verlet *list = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *list);
     if (list != NULL) {
         memset(list, 0, sizeof *list);
-        list->moved_now = -1;
+        list->jumps_now = -1;
         list->frames[0].points.ndim = 1;
     }
     return list;
@@ -35,8 +35,8 @@ hs_verlet_free(hs_verlet *list)
     for (int f = 0; f < 3; f++) {
         hs_frame_free(&list->frames[f]);
     }
-    hs_counts_free(&list->moved[0]);
-    hs_counts_free(&list->moved[1]);
+    hs_store_free(&list->jumps[0]);
+    hs_store_free(&list->jumps[1]);
     hs_free(NULL, list);
 }
 
@@ -60,7 +60,7 @@ radius_of(double cutoff, double skin)
     return sum.lo > 0.0 ? hs_next_up(sum.hi) : sum.hi;
 }
 
-/* The frame and the counts that are not in use. */
+/* The frame that is not in use. */
 static int
 spare_frame(const hs_verlet *list)
 {
@@ -77,10 +77,9 @@ try_to_keep(hs_verlet *list, int next, const hs_options *options, double *margin
 {
     const hs_motion motion = {.built = &list->frames[list->built],
                               .now = &list->frames[next],
-                              .counts = list->listing.counts.of,
                               .radius = list->listing.radius,
                               .cutoff = list->cutoff};
-    const int       spare = list->moved_now == 0 ? 1 : 0;
+    const int       spare = list->jumps_now == 0 ? 1 : 0;
     bool            jumped = false;
     *margin = -1.0;
     if (!list->has_list || options->cutoff != list->cutoff ||
@@ -88,11 +87,11 @@ try_to_keep(hs_verlet *list, int next, const hs_options *options, double *margin
         return HS_OK;
     }
     const hs_status status =
-        hs_motion_margin(&motion, options, margin, &jumped, &list->moved[spare]);
+        hs_motion_margin(&motion, options, margin, &jumped, &list->jumps[spare]);
     if (status == HS_OK && *margin >= 0.0) {
         list->now = next;
         list->margin = *margin;
-        list->moved_now = jumped ? spare : -1;
+        list->jumps_now = jumped ? spare : -1;
     }
     return status;
 }
@@ -106,7 +105,7 @@ build(hs_verlet *list, int next, const hs_options *options, double radius, hs_fa
         const double room = radius - options->cutoff;
         list->has_list = true;
         list->built = list->now = next;
-        list->moved_now = -1;
+        list->jumps_now = -1;
         list->cutoff = options->cutoff;
         list->margin = options->cutoff > 0.0 && room > 0.0 ? hs_next_down(room) : room;
     }

@@ -8,20 +8,26 @@
 #include "motion.h"
 
 /*
- * The pairs within `radius` of one step, as numbers of points and images:
+ * The pairs within `radius` of one step, as places of points in the cell order of that step, and
+ * images:
  *
- *     S = image + counts_i - counts_j      over the box vectors that repeat, as given
+ *     S = image + count_i - count_j      over the box vectors that repeat, as given
  *
- * Points keep their image of each other while they move; counts follow their jumps. The first
+ * Points keep their image of each other while they move; their counts follow their jumps. The first
  * n_plain pairs have the image 0.
  */
 typedef struct hs_listing {
     int64_t   n_pairs, n_plain;
-    int32_t  *i, *j;  /* owned: hs_array_free; i < j, or a point and its own image */
-    int32_t  *code;   /* owned; of pairs from n_plain on: the number of their image */
+    int32_t  *i, *j;   /* the caller's numbers of them are i < j, or equal */
+    int32_t  *code;    /* of pairs from n_plain on: the number of their image */
     hs_images images;
-    hs_counts counts; /* when it was built; of == NULL: all zero */
+    int32_t  *order;   /* the caller's number of each place */
+    int64_t  *counts;  /* m for each place, when it was built; NULL: all zero */
     double    radius;
+    /* Where these are. Pairs are written when nothing can fail any more; the others are made beside
+     * those in use, and `turn` says which are. */
+    hs_store  for_i, for_j, for_code, for_order[2], for_counts[2];
+    int       turn;
 } hs_listing;
 
 struct hs_verlet {
@@ -31,8 +37,8 @@ struct hs_verlet {
     double     margin;
     hs_frame   frames[3];    /* two are in use, one is for the next step */
     int        built, now;   /* numbers of frames: the step it was built for, the last step */
-    hs_counts  moved[2];     /* counts of the last step and of the next */
-    int        moved_now;    /* which of them; -1: they are those of the listing */
+    hs_store   jumps[2];     /* since it was built: those of the last step and of the next */
+    int        jumps_now;    /* which of them; -1: nothing has jumped */
 };
 
 /* Pairs within `radius` of a frame. On failure *listing is as it was. */
@@ -40,12 +46,5 @@ hs_status hs_listing_build(const hs_frame *frame, const hs_options *options, dou
                            hs_listing *listing, hs_failure *failure);
 
 void hs_listing_free(hs_listing *listing);
-
-/* Counts of the last step; NULL: all zero. */
-HS_ALWAYS_INLINE const int64_t *
-hs_verlet_counts(const hs_verlet *list)
-{
-    return list->moved_now >= 0 ? list->moved[list->moved_now].of : list->listing.counts.of;
-}
 
 #endif

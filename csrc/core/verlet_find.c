@@ -45,13 +45,10 @@ static hs_status
 find_pairs(hs_refilter *refilter, hs_output *output, hs_failure *failure)
 {
     hs_search *search = refilter->search;
-    hs_status  status = HS_OK;
-    if (refilter->measures) {
-        status = hs_refilter_open_scene(refilter, failure);
-    }
-    if (status == HS_OK && search->options.sorted) {
+    hs_status  status;
+    if (search->options.sorted) {
         status = find_sorted(refilter, output, failure);
-    } else if (status == HS_OK) {
+    } else {
         refilter->output = output;
         status = hs_refilter_run(refilter, failure);
     }
@@ -93,7 +90,6 @@ set_refilter(const hs_verlet *list, hs_search *search, hs_refilter *refilter)
     memset(refilter, 0, sizeof *refilter);
     refilter->list = list;
     refilter->now = now;
-    refilter->counts = hs_verlet_counts(list);
     refilter->search = search;
     refilter->d = now->points.ndim;
     refilter->m = hs_frame_periodic(now, refilter->vector_of_row);
