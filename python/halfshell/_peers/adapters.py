@@ -163,11 +163,12 @@ class MDAnalysis(Library):
     def refuses(self, question: Any) -> str | None:
         """Refuse a box that its six numbers cannot express too."""
         rows = question.rows
-        if rows is not None and rows.ndim == 2 and (
+        reason = super().refuses(question)
+        if reason is None and rows is not None and rows.ndim == 2 and (
             np.any(np.triu(rows, 1)) or np.any(np.diag(rows) <= 0.0)
         ):  # fmt: skip
             return "box not lower triangular"
-        return super().refuses(question)
+        return reason
 
     def prepare(self, question: Any) -> Call:
         """Give it float32 points and its six box numbers."""
@@ -222,9 +223,10 @@ class Freud(Library):
 
     def refuses(self, question: Any) -> str | None:
         """Refuse a box that is not in its lower-triangular form too."""
-        if question.rows is not None and np.any(np.triu(question.rows, 1)):
+        reason = super().refuses(question)
+        if reason is None and question.rows is not None and np.any(np.triu(question.rows, 1)):
             return "box not lower triangular"
-        return super().refuses(question)
+        return reason
 
     def indices(self, result: Any) -> tuple[Any, Any]:
         """Return the columns of its (m, 2) array."""

@@ -18,7 +18,7 @@ __all__ = ["PairErrors", "QuantityErrors", "Sample", "pair_errors", "quantity_er
 Floats = NDArray[np.float64]
 
 SAMPLED = 2000  # pairs whose distance is worked out in rational arithmetic
-_TIES, _EXTREMES = 500, 200  # of these, at most so many at the cutoff; nearest and farthest
+_TIES, _EXTREMES = 4, 10  # a fourth may be ties; a tenth each are the farthest and nearest
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,11 @@ def sample_of(truth: Truth, limit: int = SAMPLED) -> Sample:
     rows = np.arange(count)
     if count > limit:
         far = _rough_lengths(truth)
-        ends = np.argpartition(far, (_EXTREMES, count - _EXTREMES))
+        few, some = max(limit // _EXTREMES, 1), limit // _TIES
+        ends = np.argpartition(far, (few, count - few))
         ties = np.flatnonzero(truth.tie)
-        ties = ties[:: max(1, len(ties) // _TIES)][:_TIES]
-        chosen = np.unique(np.concatenate([ties, ends[:_EXTREMES], ends[-_EXTREMES:]]))
+        ties = ties[:: max(1, len(ties) // max(some, 1))][:some]
+        chosen = np.unique(np.concatenate([ties, ends[:few], ends[-few:]]))
         others = np.random.default_rng(0).permutation(count)[:limit]
         others = others[~np.isin(others, chosen)][: limit - len(chosen)]
         rows = np.sort(np.concatenate([chosen, others]))

@@ -18,11 +18,13 @@ import numpy as np
 from halfshell._report.rows import ReportRow
 from halfshell._report.words import methods_of, ratios
 
-__all__ = ["cost_figure", "drift_figure", "key_figure", "map_figure", "scene_figure", "to_svg"]
+__all__ = [
+    "LOOKS", "cost_figure", "drift_figure", "key_figure", "map_figure", "scene_figure", "to_svg",
+]  # fmt: skip
 
 # Ours in colours that are told apart by colour-blind readers too (Okabe and Ito); others in
 # shades of grey and by their marks. exact comes last, so that it is drawn on top.
-_LOOKS: dict[str, tuple[str, str]] = {
+LOOKS: dict[str, tuple[str, str]] = {
     "vesin": ("v", "0.35"),
     "cKDTree": ("^", "0.35"),
     "neighborlist-rs": ("<", "0.35"),
@@ -78,7 +80,7 @@ def key_figure(rows: Sequence[ReportRow]) -> Any:
     """Say which mark is which method, once for all scenes."""
     with _rules():
         figure = _figure(7.6, 0.55)
-        shown = [name for name in reversed(_LOOKS) if name in methods_of(rows, "halfshell", "peer")]
+        shown = [name for name in reversed(LOOKS) if name in methods_of(rows, "halfshell", "peer")]
         marks = [_mark(name) for name in shown]
         names = [f"precision {name}" if name in ("exact", "double", "single") else
                  "float32 input" if name == "float32" else name for name in shown]  # fmt: skip
@@ -87,7 +89,7 @@ def key_figure(rows: Sequence[ReportRow]) -> Any:
 
 
 def _mark(name: str) -> Any:
-    marker, color = _LOOKS[name]
+    marker, color = LOOKS[name]
     return _part(".lines", "Line2D")([], [], linestyle="", marker=marker, color=color, markersize=5)
 
 
@@ -127,9 +129,9 @@ def _work_precision(axes: Any, label: str, shown: Sequence[tuple[str, float, flo
     """Draw one diagram: run time to the right, error upwards."""
     values = [error for _, _, error in shown]
     place = _log_axis(axes.yaxis, values)
-    order = list(_LOOKS)
+    order = list(LOOKS)
     for name, seconds, error in sorted(shown, key=lambda item: order.index(item[0])):
-        marker, color = _LOOKS[name]
+        marker, color = LOOKS[name]
         axes.plot(math.log10(seconds), place(error), linestyle="", marker=marker, color=color,
                   markersize=5, clip_on=False)  # fmt: skip
     times = [math.log10(seconds) for _, seconds, _ in shown]
@@ -230,7 +232,7 @@ def cost_figure(rows: Sequence[ReportRow]) -> Any | None:
         figure = _figure(5.6, 0.9 + 0.135 * len(scenes))
         axes = figure.subplots()
         for other, values in found.items():
-            marker, color = _LOOKS[other]
+            marker, color = LOOKS[other]
             places = [(values[name], k) for k, name in enumerate(scenes) if name in values]
             if places:
                 axes.plot(*zip(*places), linestyle="", marker=marker, color=color, markersize=4,

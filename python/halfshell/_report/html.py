@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from html import escape
+from html import escape as _escape
 from typing import Any
 
 from halfshell._report import figures
@@ -42,6 +42,11 @@ _HOW = (
     "Lennard-Jones sums over the list with sigma = cutoff / 2.5 unless the scene has its own, "
     "cut and not shifted, against a sum that is rounded once."
 )
+
+
+def escape(text: str) -> str:
+    """Return text for a page, without the control characters that XML does not allow."""
+    return _escape("".join(c if c.isprintable() else " " for c in text))
 
 
 def page(facts: Mapping[str, str], rows: Sequence[ReportRow]) -> str:

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -33,11 +34,21 @@ class PeerProcess:
         Seconds that one scene may take.
     budget : float
         Seconds that all scenes together may take; those beyond are left out.
+    command : sequence of str, optional
+        What to start in place of `worker`, for tests.
     """
 
-    def __init__(self, name: str, give_up: float, budget: float = float("inf")) -> None:
+    def __init__(
+        self,
+        name: str,
+        give_up: float,
+        budget: float = float("inf"),
+        command: Sequence[str] | None = None,
+    ) -> None:
         self.name = name
         self.library = LIBRARIES[name]
+        worker = [sys.executable, "-m", "halfshell._report.worker", name]
+        self._command = list(command or worker)
         self.version: str | None = None
         self._give_up = give_up
         self._left = budget
@@ -78,10 +89,6 @@ class PeerProcess:
         self._left -= time.monotonic() - start
         return self._crashed() if reply is None else dict(reply)
 
-    def installed(self) -> bool:
-        """Wait until the library is imported; return whether it is there."""
-        return self._greeting() is None
-
     def _greeting(self) -> dict[str, Any] | None:
         """Wait for the library to be imported; return a reply if it is not."""
         if self._process is None:
@@ -105,9 +112,8 @@ class PeerProcess:
         self._replies = queue.Queue()
         self._greeted = False
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "halfshell._report.worker", self.name],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
-        )  # fmt: skip
+            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors
+        )
         threading.Thread(
             target=_listen, args=(self._stream("stdout"), self._replies), daemon=True
         ).start()
@@ -139,7 +145,8 @@ class PeerProcess:
             how = f"ended with status {status}"
         self._errors.seek(0)
         said = self._errors.read().decode(errors="replace").strip().splitlines()
-        told = f": {said[-1].strip()[:150]}" if said else ""
+        last = "".join(c if c.isprintable() else " " for c in said[-1]).strip() if said else ""
+        told = f": {last[:150]}" if last else ""
         self._errors.seek(0)
         self._errors.truncate()
         return {"status": "crashed", "note": f"the process {how}{told}"}

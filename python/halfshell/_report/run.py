@@ -53,7 +53,7 @@ class Effort:
 
 
 _EFFORTS = {
-    "small": Effort(Patience(3, 0.02), Patience(3, 0.02), 20.0, 60.0, 100_000, "small"),
+    "small": Effort(Patience(3, 0.02), Patience(3, 0.02), 60.0, 300.0, 100_000, "small"),
     "quick": Effort(Patience(5, 0.02), Patience(3, 0.02), 2.0, 4.0, 100_000, "small"),
     "full": Effort(Patience(7, 2.0), Patience(5, 3.0), 60.0, 1800.0, 400_000, "quick"),
 }

@@ -44,7 +44,7 @@ def summary_cells(rows: Sequence[ReportRow]) -> list[list[str]]:
             str(sum(1 for row in done if not row.wrong)),
             str(sum(1 for row in done if row.wrong)), str(len(mine) - len(done)),
             *(counts if done else [""] * 3), number(max(ulps)) if ulps else "",
-            f"{median(slower):.3g}" if slower else "",
+            number(median(slower)) if slower else "",
         ])  # fmt: skip
     return lines
 

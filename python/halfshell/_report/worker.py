@@ -124,8 +124,9 @@ def main(name: str) -> int:
         try:
             reply = _handle(library, request)
         except Exception as error:  # a library may refuse a scene in any way
-            text = " ".join(str(error).split())
-            reply = {"status": "failed", "note": f"{type(error).__name__}: {text}"[:200]}
+            text = "".join(c if c.isprintable() else " " for c in str(error))
+            note = f"{type(error).__name__}: {' '.join(text.split())}"[:200]
+            reply = {"status": "failed", "note": note}
         send(replies, reply)
 
 
