@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import io
+import math
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -47,6 +48,11 @@ def add_options(command: ArgumentParser) -> None:
         help="other libraries, 'all' or 'none'; default: all that are installed",
     )  # fmt: skip
     command.add_argument(
+        "--patience", type=_seconds, metavar="S",
+        help="seconds another library may take for a scene; default: 60, with --quick 3, and 4 "
+        "for all scenes together",
+    )  # fmt: skip
+    command.add_argument(
         "-o", "--output", metavar="DIR", default="halfshell-report",
         help="folder for report.csv and report.html; default: halfshell-report",
     )  # fmt: skip
@@ -55,6 +61,16 @@ def add_options(command: ArgumentParser) -> None:
     command.add_argument(
         "--no-progress", dest="progress", action="store_false", help="no progress bar"
     )
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < math.inf:
+        raise ArgumentTypeError(f"{text!r} is not a positive number of seconds")
+    return value
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -119,7 +135,7 @@ def _plan(args: Namespace) -> Plan:
         if names == ():
             raise InputError(f"{option} names nothing")
     try:
-        return plan_of(scenes, args.methods, peers, size)
+        return plan_of(scenes, args.methods, peers, size, args.patience)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
 

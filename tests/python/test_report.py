@@ -122,6 +122,8 @@ def test_names_are_checked():
         hs.report(["uniform"], peers=["vesn"])
     with pytest.raises(ValueError, match="size must be one of"):
         hs.report(["uniform"], size="big")
+    with pytest.raises(ValueError, match="patience must be"):
+        hs.report(["uniform"], patience=-1.0)
     with pytest.raises(TypeError, match="a sequence of names"):
         hs.report("uniform")
 
@@ -486,6 +488,8 @@ def test_names_are_listed(command):
         ["--methods", "exact,guess"],
         ["--peers", "nobody"],
         ["--size", "huge"],
+        ["--patience", "0"],
+        ["--patience", "soon"],
         ["--quik"],
         ["file.xyz"],
         ["--scenes"],

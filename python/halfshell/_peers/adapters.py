@@ -201,6 +201,7 @@ class Freud(Library):
     full = True
     dims = (2, 3)
     images = False
+    inside = True
     float_bits = 24
     quantities = "ijdD"
     remark = "computes in float32"

@@ -96,7 +96,7 @@ class Library:
     some_axes: ClassVar[bool] = True  # whether only some axes may repeat
     triclinic: ClassVar[bool] = True
     images: ClassVar[bool] = True
-    inside: ClassVar[bool] = False  # whether points must lie in the box, [0, L)
+    inside: ClassVar[bool] = False  # whether points must lie in the box
     counts_alone: ClassVar[bool] = False  # no list of pairs at all
     float_bits: ClassVar[int] = 53
     tolerance: ClassVar[float] = 0.0  # relative, beyond rounding
@@ -166,16 +166,21 @@ def in_space(question: Any) -> tuple[Floats, Floats | None, list[bool]]:
 
 
 def wrapped(question: Question) -> tuple[Question, bool]:
-    """Fold points into an axis-aligned box in float64; return whether any was outside."""
-    if question.rows is None:
+    """Fold points into the box in float64; return whether any was outside."""
+    if question.rows is None or not any(question.periodic):
         return question, False
     periodic = np.array(question.periodic)
-    lengths = np.where(periodic, np.diag(question.rows), 1.0)
-    outside = periodic & ((question.points < 0.0) | (question.points >= lengths))
-    if not outside.any():
-        return question, False
-    folded = question.points - np.floor(question.points / lengths) * lengths
-    folded[folded >= lengths] = 0.0  # rounded up to the face
-    folded[folded < 0.0] = 0.0
-    points = np.where(outside, folded, question.points)
-    return replace(question, points=points), True
+    points = question.points
+    if question.orthorhombic:
+        lengths = np.where(periodic, np.diag(question.rows), 1.0)
+        outside = periodic & ((points < 0.0) | (points >= lengths))
+        folded = points - np.floor(points / lengths) * lengths
+        folded[folded >= lengths] = 0.0  # rounded up to the face
+        folded[folded < 0.0] = 0.0
+        folded = np.where(outside, folded, points)
+    else:
+        rows = question.rows[periodic]
+        turns = np.floor(points @ np.linalg.pinv(rows))
+        outside = turns != 0.0
+        folded = points - turns @ rows
+    return (replace(question, points=folded), True) if outside.any() else (question, False)

@@ -18,6 +18,7 @@ def report(
     methods: Sequence[str] | None = None,
     peers: Sequence[str] | None = (),
     size: str = "quick",
+    patience: float | None = None,
 ) -> list[ReportRow]:
     """Measure error against run time: this library and others, on scenes that are hard.
 
@@ -37,8 +38,10 @@ def report(
         "cKDTree", "neighborlist-rs", "matscipy-neighbours", "matscipy", "MDAnalysis", "freud",
         "pymatgen", "ase". None: all. One that is not installed gets rows that say so.
     size : {"quick", "full", "small"}, default "quick"
-        Size of the scenes, as in `halfshell.scenes.load`, and care in timing. In "small" and
-        "quick" a library that has used up its time is left out of what follows.
+        Size of the scenes, as in `halfshell.scenes.load`, and care in timing.
+    patience : float, optional
+        Seconds that another library may take for one scene. Default: 60, and in "quick" 3, and
+        4 for all scenes together, after which it is left out.
 
     Returns
     -------
@@ -52,7 +55,7 @@ def report(
     Raises
     ------
     ValueError
-        If a name is not known.
+        If a name is not known, or `patience` is not positive.
     ImportError
         If SciPy is not installed.
 
@@ -74,4 +77,4 @@ def report(
     """
     from halfshell._report.run import plan_of, run
 
-    return run(plan_of(scenes, methods, peers, size))
+    return run(plan_of(scenes, methods, peers, size, patience))

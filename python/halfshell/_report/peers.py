@@ -89,6 +89,10 @@ class PeerProcess:
         self._left -= time.monotonic() - start
         return self._crashed() if reply is None else dict(reply)
 
+    def wait(self) -> None:
+        """Wait until the library is imported, so that this disturbs no measurement."""
+        self._greeting()
+
     def _greeting(self) -> dict[str, Any] | None:
         """Wait for the library to be imported; return a reply if it is not."""
         if self._process is None:

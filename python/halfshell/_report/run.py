@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
@@ -54,7 +55,7 @@ class Effort:
 
 _EFFORTS = {
     "small": Effort(Patience(3, 0.02), Patience(3, 0.02), 60.0, 300.0, 100_000, "small"),
-    "quick": Effort(Patience(5, 0.02), Patience(3, 0.02), 2.0, 4.0, 100_000, "small"),
+    "quick": Effort(Patience(5, 0.04), Patience(3, 0.02), 3.0, 4.0, 100_000, "small"),
     "full": Effort(Patience(7, 2.0), Patience(5, 3.0), 60.0, 1800.0, 400_000, "quick"),
 }
 
@@ -67,6 +68,7 @@ class Plan:
     methods: tuple[str, ...]
     peers: tuple[str, ...]
     size: catalogue.Size
+    patience: float | None = None  # seconds for a peer on a scene, in place of the usual
 
 
 def plan_of(
@@ -74,8 +76,11 @@ def plan_of(
     chosen: Sequence[str] | None,
     peers: Sequence[str] | None,
     size: str,
+    patience: float | None = None,
 ) -> Plan:
     """Check names; None means all. Raises ValueError with the nearest names."""
+    if patience is not None and not 0.0 < patience < math.inf:
+        raise ValueError(f"patience must be a positive number of seconds, got {patience!r}")
     if size not in catalogue.SIZES:
         raise ValueError(f"size must be one of {', '.join(catalogue.SIZES)}, got {size!r}")
     return Plan(
@@ -83,6 +88,7 @@ def plan_of(
         _named("method", chosen, methods.METHODS),
         _named("peer", peers, PEERS),
         size,
+        patience,
     )
 
 
@@ -101,12 +107,17 @@ def _named(kind: str, given: Sequence[str] | None, known: Sequence[str]) -> tupl
 def run(plan: Plan, progress: Progress = lambda done, total, text: None) -> list[ReportRow]:
     """Run all of it; return the rows, scene by scene."""
     effort = _EFFORTS[plan.size]
+    if plan.patience is not None:
+        effort = replace(effort, give_up=plan.patience, budget=math.inf)
     rows: list[ReportRow] = []
     with ExitStack() as stack:
         others = [
             stack.enter_context(PeerProcess(name, effort.give_up, effort.budget))
             for name in plan.peers
         ]
+        progress(0, len(plan.scenes), "importing")
+        for other in others:
+            other.wait()
         for done, name in enumerate(plan.scenes):
             progress(done, len(plan.scenes), name)
             rows += _Stage(name, plan, effort).rows(others)
@@ -234,11 +245,18 @@ class _Plain:
 
 
 def _rows_of(scene: Any) -> Any:
-    """The box as rows, those of open axes zero."""
+    """The box as rows; for other libraries, rows of open axes that are zero reach round it all."""
     if scene.box is None:
         return None
     box = np.asarray(scene.box, dtype=np.float64)
     rows = np.diag(box) if box.ndim == 1 else box.copy()
+    lacking = np.flatnonzero(~rows.any(axis=1))
+    if len(lacking):
+        present = rows[rows.any(axis=1)]
+        across = np.linalg.qr(np.concatenate([present, np.eye(len(rows))]).T)[0].T[len(present) :]
+        across = across[np.argsort(np.abs(across).argmax(axis=1), kind="stable")]
+        extents = np.ptp(scene.points @ across.T, axis=0) + 3.0 * scene.cutoff
+        rows[lacking] = np.abs(extents[:, None]) * across * np.sign(across.sum(axis=1))[:, None]
     return rows
 
 
@@ -246,7 +264,7 @@ def _remark(library: Library, answer: Answer, folded: bool) -> str:
     """Say what a reader should know about a comparison."""
     told = [library.remark] if library.remark else []
     if folded:
-        told.append("points were folded into the box in float64 beforehand, as it demands")
+        told.append("points were folded into the box in float64 beforehand, as it wants")
     if answer.D is None:
         told.append("D was worked out from S" if answer.S is not None else
                     "D was worked out for the nearest image")  # fmt: skip

@@ -56,7 +56,7 @@ def summary_table(rows: Sequence[ReportRow]) -> Any:
 
     table = Table(
         title="All scenes: lists right, lists wrong, scenes without a list; wrong pairs",
-        title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False,
+        title_justify="left", box=box.SIMPLE_HEAD, padding=0, pad_edge=False,
     )  # fmt: skip
     heads = [head.replace("duplicate", "twice").replace(" / exact", "") for head in SUMMARY]
     for k, head in enumerate(heads):

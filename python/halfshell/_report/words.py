@@ -19,7 +19,9 @@ def number(value: float | None) -> str:
         return ""
     if isinstance(value, int) and abs(value) < 100_000:
         return f"{value:,}"
-    return "0" if value == 0 else f"{value:.2g}" if abs(value) < 1000 else f"{value:.1e}"
+    if value == 0 or 100 <= abs(value) < 1000:
+        return f"{value:.0f}"
+    return f"{value:.2g}" if abs(value) < 100 else f"{value:.1e}"
 
 
 def duration(seconds: float | None) -> str:
