@@ -204,19 +204,23 @@ class Freud(Library):
     inside = True
     float_bits = 24
     quantities = "ijdD"
-    remark = "computes in float32"
+    remark = "computes in float32; without a box its points are centred in one beforehand"
 
     def prepare(self, question: Any) -> Call:
-        """Use its tree, faster than its cell list; open space is a box with a wide margin."""
+        """Use its tree, faster than its cell list; open space is a wide box round the origin."""
         freud = importlib.import_module("freud")
         freud.parallel.set_num_threads(1)
-        points = np.zeros((question.n, 3), dtype=np.float32)
-        points[:, : question.dim] = question.points
-        rows = question.rows
+        given, rows = question.points, question.rows
         if rows is None:
-            rows = np.diag(np.ptp(question.points, axis=0) + 3.0 * question.cutoff)
-        box = freud.box.Box.from_matrix(_columns(rows))
-        if question.rows is not None and not all(question.periodic):
+            low, high = given.min(axis=0), given.max(axis=0)
+            given = given - (low + 0.5 * (high - low))
+            length = (high - low).max() + 3.0 * question.cutoff
+            box = {2: freud.box.Box.square, 3: freud.box.Box.cube}[question.dim](length)
+        else:
+            box = freud.box.Box.from_matrix(_columns(rows))
+        points = np.zeros((question.n, 3), dtype=np.float32)
+        points[:, : question.dim] = given
+        if rows is not None and not all(question.periodic):
             box.periodic = [*question.periodic, *[False] * (3 - question.dim)]
         arguments = {"r_max": question.cutoff, "exclude_ii": True}
         tree = freud.locality.AABBQuery

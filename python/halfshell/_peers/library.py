@@ -70,11 +70,11 @@ class Question:
         if self.rows is None or not any(self.periodic):
             return False
         rows = self.rows[list(self.periodic)]
-        lengths = np.linalg.norm(rows, axis=1)
-        units = rows / lengths[:, None]
+        sizes = np.abs(rows).max(axis=1)  # so that no square overflows or vanishes
+        units = rows / sizes[:, None]
         duals = np.linalg.solve(units @ units.T, units)
-        heights = lengths / np.linalg.norm(duals, axis=1)
-        return bool(np.any(heights <= 2.0 * self.cutoff))
+        heights = 1.0 / np.linalg.norm(duals, axis=1)  # in sizes
+        return bool(np.any(heights / 2.0 <= self.cutoff / sizes))
 
 
 class Library:
@@ -180,7 +180,8 @@ def wrapped(question: Question) -> tuple[Question, bool]:
         folded = np.where(outside, folded, points)
     else:
         rows = question.rows[periodic]
-        turns = np.floor(points @ np.linalg.pinv(rows))
+        size = np.abs(rows).max()
+        turns = np.floor((points / size) @ np.linalg.pinv(rows / size))
         outside = turns != 0.0
         folded = points - turns @ rows
     return (replace(question, points=folded), True) if outside.any() else (question, False)

@@ -170,7 +170,8 @@ def vectors_of(answer: Answer, scene: Any) -> Floats:
         shifts = answer.S.astype(np.float64)
     else:
         repeating = np.array(scene.periodic)
-        full = np.where(repeating[:, None], scene.rows, np.eye(len(repeating)))
-        shifts = -np.rint(D @ np.linalg.inv(full)) * repeating
+        size = np.abs(scene.rows[repeating]).max(initial=0.0) or 1.0
+        full = np.where(repeating[:, None], scene.rows / size, np.eye(len(repeating)))
+        shifts = -np.rint((D / size) @ np.linalg.pinv(full)) * repeating
     found: Floats = D + shifts @ scene.rows
     return found
