@@ -34,7 +34,9 @@ def machine(facts: Facts, rows: Rows) -> Lines:
     return [
         f"{facts['cpu']}, {facts['cores']} cores, one thread used, {facts['machine']}; halfshell",
         f"{facts['halfshell']}, kernel {facts['kernel']}, Python {facts['python']}, NumPy "
-        f"{facts['numpy']}, SciPy {facts['scipy']}. Measured on {facts['date'][:10]}.",
+        f"{facts['numpy']}, SciPy {facts['scipy']}. Measured on {facts['date'][:10]}, on "
+        f"{len({row.scene for row in rows})} scenes of up to "
+        f"{max(row.points for row in rows):,} points.",
         f"Others: {others}." if others else "Other libraries were not asked.",
     ]
 

@@ -19,9 +19,9 @@ def number(value: float | None) -> str:
         return ""
     if isinstance(value, int) and abs(value) < 100_000:
         return f"{value:,}"
-    if value == 0 or 100 <= abs(value) < 1000:
+    if value == 0 or 99.5 <= abs(value) < 999.5:
         return f"{value:.0f}"
-    return f"{value:.2g}" if abs(value) < 100 else f"{value:.1e}"
+    return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.1e}"
 
 
 def duration(seconds: float | None) -> str:
@@ -156,10 +156,8 @@ def _reuse(rows: Rows) -> list[str]:
             text = f"On {scene}, {_times(len(runs), 'run')} with {words}: "
             text += f"{len(wrong)} missed pairs" if wrong else "none missed a pair"
             if drifts:
-                text += (
-                    f"; the energy drifts by {number(min(drifts))} to {number(max(drifts))} of the "
-                    "kinetic energy"
-                )
+                ends = dict.fromkeys([number(min(drifts)), number(max(drifts))])
+                text += f"; the energy drifts by {' to '.join(ends)} of the kinetic energy"
             every = [row.drift_kinetic for row in mine if row.method == "exact, every step"]
             if every and every[0] is not None:
                 text += f", {number(every[0])} with a new list in every step"
