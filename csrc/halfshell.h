@@ -243,8 +243,9 @@ hs_verlet *hs_verlet_new(void);
  * The next step. The points and the box are copied. The list is kept, or built again with
  * options->cutoff + skin where it must be (the first step, another number or type of points, other
  * axes that repeat, another cutoff, a margin that is used up) or `rebuild` says so. skin: finite,
- * not negative; not looked at unless the list is built. Of the options only cutoff, kernel, threads,
- * limits and poll count. On failure the list is as it was, with the points of the step before.
+ * not negative; not looked at unless the list is built. Of the options only cutoff, kernel,
+ * threads, limits and poll count. On failure the list is as it was, with the points of the step
+ * before.
  */
 hs_status hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
                            const hs_options *options, double skin, bool rebuild, bool *rebuilt,
@@ -267,6 +268,8 @@ typedef struct hs_verlet_state {
     double  cutoff;
     double  radius;   /* cutoff + skin, rounded up */
     double  margin;   /* by how much pairs may yet come closer before the list is built again */
+    double  tried;    /* the margin of the last step with the list of the one before; -infinity:
+                         unknown. Below 0: the list was built again */
 } hs_verlet_state;
 
 hs_verlet_state hs_verlet_look(const hs_verlet *list);

@@ -40,7 +40,8 @@ PyObject *hs_py_verlet_new(PyObject *module, PyObject *ignored);
 /* A list, the arguments of call.h, skin, rebuild -> whether it was built. */
 PyObject *hs_py_verlet_update(PyObject *module, PyObject *const *arguments,
                               Py_ssize_t n_arguments);
-/* A list, the arguments of call.h with points of shape (0, d), quantities, sort, index_bytes, out. */
+/* A list, the arguments of call.h with points of shape (0, d), quantities, sort, index_bytes,
+ * out. */
 PyObject *hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments,
                              Py_ssize_t n_arguments);
 /* A list -> dict of its state. */

@@ -22,11 +22,13 @@
 #define HS_NO_INLINE __declspec(noinline)
 #define HS_RESTRICT __restrict
 #define HS_UNLIKELY(x) (x)
+#define HS_PREFETCH(address) ((void)(address))
 #else
 #define HS_ALWAYS_INLINE static inline __attribute__((always_inline))
 #define HS_NO_INLINE __attribute__((noinline))
 #define HS_RESTRICT restrict
 #define HS_UNLIKELY(x) __builtin_expect(!!(x), 0)
+#define HS_PREFETCH(address) __builtin_prefetch(address) /* harmless for any address */
 #endif
 
 /* -DHS_HAVE_INT128=0 builds what compilers without a 128-bit integer build. */

@@ -378,7 +378,7 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
 {
     tracking  track;
     hs_status status = start(motion, jumps, &track);
-    *margin = -1.0;
+    *margin = -INFINITY;
     *jumped = false;
     if (status == HS_OK) {
         find_base(&track);
@@ -387,7 +387,7 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
     }
     if (status == HS_OK) {
         const double found = find_margin(&track);
-        *margin = found >= 0.0 ? found : -1.0; /* also for NaN */
+        *margin = found == found ? found : -INFINITY;
         *jumped = track.jump_of != NULL;
     }
     return status == HS_STATUS_END ? HS_OK : status;

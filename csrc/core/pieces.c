@@ -20,6 +20,11 @@ typedef struct worker {
     hs_piece  *piece; /* that it is working on */
     int32_t   *ids;   /* owned; places in cell order of hits */
     hs_turn    turn;
+    /* Of the block that was looked at last: */
+    int64_t    block; /* candidates that had been tested before it: tells blocks apart; -1: none */
+    bool       has_images;
+    bool      *is_shifted; /* owned; whether a run is in another image ... */
+    int32_t   *shift;      /* owned; ... and which, over the rows as given: m numbers */
 } worker;
 
 struct crew {
@@ -112,49 +117,66 @@ is_negative(const int32_t *shift, int m)
     return shift[r] < 0;
 }
 
-/* The hits of one point, whose places in the block ascend, as do its runs. */
-static hs_status
-note_row(worker *me, int32_t si, int32_t first, int32_t end, const hs_rows *rows)
+/* Finds out about the runs of a block, once. */
+static bool
+look_at_block(worker *me)
 {
-    hs_walker    *walker = &me->walker;
-    const int     m = walker->search->bins.n_periodic;
-    const hs_run *run = walker->block.runs, *known = NULL;
-    int32_t       shift[HS_MAX_DIM];
-    for (int32_t h = first; h < end; h++) {
-        while (run[1].at <= rows->hits[h]) {
-            run++;
-        }
-        if (!has_shift(run, m)) {
-            continue;
-        }
-        if (run != known && !shift_of_run(walker->search, run, shift)) {
-            walker->failed_point = si;
-            return HS_ERR_SHIFT_RANGE;
-        }
-        known = run;
-        const bool turned =
-            me->ids[h] < si || (me->ids[h] == si && is_negative(shift, m));
-        if (!note_shift(me->piece, m, me->piece->pairs.n_pairs + h, turned, shift)) {
-            return HS_ERR_MEMORY;
+    const hs_walker *walker = &me->walker;
+    const hs_block  *block = &walker->block;
+    const int        m = walker->search->bins.n_periodic;
+    if (me->block == walker->n_candidates) {
+        return true;
+    }
+    me->block = walker->n_candidates;
+    me->has_images = false;
+    for (int32_t r = 0; m > 0 && block->runs[r].at < block->n; r++) {
+        me->is_shifted[r] = has_shift(&block->runs[r], m);
+        me->has_images = me->has_images || me->is_shifted[r];
+        if (me->is_shifted[r] &&
+            !shift_of_run(walker->search, &block->runs[r], me->shift + (int64_t)r * m)) {
+            return false;
         }
     }
-    return HS_OK;
+    return true;
+}
+
+/* The hits of one point, whose places in the block ascend, as do its runs. */
+static bool
+note_row(worker *me, int32_t si, int32_t first, int32_t end, const hs_rows *rows)
+{
+    const int     m = me->walker.search->bins.n_periodic;
+    const hs_run *runs = me->walker.block.runs;
+    int32_t       r = 0;
+    for (int32_t h = first; h < end; h++) {
+        while (runs[r + 1].at <= rows->hits[h]) {
+            r++;
+        }
+        if (!me->is_shifted[r]) {
+            continue;
+        }
+        const int32_t *shift = me->shift + (int64_t)r * m;
+        const bool turned = me->ids[h] < si || (me->ids[h] == si && is_negative(shift, m));
+        if (!note_shift(me->piece, m, me->piece->pairs.n_pairs + h, turned, shift)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 static hs_status
 note_shifts(worker *me, int32_t first, const hs_rows *rows)
 {
-    const hs_block *block = &me->walker.block;
-    const int       m = me->walker.search->bins.n_periodic;
-    bool            any = false;
-    for (const hs_run *run = block->runs; m > 0 && run->at < block->n; run++) {
-        any = any || has_shift(run, m);
+    if (!look_at_block(me)) {
+        me->walker.failed_point = first;
+        return HS_ERR_SHIFT_RANGE;
     }
-    hs_status status = HS_OK;
-    for (int32_t row = 0; any && row < rows->n && status == HS_OK; row++) {
-        status = note_row(me, first + row, row > 0 ? rows->end[row - 1] : 0, rows->end[row], rows);
+    for (int32_t row = 0; me->has_images && row < rows->n; row++) {
+        const int32_t begin = row > 0 ? rows->end[row - 1] : 0;
+        if (!note_row(me, first + row, begin, rows->end[row], rows)) {
+            return HS_ERR_MEMORY;
+        }
     }
-    return status;
+    return HS_OK;
 }
 
 /* A hs_visit_fn. */
@@ -214,9 +236,18 @@ open_worker(crew *all, worker *me)
     hs_status status =
         hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
     if (status == HS_OK) {
-        me->ids = hs_alloc(&search->account, HS_FOR_CANDIDATES,
-                           me->walker.block.most_hits + HS_PADDING, sizeof *me->ids);
-        status = me->ids != NULL ? HS_OK : HS_ERR_MEMORY;
+        hs_account     *account = &search->account;
+        const hs_block *block = &me->walker.block;
+        const int64_t   n_runs = block->most_runs + 1;
+        me->ids = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING,
+                           sizeof *me->ids);
+        me->is_shifted =
+            hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
+        me->shift = hs_alloc(account, HS_FOR_CANDIDATES, n_runs * search->bins.n_periodic,
+                             sizeof *me->shift);
+        me->block = -1;
+        status = me->ids != NULL && me->is_shifted != NULL && me->shift != NULL ? HS_OK
+                                                                                : HS_ERR_MEMORY;
     }
     return status;
 }
@@ -246,6 +277,8 @@ run_crew(crew *all, hs_failure *failure)
     }
     for (int w = 0; w < opened; w++) {
         hs_walker_close(all->search, &all->workers[w].walker);
+        hs_free(account, all->workers[w].shift);
+        hs_free(account, all->workers[w].is_shifted);
         hs_free(account, all->workers[w].ids);
     }
     hs_free(account, all->workers);

@@ -19,7 +19,7 @@
 typedef struct hs_refilter {
     const hs_verlet *list;   /* borrowed */
     const hs_frame  *now;    /* the list's */
-    hs_search       *search; /* borrowed: account, options, team, kernel; the scene if it measures */
+    hs_search       *search; /* borrowed: account, options, team, kernel; scene if measuring */
     hs_output       *output; /* borrowed */
     int              d, m;
     int              vector_of_row[HS_MAX_DIM];

@@ -14,6 +14,9 @@
 /* Integers up to here are float64 numbers, and what the batch kernels take. */
 #define WIDEST_SHIFT (INT64_C(1) << 53)
 
+/* Points ahead whose numbers are fetched: they lie anywhere in memory. */
+#define AHEAD 16
+
 enum { IN_BATCH = HS_BATCH + HS_BATCH_PADDING };
 
 /* Some hits, as the batch kernels take them, and what they return. */
@@ -133,9 +136,14 @@ set_coordinates(hs_refilter *refilter)
     const hs_scene *scene = &refilter->search->scene;
     double *const  *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
     const int       d = refilter->d;
-    for (int64_t a = 0; a < refilter->now->points.n; a++) {
+    const int32_t *order = refilter->list->listing.order;
+    const int64_t  n = refilter->now->points.n;
+    for (int64_t a = 0; a < n; a++) {
         for (int k = 0; k < d; k++) {
-            refilter->x[a * d + k] = x[k][refilter->list->listing.order[a]];
+            if (a + AHEAD < n) {
+                HS_PREFETCH(x[k] + order[a + AHEAD]);
+            }
+            refilter->x[a * d + k] = x[k][order[a]];
         }
     }
 }

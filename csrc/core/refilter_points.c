@@ -6,6 +6,8 @@
 #include <math.h>
 
 #define UNIT 0x1p-53
+/* Points ahead whose numbers are fetched: they lie anywhere in memory. */
+#define AHEAD 16
 /* Points that the middle of all is guessed from. */
 #define SAMPLE 1024
 /* Cutoffs between 2^-20 and 2^20 are left alone, as in scene.c. */
@@ -30,6 +32,9 @@ add_counts(hs_refilter *refilter)
     }
     for (int64_t a = 0; a < n; a++) {
         const int64_t *jump = jumps != NULL ? jumps + (int64_t)listing->order[a] * m : NULL;
+        if (jumps != NULL && a + AHEAD < n) {
+            HS_PREFETCH(jumps + (int64_t)listing->order[a + AHEAD] * m);
+        }
         for (int r = 0; r < m; r++) {
             const int64_t count = (listing->counts != NULL ? listing->counts[a * m + r] : 0) +
                                   (jump != NULL ? jump[r] : 0);
@@ -86,9 +91,15 @@ put_floats(const hs_refilter *refilter, hs_scale scale, const double *centre, co
 {
     const int stride = hs_sift_stride(d);
     double    largest[HS_MAX_DIM] = {0.0}, poison[HS_MAX_DIM] = {0.0}, most = 0.0;
-    for (int64_t a = 0; a < refilter->now->points.n; a++) {
+    const int32_t *order = refilter->list->listing.order;
+    const int64_t  n = refilter->now->points.n;
+    for (int64_t a = 0; a < n; a++) {
         double z[HS_MAX_DIM];
         float *y = refilter->y + a * stride;
+        if (a + AHEAD < n) {
+            HS_PREFETCH((const char *)refilter->now->rows +
+                        order[a + AHEAD] * refilter->now->points.row_stride);
+        }
         place_of(refilter, real, a, d, m, z);
         for (int k = 0; k < stride; k++) {
             const float entry =

@@ -38,25 +38,24 @@ put_shifts(const hs_refilter *refilter, hs_sifted *slab)
     }
 }
 
-/* Numbers of the hits, to every `step`-th index. */
-static void
-put_numbers(const int32_t *from, const int32_t *order, const hs_sifted *slab, int index_bytes,
-            int step, void *to)
+/* The caller's number of each hit's point, to every `step`-th index. */
+HS_ALWAYS_INLINE void
+put_numbers(const int32_t *places, const int32_t *order, const hs_sifted *slab, int index_bytes,
+            const int step, void *to)
 {
     const uint16_t *hits = slab->hits;
-    from += slab->first;
     if (to == NULL) {
         return;
     }
     if (index_bytes == 8) {
         int64_t *wide = to;
         for (int32_t h = 0; h < slab->n_hits; h++) {
-            wide[(int64_t)h * step] = order[from[hits[h]]];
+            wide[(int64_t)h * step] = order[places[hits[h]]];
         }
     } else {
         int32_t *narrow = to;
         for (int32_t h = 0; h < slab->n_hits; h++) {
-            narrow[(int64_t)h * step] = order[from[hits[h]]];
+            narrow[(int64_t)h * step] = order[places[hits[h]]];
         }
     }
 }
@@ -67,11 +66,12 @@ hs_refilter_put(const hs_refilter *refilter, hs_sifted *slab)
     const hs_listing *listing = &refilter->list->listing;
     const int         bytes = refilter->output->index_bytes;
     const int32_t    *order = listing->order;
+    const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
     char             *both = hs_refilter_column(refilter, HS_WANT_BOTH, slab->at);
-    put_numbers(listing->i, order, slab, bytes, 1, hs_refilter_column(refilter, HS_WANT_I, slab->at));
-    put_numbers(listing->j, order, slab, bytes, 1, hs_refilter_column(refilter, HS_WANT_J, slab->at));
-    put_numbers(listing->i, order, slab, bytes, 2, both);
-    put_numbers(listing->j, order, slab, bytes, 2, both == NULL ? NULL : both + bytes);
+    put_numbers(i, order, slab, bytes, 1, hs_refilter_column(refilter, HS_WANT_I, slab->at));
+    put_numbers(j, order, slab, bytes, 1, hs_refilter_column(refilter, HS_WANT_J, slab->at));
+    put_numbers(i, order, slab, bytes, 2, both);
+    put_numbers(j, order, slab, bytes, 2, both == NULL ? NULL : both + bytes);
     if (refilter->output->columns & HS_WANT_SHIFT) {
         put_shifts(refilter, slab);
     }

@@ -49,7 +49,8 @@ hs_verlet_look(const hs_verlet *list)
                              .n_listed = list->listing.n_pairs,
                              .cutoff = list->cutoff,
                              .radius = list->listing.radius,
-                             .margin = list->margin};
+                             .margin = list->margin,
+                             .tried = list->tried};
 }
 
 /* cutoff + skin, rounded up. */
@@ -81,7 +82,6 @@ try_to_keep(hs_verlet *list, int next, const hs_options *options, double *margin
                               .cutoff = list->cutoff};
     const int       spare = list->jumps_now == 0 ? 1 : 0;
     bool            jumped = false;
-    *margin = -1.0;
     if (!list->has_list || options->cutoff != list->cutoff ||
         !hs_frames_match(motion.built, motion.now)) {
         return HS_OK;
@@ -118,7 +118,7 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
 {
     const double radius = radius_of(options->cutoff, skin);
     const int    next = spare_frame(list);
-    double       margin = -1.0;
+    double       margin = -INFINITY;
     if (!(options->cutoff >= 0.0) || !isfinite(options->cutoff) || !(skin >= 0.0) ||
         !isfinite(radius)) {
         failure->value = options->cutoff >= 0.0 && isfinite(options->cutoff) ? radius
@@ -138,6 +138,7 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
     }
     if (status == HS_OK) {
         *rebuilt = needed;
+        list->tried = margin;
     }
     return status;
 }

@@ -35,6 +35,7 @@ struct hs_verlet {
     hs_listing listing;
     double     cutoff;
     double     margin;
+    double     tried;        /* the margin of the last step before the list was built for it */
     hs_frame   frames[3];    /* two are in use, one is for the next step */
     int        built, now;   /* numbers of frames: the step it was built for, the last step */
     hs_store   jumps[2];     /* since it was built: those of the last step and of the next */

@@ -132,14 +132,14 @@ typedef struct placing {
     int64_t        *plain, *shifted; /* owned, one for each piece */
 } placing;
 
-/* A pair the way the caller's numbers have it: i < j. Returns whether it had to be turned. */
-HS_ALWAYS_INLINE bool
+/* A pair the way the caller's numbers have it: i < j. Half of them must be turned, without any
+ * pattern: a branch would be mispredicted. */
+HS_ALWAYS_INLINE void
 put_pair(const int32_t *order, int32_t a, int32_t b, hs_listing *listing, int64_t to)
 {
-    const bool turned = order[a] > order[b];
-    listing->i[to] = turned ? b : a;
-    listing->j[to] = turned ? a : b;
-    return turned;
+    const int32_t change = (a ^ b) & -(int32_t)(order[a] > order[b]);
+    listing->i[to] = a ^ change;
+    listing->j[to] = b ^ change;
 }
 
 /* A hs_task_fn: the pairs of one piece to the listing, those with an image behind all others. */
@@ -282,10 +282,10 @@ build(const hs_frame *frame, building *built, const hs_options *options, hs_fail
     hs_search *search = &built->search;
     hs_status  status =
         hs_search_open(&frame->points, hs_frame_box(frame), options, search, failure);
-    if (status != HS_OK) {
-        return status;
+    const bool opened = status == HS_OK;
+    if (status == HS_OK) {
+        status = find(built, failure);
     }
-    status = find(built, failure);
     if (status == HS_OK) {
         status = settle_pairs(built);
     }
@@ -294,8 +294,10 @@ build(const hs_frame *frame, building *built, const hs_options *options, hs_fail
             fmax(failure->expected_pairs, (double)built->listing->n_pairs);
         failure->limit_bytes = search->account.limit;
     }
-    hs_pieces_free(&search->account, &built->pieces);
-    hs_search_close(search);
+    if (opened) {
+        hs_pieces_free(&search->account, &built->pieces);
+        hs_search_close(search);
+    }
     return status;
 }
 

@@ -57,6 +57,10 @@ class VerletList:
     needed (other points, another number or type of them, a box that deformed too much), it is
     built; that is no error.
 
+    A search is so fast that a list saves less than elsewhere: nothing for the indices of many
+    neighbours in three dimensions, something where there are few, or more dimensions, or d and D
+    are wanted. ``docs/verlet.md`` has measurements.
+
     Several threads may use one list, one at a time: the others wait. It cannot be copied or
     pickled.
 
@@ -135,7 +139,7 @@ class VerletList:
         >>> pair_list.pairs("d").tolist()
         [0.95]
         """
-        with self._alone():
+        with _Alone(self):
             return self._update(points, box, periodic)
 
     def _update(self, points: Any, box: Any, periodic: Any) -> bool:
@@ -143,7 +147,7 @@ class VerletList:
         periodic = self._periodic if periodic is None else periodic
         array, vectors, bits = _inputs.scene(points, box, periodic)
         auto = self._auto
-        change = auto is not None and auto.wants_change()
+        change = auto is not None and auto.wants_change(array.shape[1])
         skin = auto.next_skin() if auto is not None else self._skin
         start = perf_counter()
         rebuilt = _core.verlet_update(
@@ -168,7 +172,7 @@ class VerletList:
         if rebuilt:
             self._skin = skin
         if auto is not None:
-            auto.updated(rebuilt, taken, self.margin, array.shape[1])
+            auto.updated(rebuilt, taken, self._state()["tried"], array.shape[1])
         return rebuilt
 
     @overload
@@ -239,7 +243,7 @@ class VerletList:
         >>> i.tolist(), j.tolist(), S.tolist()
         ([0, 0], [1, 2], [[0, 0], [-1, 0]])
         """
-        with self._alone():
+        with _Alone(self):
             state = self._state()
             start = perf_counter()
             arrays = _core.verlet_pairs(
@@ -301,9 +305,6 @@ class VerletList:
         if not state["has_list"]:
             raise RuntimeError("there are no points yet: call update first")
         return state
-
-    def _alone(self) -> _Alone:
-        return _Alone(self)
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a VerletList cannot be copied or pickled: make a new one")
