@@ -26,6 +26,7 @@ __all__ = ["EveryStep", "Lists", "Run", "Stale", "Verlet", "run_nve"]
 Floats = NDArray[np.float64]
 
 _LOOKS = 8  # steps at which the list is held against the truth, the last one among them
+_LAST_LOOKS = 64  # and at most so many steps that are the last ones of their list
 
 
 class Lists(Protocol):
@@ -79,12 +80,12 @@ class Verlet:
 
 
 class Stale:
-    """A list with a skin that is rebuilt by the clock, whatever has moved."""
+    """A list with a skin that is rebuilt by the clock, whatever has moved: each `every` steps."""
 
     def __init__(self, scene: Any, skin: float, every: int) -> None:
         self.builds = 0
         self._options = _search(scene) | {"cutoff": scene.cutoff + skin}
-        self._cutoff, self._inclusive, self._every = scene.cutoff, scene.inclusive, every
+        self._cutoff, self._inclusive, self.every = scene.cutoff, scene.inclusive, every
         self._rows = np.zeros((scene.ndim,) * 2) if scene.box is None else scene.box
         if self._rows.ndim == 1:
             self._rows = np.diag(self._rows)
@@ -93,7 +94,7 @@ class Stale:
 
     def pairs(self, points: Floats) -> Answer:
         """Take the list as it is, and of its pairs those within the cutoff."""
-        if self._steps % self._every == 0:
+        if self._steps % self.every == 0:
             self.builds += 1
             self._listed = tuple(hs.pairs(points, quantities="ijS", **self._options))
         self._steps += 1
@@ -128,6 +129,8 @@ class Run:
 def run_nve(scene: Any, lists: Lists) -> Run:
     """Run the motion of a scene with lists of some kind."""
     looks = set(np.linspace(0, scene.motion.n_steps, _LOOKS + 1)[1:].astype(int).tolist())
+    if isinstance(lists, Stale):
+        looks.update(range(lists.every - 1, scene.motion.n_steps, lists.every)[:_LAST_LOOKS])
     energies: list[float] = []
     found: list[PairErrors] = []
     seconds = 0.0
