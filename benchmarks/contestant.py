@@ -1,33 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What every measured library is to the runner, and our own search as one of them.
 
-An adapter runs its library on one thread, in the cheapest mode that gives the same answer:
-half lists where there are any, indices alone where only indices are asked for, and input of
-the type that the library works on, converted beforehand. Whatever a caller has to do for each
-new set of points (building a tree or a grid) is part of the call.
-
-Libraries are imported when they are first used; a missing one is reported, not an error.
+How a library is called is said in `halfshell._peers`; here is what the runner needs besides:
+keys to compare answers by, counts, batches, and how far rounding may lead it astray.
 """
 
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agreement import Keys, half_keys
+from halfshell._peers import Call, Library
 from scenes import Scene
 
-__all__ = ["Call", "Contestant", "Floats", "Halfshell", "Looped", "in_space", "pin_threads"]
-
-Call = Callable[[], Any]
-Floats = NDArray[np.float64]
+__all__ = ["Call", "Contestant", "Halfshell", "Looped", "pin_threads"]
 
 _THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -46,63 +38,17 @@ def pin_threads() -> None:
         os.environ[name] = "1"
 
 
-class Contestant:
+class Contestant(Library):
     """What the runner needs to know about a library."""
 
-    name: ClassVar[str]
-    distribution: ClassVar[str]
-    module: ClassVar[str]
-    inclusive: ClassVar[bool] = False  # whether a pair at exactly the cutoff counts
-    full: ClassVar[bool] = False  # whether a pair comes in both directions
-    quantities: ClassVar[str] = "ij"
-    dims: ClassVar[tuple[int, ...]] = (3,)
-    flat: ClassVar[bool] = False  # whether a plane can be given as a slab open in z
-    open_space: ClassVar[bool] = True
-    triclinic: ClassVar[bool] = True
-    images: ClassVar[bool] = True
-    counts_alone: ClassVar[bool] = False  # no list of pairs at all
-    float_bits: ClassVar[int] = 53
-    tolerance: ClassVar[float] = 0.0  # relative, beyond rounding
     most_pairs: ClassVar[float] = np.inf  # half pairs that it can list in reasonable time
-
-    def version(self) -> str | None:
-        """Return the installed version, None where it is missing or cannot be imported."""
-        try:
-            importlib.import_module(self.module)
-            return importlib.metadata.version(self.distribution)
-        except ImportError:
-            return None
 
     def refuses(self, scene: Scene) -> str | None:
         """Say why this library cannot do `scene`, or return None."""
-        if scene.dim not in self.dims and not (scene.dim == 2 and self.flat):
-            return f"{scene.dim} dimensions"
-        if scene.box is None and not self.open_space:
-            return "open space"
-        if not scene.orthorhombic and not self.triclinic:
-            return "triclinic box"
-        if scene.has_images and not self.images:
-            return "several images of one pair"
-        if scene.task == "count":
-            return None
-        lacking = set(scene.quantities) - set(self.quantities)
-        if lacking or self.counts_alone:
-            return f"quantities {''.join(sorted(lacking)) or scene.quantities}"
-        if (scene.n_pairs or 0) > self.most_pairs:
+        reason = super().refuses(scene)
+        if reason is None and scene.task == "pairs" and (scene.n_pairs or 0) > self.most_pairs:
             return "too many pairs for its speed"
-        return None
-
-    def prepare(self, scene: Scene) -> Call:
-        """Convert the input, and return the call that is to be timed."""
-        raise NotImplementedError
-
-    def indices(self, result: Any) -> tuple[Any, Any]:
-        """Return i and j of a result. Default: the first two arrays."""
-        return result[0], result[1]
-
-    def shifts(self, result: Any) -> Any:
-        """Return the shifts of a result for `quantities` "ijS". Default: the third array."""
-        return result[2]
+        return reason
 
     def keys(self, scene: Scene, result: Any) -> Keys:
         """Turn a result into keys that can be compared."""
@@ -125,20 +71,6 @@ class Contestant:
             return 0.0
         extent = float(np.abs(scene.points).max()) + scene.cutoff
         return 8.0 * 2.0**-self.float_bits * extent / scene.cutoff + self.tolerance
-
-
-def in_space(scene: Scene) -> tuple[Floats, Floats | None, list[bool]]:
-    """Points, rows of the box and periodic axes, a plane laid at z = 0 in a slab open in z."""
-    rows, periodic = scene.rows, list(scene.periodic) or [False] * 3
-    if scene.dim == 3:
-        return scene.points, rows, periodic
-    points = np.zeros((scene.n, 3))
-    points[:, :2] = scene.points
-    if rows is None:
-        return points, None, [False] * 3
-    slab = np.diag([0.0, 0.0, 2.0 * scene.cutoff])
-    slab[:2, :2] = rows
-    return points, slab, [*scene.periodic, False]
 
 
 class Looped(Contestant):

@@ -3,8 +3,7 @@
 
     python benchmarks/fill_docs.py --results CSV --memory CSV --stages CSV
 
-A section stands between ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. One for which no
-figures are given says so, so that the page never shows figures of another version.
+How sections are marked is said in `marks`.
 """
 
 from __future__ import annotations
@@ -15,24 +14,15 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from marks import EMPTY, Lines, fill, table
 from report import OURS, duration, limit_rows, ratio_rows
 from results import Row, is_ours, read_csv
 from scenes import GROUPS, SCENES, Limit, load
 
 __all__ = ["EMPTY", "SECTIONS", "fill", "main"]
 
-EMPTY = "Not measured for this version yet."
 _PAGE = Path(__file__).resolve().parents[1] / "docs" / "performance.md"
 
-Lines = list[str]
-
-
-def _table(head: Sequence[str], body: Sequence[Sequence[str]]) -> Lines:
-    """Lay out a table in Markdown, nothing where there are no rows."""
-    if not body:
-        return []
-    rule = ["---"] * len(head)
-    return [f"| {' | '.join(row)} |" for row in (head, rule, *body)]
 
 
 def _limits(rows: Sequence[Row], kinds: Sequence[str]) -> list[tuple[Limit, str, float]]:
@@ -87,7 +77,7 @@ def ratios(rows: Sequence[Row]) -> Lines:
         for one in ratio_rows(mine, wanted)
     ]  # fmt: skip
     head = ["scene", "ours", "ns a pair", "fastest other", "ratio", "results dropped", "wanted"]
-    return _table(head, body)
+    return table(head, body)
 
 
 def _star(all_held: bool) -> str:
@@ -106,7 +96,7 @@ def families(rows: Sequence[Row]) -> Lines:
         ]
         for one in ratio_rows(mine, {})
     ]  # fmt: skip
-    return _table(["scene", "ours", "ns a pair", "fastest other", "ratio"], body)
+    return table(["scene", "ours", "ns a pair", "fastest other", "ratio"], body)
 
 
 def exactness(rows: Sequence[Row]) -> Lines:
@@ -119,7 +109,7 @@ def exactness(rows: Sequence[Row]) -> Lines:
         for limit, scene, value in _limits(rows, ("variant", "scene"))
         if "threads" not in limit.options
     ]  # fmt: skip
-    return _table(["scene", "against", "our time over it", "at most"], body)
+    return table(["scene", "against", "our time over it", "at most"], body)
 
 
 def writing(rows: Sequence[Row]) -> Lines:
@@ -134,7 +124,7 @@ def writing(rows: Sequence[Row]) -> Lines:
         [f"`{scene}`", *(cells.get(key, "") for key in ("floor", "at most", "rewrite"))]
         for scene, cells in found.items()
     ]
-    return _table(["scene", "over writing, kept", "at most", "over rewriting, dropped"], body)
+    return table(["scene", "over writing, kept", "at most", "over rewriting, dropped"], body)
 
 
 def growth(rows: Sequence[Row]) -> Lines:
@@ -152,7 +142,7 @@ def growth(rows: Sequence[Row]) -> Lines:
             name.split("-")[1], order, duration(one.fresh_median) + _star(one.all_held),
             f"{one.ns_per_point:.0f}", f"{over[name]:.2f}" if name in over else "",
         ])  # fmt: skip
-    return _table(["points", "order", "time", "ns a point", "over 1e5 random"], body)
+    return table(["points", "order", "time", "ns a point", "over 1e5 random"], body)
 
 
 def threads(rows: Sequence[Row]) -> Lines:
@@ -162,7 +152,7 @@ def threads(rows: Sequence[Row]) -> Lines:
         for limit, scene, value in _limits(rows, ("variant",))
         if "threads" in limit.options
     ]
-    return _table(["scene", "one thread over two", "wanted"], body)
+    return table(["scene", "one thread over two", "wanted"], body)
 
 
 def latency(rows: Sequence[Row]) -> Lines:
@@ -184,7 +174,7 @@ def latency(rows: Sequence[Row]) -> Lines:
             cells += ["" if time is None else duration(time) for time in times]
         body.append([*cells, "" if best is None else best.contestant])
     head = ["scene", "points", "ours, median", "99 %", "other, median", "99 %", "which"]
-    return _table(head, body)
+    return table(head, body)
 
 
 def memory(lines: Sequence[Mapping[str, str]]) -> Lines:
@@ -198,7 +188,7 @@ def memory(lines: Sequence[Mapping[str, str]]) -> Lines:
         for line in lines
     ]  # fmt: skip
     head = ["scene", "quantities", "output", "beyond it", "bytes a point", "allowed"]
-    return _table(head, body)
+    return table(head, body)
 
 
 def stages(lines: Sequence[Mapping[str, str]]) -> Lines:
@@ -208,7 +198,7 @@ def stages(lines: Sequence[Mapping[str, str]]) -> Lines:
         [f"`{line['scene']}`", line["pairs"], *(f"{float(line[key]):.2g}" for key in keys)]
         for line in lines
     ]
-    return _table(
+    return table(
         ["scene", "pairs", "ambiguous", "by float64", "by double words", "by integers"], body
     )
 
@@ -223,19 +213,6 @@ SECTIONS: dict[str, Callable[[Sequence[Row]], Lines]] = {
     "threads": threads,
     "latency": latency,
 }
-
-
-def fill(page: str, sections: Mapping[str, Sequence[str]]) -> str:
-    """Put lines between the marks of each section. Raises ValueError for a missing mark."""
-    for name, lines in sections.items():
-        begin, end = f"<!-- begin: {name} -->", f"<!-- end: {name} -->"
-        head, found, rest = page.partition(begin)
-        tail = rest.partition(end)[2]
-        if not found or end not in rest:
-            raise ValueError(f"no marks of the section {name}")
-        body = "\n".join(lines) or EMPTY
-        page = f"{head}{begin}\n{body}\n{end}{tail}"
-    return page
 
 
 def _lines(path: Path | None) -> list[dict[str, str]]:

@@ -11,6 +11,7 @@ from halfshell._explain import Explanation, explain
 from halfshell._neighbors import coordination, neighbors
 from halfshell._options import kernels
 from halfshell._pairs import pairs
+from halfshell._report import report
 from halfshell._stream import iter_pairs
 from halfshell._table import NeighborTable
 from halfshell._verify import Verdict, verify
@@ -37,6 +38,7 @@ __all__ = [
     "neighbors",
     "pairs",
     "pairs_between",
+    "report",
     "set_cache_limit",
     "verify",
 ]

@@ -7,12 +7,13 @@ import importlib
 import importlib.metadata
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from halfshell._files import InputError, Scene, one_line
+from halfshell._peers import LIBRARIES, Library, Question, wrapped
 
 __all__ = ["PEERS", "PairList", "Peer", "ask_peer", "find_peer"]
 
@@ -48,80 +49,39 @@ class PairList:
         return PairList(i[kept], j[kept], self.S[kept], self.inclusive, self.full)
 
 
-def _module(name: str) -> Any:
-    return importlib.import_module(name)
+def _ask(library: Library, scene: Scene, cutoff: float) -> PairList:
+    """Return the list of a library that tells shifts."""
+    question = _question(scene, cutoff, "ijS")
+    if question.dim > 3:
+        raise InputError(f"{scene.source}: has {question.dim} coordinates; this library knows 3")
+    result = library.prepare(question)()
+    i, j = (np.asarray(part).astype(np.int64) for part in library.indices(result))
+    shifts = np.asarray(library.shifts(result), dtype=np.int64)[:, : question.dim]
+    return PairList(i, j, shifts, library.inclusive, library.full)
 
 
-def _ask_ase(scene: Scene, cutoff: float) -> PairList:
-    return _ask_with_atoms(scene, cutoff, _module("ase.neighborlist").neighbor_list)
-
-
-def _ask_matscipy(scene: Scene, cutoff: float) -> PairList:
-    return _ask_with_atoms(scene, cutoff, _module("matscipy.neighbours").neighbour_list)
-
-
-def _ask_with_atoms(scene: Scene, cutoff: float, search: Callable[..., Any]) -> PairList:
-    points, rows, flags = _in_three_dimensions(scene)
-    atoms = _module("ase").Atoms(positions=points, cell=rows, pbc=flags)
-    return _full_list(scene, *search("ijS", atoms, cutoff))
-
-
-def _ask_matscipy_neighbours(scene: Scene, cutoff: float) -> PairList:
-    points, rows, flags = _in_three_dimensions(scene)
-    cell = rows if rows.any() else None
-    found = _module("matscipy_neighbours").neighbour_list(
-        "ijS", cutoff=cutoff, positions=points, cell=cell, pbc=flags
-    )
-    return _full_list(scene, *found)
-
-
-def _ask_vesin(scene: Scene, cutoff: float) -> PairList:
-    points, rows, flags = _in_three_dimensions(scene)
-    search = _module("vesin").NeighborList(cutoff=cutoff, full_list=True)
-    return _full_list(scene, *search.compute(points, rows, flags, "ijS"))
-
-
-def _ask_scipy(scene: Scene, cutoff: float) -> PairList:
-    points = np.asarray(scene.points, dtype=np.float64)
-    lengths = np.zeros(points.shape[1])  # 0: the axis does not repeat
-    if any(scene.periodic):
-        rows = scene.box_rows
-        assert rows is not None
-        repeating = np.array(scene.periodic)
-        if (rows - np.diag(rows.diagonal()))[repeating].any() or (rows.diagonal() < 0).any():
+def _ask_scipy(library: Library, scene: Scene, cutoff: float) -> PairList:
+    """Return its list, with the shifts of the nearest images, which are those it means."""
+    question = _question(scene, cutoff, "ij")
+    lengths = np.zeros(question.dim)  # 0: the axis does not repeat
+    if question.rows is not None:
+        if not question.orthorhombic or (np.diag(question.rows)[list(scene.periodic)] < 0).any():
             raise InputError(f"{scene.source}: scipy has no boxes with other than right angles")
-        lengths[repeating] = rows.diagonal()[repeating]
-        outside = repeating & ((points < 0) | (points >= lengths)).any(axis=0)
-        if outside.any():
+        lengths = np.where(scene.periodic, np.diag(question.rows), 0.0)
+        if wrapped(question)[1]:
             raise InputError(f"{scene.source}: scipy wants all points in the box [0, L)")
-    tree = _module("scipy.spatial").KDTree(points, boxsize=lengths)
-    pairs = tree.query_pairs(cutoff, output_type="ndarray")
-    i, j = pairs.astype(np.int64).T
+    i, j = (part.astype(np.int64) for part in library.indices(library.prepare(question)()))
     with np.errstate(divide="ignore", invalid="ignore"):
-        shifts = np.where(lengths > 0, np.rint((points[i] - points[j]) / lengths), 0.0)
-    return PairList(i, j, shifts.astype(np.int64), inclusive=True, full=False)
+        turns = np.rint((question.points[i] - question.points[j]) / lengths)
+    shifts = np.where(lengths > 0, turns, 0.0)
+    return PairList(i, j, shifts.astype(np.int64), library.inclusive, library.full)
 
 
-def _full_list(scene: Scene, i: Any, j: Any, S: Any) -> PairList:
-    """Return a list with both directions and the rule ``d < cutoff``."""
-    ndim = scene.points.shape[1]
-    shifts = np.asarray(S, dtype=np.int64)[:, :ndim]
-    return PairList(i.astype(np.int64), j.astype(np.int64), shifts, inclusive=False, full=True)
-
-
-def _in_three_dimensions(
-    scene: Scene,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[bool]]:
-    """Return points (n, 3), box (3, 3) and flags; axes that are added do not repeat."""
-    n, ndim = scene.points.shape
-    if ndim > 3:
-        raise InputError(f"{scene.source}: has {ndim} coordinates; this library knows 3")
-    points = np.zeros((n, 3))
-    points[:, :ndim] = scene.points
-    rows = np.zeros((3, 3))
-    if scene.box_rows is not None:
-        rows[:ndim, :ndim] = scene.box_rows
-    return points, rows, [*scene.periodic, *[False] * (3 - ndim)]
+def _question(scene: Scene, cutoff: float, quantities: str) -> Question:
+    points = np.asarray(scene.points, dtype=np.float64)
+    rows = scene.box_rows
+    return Question(points, cutoff, rows, tuple(scene.periodic) if rows is not None else (),
+                    quantities)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -140,14 +100,17 @@ class Peer:
             return self.package
 
 
+def _peer(name: str, ask: Callable[[Library, Scene, float], PairList]) -> Peer:
+    library = LIBRARIES[name]
+    return Peer((library.module,), library.distribution, partial(ask, library))
+
+
 PEERS = {
-    "ase": Peer(("ase.neighborlist",), "ase", _ask_ase),
-    "matscipy": Peer(("matscipy.neighbours", "ase"), "matscipy", _ask_matscipy),
-    "matscipy-neighbours": Peer(
-        ("matscipy_neighbours",), "matscipy-neighbours", _ask_matscipy_neighbours
-    ),
-    "scipy": Peer(("scipy.spatial",), "scipy", _ask_scipy),
-    "vesin": Peer(("vesin",), "vesin", _ask_vesin),
+    "ase": _peer("ase", _ask),
+    "matscipy": _peer("matscipy", _ask),
+    "matscipy-neighbours": _peer("matscipy-neighbours", _ask),
+    "scipy": _peer("cKDTree", _ask_scipy),
+    "vesin": _peer("vesin", _ask),
 }
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``halfshell pairs``, ``verify``, ``info`` and ``selftest``.
+"""The command line: ``halfshell pairs``, ``verify``, ``report``, ``info`` and ``selftest``.
 
-Exit status: 0 done; 1 a check failed (``verify``, ``selftest``); 2 the input or an option is
-wrong, said in one line on standard error; 130 interrupted.
+Exit status: 0 done; 1 a check failed (``verify``, ``report``, ``selftest``); 2 the input or an
+option is wrong, said in one line on standard error; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -79,6 +79,7 @@ def _parser() -> _Parser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_pairs(commands)
     _add_verify(commands)
+    _add_report(commands)
     info = commands.add_parser("info", help="what this installation consists of")
     info.add_argument("--json", action="store_true", help="the same for machines")
     info.set_defaults(run=_run_info)
@@ -168,6 +169,16 @@ def _add_verify(commands: Any) -> None:
     command.set_defaults(run=_run_verify)
 
 
+def _add_report(commands: Any) -> None:
+    from halfshell import _cli_report
+
+    command = commands.add_parser(
+        "report", help="error against run time, ours and other libraries', on hard scenes"
+    )
+    _cli_report.add_options(command)
+    command.set_defaults(run=_run_report)
+
+
 def _cutoff(text: str) -> float:
     value = _number(text)
     if value < 0:
@@ -227,6 +238,12 @@ def _run_verify(args: argparse.Namespace) -> int:
     from halfshell import _cli_verify
 
     return _cli_verify.run(args)
+
+
+def _run_report(args: argparse.Namespace) -> int:
+    from halfshell import _cli_report
+
+    return _cli_report.run(args)
 
 
 def _run_selftest(args: argparse.Namespace) -> int:

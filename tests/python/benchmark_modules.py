@@ -16,8 +16,7 @@ BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 MODULES = (
     "scenes", "agreement", "contestant", "peers", "full_peers", "measure", "machine", "report",
     "results", "runner", "run", "stages", "footprint", "check_scenes", "extreme", "compare",
-    "plot",
-    "fill_docs", "reproduce",
+    "plot", "marks", "fill_docs", "fill_errors", "reproduce",
 )  # fmt: skip
 
 only_in_a_checkout = pytest.mark.skipif(not BENCHMARKS.exists(), reason="only in a checkout")

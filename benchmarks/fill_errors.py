@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fill the marked sections of docs/errors.md from a report.
+
+    halfshell report -o docs/report
+    python benchmarks/fill_errors.py docs/report/report.csv
+
+How sections are marked is said in `marks`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from halfshell._report.rows import ReportRow, read_csv
+from halfshell._report.table import SUMMARY, method_label, summary_cells
+from halfshell._report.words import duration, findings, methods_of, number, ratios
+from marks import Lines, fill, table
+
+__all__ = ["SECTIONS", "fill_page", "main"]
+
+_DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+Facts = Mapping[str, str]
+Rows = Sequence[ReportRow]
+
+
+def machine(facts: Facts, rows: Rows) -> Lines:
+    """Say where, when and with what the figures were measured."""
+    versions = {row.method: row.version for row in rows if row.kind == "peer" and row.version}
+    others = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return [
+        f"{facts['cpu']}, {facts['cores']} cores, one thread used, {facts['machine']}; halfshell",
+        f"{facts['halfshell']}, kernel {facts['kernel']}, Python {facts['python']}, NumPy "
+        f"{facts['numpy']}, SciPy {facts['scipy']}. Measured on {facts['date'][:10]}, on "
+        f"{len({row.scene for row in rows})} scenes of up to "
+        f"{max(row.points for row in rows):,} points.",
+        f"Others: {others}." if others else "Other libraries were not asked.",
+    ]
+
+
+def found(facts: Facts, rows: Rows) -> Lines:
+    """The words of the report."""
+    return [f"* {text}" for text in findings(rows)]
+
+
+def methods(facts: Facts, rows: Rows) -> Lines:
+    """One line a method."""
+    return table(SUMMARY, summary_cells(rows))
+
+
+def scenes(facts: Facts, rows: Rows) -> Lines:
+    """Wrong pairs of every method on every scene where anybody errs or fails."""
+    plain = [row for row in rows if row.kind in ("halfshell", "peer")]
+    names = methods_of(plain, "halfshell", "peer")
+    body = []
+    for scene in dict.fromkeys(row.scene for row in plain):
+        mine = {row.method: row for row in plain if row.scene == scene}
+        first = next((row for row in mine.values() if row.pairs_true is not None), None)
+        if first is None or not any(_notable(row) for row in mine.values()):
+            continue
+        body.append([f"`{scene}`", f"{first.pairs_true:,}", f"{first.ties:,}",
+                     *(_cell(mine.get(name)) for name in names)])  # fmt: skip
+    return table(["scene", "pairs", "at the cutoff", *names], body)
+
+
+def _notable(row: ReportRow) -> bool:
+    return bool(row.wrong) or row.status in ("failed", "crashed", "timed out")
+
+
+def _cell(row: ReportRow | None) -> str:
+    if row is None or row.status in ("left out", "not installed"):
+        return ""
+    if row.status != "ok":
+        return "-" if row.status == "not offered" else row.status
+    return number(row.wrong) if row.wrong == 0 else f"**{number(row.wrong)}**"
+
+
+def cost(facts: Facts, rows: Rows) -> Lines:
+    """What the exact decision costs, scene by scene."""
+    double, single = (ratios(rows, "exact", other) for other in ("double", "single"))
+    times = {row.scene: row.seconds_least for row in rows
+             if row.kind == "halfshell" and row.method == "exact"}  # fmt: skip
+    body = [
+        [f"`{scene}`", duration(times[scene]), f"{double[scene]:.2f}",
+         f"{single[scene]:.2f}" if scene in single else ""]
+        for scene in double
+    ]  # fmt: skip
+    return table(["scene", "exact", "over double", "over single"], body)
+
+
+def kept(facts: Facts, rows: Rows) -> Lines:
+    """Lists that are kept over steps."""
+    body = [
+        [f"`{row.scene}`", method_label(row), number(row.builds), f"{row.steps}",
+         number(row.missed), number(row.drift_kinetic)]
+        for row in rows
+        if row.kind == "reuse" and row.status == "ok"
+    ]  # fmt: skip
+    return table(["scene", "lists", "built", "steps", "missed", "energy drift"], body)
+
+
+def failures(facts: Facts, rows: Rows) -> Lines:
+    """What libraries said instead of an answer."""
+    body = [
+        [f"`{row.scene}`", row.method, row.status, row.note.replace("|", "/")]
+        for row in rows
+        if row.kind == "peer" and row.status in ("failed", "crashed")
+    ]
+    return table(["scene", "library", "", "what it said"], body)
+
+
+SECTIONS: dict[str, Callable[[Facts, Rows], Lines]] = {
+    "machine": machine,
+    "found": found,
+    "methods": methods,
+    "scenes": scenes,
+    "cost": cost,
+    "kept": kept,
+    "failures": failures,
+}
+
+
+def fill_page(page: str, report: Path) -> str:
+    """Return the page with every section filled from a report."""
+    with report.open(newline="", encoding="utf-8") as stream:
+        facts, rows = read_csv(stream)
+    return fill(page, {name: make(facts, rows) for name, make in SECTIONS.items()})
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("report", type=Path, metavar="CSV", help="of halfshell report")
+    parser.add_argument("--page", type=Path, default=_DOCS / "errors.md", metavar="MD")
+    options = parser.parse_args(arguments)
+    page = fill_page(options.page.read_text(encoding="utf-8"), options.report)
+    options.page.write_text(page, encoding="utf-8")
+    print(f"wrote {options.page}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,120 @@
+"""What the report says: words, tables, figures, and the page that holds them all."""
+
+import base64
+import io
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+import halfshell as hs
+from halfshell._peers import LIBRARIES
+from halfshell._report import figures, html, table, words
+from halfshell._report.facts import machine_facts
+from report_helpers import bare, parse, row
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Two scenes, one of which moves, by every method of ours and SciPy's tree."""
+    return hs.report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
+
+
+def test_words_say_what_the_rows_say():
+    said = words.findings([
+        row("exact", d_max_ulp=0.0), row("double", missed=3, seconds_least=0.5, d_max_ulp=1.0),
+        row("other", "peer", spurious=1, version="2"), bare("gone", "not installed"),
+    ])  # fmt: skip
+    text = "\n".join(said)
+    assert "Precision 'exact' gave 1 list with 1,000 pairs in all, and every one was right." in text
+    assert "1 of the lists is wrong, by 3 pairs. Worst on s: 3 missed of 1,000 pairs." in text
+    assert "2.00 times as long as 'double'" in text
+    assert "off by 1 unit in the last place" in text
+    assert "gone: not installed; no list to judge." in text
+
+
+def test_words_on_a_scene_tell_right_from_wrong():
+    said = words.scene_words([
+        row("exact"), row("single", missed=1, spurious=2),
+        bare("other", "crashed", note="ended by SIGABRT"), bare("more", "not offered", note="2-D"),
+    ])  # fmt: skip
+    assert said == (
+        "Right: exact. Wrong: single (1 missed, 2 spurious). "
+        "No answer: other (crashed: ended by SIGABRT). Not offered: more (2-D)."
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, ""), (0, "0"), (7, "7"), (12345, "12,345"), (0.5, "0.5"), (1e10, "1.0e+10"),
+     (math.inf, "inf"), (3e-17, "3e-17"), (99.9, "100"), (9.96, "10"), (580.4, "580")],
+)  # fmt: skip
+def test_numbers_are_short(value, text):
+    assert words.number(value) == text
+
+
+def test_durations_have_units():
+    assert [words.duration(x) for x in (2.0, 3e-3, 4e-6, None)] == ["2 s", "3 ms", "4 µs", ""]
+
+
+def test_tables_have_a_line_a_method(rows):
+    from rich.console import Console
+
+    stream = io.StringIO()
+    console = Console(file=stream, width=80)
+    console.print(table.summary_table(rows))
+    for name in ("near-ties", "head-on"):
+        console.print(table.scene_table([row for row in rows if row.scene == name]))
+    console.print(table.scene_table([bare("other", "crashed", note="by SIGABRT")]))
+    text = stream.getvalue()
+    assert max(map(len, text.splitlines())) <= 80
+    assert re.search(r"exact +2 +0 +0 +0 +0 +0 +0", text)
+    assert re.search(r"single +<= .* spurious", text)
+    assert "other: crashed: by SIGABRT" in text
+    assert "…" not in text
+
+
+def test_the_page_is_well_formed_and_needs_nothing_else(rows):
+    page = html.page(machine_facts(), rows)
+    tree = parse(page)
+    assert "http" not in re.sub(r"base64,[^\"]*", "", page)
+    for element in tree.iter():
+        assert element.tag not in ("script", "link", "iframe", "object")
+        for name, value in element.attrib.items():
+            if name in ("src", "href"):
+                assert value.startswith("data:image/svg+xml;base64,")
+    images = [element.get("src") for element in tree.iter("img")]
+    assert len(images) >= 5
+    for image in images:
+        svg = ElementTree.fromstring(base64.b64decode(image.partition(",")[2]))
+        assert svg.tag == "{http://www.w3.org/2000/svg}svg"
+    text = " ".join(tree.itertext())
+    assert "every one was right" in text and "near-ties" in text
+    assert len(page) < 500_000
+
+
+def test_what_a_library_says_cannot_break_the_page(rows):
+    note = '<script>alert("&")</script> \x1b[31m'
+    page = html.page(machine_facts(), [*rows, bare("vesin", "failed", note=note)])
+    parse(page)
+    assert "<script>" not in page
+
+
+def test_zero_and_infinity_have_a_place_in_the_figures(rows):
+    odd = [row("exact", d_max_ulp=0.0, force_error=0.0),
+           row("single", missed=5, d_max_ulp=math.inf, force_error=math.inf)]  # fmt: skip
+    svg = figures.to_svg(figures.scene_figure(odd)).decode()
+    assert ">0<" in svg and ">∞<" in svg
+    assert figures.scene_figure([bare("vesin", "crashed")]) is None
+    assert figures.cost_figure([row("exact")]) is None
+    assert figures.drift_figure([row("exact")]) is None
+
+
+def test_figures_are_the_same_bytes_each_time(rows):
+    for make in (figures.map_figure, figures.cost_figure, figures.drift_figure):
+        assert figures.to_svg(make(rows)) == figures.to_svg(make(rows))
+
+
+def test_every_method_has_a_mark():
+    assert set(figures.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
