@@ -12,8 +12,6 @@
 #define ORDINARY_EXPONENT 20
 /* Scaled coordinates stay below 2^900, so that sums of a few of them are finite. */
 #define LARGEST_EXPONENT 900
-/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
-#define SCALING_LOSS 0x1p-1000
 #define UNIT 0x1p-53 /* unit roundoff of float64 */
 
 /* x = m 2^e with 1 <= m < 2: e; for 0 the smallest int there is. */
@@ -49,10 +47,11 @@ box_magnitudes(const hs_box *box)
     return found;
 }
 
-/* The exponent to scale by, and whether that loses digits. asking: the other cloud, or NULL. */
+/* The exponent to scale by, and whether that loses digits. asking: the other cloud, or NULL. least:
+ * as hs_sets.least_cutoff. */
 static int
 choose_exponent(const hs_cloud *cloud, const hs_cloud *asking, const hs_box *box, double cutoff,
-                bool *extreme)
+                double least, bool *extreme)
 {
     const magnitudes found = box_magnitudes(box);
     /* With cutoff 0 the scene has another length to go by: its box, or where its points are. */
@@ -72,6 +71,7 @@ choose_exponent(const hs_cloud *cloud, const hs_cloud *asking, const hs_box *box
         double smallest = fmin(found.smallest, hs_cloud_smallest(cloud));
         smallest = asking != NULL ? fmin(smallest, hs_cloud_smallest(asking)) : smallest;
         smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
+        smallest = least > 0.0 ? fmin(smallest, least) : smallest;
         *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
     }
     return exponent;
@@ -101,7 +101,7 @@ bound_errors(hs_scene *scene, double magnitude)
     for (int k = 0; k < scene->ndim; k++) {
         largest = hs_larger(scene->x_largest[k], largest);
     }
-    scene->x_error = scene->extreme ? SCALING_LOSS : 0.0;
+    scene->x_error = scene->extreme ? HS_SCALING_LOSS : 0.0;
     if (!lattice->aligned) {
         const double terms = 2 * lattice->n_periodic + 2;
         scene->x_error += 2.0 * UNIT * largest + terms * terms * 0x1p-104 * magnitude;
@@ -336,19 +336,20 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
 
 /* Scale, cutoff and lattice. */
 static void
-settle_unit(const hs_box *box, const hs_options *options, hs_scene *scene,
+settle_unit(const hs_sets *sets, const hs_box *box, const hs_options *options, hs_scene *scene,
             const hs_scene *asking)
 {
     const int exponent = choose_exponent(&scene->cloud, asking != NULL ? &asking->cloud : NULL,
-                                         box, options->cutoff, &scene->extreme);
+                                         box, options->cutoff, sets->least_cutoff,
+                                         &scene->extreme);
     scene->scale = hs_scale_of(exponent);
     scene->unscale = hs_scale_of(-scene->scale.exponent);
     scene->cutoff = hs_scale_apply(scene->scale, options->cutoff);
     scene->cutoff_low = scene->cutoff;
     if (scene->extreme && options->cutoff > 0.0) {
         /* The scaled cutoff may have been rounded or flushed: take bounds. */
-        scene->cutoff_low -= SCALING_LOSS;
-        scene->cutoff += SCALING_LOSS;
+        scene->cutoff_low -= HS_SCALING_LOSS;
+        scene->cutoff += HS_SCALING_LOSS;
     }
     /* Without points nothing has an image, however small the box is. */
     const bool empty = scene->n == 0 || (asking != NULL && asking->n == 0);
@@ -376,7 +377,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
         status = load_clouds(account, team, sets, options, scene, asking, failure);
     }
     if (status == HS_OK) {
-        settle_unit(box, options, scene, asking);
+        settle_unit(sets, box, options, scene, asking);
         if (asking != NULL) {
             hs_scene_share(scene, asking);
         }

@@ -11,6 +11,9 @@
 #include "memory.h"
 #include "points.h"
 
+/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
+#define HS_SCALING_LOSS 0x1p-1000
+
 typedef struct hs_scene {
     int        ndim;
     int64_t    n;
@@ -43,6 +46,8 @@ typedef struct hs_sets {
     const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
+    double           least_cutoff; /* the smallest positive length that pairs are compared with,
+                                    * where there are several; 0: the cutoff alone */
 } hs_sets;
 
 /*
