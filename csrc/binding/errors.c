@@ -31,6 +31,17 @@ raise_at(const char *format, const hs_failure *failure)
     return NULL;
 }
 
+static PyObject *
+raise_of_row(const char *format, const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError, format, (long long)failure->row, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
 /* The same for entries of the box of one system out of many. */
 static PyObject *
 raise_box_of_system(const hs_failure *failure)
@@ -159,7 +170,10 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                                  "cutoff must be finite and not negative, got %R",
                                  failure->value);
     case HS_ERR_NOT_FINITE:
-        return raise_at("points must be finite, got points[%lld, %lld] = %R", failure);
+        return raise_at(failure->in_queries
+                            ? "queries must be finite, got queries[%lld, %lld] = %R"
+                            : "points must be finite, got points[%lld, %lld] = %R",
+                        failure);
     case HS_ERR_BOX_FINITE:
         return failure->system >= 0
                    ? raise_box_of_system(failure)
@@ -169,11 +183,24 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
         return raise_with_number(PyExc_OverflowError,
                                  "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
                                  failure->value);
+    case HS_ERR_EDGES:
+        return raise_of_row("edges must be finite, not negative and ascending, got edges[%lld] = %R",
+                            failure);
+    case HS_ERR_TYPES:
+        return raise_of_row(failure->in_queries
+                                ? "types must be from 0 on, got query_types[%lld] = %R"
+                                : "types must be from 0 on, got types[%lld] = %R",
+                            failure);
+    case HS_ERR_WEIGHTS:
+        return raise_of_row(failure->in_queries
+                                ? "query_weights must be finite, got query_weights[%lld] = %R"
+                                : "weights must be finite, got weights[%lld] = %R",
+                            failure);
     case HS_ERR_SHIFT_RANGE:
         PyErr_Format(PyExc_OverflowError,
-                     "points[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
+                     "%s[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
                      "and S holds 2**31; wrap the points first",
-                     (long long)failure->row);
+                     failure->in_queries ? "queries" : "points", (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
     case HS_ERR_CAPACITY: return raise_capacity(failure);

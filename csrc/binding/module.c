@@ -10,6 +10,7 @@
 static PyMethodDef methods[] = {
     {"pairs", FASTCALL(hs_py_pairs), METH_FASTCALL, "See halfshell.pairs."},
     {"count_pairs", FASTCALL(hs_py_count_pairs), METH_FASTCALL, "See halfshell.count_pairs."},
+    {"histogram", FASTCALL(hs_py_histogram), METH_FASTCALL, "See halfshell.pair_histogram."},
     {"plain_pairs", FASTCALL(hs_py_plain_pairs), METH_FASTCALL,
      "pairs of plain arguments, or NotImplemented."},
     {"plain_count", FASTCALL(hs_py_plain_count), METH_FASTCALL,
