@@ -80,20 +80,54 @@ take_threads(PyObject *object, int64_t n_points, hs_options *options)
     return true;
 }
 
+static bool
+take_queries(PyObject *object, hs_call *call)
+{
+    const hs_points *points = &call->points, *queries = &call->queries;
+    call->has_queries = object != Py_None;
+    if (!call->has_queries) {
+        return true;
+    }
+    if (!hs_points_of(object, "queries", &call->queries)) {
+        return false;
+    }
+    if (queries->ndim != points->ndim) {
+        PyErr_Format(PyExc_ValueError,
+                     "queries and points must have the same number of columns, got shapes "
+                     "(%lld, %d) and (%lld, %d)",
+                     (long long)queries->n, queries->ndim, (long long)points->n, points->ndim);
+        return false;
+    }
+    return true;
+}
+
+static int64_t
+count_points(const hs_call *call)
+{
+    return call->points.n + (call->has_queries ? call->queries.n : 0);
+}
+
 bool
 hs_call_init(hs_call *call, PyObject *const *arguments)
+{
+    return hs_call_init_sets(call, arguments, Py_None);
+}
+
+bool
+hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries)
 {
     call->options = hs_options_default();
     call->thread = NULL;
     hs_options *options = &call->options;
     const int   inclusive = PyObject_IsTrue(arguments[4]);
-    if (inclusive < 0 || !hs_points_of(arguments[0], &call->points) ||
+    if (inclusive < 0 || !hs_points_of(arguments[0], "points", &call->points) ||
+        !take_queries(queries, call) ||
         !hs_cutoff_of(arguments[1], &options->cutoff) ||
         !hs_box_of(arguments[2], arguments[3], call->points.ndim, &call->box, &call->has_box) ||
         !hs_precision_of(arguments[5], &options->precision) ||
         !hs_kernel_of(arguments[6], &options->kernel) ||
         !take_memory_limit(arguments[7], options) ||
-        !take_threads(arguments[9], call->points.n, options)) {
+        !take_threads(arguments[9], count_points(call), options)) {
         return false;
     }
     options->inclusive = inclusive != 0;
@@ -106,7 +140,7 @@ hs_call_init(hs_call *call, PyObject *const *arguments)
 void
 hs_call_release(hs_call *call)
 {
-    if (call->points.n >= FEW_POINTS) {
+    if (count_points(call) >= FEW_POINTS) {
         call->thread = PyEval_SaveThread();
     }
 }

@@ -11,6 +11,8 @@
  * alive. */
 typedef struct hs_call {
     hs_points      points;
+    hs_points      queries;  /* when has_queries */
+    bool           has_queries;
     hs_box         box;
     bool           has_box;
     hs_options     options;
@@ -26,6 +28,9 @@ typedef struct hs_call {
 enum { HS_CALL_ARGUMENTS = 10 };
 bool hs_call_init(hs_call *call, PyObject *const *arguments);
 
+/* The same for two sets. queries: None, or an array as points, with as many columns. */
+bool hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries);
+
 /* Release and take the GIL around a call of the core; poll() takes it in between. With few points
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_call_release(hs_call *call);
@@ -36,6 +41,13 @@ static inline const hs_box *
 hs_call_box(const hs_call *call)
 {
     return call->has_box ? &call->box : NULL;
+}
+
+/* The queries, or NULL where there is one set. */
+static inline const hs_points *
+hs_call_queries(const hs_call *call)
+{
+    return call->has_queries ? &call->queries : NULL;
 }
 
 #endif

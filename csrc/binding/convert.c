@@ -5,28 +5,28 @@
 #include <string.h>
 
 bool
-hs_points_of(PyObject *object, hs_points *points)
+hs_points_of(PyObject *object, const char *name, hs_points *points)
 {
     if (!PyArray_Check(object)) {
-        PyErr_Format(PyExc_TypeError, "points must be an array, got %s",
+        PyErr_Format(PyExc_TypeError, "%s must be an array, got %s", name,
                      Py_TYPE(object)->tp_name);
         return false;
     }
     PyArrayObject *array = (PyArrayObject *)object;
     const int      type = PyArray_TYPE(array);
     if ((type != NPY_FLOAT && type != NPY_DOUBLE) || PyArray_ISBYTESWAPPED(array)) {
-        PyErr_SetString(PyExc_TypeError, "points must be native float32 or float64");
+        PyErr_Format(PyExc_TypeError, "%s must be native float32 or float64", name);
         return false;
     }
     if (PyArray_NDIM(array) != 2) {
-        PyErr_Format(PyExc_ValueError, "points must have shape (n, d), got %d dimension%s",
+        PyErr_Format(PyExc_ValueError, "%s must have shape (n, d), got %d dimension%s", name,
                      PyArray_NDIM(array), PyArray_NDIM(array) == 1 ? "" : "s");
         return false;
     }
     const npy_intp d = PyArray_DIM(array, 1);
     if (d < 1 || d > HS_MAX_DIM) {
         PyErr_Format(PyExc_ValueError,
-                     "points must have shape (n, d) with 1 <= d <= %d, got d = %zd", HS_MAX_DIM,
+                     "%s must have shape (n, d) with 1 <= d <= %d, got d = %zd", name, HS_MAX_DIM,
                      (Py_ssize_t)d);
         return false;
     }
@@ -69,13 +69,29 @@ hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *giv
     return true;
 }
 
-/* The bit of a letter in "ijdDSP" is its HS_WANT_ bit. */
+/* The bit of a letter of HS_LETTERS is its HS_WANT_ bit. */
 _Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 &&
                    HS_WANT_VECTOR == 8 && HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32,
                "hs_quantities_of counts on this");
 
+/* "i j d", with spaces, for a message. */
+static void
+refuse_quantities(const char *known, PyObject *object)
+{
+    char   text[2 * sizeof HS_LETTERS];
+    size_t n = 0;
+    for (const char *letter = known; *letter != '\0'; letter++) {
+        text[n++] = *letter;
+        text[n++] = ' ';
+    }
+    text[n - 1] = '\0';
+    PyErr_Format(PyExc_ValueError,
+                 "quantities must be some of the letters %s, each at most once, got %R", text,
+                 object);
+}
+
 bool
-hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
+hs_quantities_of(PyObject *object, const char *known, const char **letters, unsigned *want)
 {
     unsigned seen = 0;
     if (!PyUnicode_Check(object)) {
@@ -87,8 +103,8 @@ hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
         return false;
     }
     for (const char *letter = *letters; *letter != '\0'; letter++) {
-        const char *known = strchr("ijdDSP", *letter);
-        const unsigned bit = known != NULL ? 1u << (known - "ijdDSP") : 0;
+        const bool     is_known = strchr(known, *letter) != NULL;
+        const unsigned bit = is_known ? 1u << (strchr(HS_LETTERS, *letter) - HS_LETTERS) : 0;
         if (bit == 0 || (seen & bit)) {
             seen = 0;
             break;
@@ -97,13 +113,9 @@ hs_quantities_of(PyObject *object, const char **letters, unsigned *want)
     }
     *want = seen;
     if (seen == 0) {
-        PyErr_Format(PyExc_ValueError,
-                     "quantities must be some of the letters i j d D S P, each at most once, "
-                     "got %R",
-                     object);
-        return false;
+        refuse_quantities(known, object);
     }
-    return true;
+    return seen != 0;
 }
 
 bool

@@ -10,8 +10,9 @@
 
 #include "../halfshell.h"
 
-/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. */
-bool hs_points_of(PyObject *object, hs_points *points);
+/* A native float32 or float64 array of shape (n, d), 1 <= d <= 8. The view borrows from it. `name`
+ * is that of the argument, for messages. */
+bool hs_points_of(PyObject *object, const char *name, hs_points *points);
 
 /*
  * box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). periodic: int, bit
@@ -19,9 +20,10 @@ bool hs_points_of(PyObject *object, hs_points *points);
  */
 bool hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given);
 
-/* A string of the letters i j d D S P, each at most once, and its HS_WANT_ bits; P wants i and
- * j. */
-bool hs_quantities_of(PyObject *object, const char **letters, unsigned *want);
+/* A string of the known letters, which are some of HS_LETTERS, each at most once, and its HS_WANT_
+ * bits. */
+#define HS_LETTERS "ijdDSP"
+bool hs_quantities_of(PyObject *object, const char *known, const char **letters, unsigned *want);
 
 bool hs_precision_of(PyObject *object, hs_precision *precision);
 

@@ -19,12 +19,20 @@ raise_with_number(PyObject *type, const char *format, double value)
     return NULL;
 }
 
+/* The argument that a failure's row is of. */
+static const char *
+set_of(const hs_failure *failure)
+{
+    return failure->in_queries ? "queries" : "points";
+}
+
 static PyObject *
-raise_at(const char *format, const hs_failure *failure)
+raise_not_finite(const hs_failure *failure)
 {
     PyObject *number = PyFloat_FromDouble(failure->value);
     if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, format, (long long)failure->row,
+        PyErr_Format(PyExc_ValueError, "%s must be finite, got %s[%lld, %lld] = %R",
+                     set_of(failure), set_of(failure), (long long)failure->row,
                      (long long)failure->column, number);
         Py_DECREF(number);
     }
@@ -37,6 +45,18 @@ raise_of_row(const char *format, const hs_failure *failure)
     PyObject *number = PyFloat_FromDouble(failure->value);
     if (number != NULL) {
         PyErr_Format(PyExc_ValueError, format, (long long)failure->row, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_box(const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError, "box must be finite, got box[%lld, %lld] = %R",
+                     (long long)failure->row, (long long)failure->column, number);
         Py_DECREF(number);
     }
     return NULL;
@@ -169,23 +189,17 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
         return raise_with_number(PyExc_ValueError,
                                  "cutoff must be finite and not negative, got %R",
                                  failure->value);
-    case HS_ERR_NOT_FINITE:
-        return raise_at(failure->in_queries
-                            ? "queries must be finite, got queries[%lld, %lld] = %R"
-                            : "points must be finite, got points[%lld, %lld] = %R",
-                        failure);
+    case HS_ERR_NOT_FINITE: return raise_not_finite(failure);
     case HS_ERR_BOX_FINITE:
-        return failure->system >= 0
-                   ? raise_box_of_system(failure)
-                   : raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
+        return failure->system >= 0 ? raise_box_of_system(failure) : raise_box(failure);
     case HS_ERR_BOX_DEPENDENT: return raise_dependent(failure);
     case HS_ERR_TOO_MANY:
         return raise_with_number(PyExc_OverflowError,
                                  "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
                                  failure->value);
     case HS_ERR_EDGES:
-        return raise_of_row("edges must be finite, not negative and ascending, got edges[%lld] = %R",
-                            failure);
+        return raise_of_row(
+            "edges must be finite, not negative and ascending, got edges[%lld] = %R", failure);
     case HS_ERR_TYPES:
         return raise_of_row(failure->in_queries
                                 ? "types must be from 0 on, got query_types[%lld] = %R"
@@ -198,9 +212,9 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
                             failure);
     case HS_ERR_SHIFT_RANGE:
         PyErr_Format(PyExc_OverflowError,
-                     "%s[%lld] lies too many box vectors away: shifts are counted up to 2**51, "
-                     "and S holds 2**31; wrap the points first",
-                     failure->in_queries ? "queries" : "points", (long long)failure->row);
+                     "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
+                     "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
+                     set_of(failure), (long long)failure->row);
         return NULL;
     case HS_ERR_KERNEL: return raise_kernel(options);
     case HS_ERR_CAPACITY: return raise_capacity(failure);

@@ -55,6 +55,17 @@ array_over(void *data, int n_dimensions, npy_intp *shape, int type)
     return array;
 }
 
+/* An array with a copy of so many bytes. */
+static PyObject *
+array_like(const void *data, size_t bytes, int n_dimensions, npy_intp *shape, int type)
+{
+    PyObject *array = PyArray_SimpleNew(n_dimensions, shape, type);
+    if (array != NULL && bytes > 0) {
+        memcpy(PyArray_DATA((PyArrayObject *)array), data, bytes);
+    }
+    return array;
+}
+
 static PyObject *
 new_array(hs_pairs *pairs, array_form form)
 {
@@ -64,11 +75,29 @@ new_array(hs_pairs *pairs, array_form form)
     if (bytes >= OWN_BYTES) {
         return array_over(hs_pairs_take(pairs, form.which), n_dimensions, shape, form.type);
     }
-    PyObject *array = PyArray_SimpleNew(n_dimensions, shape, form.type);
-    if (array != NULL && bytes > 0) {
-        memcpy(PyArray_DATA((PyArrayObject *)array), hs_pairs_array(pairs, form.which), bytes);
+    return array_like(hs_pairs_array(pairs, form.which), bytes, n_dimensions, shape, form.type);
+}
+
+static PyObject *
+new_offsets(hs_pairs *rows)
+{
+    npy_intp     length = (npy_intp)hs_pairs_rows(rows) + 1;
+    const size_t bytes = (size_t)length * sizeof(int64_t);
+    if (bytes >= OWN_BYTES) {
+        return array_over(hs_pairs_take_offsets(rows), 1, &length, NPY_INT64);
     }
-    return array;
+    return array_like(hs_pairs_offsets(rows), bytes, 1, &length, NPY_INT64);
+}
+
+/* Puts one array into a tuple, which is freed where there is none. */
+static void
+put_array(PyObject **tuple, Py_ssize_t at, PyObject *array)
+{
+    if (array == NULL) {
+        Py_CLEAR(*tuple);
+    } else {
+        PyTuple_SET_ITEM(*tuple, at, array);
+    }
 }
 
 PyObject *
@@ -80,14 +109,26 @@ hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes)
     }
     PyObject *result = PyTuple_New(n);
     for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
-        PyObject *array = new_array(pairs, form_of(letters[k], ndim, index_bytes));
-        if (array == NULL) {
-            Py_CLEAR(result);
-        } else {
-            PyTuple_SET_ITEM(result, k, array);
-        }
+        put_array(&result, k, new_array(pairs, form_of(letters[k], ndim, index_bytes)));
     }
     return result;
+}
+
+PyObject *
+hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    PyObject        *table = PyTuple_New(n + 1);
+    if (table != NULL) {
+        put_array(&table, 0, new_offsets(rows));
+    }
+    for (Py_ssize_t k = 0; table != NULL && k < n; k++) {
+        put_array(&table, k + 1, new_array(rows, form_of(letters[k], ndim, index_bytes)));
+    }
+    for (Py_ssize_t k = 0; table != NULL && k <= n; k++) {
+        PyArray_CLEARFLAGS((PyArrayObject *)PyTuple_GET_ITEM(table, k), NPY_ARRAY_WRITEABLE);
+    }
+    return table;
 }
 
 /* Checks one array of `out`; returns how many pairs it holds, or -1 with an exception set. */
@@ -192,12 +233,7 @@ hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     PyObject        *result = PyTuple_New(n);
     for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
-        PyObject *view = PySequence_GetSlice(item_of(out, k, n), 0, (Py_ssize_t)n_pairs);
-        if (view == NULL) {
-            Py_CLEAR(result);
-        } else {
-            PyTuple_SET_ITEM(result, k, view);
-        }
+        put_array(&result, k, PySequence_GetSlice(item_of(out, k, n), 0, (Py_ssize_t)n_pairs));
     }
     if (result == NULL || n > 1) {
         return result;

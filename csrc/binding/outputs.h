@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* outputs.h: the arrays that pairs are returned in: new ones, or the caller's. */
+/* outputs.h: the arrays that pairs and rows are returned in: new ones, or the caller's. */
 #ifndef HS_OUTPUTS_H
 #define HS_OUTPUTS_H
 
@@ -21,5 +21,9 @@ PyObject *hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs);
 /* New arrays in the order of the letters: a tuple, or for one letter the array itself. Takes
  * what it can from the pairs; a new reference or NULL. */
 PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes);
+
+/* Rows of a full search: a tuple of the offsets and these arrays, all of them read-only. Takes what
+ * it can from the rows; a new reference or NULL. */
+PyObject *hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes);
 
 #endif

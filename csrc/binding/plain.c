@@ -79,10 +79,10 @@ periodic_bits(PyObject *object, bool has_box, int ndim)
     return bits;
 }
 
-/* Copies the arguments that all searches share, periodic as the core's functions take it: a new
- * reference in place of the borrowed one. False when some are not plain. */
+/* Puts periodic as the core's functions take it in place of the argument: a new reference, where
+ * the others stay borrowed. False when some that all searches share are not plain. */
 static bool
-take_plain(PyObject *const *arguments, PyObject **taken)
+take_shared(PyObject *const *arguments, PyObject **taken)
 {
     const int ndim = dimensions_of(arguments[0]);
     PyObject *box = arguments[2];
@@ -94,7 +94,6 @@ take_plain(PyObject *const *arguments, PyObject **taken)
     if (bits == IS_NOT_PLAIN) {
         return false;
     }
-    memcpy(taken, arguments, HS_CALL_ARGUMENTS * sizeof *taken);
     taken[3] = PyLong_FromLong(bits);
     if (taken[3] == NULL) {
         PyErr_Clear(); /* the way round will say so */
@@ -120,44 +119,112 @@ index_bytes_of(PyObject *object)
     return type == NPY_INT64 ? 8 : type == NPY_INT32 ? 4 : IS_NOT_PLAIN;
 }
 
-PyObject *
-hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+/* One of the core's functions, and where its arguments beyond those of call.h are; 0: nowhere. */
+typedef struct plain_form {
+    const char *name;
+    PyObject *(*function)(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+    int n_arguments;
+    int sort;
+    int index_dtype;
+    int queries;
+} plain_form;
+
+enum { MOST_ARGUMENTS = HS_CALL_ARGUMENTS + 5 };
+
+static bool
+is_plain_rest(const plain_form *form, PyObject *const *arguments)
 {
-    PyObject *taken[HS_CALL_ARGUMENTS + 4];
-    if (n_arguments != HS_CALL_ARGUMENTS + 4) {
-        PyErr_Format(PyExc_TypeError, "plain_pairs takes %d arguments", HS_CALL_ARGUMENTS + 4);
-        return NULL;
+    PyObject *queries = form->queries > 0 ? arguments[form->queries] : Py_None;
+    return (form->sort == 0 || is_flag(arguments[form->sort])) &&
+           (queries == Py_None || (dimensions_of(queries) != IS_NOT_PLAIN &&
+                                   dimensions_of(queries) == dimensions_of(arguments[0])));
+}
+
+static PyObject *
+call_plain(const plain_form *form, PyObject *module, PyObject *const *arguments,
+           Py_ssize_t n_arguments)
+{
+    PyObject *taken[MOST_ARGUMENTS], *index_bytes = NULL, *result = NULL;
+    if (n_arguments != form->n_arguments) {
+        return PyErr_Format(PyExc_TypeError, "%s takes %d arguments", form->name,
+                            form->n_arguments);
     }
-    PyObject *const *more = arguments + HS_CALL_ARGUMENTS; /* quantities, sort, index_dtype, out */
-    const int        index_bytes = index_bytes_of(more[2]);
-    if (!is_flag(more[1]) || index_bytes == IS_NOT_PLAIN ||
-        !take_plain(arguments, taken)) {
+    memcpy(taken, arguments, (size_t)n_arguments * sizeof *taken);
+    const int bytes = form->index_dtype > 0 ? index_bytes_of(arguments[form->index_dtype]) : 0;
+    if (bytes == IS_NOT_PLAIN || !is_plain_rest(form, arguments) ||
+        !take_shared(arguments, taken)) {
         Py_RETURN_NOTIMPLEMENTED;
     }
-    taken[HS_CALL_ARGUMENTS] = more[0];
-    taken[HS_CALL_ARGUMENTS + 1] = more[1];
-    taken[HS_CALL_ARGUMENTS + 2] = PyLong_FromLong(index_bytes);
-    taken[HS_CALL_ARGUMENTS + 3] = more[3];
-    PyObject *result = taken[HS_CALL_ARGUMENTS + 2] == NULL
-                           ? NULL
-                           : hs_py_pairs(module, taken, HS_CALL_ARGUMENTS + 4);
-    Py_XDECREF(taken[HS_CALL_ARGUMENTS + 2]);
+    if (form->index_dtype > 0) {
+        taken[form->index_dtype] = index_bytes = PyLong_FromLong(bytes);
+    }
+    if (form->index_dtype == 0 || index_bytes != NULL) {
+        result = form->function(module, taken, n_arguments);
+    }
+    Py_XDECREF(index_bytes);
     Py_DECREF(taken[3]);
     return result;
 }
 
 PyObject *
+hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    static const plain_form form = {.name = "plain_pairs",
+                                    .function = hs_py_pairs,
+                                    .n_arguments = HS_CALL_ARGUMENTS + 4,
+                                    .sort = HS_CALL_ARGUMENTS + 1,
+                                    .index_dtype = HS_CALL_ARGUMENTS + 2};
+    return call_plain(&form, module, arguments, n_arguments);
+}
+
+PyObject *
 hs_py_plain_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    PyObject *taken[HS_CALL_ARGUMENTS];
-    if (n_arguments != HS_CALL_ARGUMENTS) {
-        PyErr_Format(PyExc_TypeError, "plain_count takes %d arguments", HS_CALL_ARGUMENTS);
-        return NULL;
-    }
-    if (!take_plain(arguments, taken)) {
-        Py_RETURN_NOTIMPLEMENTED;
-    }
-    PyObject *result = hs_py_count_pairs(module, taken, HS_CALL_ARGUMENTS);
-    Py_DECREF(taken[3]);
-    return result;
+    static const plain_form form = {.name = "plain_count",
+                                    .function = hs_py_count_pairs,
+                                    .n_arguments = HS_CALL_ARGUMENTS};
+    return call_plain(&form, module, arguments, n_arguments);
+}
+
+PyObject *
+hs_py_plain_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    static const plain_form form = {.name = "plain_between",
+                                    .function = hs_py_pairs_between,
+                                    .n_arguments = HS_CALL_ARGUMENTS + 5,
+                                    .sort = HS_CALL_ARGUMENTS + 1,
+                                    .index_dtype = HS_CALL_ARGUMENTS + 2,
+                                    .queries = HS_CALL_ARGUMENTS + 4};
+    return call_plain(&form, module, arguments, n_arguments);
+}
+
+PyObject *
+hs_py_plain_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    static const plain_form form = {.name = "plain_neighbors",
+                                    .function = hs_py_neighbors,
+                                    .n_arguments = HS_CALL_ARGUMENTS + 3,
+                                    .index_dtype = HS_CALL_ARGUMENTS + 1,
+                                    .queries = HS_CALL_ARGUMENTS + 2};
+    return call_plain(&form, module, arguments, n_arguments);
+}
+
+PyObject *
+hs_py_plain_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    static const plain_form form = {.name = "plain_count_between",
+                                    .function = hs_py_count_between,
+                                    .n_arguments = HS_CALL_ARGUMENTS + 1,
+                                    .queries = HS_CALL_ARGUMENTS};
+    return call_plain(&form, module, arguments, n_arguments);
+}
+
+PyObject *
+hs_py_plain_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    static const plain_form form = {.name = "plain_coordination",
+                                    .function = hs_py_coordination,
+                                    .n_arguments = HS_CALL_ARGUMENTS + 1,
+                                    .queries = HS_CALL_ARGUMENTS};
+    return call_plain(&form, module, arguments, n_arguments);
 }

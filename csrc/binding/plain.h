@@ -13,12 +13,21 @@
  * Plain are: points, an ndarray (no subclass) of native float32 or float64, shape (n, d); cutoff, a
  * float; box, None or a C-contiguous ndarray of float64, shape (d,) or (d, d); periodic, None, a
  * bool, or a tuple or list of d bools; flags, True or False; index_dtype, numpy.int32 or
- * numpy.int64 itself. The rest is checked by the core's functions whoever calls them.
+ * numpy.int64 itself; queries, None or as points, with as many columns. The rest is checked by the
+ * core's functions whoever calls them.
  *
- * Both return NotImplemented, and no exception, where an argument is not plain. Positional
+ * All return NotImplemented, and no exception, where an argument is not plain. Positional
  * arguments as in py_functions.h, but for periodic, and index_dtype in place of index_bytes.
  */
 PyObject *hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 PyObject *hs_py_plain_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+PyObject *hs_py_plain_between(PyObject *module, PyObject *const *arguments,
+                              Py_ssize_t n_arguments);
+PyObject *hs_py_plain_count_between(PyObject *module, PyObject *const *arguments,
+                                    Py_ssize_t n_arguments);
+PyObject *hs_py_plain_neighbors(PyObject *module, PyObject *const *arguments,
+                                Py_ssize_t n_arguments);
+PyObject *hs_py_plain_coordination(PyObject *module, PyObject *const *arguments,
+                                   Py_ssize_t n_arguments);
 
 #endif

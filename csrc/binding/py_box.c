@@ -60,7 +60,7 @@ hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argume
         PyErr_SetString(PyExc_TypeError, "box_wrap takes points, a box and periodic bits");
         return NULL;
     }
-    if (!hs_points_of(arguments[0], &points) ||
+    if (!hs_points_of(arguments[0], "points", &points) ||
         !hs_box_of(arguments[1], arguments[2], points.ndim, &box, &given)) {
         return NULL;
     }

@@ -120,7 +120,7 @@ static bool
 take_more(PyObject *const *more, hs_call *call, bool *measures)
 {
     const char *letters;
-    if (!hs_quantities_of(more[0], &letters, &call->options.want)) {
+    if (!hs_quantities_of(more[0], HS_LETTERS, &letters, &call->options.want)) {
         return false;
     }
     const int sorted = PyObject_IsTrue(more[1]);

@@ -35,23 +35,19 @@ take_marks(PyObject *types, PyObject *weights, const char *name, int64_t n, hs_m
     return true;
 }
 
-/* edges, last_inclusive, queries, n_types, and types and weights of the points and of the queries. */
+/* edges, last_inclusive, queries, n_types; types and weights of the points and of the queries. */
 static bool
-take_histogram(PyObject *const *more, const hs_call *call, hs_points *queries,
-               hs_histogram *wanted)
+take_histogram(PyObject *const *more, const hs_call *call, hs_histogram *wanted)
 {
     const void *edges = NULL;
-    const bool  has_queries = more[2] != Py_None;
     const int   last_inclusive = PyObject_IsTrue(more[1]);
     const long  n_types = PyLong_AsLong(more[3]);
     if (last_inclusive < 0 || (n_types == -1 && PyErr_Occurred()) ||
-        !take_column(more[0], NPY_DOUBLE, -1, "edges", &edges) ||
-        (has_queries && !hs_points_of(more[2], queries))) {
+        !take_column(more[0], NPY_DOUBLE, -1, "edges", &edges)) {
         return false;
     }
-    if (edges == NULL || n_types < 1 || n_types > INT32_MAX ||
-        (has_queries && queries->ndim != call->points.ndim)) {
-        PyErr_SetString(PyExc_ValueError, "edges, types and queries do not fit points");
+    if (edges == NULL || n_types < 1 || n_types > INT32_MAX) {
+        PyErr_SetString(PyExc_ValueError, "edges and a number of types are expected");
         return false;
     }
     *wanted = (hs_histogram){.n_edges = PyArray_DIM((PyArrayObject *)more[0], 0),
@@ -61,7 +57,7 @@ take_histogram(PyObject *const *more, const hs_call *call, hs_points *queries,
                              .n_types = (int32_t)n_types};
     return take_marks(more[4], more[5], "types or weights", call->points.n, &wanted->of_points) &&
            take_marks(more[6], more[7], "types or weights of queries",
-                      has_queries ? queries->n : 0, &wanted->of_queries);
+                      call->has_queries ? call->queries.n : 0, &wanted->of_queries);
 }
 
 /* Zeros of shape (n_types, n_types, n_edges); of float64 where there are weights. */
@@ -86,13 +82,12 @@ hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     hs_call          call;
     hs_failure       failure;
     hs_histogram     wanted;
-    hs_points        queries;
     (void)module;
     if (n_arguments != HS_CALL_ARGUMENTS + 8) {
         PyErr_Format(PyExc_TypeError, "histogram takes %d arguments", HS_CALL_ARGUMENTS + 8);
         return NULL;
     }
-    if (!hs_call_init(&call, arguments) || !take_histogram(more, &call, &queries, &wanted)) {
+    if (!hs_call_init_sets(&call, arguments, more[2]) || !take_histogram(more, &call, &wanted)) {
         return NULL;
     }
     PyObject *array = new_result(&wanted);
@@ -101,8 +96,8 @@ hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     }
     hs_call_release(&call);
     const hs_status status =
-        hs_pairs_histogram(&call.points, more[2] != Py_None ? &queries : NULL, hs_call_box(&call),
-                           &call.options, &wanted, &failure);
+        hs_pairs_histogram(&call.points, hs_call_queries(&call), hs_call_box(&call), &call.options,
+                           &wanted, &failure);
     hs_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(array);

@@ -9,7 +9,7 @@ bool
 hs_result_init(hs_result *result, PyObject *const *arguments, hs_call *call)
 {
     hs_options *options = &call->options;
-    if (!hs_quantities_of(arguments[0], &result->letters, &options->want)) {
+    if (!hs_quantities_of(arguments[0], HS_LETTERS, &result->letters, &options->want)) {
         return false;
     }
     const int sorted = PyObject_IsTrue(arguments[1]);

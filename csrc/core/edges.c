@@ -7,9 +7,9 @@
 #include <float.h>
 #include <math.h>
 
-/* Bits of a float32 that do not choose its cell, in the order in which they are tried. For each power
- * of two there are 128 cells, which tell a hundred bins apart, or 2048 for a thousand, or 32768.
- * Constants make the loop quicker. */
+/* Bits of a float32 that do not choose its cell, in the order in which they are tried. For each
+ * power of two there are 128 cells, which tell a hundred bins apart, or 2048 for a thousand, or
+ * 32768. Constants make the loop quicker. */
 #define FEW_CELLS  16
 #define MANY_CELLS 12
 #define ALL_CELLS  8

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * edges.h: from float32 squares to bins. Around each edge there is a band of squares that cannot
- * tell on which side of it a pair is (filter.h); between two bands the bin is sure. A table, indexed
- * by the leading bits of the square, knows for each of its cells which bands reach into it.
+ * tell on which side of it a pair is (filter.h); between two bands the bin is sure. A table,
+ * indexed by the leading bits of the square, knows for each of its cells which bands reach into it.
  *
  * A slot is 2 k for "k edges are reached, surely", and odd for pairs that must be looked at again.
  */
@@ -22,8 +22,8 @@ typedef struct hs_edges {
     double  filter_error; /* as hs_search */
 } hs_edges;
 
-/* Squares of one cell of the table: with s < in `slot`, with s > out two more, else one more. in and
- * out are the bits of floats, which order like these. */
+/* Squares of one cell of the table: with s < in `slot`, with s > out two more, else one more. in
+ * and out are the bits of floats, which order like these. */
 typedef struct hs_edge_cell {
     int32_t in, out;
     int32_t slot;
@@ -53,13 +53,13 @@ hs_edge_is_inclusive(const hs_edges *edges, int64_t k)
     return k == edges->n - 1 ? edges->last_inclusive : edges->inclusive;
 }
 
-/* Replaces the table by one for this extent (as hs_thresholds_of takes it). Called by threads as they
- * go, so its memory, at most 8 bytes an edge and a megabyte, is on no account. */
+/* Replaces the table by one for this extent (as hs_thresholds_of takes it). Called by threads as
+ * they go, so its memory, at most 8 bytes an edge and a megabyte, is on no account. */
 hs_status hs_edge_table_build(const hs_edges *edges, double extent, hs_edge_table *table);
 void      hs_edge_table_free(hs_edge_table *table);
 
-/* The slots of n squares, all of them from neighbourhoods up to the table's extent and !(s > out) for
- * the last edge there. Returns whether any is odd. */
+/* The slots of n squares, all of them from neighbourhoods up to the table's extent and !(s > out)
+ * for the last edge there. Returns whether any is odd. */
 bool hs_edge_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t *slots);
 
 /* For a square whose slot is odd: *low edges are surely reached, no more than *high perhaps. */

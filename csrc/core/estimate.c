@@ -166,6 +166,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
         status = take_sample(&walker, n, &taken);
         if (status == HS_ERR_SHIFT_RANGE) {
             failure->row = walker.failed_point;
+            failure->in_queries = search->has_queries;
         }
         hs_walker_close(search, &walker);
     }

@@ -123,9 +123,15 @@ fill_block(hs_walker *walker)
                     &walker->group);
     hs_trace_reset(&walker->trace);
     set_form(walker);
-    return walker->is_ordered ? hs_order_block(&walker->search->scene.lattice, walker->use, block,
-                                               &walker->order)
-                              : HS_OK;
+    if (!walker->is_ordered) {
+        return HS_OK;
+    }
+    const hs_status status = hs_order_block(&walker->search->scene.lattice, walker->use, block,
+                                            &walker->order);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        walker->failed_point = hs_search_asking(walker->search)->order[walker->group.first];
+    }
+    return status;
 }
 
 /* What was tested, and whether to go on. */

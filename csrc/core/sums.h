@@ -21,7 +21,7 @@ typedef struct hs_weights {
     int      most_place; /* ... and the largest place */
 } hs_weights;
 
-/* Weight order[i] of the caller, finite or HS_ERR_WEIGHTS, becomes number i. weights NULL: all 1. */
+/* Weight order[i] of the caller, finite or HS_ERR_WEIGHTS, becomes number i. NULL: all are 1. */
 hs_status hs_weights_init(hs_account *account, const double *weights, const int32_t *order,
                           int64_t n, hs_weights *taken, hs_failure *failure);
 void      hs_weights_free(hs_account *account, hs_weights *weights);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * tally.h: what one thread counts for a histogram. Hits come with their float32 squares; a table
- * (edges.h) says which slot each belongs to, and those that it cannot tell are decided exactly, edge
- * by edge.
+ * (edges.h) says which slot each belongs to, and those that it cannot tell are decided exactly,
+ * edge by edge.
  */
 #ifndef HS_TALLY_H
 #define HS_TALLY_H

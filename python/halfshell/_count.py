@@ -9,14 +9,16 @@ from typing import Any, Unpack, cast, overload
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _batch, _core, _inputs
+from halfshell import _batch, _between, _core, _inputs
 from halfshell._box import Box
+from halfshell._cutoffs import count_within
 from halfshell._options import Precision, SearchOptions
 
 
 class _CountOptions(SearchOptions, total=False):
     """The keywords of `count_pairs`, as far as its type does not depend on them."""
 
+    queries: Any
     batch: None
 
 
@@ -42,6 +44,7 @@ def count_pairs(
     points: Any,
     cutoff: Any,
     *,
+    queries: Any = None,
     box: Any = None,
     periodic: Any = None,
     inclusive: bool = True,
@@ -58,28 +61,34 @@ def count_pairs(
     points, box, periodic, inclusive, precision, kernel, threads
         As in `pairs`.
     cutoff : float or array_like of float, shape (k,)
-        One cutoff, or several in ascending order. k cutoffs cost k searches. With `batch`: one
-        for all systems, or one for each.
+        One cutoff, or several in ascending order, for which there is one search up to the largest
+        (k searches where `precision` is not "exact"). With `batch`: one for all systems, or one
+        for each.
+    queries : array_like of float, shape (q, d), optional
+        Count pairs of a query and a point instead, as `pairs_between` finds them.
     memory_limit : float, optional
         Bytes that the search may take.
     batch : array_like of int, shape (n,), optional
-        Count many systems in one call, as in `pairs`.
+        Count many systems in one call, as in `pairs`; not with `queries`.
 
     Returns
     -------
     int or ndarray of int64, shape (k,)
-        The number of pairs of the half list for each cutoff; with `batch`, for each system: those
-        that `box` or `cutoff` is given for, or up to the largest number in `batch`.
+        The number of pairs of the half list, or of `queries` and `points`, for each cutoff; with
+        `batch`, for each system: those that `box` or `cutoff` is given for, or up to the largest
+        number in `batch`.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`; ValueError also if several cutoffs are not ascending. MemoryError only if the
-        search itself would not fit: no pair is stored.
+        As `pairs` and `pairs_between`; ValueError also if several cutoffs are not ascending, or
+        for `queries` with `batch`. MemoryError only if the search itself would not fit: no pair
+        is stored.
 
     See Also
     --------
     pairs : the pairs themselves.
+    pair_histogram : the number of pairs between one distance and the next, by type or weighted.
 
     Examples
     --------
@@ -91,18 +100,29 @@ def count_pairs(
     [0, 1, 2]
     >>> hs.count_pairs(points, 1.5, batch=[0, 0, 2]).tolist()
     [1, 0, 0]
+    >>> hs.count_pairs(points, 1.5, queries=[[2.0, 0.0]])
+    2
     """
     if type(box) is Box:
         box = box.vectors
     if batch is None:
-        result: Any = _core.plain_count(
+        plain = (
             points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
+        )
+        result: Any = (
+            _core.plain_count(*plain)
+            if queries is None
+            else _core.plain_count_between(*plain, queries)
         )
         if result is not NotImplemented:
             return cast(int, result)
     rest = (
         _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None, threads,
     )
+    if queries is not None:
+        if batch is not None:
+            raise ValueError("batch and queries cannot be given together")
+        return _between.count_between(queries, points, cutoff, box, periodic, rest)
     if batch is not None:
         scene, own = _batch.of(points, cutoff, box, periodic, batch)
         return _core.batch_count(*(*scene, *rest, *own))
@@ -110,5 +130,4 @@ def count_pairs(
     cutoffs = _inputs.as_cutoffs(cutoff)
     if isinstance(cutoffs, float):
         return _core.count_pairs(array, cutoffs, vectors, bits, *rest)
-    counts = [_core.count_pairs(array, one, vectors, bits, *rest) for one in cutoffs.tolist()]
-    return np.array(counts, dtype=np.int64)
+    return count_within(cutoffs, array, vectors, bits, rest)

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 
 class CapacityError(ValueError):
-    """Arrays that the caller gave are too small for the result.
+    """Arrays or a capacity that the caller gave are too small for the result.
 
     Attributes
     ----------
     needed : int
-        The number of pairs that there are.
+        The number of pairs that there are, or for `NeighborTable.to_padded` of entries in the
+        longest row.
 
     Examples
     --------

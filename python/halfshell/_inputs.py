@@ -117,14 +117,14 @@ def _from_objects(array: npt.NDArray[Any], name: str, single: str) -> FloatArray
     return array.astype(np.float64)
 
 
-def as_points(values: Any) -> PointArray:
-    """Points of shape (n, d); a list without elements counts as n = 0, d = 3."""
-    array = as_real_array(values, "points")
+def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
+    """Points of shape (n, d); a list without elements counts as n = 0, d = `ndim`."""
+    array = as_real_array(values, name)
     if array.ndim != 2 or not 1 <= array.shape[1] <= MAX_DIM:
         if array.shape == (0,):
-            return np.empty((0, 3))
+            return np.empty((0, ndim))
         raise ValueError(
-            f"points must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {array.shape}"
+            f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {array.shape}"
         )
     if array.shape[0] >= 2**31:
         raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
@@ -213,25 +213,77 @@ def as_index_bytes(index_dtype: Any) -> int:
     return int(dtype.itemsize)
 
 
-def scene(points: Any, box: Any, periodic: Any) -> tuple[PointArray, FloatArray | None, int]:
-    """Points, box and periodic bits; from an ASE-like object all three.
+def _brings_box(points: Any) -> bool:
+    """Whether this is an object like ``ase.Atoms``, with a box of its own."""
+    return hasattr(points, "positions") and hasattr(points, "cell") and hasattr(points, "pbc")
+
+
+def _own_box(atoms: Any) -> tuple[Any, Any]:
+    """The box and periodic of such an object, as arguments."""
+    periodic = np.asarray(atoms.pbc, dtype=bool)
+    return (np.asarray(atoms.cell), periodic) if periodic.any() else (None, None)
+
+
+def scene(
+    points: Any, box: Any, periodic: Any, ndim: int = 3
+) -> tuple[PointArray, FloatArray | None, int]:
+    """Points, box and periodic bits; from an ASE-like object all three. `ndim`: of an empty list.
 
     An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an
     error.
     """
-    if hasattr(points, "positions") and hasattr(points, "cell") and hasattr(points, "pbc"):
+    if _brings_box(points):
         if box is not None or periodic is not None:
             given = "box" if box is not None else "periodic"
             raise ValueError(f"{given} comes from the {type(points).__name__} object itself")
-        periodic = np.asarray(points.pbc, dtype=bool)
-        box = np.asarray(points.cell) if periodic.any() else None
+        box, periodic = _own_box(points)
         points = points.positions
-        if box is None:
-            periodic = None
-    array = as_points(points)
-    ndim = array.shape[1]
+    array = as_points(points, ndim=ndim)
+    return array, *box_and_bits(box, periodic, array.shape[1])
+
+
+def box_and_bits(box: Any, periodic: Any, ndim: int) -> tuple[FloatArray | None, int]:
+    """Box vectors as rows, or None, and which of them repeat."""
     if box is None:
         if as_periodic_bits(periodic, ndim, default=False):
             raise ValueError("periodic needs a box: give box, or leave periodic out")
-        return array, None, 0
-    return array, as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
+        return None, 0
+    return as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
+
+
+def two_sets(
+    queries: Any, points: Any, box: Any, periodic: Any
+) -> tuple[PointArray, PointArray, FloatArray | None, int]:
+    """Queries, points, box and periodic bits.
+
+    The box of an ASE-like object holds for both sets: where both are such objects, they must agree.
+    """
+    own = _own_box(queries) if _brings_box(queries) else None
+    queries = queries.positions if own is not None else queries
+    asking = as_points(queries, "queries")
+    array, vectors, bits = scene(points, box, periodic, asking.shape[1])
+    if len(asking) == 0:
+        asking = as_points(queries, "queries", array.shape[1])
+    if asking.shape[1] != array.shape[1]:
+        raise ValueError(
+            "queries and points must have the same number of columns, got shapes "
+            f"{asking.shape} and {array.shape}"
+        )
+    if own is not None and not _same_box(box_and_bits(*own, asking.shape[1]), (vectors, bits)):
+        raise ValueError(
+            "queries bring a box that is not that of points: give arrays, and box and periodic"
+        )
+    return asking, array, vectors, bits
+
+
+def _same_box(
+    one: tuple[FloatArray | None, int], other: tuple[FloatArray | None, int]
+) -> bool:
+    """Whether the same axes repeat by the same vectors."""
+    if one[1] != other[1]:
+        return False
+    if one[0] is None or other[0] is None:
+        return True  # no axis repeats
+    return all(
+        np.array_equal(a, b) for k, (a, b) in enumerate(zip(one[0], other[0])) if one[1] >> k & 1
+    )

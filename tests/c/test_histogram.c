@@ -49,7 +49,10 @@ choose_edges(harness_random *random, trial *t)
         if (k > 0 && random_below(random, 8) == 0) {
             edge = t->edges[k - 1];
         }
-        t->edges[k] = edge <= most ? edge : random_below(random, 3) ? most * random_unit(random) : 0.0;
+        if (edge > most) {
+            edge = random_below(random, 3) ? most * random_unit(random) : 0.0;
+        }
+        t->edges[k] = edge;
     }
     if (random_below(random, 6) == 0) { /* so close that their bands overlap */
         for (int k = 1; k < t->n_edges; k++) {
@@ -92,7 +95,8 @@ scale_scene(trial *t, int exponent)
 static void
 expect(trial *t, const brute_pair *pair, int k, int sign)
 {
-    const int a = t->n_types > 1 ? t->types[pair->i] : 0, b = t->n_types > 1 ? t->types[pair->j] : 0;
+    const int    a = t->n_types > 1 ? t->types[pair->i] : 0;
+    const int    b = t->n_types > 1 ? t->types[pair->j] : 0;
     const int    ways = t->split < 0 && a != b ? 2 : 1;
     const double weight = sign * t->weights[pair->i] * t->weights[pair->j];
     for (int way = 0; way < ways; way++) {

@@ -30,7 +30,13 @@ def test_public_functions_have_examples(name):
     assert ">>>" in doc
 
 
-@pytest.mark.parametrize("name", ["count_pairs", "explain", "pairs", "verify"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "coordination", "count_pairs", "explain", "neighbors", "pair_histogram", "pairs",
+        "pairs_between", "rdf", "verify",
+    ],
+)
 def test_every_argument_is_documented(name):
     function = getattr(hs, name)
     head = inspect.getdoc(function).split("Returns\n")[0]
@@ -46,6 +52,14 @@ def test_readme_notebook_example_runs(capsys):
     assert len(names["i"]) == len(names["S"]) > 200_000
     assert names["i"].dtype == np.int64
     assert "algorithm" in capsys.readouterr().out
+
+
+def test_example_of_tables_runs():
+    text = (ROOT / "docs/neighbors.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "neighbors.md", "exec"), names)
+    assert len(names["table"]) == 1000 and len(names["first"]) == 100
 
 
 def test_readme_commands_create_what_they_need():

@@ -7,9 +7,14 @@ from subprocesses import RESIDENT, run
 SEARCHES = {
     "pairs": "hs.pairs(points, 0.16, memory_limit=1e13)",
     "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS', memory_limit=1e13)",
+    "neighbors": "hs.neighbors(points, 0.16, quantities='jdDS', memory_limit=1e13)",
+    "coordination": "hs.coordination(points, 0.5)",
+    "pairs of two sets": "hs.pairs_between(points[1::2], points, 0.16, memory_limit=1e13)",
+    "count of two sets": "hs.count_pairs(points[::2], 0.7, queries=points[1::2])",
     "count": "hs.count_pairs(points, 0.5)",
     "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
     "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
+    "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
     "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
     "count of exact ties": "hs.count_pairs(grid, 40.0, box=[60.0] * 3)",
 }

@@ -54,6 +54,69 @@ def test_same_answer_as_converted_arguments(box, periodic, real, index_dtype):
     assert _core.plain_count(points, 1.5, *shared.values()) == len(direct[0])
 
 
+QUERIES = POINTS[:7] + 0.25
+
+# Each function of the core for plain arguments that may have queries, and its public counterpart;
+# what comes between the shared arguments and the queries.
+WITH_QUERIES = {
+    "plain_between": (
+        ("ijdS", True, np.int64, None),
+        lambda points, queries, **how: hs.pairs_between(
+            queries, points, 1.5, quantities="ijdS", **how
+        ),
+    ),
+    "plain_count_between": (
+        (),
+        lambda points, queries, **how: hs.count_pairs(points, 1.5, queries=queries, **how),
+    ),
+    "plain_neighbors": (
+        ("jdS", np.int64),
+        lambda points, queries, **how: hs.neighbors(
+            points, 1.5, queries=queries, quantities="jdS", **how
+        )._arrays,
+    ),
+    "plain_coordination": (
+        (),
+        lambda points, queries, **how: hs.coordination(points, 1.5, queries=queries, **how),
+    ),
+}
+
+
+def plain_with_queries(name, points, queries, **options):
+    shared = {**SHARED, **options}
+    more = WITH_QUERIES[name][0]
+    return getattr(_core, name)(points, 1.5, *shared.values(), *more, queries)
+
+
+@pytest.mark.parametrize("name", WITH_QUERIES)
+@pytest.mark.parametrize(("box", "periodic"), BOXES)
+def test_same_answer_with_queries(name, box, periodic):
+    for types in (("f4", "f8"), ("f8", "f4"), ("f8", None)):
+        points = POINTS.astype(types[0])
+        queries = None if types[1] is None else QUERIES.astype(types[1])
+        if queries is None and "between" in name:
+            with pytest.raises(TypeError, match="queries"):
+                plain_with_queries(name, points, queries)
+            continue
+        how = {"box": box, "periodic": periodic}
+        direct = plain_with_queries(name, points, queries, **how)
+        asking = queries if queries is None else queries.tolist()
+        converted = WITH_QUERIES[name][1](points.tolist(), asking, **how)
+        public = WITH_QUERIES[name][1](points, queries, **how)
+        for one in (converted, public):
+            np.testing.assert_equal(one, direct)
+
+
+@pytest.mark.parametrize("name", WITH_QUERIES)
+def test_other_queries_are_converted(name):
+    for queries in (QUERIES.tolist(), QUERIES.view(Subclass), QUERIES.astype(int), QUERIES[:, :2],
+                    QUERIES.astype(QUERIES.dtype.newbyteorder()), QUERIES[0]):  # fmt: skip
+        assert plain_with_queries(name, POINTS, queries) is NotImplemented
+    assert plain_with_queries(name, POINTS.tolist(), QUERIES) is NotImplemented
+    with pytest.raises(TypeError, match="arguments"):
+        getattr(_core, name)(POINTS, 1.5)
+
+
 @pytest.mark.parametrize(
     "points",
     [

@@ -40,6 +40,18 @@ assert_type(hs.count_pairs(p, [0.5, 1.0]), npt.NDArray[np.int64])
 assert_type(hs.count_pairs(p, (1, 2), inclusive=False), npt.NDArray[np.int64])
 assert_type(hs.count_pairs(p, np.linspace(0.0, 1.0)), npt.NDArray[np.int64])
 
+assert_type(hs.count_pairs(p, 1.0, queries=p), int)
+assert_type(hs.pairs_between(p, p, 1.0), tuple[npt.NDArray[Any], npt.NDArray[Any]])
+assert_type(hs.pairs_between(p, p, 1.0, quantities="S"), npt.NDArray[Any])
+i, j, d = hs.pairs_between(p, p, 1.0, quantities="ijd", box=[2.0] * 3, index_dtype=np.int32)
+table = hs.neighbors(p, 1.0, quantities="jd", queries=p)
+assert_type(table, hs.NeighborTable)
+assert_type(table[:2].sort().filter(p[:, 0] > 0), hs.NeighborTable)
+assert_type(table[0], npt.NDArray[Any] | tuple[npt.NDArray[Any], ...])
+assert_type(table.distances, npt.NDArray[np.float64])
+assert_type(table.reverse(), npt.NDArray[np.int64])
+assert_type(hs.coordination(p, 1.0, box=[2.0] * 3), npt.NDArray[np.int64])
+
 plan: hs.Explanation = hs.explain(p, 1.0, precision="exact")
 verdict: hs.Verdict = hs.verify(p, 1.0, i, j)
 box = hs.Box.orthorhombic(1.0, 1.0)
@@ -54,6 +66,9 @@ BAD = {
     "m: int = hs.count_pairs(p, [1.0])": "assignment",
     "hs.count_pairs(p, 1.0, sort=True)": "call-overload",
     "hs.explain(p, 1.0, precision='half')": "arg-type",
+    "hs.neighbors(p, 1.0, sort=True)": "call-arg",
+    "hs.neighbors(p, 1.0).indices = p": "misc",
+    "hs.pairs_between(p, 1.0)": "call-overload",
     "hs.Box([1.0]).vectors = p": "misc",
 }
 

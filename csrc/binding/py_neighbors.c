@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_neighbors.c: full searches: _core.pairs_between and count_between of two sets, and the rows of
+ * each point or query, _core.neighbors and coordination. */
+#include "py_functions.h"
+
+#include "call.h"
+#include "convert.h"
+#include "errors.h"
+#include "outputs.h"
+#include "result.h"
+
+#define ROW_LETTERS "jdDS" /* a row says itself what i is */
+
+static bool
+expect_arguments(const char *name, Py_ssize_t n, int expected)
+{
+    if (n != expected) {
+        PyErr_Format(PyExc_TypeError, "%s takes %d arguments", name, expected);
+    }
+    return n == expected;
+}
+
+/* Where two sets are asked for, None is none of them. */
+static bool
+expect_queries(PyObject *queries)
+{
+    if (queries == Py_None) {
+        PyErr_SetString(PyExc_TypeError, "queries must be an array, got NoneType");
+    }
+    return queries != Py_None;
+}
+
+/* Rows of all neighbours, or NULL with an exception set. */
+static hs_pairs *
+find_rows(hs_call *call)
+{
+    hs_failure failure;
+    hs_pairs  *rows = NULL;
+    hs_call_release(call);
+    const hs_status status = hs_neighbors_find(&call->points, hs_call_queries(call),
+                                               hs_call_box(call), &call->options, &rows, &failure);
+    hs_call_acquire(call);
+    if (status != HS_OK) {
+        (void)hs_raise(status, &failure, &call->options);
+    }
+    return rows;
+}
+
+PyObject *
+hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
+    hs_call          call;
+    hs_result        result;
+    (void)module;
+    if (!expect_arguments("pairs_between", n_arguments, HS_CALL_ARGUMENTS + 5) ||
+        !expect_queries(more[4]) ||
+        !hs_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call)) {
+        return NULL;
+    }
+    hs_pairs *rows = find_rows(&call);
+    PyObject *arrays = rows != NULL ? hs_result_of(&result, rows, &call) : NULL;
+    hs_pairs_free(rows);
+    return arrays;
+}
+
+PyObject *
+hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call    call;
+    hs_failure failure;
+    int64_t    count = 0;
+    (void)module;
+    if (!expect_arguments("count_between", n_arguments, HS_CALL_ARGUMENTS + 1) ||
+        !expect_queries(arguments[HS_CALL_ARGUMENTS]) ||
+        !hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
+        return NULL;
+    }
+    hs_call_release(&call);
+    const hs_status status = hs_between_count(&call.points, hs_call_queries(&call),
+                                              hs_call_box(&call), &call.options, &count, &failure);
+    hs_call_acquire(&call);
+    return status == HS_OK ? PyLong_FromLongLong(count)
+                           : hs_raise(status, &failure, &call.options);
+}
+
+PyObject *
+hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
+    hs_call          call;
+    const char      *letters;
+    (void)module;
+    if (!expect_arguments("neighbors", n_arguments, HS_CALL_ARGUMENTS + 3) ||
+        !hs_call_init_sets(&call, arguments, more[2]) ||
+        !hs_quantities_of(more[0], ROW_LETTERS, &letters, &call.options.want)) {
+        return NULL;
+    }
+    call.options.index_bytes = (int)PyLong_AsLong(more[1]);
+    if (PyErr_Occurred()) {
+        return NULL;
+    }
+    hs_pairs *rows = find_rows(&call);
+    PyObject *table = rows != NULL ? hs_table_of(rows, letters, call.points.ndim,
+                                                 call.options.index_bytes)
+                                   : NULL;
+    hs_pairs_free(rows);
+    return table;
+}
+
+PyObject *
+hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call    call;
+    hs_failure failure;
+    (void)module;
+    if (!expect_arguments("coordination", n_arguments, HS_CALL_ARGUMENTS + 1) ||
+        !hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
+        return NULL;
+    }
+    npy_intp  n_rows = (npy_intp)(call.has_queries ? call.queries.n : call.points.n);
+    PyObject *counts = PyArray_SimpleNew(1, &n_rows, NPY_INT64);
+    if (counts == NULL) {
+        return NULL;
+    }
+    hs_call_release(&call);
+    const hs_status status = hs_neighbors_count(
+        &call.points, hs_call_queries(&call), hs_call_box(&call), &call.options,
+        PyArray_DATA((PyArrayObject *)counts), &failure);
+    hs_call_acquire(&call);
+    if (status != HS_OK) {
+        Py_DECREF(counts);
+        return hs_raise(status, &failure, &call.options);
+    }
+    return counts;
+}
