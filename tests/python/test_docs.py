@@ -62,6 +62,14 @@ def test_example_of_tables_runs():
     assert len(names["table"]) == 1000 and len(names["first"]) == 100
 
 
+def test_example_of_histograms_runs():
+    text = (ROOT / "docs/histograms.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "histograms.md", "exec"), names)
+    assert names["counts"].sum() == names["within"][-1] == names["result"].counts.sum()
+
+
 def test_readme_commands_create_what_they_need():
     text = (ROOT / "README.md").read_text()
     commands = re.findall(r"```bash\n(.*?)\n```", text)
