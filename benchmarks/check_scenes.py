@@ -30,6 +30,10 @@ def count_pairs(scene: Scene) -> int:
 def _count_one(scene: Scene) -> int:
     from scipy.spatial import cKDTree
 
+    if scene.task == "between":
+        tree = cKDTree(scene.asking, boxsize=np.diag(scene.rows))
+        other = cKDTree(scene.found, boxsize=np.diag(scene.rows))
+        return int(tree.count_neighbors(other, scene.cutoff))
     tree = cKDTree(scene.points)
     if scene.rows is None:
         return int(tree.count_neighbors(tree, scene.cutoff) - scene.n) // 2

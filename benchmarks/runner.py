@@ -12,6 +12,7 @@ import numpy as np
 
 from agreement import Verdict, compare, compare_counts
 from contestant import Call, Contestant, Halfshell
+from full_peers import for_scene, ours_for
 from measure import Turn, plan_turn, single_calls, take_turns
 from report import OURS, Measurement
 from scenes import Scene, load
@@ -46,6 +47,7 @@ def measure_scene(
     were right.
     """
     print(f"{scene.name}: {scene.stresses}", flush=True)
+    ours = ours_for(ours, scene)
     reason = ours.refuses(scene) if ours is not None else None
     if scene.bytes_of_output() > patience.largest:
         reason = f"{scene.bytes_of_output() / 1e9:.1f} GB of output"
@@ -97,7 +99,7 @@ def _who(
     for peer in peers:
         if peer.name not in scene.peers:
             continue
-        one = peer if scene.batch is None else peer.for_batch()
+        one = for_scene(peer, scene)
         reason = one.refuses(scene)
         if quick and (scene.n_pairs or 0) > peer.most_pairs / 20.0:
             reason = "slow"
@@ -121,7 +123,7 @@ def _check(
     plain = scene
     if scene.task == "pairs":
         plain = replace(scene, quantities="ijS" if scene.has_images else "ij", index_dtype="int64")
-    same_rule = Halfshell(options)
+    same_rule = type(ours)(options)
     answer = same_rule.prepare(plain)()
     if scene.task == "count":
         return pairs, compare_counts(int(answer), pairs)

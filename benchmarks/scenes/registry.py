@@ -36,6 +36,7 @@ TITLES = {
     "S8": "narrow angles, and boxes shorter than two cutoffs",
     "S9": "batches of small systems",
     "S10": "single calls on few points: median and 99th percentile",
+    "S11": "rows of all neighbours, and two sets",
     "S13": "input order: random, sorted, and the worst",
     "S14": "one thread and two",
 }

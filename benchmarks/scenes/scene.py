@@ -64,7 +64,8 @@ class Scene:
     """One input, what is asked about it, and what the answer should cost.
 
     With `batch` the points are those of several systems, one after the other, and pairs are
-    sought within each; the box is then of shape (systems, d, d), or None.
+    sought within each; the box is then of shape (systems, d, d), or None. The task "between" takes
+    the first `n_queries` points as queries, and pairs them with the others.
     """
 
     name: str
@@ -73,7 +74,7 @@ class Scene:
     cutoff: float
     box: Floats | None = None  # lengths (d,), row vectors (d, d), or None: open space
     periodic: tuple[bool, ...] = ()
-    task: Literal["pairs", "count"] = "pairs"
+    task: Literal["pairs", "count", "rows", "between"] = "pairs"
     quantities: str = "ij"
     index_dtype: str = "int64"
     n_pairs: int | None = None  # the exact answer, a pair at the cutoff included
@@ -82,6 +83,7 @@ class Scene:
     limits: tuple[Limit, ...] = ()
     peers: tuple[str, ...] = LIST_PEERS
     batch: NDArray[np.int64] | None = None  # (n,) ascending numbers of systems
+    n_queries: int = 0
     threads: int = 1
     latency: bool = False  # whether single calls are timed one by one as well
 
@@ -89,6 +91,16 @@ class Scene:
     def n(self) -> int:
         """Number of points."""
         return len(self.points)
+
+    @property
+    def asking(self) -> Floats:
+        """The queries."""
+        return self.points[: self.n_queries]
+
+    @property
+    def found(self) -> Floats:
+        """The points that are paired with queries."""
+        return self.points[self.n_queries :]
 
     @property
     def dim(self) -> int:
@@ -144,6 +156,8 @@ class Scene:
             state.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
         if self.batch is not None:
             state.update(self.batch.tobytes())
+        if self.n_queries > 0:
+            state.update(str(self.n_queries).encode())
         return state.hexdigest()
 
     def bytes_of_output(self) -> int:
@@ -153,4 +167,6 @@ class Scene:
         width = np.dtype(self.index_dtype).itemsize
         size = {"i": width, "j": width, "P": 2 * width, "d": 8, "D": 8 * self.dim}
         pairs = round(self.about_pairs) if self.n_pairs is None else self.n_pairs
-        return pairs * sum(size.get(letter, 4 * self.dim) for letter in self.quantities)
+        entries = 2 * pairs if self.task == "rows" else pairs
+        offsets = 8 * (self.n + 1) if self.task == "rows" else 0
+        return offsets + entries * sum(size.get(letter, 4 * self.dim) for letter in self.quantities)

@@ -63,7 +63,7 @@ def neighbors(
 
     See Also
     --------
-    pairs : each pair once, which takes half the memory.
+    pairs : each pair once, found in less time.
     coordination : the lengths of the rows alone.
     pairs_between : two sets, as arrays of pairs.
 

@@ -306,7 +306,7 @@ class NeighborTable:
         if by != "distance":
             raise ValueError(f"by must be 'distance', got {by!r}")
         # A stable sort keeps (j, S) ascending where distances are equal.
-        order = np.lexsort((self.distances, _table_forms.rows_of(self.offsets)))
+        order = _table_forms.order_by_distance(self.offsets, self.distances)
         return self._with(self.offsets, order, self._is_complete, False)
 
     # ---- other forms -----------------------------------------------------------------------
@@ -392,8 +392,12 @@ class NeighborTable:
         """
         if duplicates not in ("raise", "min"):
             raise ValueError(f"duplicates must be 'raise' or 'min', got {duplicates!r}")
+        indices, distances = self.indices, self.distances
+        if not self._is_in_order:
+            order = _table_forms.order_by_neighbor(self.offsets, indices)
+            indices, distances = indices[order], distances[order]
         return _table_forms.sparse_array(
-            self.offsets, self.indices, self.distances, self._n_points, duplicates == "min"
+            self.offsets, indices, distances, self._n_points, duplicates == "min"
         )
 
     def to_padded(

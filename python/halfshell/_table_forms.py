@@ -103,31 +103,6 @@ def _as_fill(value: Any, dtype: np.dtype[Any]) -> Any:
     return int(number)
 
 
-def sparse_array(
-    offsets: Array, indices: Array, distances: Array, n_points: int, keeps_nearest: bool
-) -> Any:
-    """SciPy's, of one entry for each point in a row."""
-    try:
-        sparse = importlib.import_module("scipy.sparse")
-    except ImportError as error:
-        raise ImportError("to_scipy needs SciPy: pip install scipy") from error
-    rows = rows_of(offsets)
-    order = np.lexsort((distances, indices, rows))  # the nearest image comes first
-    rows, ordered = rows[order], indices[order]
-    is_first = np.ones(len(order), np.bool_)
-    is_first[1:] = (rows[1:] != rows[:-1]) | (ordered[1:] != ordered[:-1])
-    if not keeps_nearest:
-        for k in np.flatnonzero(~is_first)[:1]:
-            raise ValueError(
-                f"row {rows[k]} has several images of point {ordered[k]}, and a matrix has one "
-                "place for them: duplicates='min' keeps the nearest"
-            )
-    before = np.concatenate(([0], np.cumsum(is_first, dtype=np.int64)))
-    order = order[is_first]
-    shape = (len(offsets) - 1, n_points)
-    return sparse.csr_array((distances[order], indices[order], before[offsets]), shape=shape)
-
-
 def _order_by_index(indices: Array) -> Positions:
     """A stable argsort of numbers below 2**31; NumPy's is quick for 16 bits at a time."""
     order: Positions = np.argsort((indices & 0xFFFF).astype(np.uint16), kind="stable")
@@ -135,6 +110,44 @@ def _order_by_index(indices: Array) -> Positions:
         upper = (indices >> 16).astype(np.uint16)
         order = order[np.argsort(upper[order], kind="stable")]
     return order
+
+
+def order_by_distance(offsets: Array, distances: Array) -> Positions:
+    """Entries by row, then distance, then as they were."""
+    order = np.argsort(distances, kind="stable")
+    return order[_order_by_index(rows_of(offsets)[order])]
+
+
+def order_by_neighbor(offsets: Array, indices: Array) -> Positions:
+    """Entries by row, then number of the neighbour."""
+    order = _order_by_index(indices)
+    return order[_order_by_index(rows_of(offsets)[order])]
+
+
+def sparse_array(
+    offsets: Array, indices: Array, distances: Array, n_points: int, keeps_nearest: bool
+) -> Any:
+    """SciPy's, of one entry for each point in a row; rows ascend by j."""
+    try:
+        sparse = importlib.import_module("scipy.sparse")
+    except ImportError as error:
+        raise ImportError("to_scipy needs SciPy: pip install scipy") from error
+    shape = (len(offsets) - 1, n_points)
+    is_first = np.ones(len(indices), np.bool_)
+    is_first[1:] = indices[1:] != indices[:-1]
+    is_first[offsets[:-1][np.diff(offsets) > 0]] = True
+    if is_first.all():
+        return sparse.csr_array((distances, indices, offsets), shape=shape, copy=True)
+    if not keeps_nearest:
+        k = int(np.flatnonzero(~is_first)[0])
+        row = int(np.searchsorted(offsets, k, side="right")) - 1
+        raise ValueError(
+            f"row {row} has several images of point {indices[k]}, and a matrix has one place for "
+            "them: duplicates='min' keeps the nearest"
+        )
+    nearest = np.minimum.reduceat(distances, np.flatnonzero(is_first))
+    before = np.concatenate(([0], np.cumsum(is_first, dtype=np.int64)))
+    return sparse.csr_array((nearest, indices[is_first], before[offsets]), shape=shape)
 
 
 def reverse_in_order(offsets: Array, indices: Array) -> Positions:

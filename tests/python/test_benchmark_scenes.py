@@ -120,7 +120,8 @@ def test_pair_numbers_of_small_scenes_are_those_of_brute_force(
     ["uniform-1e4-k50", "uniform-1e5-k6", "pairs-1e4-k52", "triclinic-1e4-k52", "open-1e4",
      "clusters-1e5", "narrow-1e4", "plane-1e5-k8", "plane-1e5-k30", "packing-131k", "slab-1e5",
      "droplet-1e5", "two-clusters-open", "two-clusters-periodic", "lognormal-1e5", "plummer-1e5",
-     "equal-2000", "one-cell-2000", "outlier-1e5", "batch-30", "growth-1e4-sorted"],
+     "equal-2000", "one-cell-2000", "outlier-1e5", "batch-30", "growth-1e4-sorted", "rows-1e4-k52",
+     "between-few", "between-halves"],
 )  # fmt: skip
 def test_pair_numbers_of_larger_scenes_are_those_of_a_tree(
     bench: SimpleNamespace, name: str
