@@ -14,9 +14,9 @@ import pytest
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 MODULES = (
-    "scenes", "agreement", "contestant", "peers", "full_peers", "measure", "machine", "report",
-    "results", "runner", "run", "stages", "footprint", "check_scenes", "compare", "plot",
-    "fill_docs", "reproduce",
+    "scenes", "agreement", "contestant", "peers", "histogram_peers", "full_peers", "measure",
+    "machine", "report", "results", "runner", "run", "stages", "footprint", "check_scenes",
+    "compare", "plot", "fill_docs", "reproduce",
 )  # fmt: skip
 
 only_in_a_checkout = pytest.mark.skipif(not BENCHMARKS.exists(), reason="only in a checkout")
