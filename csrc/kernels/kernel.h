@@ -81,8 +81,8 @@ typedef struct hs_scan {
  * of point `first`; unsure ones, with !(s < in), are ascending too. NaN counts as a hit and unsure.
  * Counting leaves hits and end alone.
  *
- * `squares` lists as the direct form does, and writes s of each hit. It does not look at `in`, notes
- * none as unsure and leaves unsure and n_unsure alone.
+ * `squares` lists as the direct form does, and writes s of each hit, fused or not. It does not look
+ * at `in`, notes none as unsure and leaves unsure and n_unsure alone.
  */
 typedef int32_t (*hs_scan_fn)(hs_scan *scan, int32_t first);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * scan_forms.h: the five scans of a kernel, from its scan_points and square_points. Include it after
- * these functions. Defines list, count, list_direct, count_direct and squares (hs_scan_fn), each with
- * one loop for 1, 2, 3 and any number of axes, made by inlining with constants.
+ * scan_forms.h: the five scans of a kernel, from its scan_points and square_points. Include it
+ * after these functions. Defines list, count, list_direct, count_direct and squares (hs_scan_fn),
+ * each with one loop for 1, 2, 3 and any number of axes, made by inlining with constants.
  */
 
 HS_ALWAYS_INLINE int32_t
