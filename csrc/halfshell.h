@@ -238,7 +238,8 @@ typedef struct hs_histogram {
 /*
  * Sort all pairs into a histogram by their distance, each decided exactly at each edge, and store
  * none. counts[(a * n_types + b) * n_edges + k]: how many lie below edge k and not below edge
- * k - 1, if there is one. sums: of the products of their two weights, exact until they are rounded once.
+ * k - 1, if there is one. sums: of the products of their two weights, exact until they are rounded
+ * once.
  *
  * queries NULL: each pair of points once (half list); a and b are its two types, and [a][b] is
  * [b][a]. Otherwise each query with each point: a is the type of the query, b that of the point.

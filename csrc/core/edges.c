@@ -126,7 +126,7 @@ set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
 static void
 choose_cells(const hs_edges *edges, hs_edge_table *table)
 {
-    const int64_t few = edges->n / 8;
+    const int64_t few = edges->n / 64; /* the last bins share first, and have the most pairs */
     if (set_cells(edges, FEW_CELLS, table) > few && set_cells(edges, MANY_CELLS, table) > few) {
         (void)set_cells(edges, ALL_CELLS, table);
     }
