@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+import histogram_peers
 from contestant import Call, Contestant, Halfshell, in_space
 from peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin, _columns
 from scenes import Scene
@@ -195,6 +196,8 @@ _PEERS: dict[str, dict[str, Contestant]] = {
 
 def for_scene(peer: Contestant, scene: Scene) -> Contestant:
     """Return the peer as it is asked for this scene. Raises KeyError where it has no such list."""
+    if scene.bins:
+        return histogram_peers.PEERS[peer.name]
     if scene.task in _PEERS:
         return _PEERS[scene.task][peer.name]
     return peer if scene.batch is None else peer.for_batch()
@@ -203,6 +206,8 @@ def for_scene(peer: Contestant, scene: Scene) -> Contestant:
 def ours_for(ours: Halfshell | None, scene: Scene) -> Halfshell | None:
     """Return our search as it is asked for this scene."""
     kinds = {"rows": OwnRows, "between": OwnBetween}
+    if ours is not None and scene.bins:
+        return histogram_peers.OwnHistogram(ours.options)
     if ours is None or scene.task not in kinds:
         return ours
     return kinds[scene.task](ours.options)

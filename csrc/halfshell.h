@@ -41,6 +41,9 @@ typedef enum hs_status {
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
     HS_ERR_FAR,           /* queries lie too far away for cells that were made without them */
     HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
+    HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
+    HS_ERR_TYPES,         /* a type is none of those that there are: failure.row */
+    HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
     HS_STATUS_END         /* number of codes, not a code */
 } hs_status;
 
@@ -216,6 +219,41 @@ hs_status hs_neighbors_count(const hs_points *points, const hs_points *queries, 
 /* The sum of these lengths only, for queries that are not NULL. */
 hs_status hs_between_count(const hs_points *points, const hs_points *queries, const hs_box *box,
                            const hs_options *options, int64_t *count, hs_failure *failure);
+
+/* What is known of each point of a set beside its place; borrowed. */
+typedef struct hs_marks {
+    const int32_t *types;   /* n, from 0 on; NULL: all 0 */
+    const double  *weights; /* n, finite; NULL: all 1 */
+} hs_marks;
+
+/* Pairs by distance, and where the numbers go. Everything is borrowed. */
+typedef struct hs_histogram {
+    int64_t       n_edges;       /* at least 1, less than 2^30 */
+    const double *edges;         /* finite, not negative, not descending */
+    bool          inclusive;     /* a pair at exactly an edge counts below it, not from it on ... */
+    bool          last_inclusive;/* ... and at the last one, the cutoff; if inclusive, this too */
+    int32_t       n_types;       /* at least 1 */
+    hs_marks      of_points;
+    hs_marks      of_queries;
+    int64_t      *counts;        /* n_types * n_types * n_edges, or NULL */
+    double       *sums;          /* the same, or NULL */
+} hs_histogram;
+
+/*
+ * Sort all pairs into a histogram by their distance, each decided exactly at each edge, and store
+ * none. counts[(a * n_types + b) * n_edges + k]: how many lie below edge k and not below edge
+ * k - 1, if there is one. sums: of the products of their two weights, exact until they are rounded
+ * once.
+ *
+ * queries NULL: each pair of points once (half list); a and b are its two types, and [a][b] is
+ * [b][a]. Otherwise each query with each point: a is the type of the query, b that of the point.
+ *
+ * options->cutoff, inclusive and precision are ignored, as are want and sorted. Outputs are
+ * unspecified on failure.
+ */
+hs_status hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_box *box,
+                             const hs_options *options, const hs_histogram *histogram,
+                             hs_failure *failure);
 
 /* Rows of a result of hs_neighbors_find, and where each begins: rows + 1 numbers, the last one the
  * length of all; borrowed. NULL when taken, or of another search. */

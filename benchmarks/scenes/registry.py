@@ -37,6 +37,7 @@ TITLES = {
     "S9": "batches of small systems",
     "S10": "single calls on few points: median and 99th percentile",
     "S11": "rows of all neighbours, and two sets",
+    "S12": "histograms of distances",
     "S13": "input order: random, sorted, and the worst",
     "S14": "one thread and two",
 }

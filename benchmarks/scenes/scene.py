@@ -11,7 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COUNT_PEERS", "FAST_PEERS", "LIST_PEERS", "Floats", "Limit", "Scene"]
+__all__ = [
+    "COUNT_PEERS", "FAST_PEERS", "HISTOGRAM_PEERS", "LIST_PEERS", "Floats", "Limit", "Scene",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +29,7 @@ LIST_PEERS = (
 )
 # Enough for families of many scenes: one of these was the fastest wherever all were measured.
 FAST_PEERS = ("vesin", "cKDTree", "neighborlist-rs", "pymatgen")
+HISTOGRAM_PEERS = ("Corrfunc", "cKDTree", "freud")
 COUNT_PEERS = ("Corrfunc", "cKDTree", "vesin", "neighborlist-rs")
 
 
@@ -84,6 +87,7 @@ class Scene:
     peers: tuple[str, ...] = LIST_PEERS
     batch: NDArray[np.int64] | None = None  # (n,) ascending numbers of systems
     n_queries: int = 0
+    bins: int = 0  # with the task "count": so many bins of equal width, or one number
     threads: int = 1
     latency: bool = False  # whether single calls are timed one by one as well
 

@@ -40,6 +40,17 @@ raise_not_finite(const hs_failure *failure)
 }
 
 static PyObject *
+raise_of_row(const char *format, const hs_failure *failure)
+{
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL) {
+        PyErr_Format(PyExc_ValueError, format, (long long)failure->row, number);
+        Py_DECREF(number);
+    }
+    return NULL;
+}
+
+static PyObject *
 raise_box(const hs_failure *failure)
 {
     PyObject *number = PyFloat_FromDouble(failure->value);
@@ -202,6 +213,19 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
         return raise_with_number(PyExc_OverflowError,
                                  "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
                                  failure->value);
+    case HS_ERR_EDGES:
+        return raise_of_row(
+            "edges must be finite, not negative and ascending, got edges[%lld] = %R", failure);
+    case HS_ERR_TYPES:
+        return raise_of_row(failure->in_queries
+                                ? "types must be from 0 on, got query_types[%lld] = %R"
+                                : "types must be from 0 on, got types[%lld] = %R",
+                            failure);
+    case HS_ERR_WEIGHTS:
+        return raise_of_row(failure->in_queries
+                                ? "query_weights must be finite, got query_weights[%lld] = %R"
+                                : "weights must be finite, got weights[%lld] = %R",
+                            failure);
     case HS_ERR_SHIFT_RANGE:
         PyErr_Format(PyExc_OverflowError,
                      "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "

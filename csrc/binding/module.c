@@ -13,6 +13,7 @@ static PyMethodDef methods[] = {
     {"iter_pairs", FASTCALL(hs_py_iter_pairs), METH_FASTCALL, "See halfshell.iter_pairs."},
     {"for_each_pair", FASTCALL(hs_py_for_each_pair), METH_FASTCALL,
      "See halfshell.for_each_pair."},
+    {"histogram", FASTCALL(hs_py_histogram), METH_FASTCALL, "See halfshell.pair_histogram."},
     {"plain_pairs", FASTCALL(hs_py_plain_pairs), METH_FASTCALL,
      "pairs of plain arguments, or NotImplemented."},
     {"plain_count", FASTCALL(hs_py_plain_count), METH_FASTCALL,

@@ -11,6 +11,10 @@ PyObject *hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n
 /* The arguments of call.h. */
 PyObject *hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
+/* py_histogram.c. The arguments of call.h (its cutoff is ignored, inclusive is that of all edges
+ * but the last), edges, last_inclusive, queries or None, n_types; types and weights of the points,
+ * then of the queries, each an array (int32, float64) or None -> (n_types, n_types, edges). */
+PyObject *hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* py_neighbors.c. The arguments of call.h, then quantities, sort (which changes nothing),
  * index_bytes, out; queries. */
 PyObject *hs_py_pairs_between(PyObject *module, PyObject *const *arguments,

@@ -29,12 +29,11 @@ remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
 
 /* One pair of the batch, by all stages or by the last alone. */
 static bool
-decide_pair(hs_walker *walker, int32_t e, bool others_failed)
+decide_pair(hs_walker *walker, const hs_metric *metric, int32_t e, bool others_failed)
 {
-    const hs_metric *metric = &walker->search->scene.metric;
-    double           p[HS_MAX_DIM], q[HS_MAX_DIM];
-    int64_t          of_pair[HS_MAX_DIM];
-    const int64_t   *shift = hs_trace_pair(&walker->trace, e, p, q, of_pair);
+    double         p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t        of_pair[HS_MAX_DIM];
+    const int64_t *shift = hs_trace_pair(&walker->trace, e, p, q, of_pair);
     if (walker->options.precision == HS_DOUBLE) {
         return hs_metric_within_double(metric, p, q, shift);
     }
@@ -67,14 +66,12 @@ judge_components(const hs_metric *metric, const hs_trace *trace, uint8_t *verdic
     }
 }
 
-/* Whether each pair of the batch is within the cutoff. */
-static void
-decide_batch(hs_walker *walker, uint8_t *within)
+void
+hs_decide_traced(hs_walker *walker, const hs_metric *metric, uint8_t *within)
 {
-    const hs_metric *metric = &walker->search->scene.metric;
-    const hs_trace  *trace = &walker->trace;
-    const bool       by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
-    uint8_t          verdict[HS_BATCH + HS_BATCH_PADDING];
+    const hs_trace *trace = &walker->trace;
+    const bool      by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
+    uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
     if (by_batch && !metric->floats_usable && !trace->is_shifted) {
         judge_components(metric, trace, verdict, &walker->stages);
     } else if (by_batch) {
@@ -82,8 +79,9 @@ decide_batch(hs_walker *walker, uint8_t *within)
         walker->search->kernel->judge(metric, &batch, verdict, &walker->stages);
     }
     for (int32_t e = 0; e < trace->n; e++) {
-        within[e] = by_batch && verdict[e] != HS_UNDECIDED ? verdict[e] == HS_WITHIN
-                                                           : decide_pair(walker, e, by_batch);
+        within[e] = by_batch && verdict[e] != HS_UNDECIDED
+                        ? verdict[e] == HS_WITHIN
+                        : decide_pair(walker, metric, e, by_batch);
     }
 }
 
@@ -121,7 +119,7 @@ hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next)
         if (status != HS_OK) {
             return status;
         }
-        decide_batch(walker, within);
+        hs_decide_traced(walker, &walker->search->scene.metric, within);
         for (int32_t e = 0; e < end - u; e++) {
             scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather at the front */
             n_beyond += !within[e];

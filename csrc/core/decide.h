@@ -9,4 +9,8 @@
  * the cutoff from the hits; the order stays. */
 hs_status hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next);
 
+/* Whether each pair of walker->trace is within the metric's cutoff, which need not be the scene's.
+ * within: HS_BATCH of them. */
+void hs_decide_traced(hs_walker *walker, const hs_metric *metric, uint8_t *within);
+
 #endif

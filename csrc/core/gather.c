@@ -7,13 +7,18 @@
 /* Every array begins on a cache line. */
 #define FLOATS_PER_LINE (HS_ALIGNMENT / (int64_t)sizeof(float))
 
+int32_t
+hs_block_most_hits(int32_t capacity)
+{
+    return capacity < INT32_MAX / HS_HITS_PER_CANDIDATE ? HS_HITS_PER_CANDIDATE * capacity : capacity;
+}
+
 hs_status
 hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
               hs_block *block)
 {
     *block = (hs_block){.capacity = most, .most_runs = most_runs};
-    block->most_hits =
-        most < INT32_MAX / HS_HITS_PER_CANDIDATE ? HS_HITS_PER_CANDIDATE * most : most;
+    block->most_hits = hs_block_most_hits(most);
     const int64_t capacity = (int64_t)most + HS_PADDING;
     const int64_t room = (capacity + FLOATS_PER_LINE - 1) / FLOATS_PER_LINE * FLOATS_PER_LINE;
     block->y[0] = hs_alloc(account, HS_FOR_CANDIDATES, room * (ndim + 1), sizeof(float));
@@ -32,7 +37,12 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
                                (int64_t)block->most_hits + HS_PADDING, sizeof(int32_t));
         complete = complete && block->hits != NULL;
     }
-    if (use == HS_BLOCK_LISTS_PLACES) {
+    if (use == HS_BLOCK_LISTS_SQUARES) {
+        block->squares = hs_alloc(account, HS_FOR_CANDIDATES,
+                                  (int64_t)block->most_hits + HS_PADDING, sizeof(float));
+        complete = complete && block->squares != NULL;
+    }
+    if (use == HS_BLOCK_LISTS_PLACES || use == HS_BLOCK_LISTS_SQUARES) {
         block->place = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
         complete = complete && block->place != NULL;
     }
@@ -53,6 +63,7 @@ hs_block_free(hs_account *account, hs_block *block)
     hs_free(account, block->id);
     hs_free(account, block->place);
     hs_free(account, block->hits);
+    hs_free(account, block->squares);
     hs_free(account, block->unsure);
     hs_free(account, block->runs);
     *block = (hs_block){0};

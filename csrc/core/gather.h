@@ -28,6 +28,7 @@ typedef struct hs_block {
     int32_t   *origin; /* where candidates were before they were put in order (order.h); NULL when
                         * they are not */
     int32_t   *hits;   /* most_hits + HS_PADDING; NULL when only counting */
+    float     *squares; /* of the hits, the same; NULL unless asked for */
     hs_unsure *unsure; /* capacity */
     hs_run    *runs;   /* most_runs + 1; runs[n_runs].at is the number of candidates */
     int32_t    capacity, most_hits, most_runs;
@@ -39,7 +40,8 @@ typedef struct hs_block {
 typedef enum hs_block_use {
     HS_BLOCK_COUNTS,
     HS_BLOCK_LISTS_IDS,
-    HS_BLOCK_LISTS_PLACES
+    HS_BLOCK_LISTS_PLACES,
+    HS_BLOCK_LISTS_SQUARES /* places, all that may be hits, and their float32 squares */
 } hs_block_use;
 
 /* The points whose neighbourhood it is: [first, last) in cell order. */
@@ -54,6 +56,9 @@ typedef struct hs_group {
 hs_status hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t capacity,
                         int32_t most_runs, hs_block *block);
 void      hs_block_free(hs_account *account, hs_block *block);
+
+/* most_hits of a block of this capacity. */
+int32_t hs_block_most_hits(int32_t capacity);
 
 /* Chooses the centre. */
 void hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group);

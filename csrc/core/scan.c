@@ -62,7 +62,9 @@ set_form(hs_walker *walker)
         return;
     }
     set_thresholds(walker);
-    if (hs_expanded_pays(walker->search->scene.cutoff, extent)) {
+    if (walker->use == HS_BLOCK_LISTS_SQUARES) {
+        walker->scan = kernel->squares;
+    } else if (hs_expanded_pays(walker->search->scene.cutoff, extent)) {
         walker->scan = counts ? kernel->count : kernel->list;
     }
 }
@@ -72,14 +74,15 @@ static void
 set_scan(const hs_walker *walker, hs_scan *scan)
 {
     const hs_block *block = &walker->block;
+    const bool      lists_places = walker->use == HS_BLOCK_LISTS_PLACES;
     scan->ndim = walker->search->scene.ndim;
     for (int k = 0; k < scan->ndim; k++) {
         scan->y[k] = block->y[k];
         scan->q[k] = walker->group.q[k];
     }
-    scan->label = walker->use != HS_BLOCK_LISTS_PLACES ? block->id
-                  : walker->is_ordered                 ? block->origin
-                                                       : block->place;
+    scan->label = block->place == NULL ? block->id
+                  : walker->is_ordered ? block->origin
+                                       : block->place;
     scan->n = block->n;
     scan->n_points = walker->group.last - walker->group.first;
     scan->triangular = walker->block_is_first;
@@ -87,9 +90,11 @@ set_scan(const hs_walker *walker, hs_scan *scan)
     scan->direct = walker->direct;
     scan->expanded = walker->expanded;
     scan->hits = block->hits;
+    scan->squares = block->squares;
     scan->unsure = block->unsure;
+    scan->n_unsure = 0;
     scan->most_hits = block->most_hits;
-    if (walker->use == HS_BLOCK_LISTS_IDS && block->n + BURST < scan->most_hits) {
+    if (!lists_places && block->hits != NULL && block->n + BURST < scan->most_hits) {
         scan->most_hits = block->n + BURST;
     }
     scan->most_unsure = block->capacity;
@@ -130,6 +135,7 @@ static hs_status
 fill_block(hs_walker *walker)
 {
     hs_block *block = &walker->block;
+    walker->n_blocks++;
     walker->of_group.candidates += block->n;
     walker->of_group.runs += block->n_runs;
     set_flushing(walker, true);

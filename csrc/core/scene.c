@@ -239,12 +239,16 @@ set_scale(const hs_condensed *condensed, int unit, hs_scene *scene, const hs_sce
     const hs_box_size size = hs_box_size_of(condensed->box);
     int               exponent = unit;
     bool              also_extreme = false;
+    /* The smallest length that pairs are compared with. */
+    const double      least = scene->least_cutoff > 0.0
+                                  ? hs_smaller(scene->least_cutoff, scene->sought)
+                                  : scene->sought;
     scene->extreme = false;
     if (!condensed->is_scaled) {
         exponent =
-            hs_choose_exponent(&scene->cloud, &size, scene->sought, unit, &scene->extreme);
+            hs_choose_exponent(&scene->cloud, &size, least, unit, &scene->extreme);
         if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
-            (void)hs_choose_exponent(&asking->cloud, &size, scene->sought, unit, &also_extreme);
+            (void)hs_choose_exponent(&asking->cloud, &size, least, unit, &also_extreme);
         }
     }
     scene->extreme = scene->extreme || also_extreme;
@@ -303,12 +307,11 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     hs_condensed      condensed = {.box = box};
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
-    const bool        alone = asking == NULL && !scene->is_kept && !scene->is_plain;
     hs_status         status = HS_OK;
-    scene->sought =
-        scene->is_kept ? options->cutoff : hs_enough_cutoff(cloud, &size, options->cutoff);
+    const bool as_given = scene->is_kept || scene->is_plain;
+    scene->sought = as_given ? options->cutoff : hs_enough_cutoff(cloud, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
-    if (alone) {
+    if (asking == NULL && !as_given) {
         status = hs_condense(account, options, box, unit, cloud, &condensed, failure);
     }
     if (status == HS_OK) {
@@ -330,6 +333,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     start_scene(sets->points, scene);
     scene->is_kept = scene->is_asked = sets->is_kept;
     scene->is_plain = sets->is_plain;
+    scene->least_cutoff = sets->least_cutoff;
     if (asking != NULL) {
         start_scene(sets->queries, asking);
     }

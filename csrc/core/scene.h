@@ -11,6 +11,9 @@
 #include "memory.h"
 #include "points.h"
 
+/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
+#define HS_SCALING_LOSS 0x1p-1000
+
 typedef struct hs_scene {
     int        ndim;
     int64_t    n;
@@ -40,6 +43,7 @@ typedef struct hs_scene {
     bool       is_asked;      /* by queries: the bounds above hold for these too */
     bool       is_kept;       /* and for others that come later */
     bool       is_plain;      /* as hs_sets says */
+    double     least_cutoff;  /* the same */
 } hs_scene;
 
 /* Who looks for neighbours among whom; borrowed. */
@@ -53,6 +57,8 @@ typedef struct hs_sets {
     bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
+    double           least_cutoff; /* the smallest positive length that pairs are compared with,
+                                    * where there are several; 0: the cutoff alone */
 } hs_sets;
 
 /*

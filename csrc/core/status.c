@@ -18,6 +18,9 @@ hs_status_text(hs_status status)
     case HS_ERR_KERNEL: return "no such kernel on this CPU";
     case HS_ERR_FAR: return "queries lie too far from the points that are in cells";
     case HS_ERR_CAPACITY: return "the arrays that were given are too small";
+    case HS_ERR_EDGES: return "edges must be finite, not negative and ascending";
+    case HS_ERR_TYPES: return "types must be from 0 on and below the number of types";
+    case HS_ERR_WEIGHTS: return "weights must be finite";
     case HS_ERR_INTERRUPTED: return "interrupted";
     case HS_STATUS_END: break;
     }

@@ -182,6 +182,13 @@ most_candidates(const hs_search *search)
     return most;
 }
 
+int32_t
+hs_walker_capacity(const hs_search *search)
+{
+    const double most = most_candidates(search); /* a small scene gets a small block */
+    return most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
+}
+
 static hs_status
 init_links(hs_search *search, hs_walker *walker)
 {
@@ -230,9 +237,7 @@ hs_status
 hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                hs_walker *walker)
 {
-    const double  most = most_candidates(search); /* a small scene gets a small block */
-    const int32_t capacity =
-        most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
+    const int32_t   capacity = hs_walker_capacity(search);
     const hs_status status = init_walker(search, use, capacity,
                                          capacity < HS_BLOCK_RUNS ? capacity : HS_BLOCK_RUNS,
                                          walker);

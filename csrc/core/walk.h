@@ -17,8 +17,9 @@ typedef struct hs_walker hs_walker;
 
 /*
  * The decided hits of points [first, first + hits->n) in cell order against the present block, as
- * entries of walker->block: point numbers, or places when walker->use says so. Anything but HS_OK
- * ends the walk with that status.
+ * entries of walker->block: point numbers, or places when walker->use says so. With
+ * HS_BLOCK_LISTS_SQUARES they are not decided, and walker->block.squares are theirs. Anything but
+ * HS_OK ends the walk with that status.
  */
 typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
                                  const hs_hits *hits);
@@ -69,12 +70,14 @@ struct hs_walker {
     int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
     int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
     hs_stages        stages;
-    int64_t          n_groups, n_candidates, n_ambiguous;
+    int64_t          n_groups, n_blocks, n_candidates, n_ambiguous;
     int64_t          work_since_poll;
 };
 
 /* Hits of one visit at most, of walkers that hs_walker_init has opened. */
 #define HS_MOST_HITS (HS_HITS_PER_CANDIDATE * (HS_BLOCK_CANDIDATES + HS_GROUP_POINTS))
+/* Candidates that a block of hs_walker_init has room for. */
+int32_t hs_walker_capacity(const hs_search *search);
 
 /* `visit` NULL: hits are only counted, in n_found. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * kernel.h: the contract of the kernels, the four inner loops of a search, and the table of them.
+ * kernel.h: the contract of the kernels, the five inner loops of a search, and the table of them.
  *
  *   gather   copies a run of points to float32, relative to a centre
  *   list     compares the points of a group with gathered candidates in float32 and lists those
  *            that are not surely beyond the cutoff
  *   count    the same, but only counts them
+ *   squares  the same as list, but gives the float32 square of each in place of the unsure ones
  *   emit     writes listed hits as pairs, i < j, int32 or int64
  *
  * All kernels list the same candidates in the same order, except that they may differ on those
@@ -65,6 +66,7 @@ typedef struct hs_scan {
     hs_expanded    expanded;      /* and of the expanded one */
     int32_t       *hits;          /* receives labels; most_hits + HS_PADDING */
     int32_t       *end;           /* receives, for each point, where its hits end; n_points */
+    float         *squares;       /* receives s of each hit, by `squares` alone; as hits */
     hs_unsure     *unsure;        /* receives hits with !(s < in); most_unsure */
     int32_t        most_hits;     /* at least n */
     int32_t        most_unsure;   /* at least n */
@@ -78,6 +80,9 @@ typedef struct hs_scan {
  * label[c] for every candidate c with !(s > out), ascending. hits begin at entry 0 with those
  * of point `first`; unsure ones, with !(s < in), are ascending too. NaN counts as a hit and unsure.
  * Counting leaves hits and end alone.
+ *
+ * `squares` lists as the direct form does, and writes s of each hit, fused or not. It does not look
+ * at `in`, notes none as unsure and leaves unsure and n_unsure alone.
  */
 typedef int32_t (*hs_scan_fn)(hs_scan *scan, int32_t first);
 
@@ -126,6 +131,7 @@ typedef struct hs_kernel {
     hs_scan_fn    count;
     hs_scan_fn    list_direct;
     hs_scan_fn    count_direct;
+    hs_scan_fn    squares;
     hs_emit_fn    emit_int32;
     hs_emit_fn    emit_int64;
     hs_judge_fn   judge; /* batch.h */
@@ -135,7 +141,8 @@ typedef struct hs_kernel {
 /* The fields for which every kernel's file has functions of its own, of these names. */
 #define HS_KERNEL_LOOPS                                                                          \
     .gather = gather, .list = list, .count = count, .list_direct = list_direct,                  \
-    .count_direct = count_direct, .emit_int32 = emit_int32, .emit_int64 = emit_int64
+    .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32,                  \
+    .emit_int64 = emit_int64
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

@@ -121,6 +121,50 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
     return t;
 }
 
+/* n squares from candidate `begin` on, and which of them are hits. */
+HS_ALWAYS_INLINE void
+square_chunk(const hs_scan *scan, const float *point, int32_t begin, int32_t n, const int ndim,
+             float *HS_RESTRICT s, int32_t *HS_RESTRICT near)
+{
+    const float  out = scan->direct.out;
+    const float *y[HS_MAX_DIM];
+    float        centre[HS_MAX_DIM];
+    for (int k = 0; k < ndim; k++) {
+        y[k] = scan->y[k] + begin;
+        centre[k] = point[k];
+    }
+    for (int32_t c = 0; c < n; c++) {
+        s[c] = square(y, NULL, centre, c, ndim, false);
+        near[c] = !(s[c] > out);
+    }
+}
+
+HS_ALWAYS_INLINE int32_t
+square_points(hs_scan *scan, int32_t first, const int ndim)
+{
+    float   s[CHUNK];
+    int32_t near[CHUNK];
+    int32_t t = first, at = 0;
+    for (; t < scan->n_points && at + scan->n <= scan->most_hits; t++) {
+        float point[HS_MAX_DIM] = {0.0f};
+        for (int k = 0; k < ndim; k++) {
+            point[k] = scan->q[k][t];
+        }
+        for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += CHUNK) {
+            const int32_t left = scan->n - begin, n = left < CHUNK ? left : CHUNK;
+            square_chunk(scan, point, begin, n, ndim, s, near);
+            for (int32_t c = 0; c < n; c++) {
+                scan->squares[at] = s[c];
+                scan->hits[at] = scan->label[begin + c];
+                at += near[c];
+            }
+        }
+        scan->end[t] = at;
+    }
+    scan->n_hits = at;
+    return t;
+}
+
 #include "scan_forms.h"
 
 static void

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * scan_forms.h: the four scans of a kernel, from its scan_points. Include it after that function.
- * Defines list, count, list_direct and count_direct (hs_scan_fn), each with one loop for 1, 2, 3
- * and any number of axes, made by inlining scan_points with constants.
+ * scan_forms.h: the five scans of a kernel, from its scan_points and square_points. Include it
+ * after these functions. Defines list, count, list_direct, count_direct and squares (hs_scan_fn),
+ * each with one loop for 1, 2, 3 and any number of axes, made by inlining with constants.
  */
 
 HS_ALWAYS_INLINE int32_t
@@ -38,4 +38,15 @@ static int32_t
 count_direct(hs_scan *scan, int32_t first)
 {
     return scan_dimensions(scan, first, false, false);
+}
+
+static int32_t
+squares(hs_scan *scan, int32_t first)
+{
+    switch (scan->ndim) {
+    case 1: return square_points(scan, first, 1);
+    case 2: return square_points(scan, first, 2);
+    case 3: return square_points(scan, first, 3);
+    default: return square_points(scan, first, scan->ndim);
+    }
 }

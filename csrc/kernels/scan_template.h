@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * scan_template.h: the vector scans, once for each instruction set. Include it after a vocabulary
- * (simd_<isa>.h), inside that instruction set's target region. Defines scan_points and, by
- * scan_forms.h, list, count, list_direct and count_direct (hs_scan_fn).
+ * (simd_<isa>.h), inside that instruction set's target region. Defines scan_points, square_points
+ * and, by scan_forms.h, list, count, list_direct, count_direct and squares (hs_scan_fn).
  */
 
 /* Notes the lanes of m, all of them hits that are listed from entry `at` on. Rare, or in crystals
@@ -44,7 +44,7 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const bool expanded, v
 
 /* s of LANES candidates from c on. */
 HS_ALWAYS_INLINE floats
-squares(const vector_scan *v, int32_t c, const int ndim, const bool expanded)
+sums_of(const vector_scan *v, int32_t c, const int ndim, const bool expanded)
 {
     if (expanded) {
         floats s = load(v->norm + c);
@@ -83,7 +83,7 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
         }
         set_point(scan, t, ndim, expanded, &v);
         for (int32_t c = scan->triangular ? t + 1 : 0; c < n; c += LANES) {
-            const floats s = squares(&v, c, ndim, expanded);
+            const floats s = sums_of(&v, c, ndim, expanded);
             mask         near = not_greater(s, v.out);
             if (HS_UNLIKELY(n - c < LANES)) {
                 near = (mask)(near & first_lanes(n - c));
@@ -103,6 +103,46 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
         }
     }
     scan->n_hits = lists ? hit - scan->hits : count;
+    return t;
+}
+
+/* Unlike the direct form above, fused where that is quicker: nobody but the caller sees s, and the
+ * bounds of filter.h hold either way. */
+HS_ALWAYS_INLINE int32_t
+square_points(hs_scan *scan, int32_t first, const int ndim)
+{
+    const int32_t *label = scan->label;
+    const int32_t  n = scan->n;
+    const floats   out = broadcast(scan->direct.out);
+    const float   *y[HS_MAX_DIM];
+    int32_t       *hits = scan->hits;
+    float         *found = scan->squares;
+    int32_t        at = 0, t = first;
+    for (int k = 0; k < ndim; k++) {
+        y[k] = scan->y[k];
+    }
+    for (; t < scan->n_points && at + n <= scan->most_hits; t++) {
+        floats q[HS_MAX_DIM];
+        for (int k = 0; k < ndim; k++) {
+            q[k] = broadcast(scan->q[k][t]);
+        }
+        for (int32_t c = scan->triangular ? t + 1 : 0; c < n; c += LANES) {
+            const floats along = subtract(load(y[0] + c), q[0]);
+            floats       s = multiply(along, along);
+            for (int k = 1; k < ndim; k++) {
+                const floats other = subtract(load(y[k] + c), q[k]);
+                s = multiply_add(other, other, s);
+            }
+            mask near = not_greater(s, out);
+            if (HS_UNLIKELY(n - c < LANES)) {
+                near = (mask)(near & first_lanes(n - c));
+            }
+            append_floats(found + at, s, near);
+            at += append(hits + at, label + c, near);
+        }
+        scan->end[t] = at;
+    }
+    scan->n_hits = at;
     return t;
 }
 

@@ -69,6 +69,14 @@ append(int32_t *dst, const int32_t *label, mask m)
     return (int32_t)_mm_popcnt_u32(m);
 }
 
+/* The same for numbers. */
+HS_ALWAYS_INLINE void
+append_floats(float *dst, floats a, mask m)
+{
+    const __m128i bytes = _mm_loadl_epi64((const __m128i *)&packed_lanes[m]);
+    _mm256_storeu_ps(dst, _mm256_permutevar8x32_ps(a, _mm256_cvtepu8_epi32(bytes)));
+}
+
 HS_ALWAYS_INLINE unsigned popcount(mask m) { return (unsigned)_mm_popcnt_u32(m); }
 
 HS_ALWAYS_INLINE void store(float *p, floats a) { _mm256_storeu_ps(p, a); }

@@ -48,6 +48,13 @@ append(int32_t *dst, const int32_t *label, mask m)
     return (int32_t)_mm_popcnt_u32(m);
 }
 
+/* The same for numbers. */
+HS_ALWAYS_INLINE void
+append_floats(float *dst, floats a, mask m)
+{
+    _mm512_storeu_ps(dst, _mm512_mask_compress_ps(a, m, a));
+}
+
 HS_ALWAYS_INLINE unsigned popcount(mask m) { return (unsigned)_mm_popcnt_u32(m); }
 
 HS_ALWAYS_INLINE void store(float *p, floats a) { _mm512_storeu_ps(p, a); }

@@ -73,6 +73,14 @@ append(int32_t *dst, const int32_t *label, mask m)
     return (int32_t)popcount(m);
 }
 
+/* The same for numbers. */
+HS_ALWAYS_INLINE void
+append_floats(float *dst, floats a, mask m)
+{
+    const uint8x16_t all = vreinterpretq_u8_f32(a);
+    vst1q_f32(dst, vreinterpretq_f32_u8(vqtbl1q_u8(all, vld1q_u8(packed_bytes[m]))));
+}
+
 HS_ALWAYS_INLINE void store(float *p, floats a) { vst1q_f32(p, a); }
 HS_ALWAYS_INLINE integers broadcast_integer(int32_t a) { return vdupq_n_s32(a); }
 HS_ALWAYS_INLINE integers load_integers(const int32_t *p) { return vld1q_s32(p); }

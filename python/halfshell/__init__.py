@@ -8,9 +8,11 @@ from halfshell._cells import CellList
 from halfshell._count import count_pairs
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
+from halfshell._histogram import pair_histogram
 from halfshell._neighbors import coordination, neighbors
 from halfshell._options import kernels
 from halfshell._pairs import pairs
+from halfshell._rdf import RadialDistribution, rdf
 from halfshell._report import report
 from halfshell._stream import iter_pairs
 from halfshell._table import NeighborTable
@@ -26,6 +28,7 @@ __all__ = [
     "CellList",
     "Explanation",
     "NeighborTable",
+    "RadialDistribution",
     "Verdict",
     "VerletList",
     "clear_cache",
@@ -36,8 +39,10 @@ __all__ = [
     "iter_pairs",
     "kernels",
     "neighbors",
+    "pair_histogram",
     "pairs",
     "pairs_between",
+    "rdf",
     "report",
     "set_cache_limit",
     "verify",

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from halfshell import _core, _inputs
 from halfshell._box import Box
+from halfshell._cutoffs import Rest, count_within
 from halfshell._options import Precision, SearchOptions
 from halfshell._pairs import Arrays, Letter
 
@@ -136,19 +137,12 @@ def pairs_between(
     )
 
 
-# What the core takes from `inclusive` to `threads`.
-_Rest = tuple[bool, Precision, str | None, float | None, None, int | None]
-
-
 def count_between(
-    queries: Any, points: Any, cutoff: Any, box: Any, periodic: Any, rest: _Rest
+    queries: Any, points: Any, cutoff: Any, box: Any, periodic: Any, rest: Rest
 ) -> int | npt.NDArray[np.int64]:
     """`count_pairs` of two sets."""
     asking, array, vectors, bits = _inputs.two_sets(queries, points, box, periodic)
     cutoffs = _inputs.as_cutoffs(cutoff)
     if isinstance(cutoffs, float):
         return _core.count_between(array, cutoffs, vectors, bits, *rest, asking)
-    counts = [
-        _core.count_between(array, one, vectors, bits, *rest, asking) for one in cutoffs.tolist()
-    ]
-    return np.array(counts, dtype=np.int64)
+    return count_within(cutoffs, array, vectors, bits, rest, asking)

@@ -220,6 +220,27 @@ def plain_neighbors(
     queries: Any,
     /,
 ) -> Any: ...  # as neighbors, or NotImplemented
+def histogram(
+    points: npt.NDArray[Any],
+    cutoff: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    edges: npt.NDArray[np.float64],
+    last_inclusive: bool,
+    queries: npt.NDArray[Any] | None,
+    n_types: int,
+    types: npt.NDArray[np.int32] | None,
+    weights: npt.NDArray[np.float64] | None,
+    query_types: npt.NDArray[np.int32] | None,
+    query_weights: npt.NDArray[np.float64] | None,
+    /,
+) -> npt.NDArray[Any]: ...
 def cells_build(
     points: npt.NDArray[Any],
     cutoff: float,

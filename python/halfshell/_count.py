@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _batch, _between, _core, _inputs
 from halfshell._box import Box
+from halfshell._cutoffs import count_within
 from halfshell._options import Precision, SearchOptions
 
 
@@ -60,8 +61,9 @@ def count_pairs(
     points, box, periodic, inclusive, precision, kernel, threads
         As in `pairs`.
     cutoff : float or array_like of float, shape (k,)
-        One cutoff, or several in ascending order. k cutoffs cost k searches. With `batch`: one
-        for all systems, or one for each.
+        One cutoff, or several in ascending order, for which there is one search up to the largest
+        (k searches where `precision` is not "exact"). With `batch`: one for all systems, or one
+        for each.
     queries : array_like of float, shape (q, d), optional
         Count pairs of a query and a point instead, as `pairs_between` finds them.
     memory_limit : float, optional
@@ -86,6 +88,7 @@ def count_pairs(
     See Also
     --------
     pairs : the pairs themselves.
+    pair_histogram : the number of pairs between one distance and the next, by type or weighted.
 
     Examples
     --------
@@ -127,5 +130,4 @@ def count_pairs(
     cutoffs = _inputs.as_cutoffs(cutoff)
     if isinstance(cutoffs, float):
         return _core.count_pairs(array, cutoffs, vectors, bits, *rest)
-    counts = [_core.count_pairs(array, one, vectors, bits, *rest) for one in cutoffs.tolist()]
-    return np.array(counts, dtype=np.int64)
+    return count_within(cutoffs, array, vectors, bits, rest)

@@ -11,7 +11,7 @@ enum { MOST_HITS = 2 * HS_BLOCK_CANDIDATES }; /* of a scan here */
 
 /* A scan with its arrays, owned by this file and reused: y, norm, label, q, hits, end, unsure. */
 static guarded y_pages[HS_MAX_DIM], norm_pages, label_pages, q_pages[HS_MAX_DIM];
-static guarded hits_pages, end_pages, unsure_pages;
+static guarded hits_pages, squares_pages, end_pages, unsure_pages;
 
 static inline void
 guard_scans(void)
@@ -24,6 +24,7 @@ guard_scans(void)
     norm_pages = guarded_pages(candidates);
     label_pages = guarded_pages(candidates);
     hits_pages = guarded_pages((MOST_HITS + HS_PADDING) * sizeof(int32_t));
+    squares_pages = guarded_pages((MOST_HITS + HS_PADDING) * sizeof(float));
     end_pages = guarded_pages(HS_GROUP_POINTS * sizeof(int32_t));
     unsure_pages = guarded_pages(HS_BLOCK_CANDIDATES * sizeof(hs_unsure));
 }
@@ -74,6 +75,7 @@ place_scan(const numbers *s, bool at_end)
     memset(label + s->n, 0xff, HS_PADDING * sizeof(int32_t));
     scan.label = label;
     scan.hits = guarded_place(hits_pages, s->most_hits + HS_PADDING, sizeof(int32_t), at_end);
+    scan.squares = guarded_place(squares_pages, s->most_hits + HS_PADDING, sizeof(float), at_end);
     scan.end = guarded_place(end_pages, s->n_points, sizeof(int32_t), at_end);
     scan.unsure = guarded_place(unsure_pages, s->most_unsure, sizeof(hs_unsure), at_end);
     return scan;
@@ -215,7 +217,39 @@ check_form(hs_scan_fn function, const numbers *s, bool expanded, bool lists, boo
     return calls;
 }
 
-/* All four scans, against the guard before and the one after; only for numbers with which no
+/* The hits of the direct form, each with its square; nothing else is written. */
+static inline int
+check_squares(const hs_kernel *kernel, const numbers *s, bool at_end)
+{
+    int     calls = 0;
+    bool    same = true;
+    hs_scan scan = place_scan(s, at_end);
+    for (int32_t first = 0, next; first < s->n_points && same; first = next) {
+        numbers listed = *s;
+        listed.most_unsure = INT32_MAX / 2; /* none is noted, so none stops the scan */
+        listed.direct.in = INFINITY;
+        expect(&listed, false, true, first);
+        next = kernel->squares(&scan, first);
+        calls++;
+        same = next == expected.next && scan.n_hits == expected.n_hits && scan.n_unsure == -1 &&
+               memcmp(scan.hits, expected.hits, (size_t)scan.n_hits * sizeof(int32_t)) == 0 &&
+               memcmp(scan.end + first, expected.end + first,
+                      (size_t)(next - first) * sizeof(int32_t)) == 0;
+        for (int32_t t = first, h = 0; same && t < next; t++) {
+            for (int32_t c = s->triangular ? t + 1 : 0; same && c < s->n; c++) {
+                const float square = square_of(s, false, t, c);
+                if (!(square > s->direct.out)) {
+                    same = isnan(square) ? isnan(scan.squares[h]) : scan.squares[h] == square;
+                    h++;
+                }
+            }
+        }
+        CHECK(same);
+    }
+    return calls;
+}
+
+/* All scans, against the guard before and the one after; only for numbers with which no
  * rounding can differ. */
 static inline int
 check_exactly(const hs_kernel *kernel, const numbers *s)
@@ -226,6 +260,7 @@ check_exactly(const hs_kernel *kernel, const numbers *s)
         calls += check_form(kernel->count, s, true, false, variant);
         calls += check_form(kernel->list_direct, s, false, true, variant);
         calls += check_form(kernel->count_direct, s, false, false, variant);
+        calls += check_squares(kernel, s, variant);
     }
     return calls;
 }

@@ -59,7 +59,7 @@ scans_stop_before_hits_might_not_fit(void)
             least = calls < least ? calls : least;
         }
     }
-    CHECK(least == 8); /* one call of each of the four functions, twice */
+    CHECK(least == 10); /* one call of each of the five functions, twice */
     CHECK(most > 8 * HS_GROUP_POINTS / 2);
 }
 

@@ -32,8 +32,10 @@ def test_public_functions_have_examples(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "neighbors", "pairs",
-     "pairs_between", "verify"],
+    [
+        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "neighbors",
+        "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
+    ],
 )
 def test_every_argument_is_documented(name):
     function = getattr(hs, name)
@@ -73,6 +75,14 @@ def test_examples_of_streaming_run():
     exec(compile(ast.parse(compiled), "streaming.md", "exec"), names)
     s = 1e-6 / d**6
     assert np.isclose(names["total"][0], (s * s - s).sum(), rtol=1e-9)
+
+
+def test_example_of_histograms_runs():
+    text = (ROOT / "docs/histograms.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "histograms.md", "exec"), names)
+    assert names["counts"].sum() == names["within"][-1] == names["result"].counts.sum()
 
 
 def test_readme_commands_create_what_they_need():

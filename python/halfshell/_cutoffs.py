@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Counting pairs within several cutoffs: one search, each cutoff an edge of a histogram."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core, _inputs
+from halfshell._options import Precision
+
+# What the core takes from `inclusive` to `threads`.
+Rest = tuple[bool, Precision, str | None, float | None, None, int | None]
+
+
+def count_within(
+    cutoffs: _inputs.FloatArray,
+    points: _inputs.PointArray,
+    box: _inputs.FloatArray | None,
+    bits: int,
+    rest: Rest,
+    queries: _inputs.PointArray | None = None,
+) -> npt.NDArray[np.int64]:
+    """How many pairs are within each of the cutoffs, which ascend and are at least 0."""
+    if rest[1] == "exact" and len(cutoffs) > 1:
+        edges = np.ascontiguousarray(cutoffs)
+        between: npt.NDArray[np.int64] = _core.histogram(
+            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None
+        )
+        return np.cumsum(between[0, 0])
+    counts = [
+        _core.count_pairs(points, one, box, bits, *rest)
+        if queries is None
+        else _core.count_between(points, one, box, bits, *rest, queries)
+        for one in cutoffs.tolist()
+    ]
+    return np.array(counts, dtype=np.int64)

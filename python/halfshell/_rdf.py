@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`rdf`: the radial distribution function, a histogram over that of an ideal gas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core, _histogram, _inputs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class RadialDistribution:
+    """What `rdf` returns.
+
+    Attributes
+    ----------
+    r : ndarray of float64, shape (bins,)
+        The middle of each bin, in the unit of the points.
+    g : ndarray of float64, shape (bins,) or (t, t, bins)
+        g(r): 1 on average where points ignore each other. NaN where there is nothing to divide by:
+        without points, or without points of a type.
+    counts : ndarray of int64, the shape of `g`
+        Pairs in each bin, as `pair_histogram` counts them.
+    edges : ndarray of float64, shape (bins + 1,)
+        Limits of the bins.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> result = hs.rdf([[0.0], [1.0], [2.0], [3.0]], 2.5, bins=5, box=[4.0])
+    >>> result.r.tolist(), result.counts.tolist(), result.g.tolist()
+    ([0.25, 0.75, 1.25, 1.75, 2.25], [0, 0, 4, 0, 4], [0.0, 0.0, 2.0, 0.0, 2.0])
+    """
+
+    r: npt.NDArray[np.float64]
+    g: npt.NDArray[np.float64]
+    counts: npt.NDArray[np.int64]
+    edges: npt.NDArray[np.float64]
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw g(r), with types one line for each pair of them.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw. Default: axes of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            What has been drawn on.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed: ``pip install 'halfshell[cli]'``.
+        """
+        if ax is None:
+            ax = _new_axes()
+        if self.g.ndim == 1:
+            ax.step(self.r, self.g, where="mid")
+        else:
+            pairs = [(a, b) for a in range(len(self.g)) for b in range(a, len(self.g))]
+            for a, b in pairs:
+                ax.step(self.r, self.g[a, b], where="mid", label=f"{a}-{b}")
+            ax.legend(title="types")
+        ax.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
+        ax.set_xlim(float(self.edges[0]), float(self.edges[-1]))
+        ax.set_ylim(bottom=0.0)
+        ax.set_xlabel("distance r")
+        ax.set_ylabel("g(r)")
+        return ax
+
+
+def _new_axes() -> Axes:
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("plot needs matplotlib: pip install 'halfshell[cli]'") from error
+    return pyplot.subplots(layout="constrained")[1]
+
+
+def rdf(
+    points: Any,
+    r_max: float,
+    bins: int = 100,
+    *,
+    queries: Any = None,
+    types: npt.ArrayLike | None = None,
+    box: Any = None,
+    periodic: Any = None,
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+) -> RadialDistribution:
+    """Compute the radial distribution function g(r) of points in a periodic box.
+
+    Parameters
+    ----------
+    points, kernel, threads, memory_limit
+        As in `pair_histogram`.
+    r_max : float
+        The largest distance, in the unit of `points`; finite, greater than 0. It may pass half
+        the box, and the box: all images are counted.
+    bins : int, default 100
+        Bins of equal width from 0 to `r_max`.
+    queries : array_like of float, shape (q, d), optional
+        g(r) of the points around these instead. A query that lies on a point finds it at distance
+        0, in the first bin. Not with `types`.
+    types : array_like of int, shape (n,), optional
+        The type of each point, from 0 on: g(r) for each pair of types.
+    box : array_like of float, shape (d,) or (d, d), or Box
+        As in `pairs`. It must repeat along every axis, for a density is needed.
+    periodic : bool or sequence of bool, shape (d,), optional
+        As in `pairs`; all True, which is the default.
+
+    Returns
+    -------
+    RadialDistribution
+        An object with ``r``, ``g``, ``counts``, ``edges`` and ``plot()``.
+
+        g is the mean number of neighbours in a shell over what the density of all points, n / V,
+        would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two different types it
+        is ``counts / (n_a * n_b / V * shell)``, for queries ``counts / (q * n / V * shell)``. A
+        shell is the length, area, volume, ... between two spheres, in any number of dimensions.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pair_histogram`; ValueError also if there is no box or an axis does not repeat, if
+        `r_max` or `bins` is not positive, or for `types` with `queries`.
+
+    See Also
+    --------
+    pair_histogram : counts only, in bins of any width, in any box and in none.
+
+    Notes
+    -----
+    n points at random have n (n - 1) / 2 pairs in their box, not n**2 / 2, so below half the box
+    their g is (n - 1) / n on average; with all images up to large r it tends to 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import halfshell as hs
+    >>> points = np.random.default_rng(0).random((2000, 3))
+    >>> result = hs.rdf(points, 0.4, bins=4, box=[1.0, 1.0, 1.0])
+    >>> result.r.tolist()
+    [0.05, 0.15000000000000002, 0.25, 0.35000000000000003]
+    >>> bool(abs(result.g - 1.0).max() < 0.05)
+    True
+    >>> int(result.counts.sum()) == hs.count_pairs(points, 0.4, box=[1.0, 1.0, 1.0])
+    True
+    """
+    edges = _edges(r_max, bins)
+    if types is not None and queries is not None:
+        raise ValueError("types and queries cannot be given together")
+    asking, array, vectors, bits = _histogram.as_sets(queries, points, box, periodic)
+    volume = _volume(vectors, bits, array.shape[1])
+    counts = _histogram.pair_histogram(
+        points, edges, queries=queries, types=types, box=box, periodic=periodic, kernel=kernel,
+        threads=threads, memory_limit=memory_limit,
+    )
+    ideal = _partners(len(array), asking, types) * (_shells(edges, array.shape[1]) / volume)
+    with np.errstate(invalid="ignore"):
+        g = counts / ideal
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
+
+
+def _edges(r_max: Any, bins: Any) -> _inputs.FloatArray:
+    if isinstance(bins, (bool, np.bool_)) or not isinstance(bins, (int, np.integer)):
+        raise TypeError(f"bins must be a whole number, got {type(bins).__name__}")
+    if bins < 1:
+        raise ValueError(f"bins must be at least 1, got {bins}")
+    array = _inputs.as_real_array(r_max, "r_max", "be a number")
+    if array.ndim != 0:
+        raise TypeError(f"r_max must be a number, got shape {array.shape}")
+    if not (np.isfinite(array) and array > 0.0):
+        raise ValueError(f"r_max must be finite and greater than 0, got {float(array)}")
+    return np.linspace(0.0, float(array), int(bins) + 1)
+
+
+def _volume(vectors: _inputs.FloatArray | None, bits: int, ndim: int) -> float:
+    if vectors is None or bits != (1 << ndim) - 1:
+        raise ValueError(
+            "rdf needs a box that repeats along every axis, for the density of the points; "
+            "pair_histogram counts without one"
+        )
+    return _core.box_measure(vectors, bits)[1]
+
+
+def _shells(edges: _inputs.FloatArray, ndim: int) -> _inputs.FloatArray:
+    """What lies between two spheres, for each bin."""
+    unit_ball = 2.0 if ndim % 2 else 1.0
+    for k in range(2 + ndim % 2, ndim + 1, 2):
+        unit_ball *= 2.0 * math.pi / k
+    shells: _inputs.FloatArray = unit_ball * np.diff(edges**ndim)
+    return shells
+
+
+def _partners(
+    n: int, queries: _inputs.PointArray | None, types: npt.ArrayLike | None
+) -> npt.NDArray[np.float64]:
+    """Pairs that each shell would share out, with types of each two of them; one axis more for
+    shells."""
+    if queries is not None:
+        return np.array([float(len(queries)) * n])
+    if types is None:
+        return np.array([0.5 * n * n])
+    of_type = np.bincount(_histogram.as_types(types, "types", n), minlength=1).astype(np.float64)
+    pairs: npt.NDArray[np.float64] = np.outer(of_type, of_type)
+    pairs[np.diag_indices(len(of_type))] *= 0.5
+    return pairs[:, :, np.newaxis]

@@ -1,0 +1,284 @@
+"""Pairs by distance: every edge decided exactly, by types, with weights, of one set and of two."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import halfshell as hs
+from halfshell._reference import exact_square, reference_pairs
+from oracles import BOX_KINDS, lattice, random_scene, rotation, same_arrays
+
+
+def bin_of(square, edges):
+    """The bin of a squared distance, a rational; None beyond the first and the last edge."""
+    last = len(edges) - 2
+    limits = [Fraction(float(edge)) ** 2 for edge in edges]
+    if square == limits[-1]:
+        below = [k for k in range(last + 1) if limits[k] <= square]
+        return max(below)
+    found = [k for k in range(last + 1) if limits[k] <= square < limits[k + 1]]
+    return found[0] if found else None
+
+
+def expected(points, edges, box=None, periodic=None, types=None, weights=None):
+    """The histogram in rational arithmetic: counts, or sums of products as fractions."""
+    t = 1 if types is None else max(types, default=0) + 1
+    bins = np.full((t, t, len(edges) - 1), Fraction(0), dtype=object)
+    for i, j, S in reference_pairs(points, edges[-1], box, periodic, True):
+        k = bin_of(exact_square(points, i, j, S or None, box), edges)
+        if k is None:
+            continue
+        a, b = (0, 0) if types is None else (types[i], types[j])
+        term = Fraction(1)
+        if weights is not None:
+            term = Fraction(float(weights[i])) * Fraction(float(weights[j]))
+        bins[a, b, k] += term
+        if a != b:
+            bins[b, a, k] += term
+    dtype = np.int64 if weights is None else np.float64  # float(Fraction) rounds once, to even
+    rounded = np.array([dtype(float(x)) for x in bins.ravel()], dtype).reshape(bins.shape)
+    return rounded[0, 0] if types is None else rounded
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_bins_are_those_of_rational_arithmetic(kind, rng, kernel):
+    for ndim in (1, 2, 3, 4):
+        points, cutoff, box, periodic = random_scene(rng, 14, ndim, kind, neighbours=25, spread=2)
+        d = hs.pairs(points, cutoff, box=box, quantities="d")
+        some = rng.choice(d, 4) if len(d) else []
+        edges = np.sort([0.0, cutoff, *some, *np.nextafter(some, 0.0), *(cutoff * rng.random(3))])
+        types = rng.integers(0, 3, len(points))
+        weights = rng.normal(size=len(points))
+        for how in ({}, {"types": types}, {"weights": weights},
+                    {"types": types, "weights": weights}):
+            found = hs.pair_histogram(
+                points, edges, box=box, periodic=periodic, kernel=kernel, **how
+            )
+            assert same_arrays(found, expected(points, edges, box, periodic, **how)), (ndim, how)
+
+
+@pytest.mark.parametrize("name", ["sc", "bcc", "fcc", "diamond", "hcp"])
+def test_edges_on_shells_of_a_crystal(name, kernel):
+    points, box = lattice(name, (2, 2, 2))
+    squares = [k for k in range(40) if math.isqrt(k) ** 2 == k]  # shells that are numbers
+    edges = [0.0, *(math.sqrt(k) for k in squares if k > 0)]
+    between = hs.pair_histogram(points, edges, box=box, kernel=kernel)
+    strict = [hs.count_pairs(points, e, box=box, inclusive=False) for e in edges[:-1]]
+    closed = hs.count_pairs(points, edges[-1], box=box)
+    assert between.tolist() == np.diff([*strict, closed]).tolist()
+    assert between.sum() > 0
+
+
+def test_edges_beside_irrational_shells(rng, kernel):
+    points, box = lattice("fcc", (3, 3, 3))
+    turn = rotation(rng)
+    roots = [math.sqrt(k) for k in (2, 4, 6, 8)]
+    edges = sorted(x for r in roots for x in (math.nextafter(r, 0), r, math.nextafter(r, 9)))
+    for crystal, frame in ((points, box), (points @ turn, box @ turn)):
+        found = hs.pair_histogram(crystal, edges, box=frame, kernel=kernel)
+        below = [hs.count_pairs(crystal, e, box=frame, inclusive=False) for e in edges[:-1]]
+        below.append(hs.count_pairs(crystal, edges[-1], box=frame))
+        assert found.tolist() == np.diff(below).tolist()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("bins", [1, 7, 100, 3000])
+def test_away_from_edges_numpy_finds_the_same(dtype, bins, rng, kernel):
+    points, cutoff, box, _ = random_scene(rng, 3000, neighbours=60)
+    points = points.astype(dtype)
+    d = hs.pairs(points, cutoff, box=box, quantities="d")
+    for spaced, first in ((np.linspace, 0.0), (np.geomspace, 1e-3 * cutoff)):
+        edges = spaced(first, cutoff, bins + 1)
+        nearest = edges[np.clip(np.searchsorted(edges, d), 1, len(edges) - 1)]
+        previous = edges[np.clip(np.searchsorted(edges, d) - 1, 0, len(edges) - 1)]
+        assert min(np.abs(d - nearest).min(), np.abs(d - previous).min()) > 1e-13 * cutoff
+        found = hs.pair_histogram(points, edges, box=box, kernel=kernel)
+        assert found.dtype == np.int64
+        assert np.array_equal(found, np.histogram(d, edges)[0])
+
+
+@given(
+    st.lists(st.tuples(*[st.integers(-3, 3)] * 2), min_size=0, max_size=9),
+    st.lists(st.sampled_from([0.0, 0.5, 1.0, math.sqrt(2), 2.0, 3.0, 5.0]), min_size=2, max_size=6),
+    st.booleans(),
+)
+def test_edges_as_numpy_takes_them(points, edges, periodic):
+    # Equal edges too: only the last bin of none of its width has pairs.
+    points = np.array(points, dtype=float).reshape(-1, 2)
+    box = [4.0, 5.0] if periodic else None
+    edges = sorted(edges)
+    found = hs.pair_histogram(points, edges, box=box)
+    d = hs.pairs(points, edges[-1], box=box, quantities="d")
+    if math.sqrt(2) not in edges:  # the others are numbers
+        assert found.tolist() == np.histogram(d, edges)[0].tolist()
+    assert same_arrays(found, expected(points, edges, box))
+
+
+def test_queries_meet_all_points(rng, kernel):
+    points, cutoff, box, _ = random_scene(rng, 400, neighbours=20, spread=2)
+    queries = np.concatenate([points[:20], random_scene(rng, 80, spread=3)[0]])
+    edges = np.linspace(0.0, cutoff, 9)
+    i, j, d = hs.pairs_between(queries, points, cutoff, box=box, quantities="ijd")
+    found = hs.pair_histogram(points, edges, queries=queries, box=box, kernel=kernel)
+    assert found.tolist() == np.histogram(d, edges)[0].tolist()
+    assert found[0] >= 20  # each of those finds itself
+    types, query_types = rng.integers(0, 2, 400), rng.integers(0, 3, 100)
+    by_type = hs.pair_histogram(
+        points, edges, queries=queries, types=types, query_types=query_types, box=box,
+        kernel=kernel,
+    )
+    assert by_type.shape == (3, 3, 8)
+    for a in range(3):
+        for b in range(3):
+            chosen = d[(query_types[i] == a) & (types[j] == b)]
+            assert by_type[a, b].tolist() == np.histogram(chosen, edges)[0].tolist()
+    weights, query_weights = rng.integers(-5, 6, 400), rng.integers(-5, 6, 100)
+    for own, asking in ((weights, None), (None, query_weights), (weights, query_weights)):
+        terms = (1 if own is None else own[j]) * (1 if asking is None else asking[i])
+        sums = hs.pair_histogram(
+            points, edges, queries=queries, weights=own, query_weights=asking, box=box,
+            kernel=kernel,
+        )
+        assert sums.dtype == np.float64
+        assert sums.tolist() == np.histogram(d, edges, weights=terms)[0].tolist()
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-160, 1e150])
+def test_weights_are_summed_exactly(scale, rng, kernel):
+    points = rng.random((60, 3))
+    weights = scale * rng.normal(size=60) * 10.0 ** rng.integers(-20, 4, 60)
+    edges = [0.0, 0.2, 0.4, 0.6]
+    found = hs.pair_histogram(points, edges, weights=weights, kernel=kernel)
+    assert same_arrays(found, expected(points, edges, weights=weights))
+    order = rng.permutation(60)
+    again = hs.pair_histogram(points[order], edges, weights=weights[order], kernel=kernel)
+    assert same_arrays(found, again)
+
+
+def test_sums_that_cancel(kernel):
+    points = np.arange(4.0)[:, None]
+    weights = [1e16, 1.0, 1e16, -1.0]  # 1e16 - 1e16 + ... of neighbours: 1e16 + 1e16 - 1e16
+    found = hs.pair_histogram(points, [0.0, 1.0], weights=weights, kernel=kernel)
+    assert found.tolist() == [1e16]
+    assert hs.pair_histogram(points, [5.0, 6.0], weights=weights).tolist() == [0.0]
+    huge = hs.pair_histogram(points[:2], [0.0, 1.0], weights=[1e200, 1e200], kernel=kernel)
+    assert huge.tolist() == [math.inf]
+
+
+@pytest.mark.parametrize("box", [None, [1.0, 1.0, 1.0]])
+def test_nothing_depends_on_kernels_and_threads(box, rng):
+    points = rng.random((30_000, 3))
+    how = {"types": rng.integers(0, 3, 30_000), "weights": rng.normal(size=30_000)}
+    edges = np.linspace(0.0, 0.08, 81)
+    results = [
+        hs.pair_histogram(points, edges, box=box, kernel=kernel, threads=threads, **how)
+        for kernel in hs.kernels()
+        for threads in (1, 2, 5)
+    ]
+    assert all(same_arrays(results[0], other) for other in results)
+    order = rng.permutation(30_000)
+    again = hs.pair_histogram(
+        points[order], edges, box=box, **{name: values[order] for name, values in how.items()}
+    )
+    assert same_arrays(results[0], again)
+
+
+def test_images_beyond_the_box(kernel):
+    found = hs.pair_histogram([[0.25]], [0.0, 1.0, 2.5, 3.0], box=[1.0], kernel=kernel)
+    assert found.tolist() == [0, 2, 1]  # itself at 1 and 2; at 3, as the last bin is closed
+
+
+def test_types_are_counted_both_ways(rng):
+    points = rng.random((200, 2))
+    types = rng.integers(0, 4, 200)
+    edges = np.linspace(0.0, 0.3, 7)
+    found = hs.pair_histogram(points, edges, types=types)
+    assert np.array_equal(found, found.transpose(1, 0, 2))
+    upper = sum(found[a, b] for a in range(4) for b in range(a, 4))
+    assert upper.tolist() == hs.pair_histogram(points, edges).tolist()
+    assert hs.pair_histogram(points, edges, types=np.zeros(200, np.uint8)).shape == (1, 1, 6)
+
+
+def test_scenes_without_pairs(kernel):
+    for points in ([], [[0.5, 0.5]], np.empty((0, 2)), [[0.0], [9.0]]):
+        assert hs.pair_histogram(points, [0.0, 1.0, 2.0], kernel=kernel).tolist() == [0, 0]
+    assert hs.pair_histogram([], [0.0, 1.0], types=[]).tolist() == [[[0]]]
+    assert hs.pair_histogram([], [0.0, 1.0], weights=[]).tolist() == [0.0]
+    assert hs.pair_histogram([[0.0]], [0.0, 1.0], queries=[]).tolist() == [0]
+    same_place = np.full((100, 3), 0.7)
+    assert hs.pair_histogram(same_place, [0.0, 0.0], kernel=kernel).tolist() == [4950]
+    assert hs.pair_histogram(same_place, [0.0, 1e-300], kernel=kernel).tolist() == [4950]
+    assert hs.pair_histogram(same_place, [5e-324, 1.0], kernel=kernel).tolist() == [0]
+
+
+@pytest.mark.parametrize("inclusive", [True, False])
+def test_counts_of_many_cutoffs_are_those_of_single_ones(inclusive, rng, kernel):
+    points, cutoff, box, _ = random_scene(rng, 500, neighbours=40)
+    cutoffs = [0.0, 1e-9, *np.sort(cutoff * rng.random(30)), cutoff, cutoff]
+    how = {"box": box, "inclusive": inclusive, "kernel": kernel}
+    for queries in (None, points[:100]):
+        found = hs.count_pairs(points, cutoffs, queries=queries, **how)
+        assert found.dtype == np.int64
+        assert found.tolist() == [
+            hs.count_pairs(points, c, queries=queries, **how) for c in cutoffs
+        ]
+
+
+def test_memory_is_that_of_the_bins(rng):
+    points = rng.random((10_000, 3))  # 5e7 pairs
+    edges = np.linspace(0.0, 2.0, 101)
+    found = hs.pair_histogram(points, edges, memory_limit=50_000_000)
+    assert found.sum() == 10_000 * 9_999 // 2
+    with pytest.raises(MemoryError):
+        hs.pair_histogram(points, edges, types=np.arange(10_000), memory_limit=50_000_000)
+
+
+BAD_EDGES = {
+    "one edge": ([1.0], ValueError, r"shape \(bins \+ 1,\)"),
+    "none": ([], ValueError, "at least"),
+    "a number": (3.0, ValueError, "shape"),
+    "2-D": ([[0.0, 1.0]], ValueError, "shape"),
+    "not ascending": ([0.0, 2.0, 1.0], ValueError, r"edges\[1\] = 2.0 before edges\[2\] = 1.0"),
+    "NaN": ([0.0, math.nan], ValueError, r"finite .* edges\[1\] = nan"),
+    "infinite": ([0.0, math.inf], ValueError, r"edges\[1\] = inf"),
+    "negative": ([-1.0, 1.0], ValueError, r"not negative, got edges\[0\] = -1.0"),
+    "strings": (["a", "b"], TypeError, "edges"),
+    "complex": ([0j, 1j], TypeError, "edges"),
+}
+
+
+@pytest.mark.parametrize("edges, error, text", BAD_EDGES.values(), ids=BAD_EDGES)
+def test_bad_edges_are_refused(edges, error, text):
+    with pytest.raises(error, match=text):
+        hs.pair_histogram([[0.0], [1.0]], edges)
+
+
+BAD_MARKS = {
+    "types of another length": ({"types": [0]}, ValueError, r"types must have shape \(2,\)"),
+    "types that are floats": ({"types": [0.0, 1.0]}, TypeError, "integers"),
+    "a negative type": ({"types": [0, -1]}, ValueError, r"types\[1\] = -1"),
+    "a type too large": ({"types": [0, 2**31]}, ValueError, r"types\[1\]"),
+    "weights of another length": ({"weights": [1.0]}, ValueError, r"shape \(2,\)"),
+    "a weight that is NaN": ({"weights": [1.0, math.nan]}, ValueError, r"weights\[1\] = nan"),
+    "weights that are complex": ({"weights": [1j, 2.0]}, TypeError, "weights"),
+    "query_types alone": ({"query_types": [0]}, ValueError, "query_types needs queries"),
+    "query_weights alone": ({"query_weights": [1.0]}, ValueError, "query_weights needs queries"),
+    "types of one set": ({"queries": [[0.0]], "types": [0, 1]}, ValueError, "together"),
+    "query_weights of another length": (
+        {"queries": [[0.0]], "query_weights": [1.0, 2.0]}, ValueError, r"shape \(1,\)",
+    ),
+    "an infinite query weight": (
+        {"queries": [[0.0]], "query_weights": [math.inf]}, ValueError, r"query_weights\[0\] = inf",
+    ),
+    "queries of another dimension": ({"queries": [[0.0, 1.0]]}, ValueError, "columns"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("marks, error, text", BAD_MARKS.values(), ids=BAD_MARKS)
+def test_bad_types_and_weights_are_refused(marks, error, text):
+    with pytest.raises(error, match=text):
+        hs.pair_histogram([[0.0], [1.0]], [0.0, 1.0], **marks)
