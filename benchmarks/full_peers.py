@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 
 import histogram_peers
-from contestant import Call, Contestant, Halfshell, in_space
-from peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin, _columns
+from contestant import Call, Contestant, Halfshell
+from halfshell._peers import in_space
+from halfshell._peers.adapters import columns
+from peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin
 from scenes import Scene
 
 __all__ = ["for_scene", "ours_for"]
@@ -153,7 +155,7 @@ class FreudBetween(Freud):
         """Use its tree of the points."""
         freud = importlib.import_module("freud")
         freud.parallel.set_num_threads(1)
-        box = freud.box.Box.from_matrix(_columns(scene.rows))
+        box = freud.box.Box.from_matrix(columns(scene.rows))
         asking, found = (np.asarray(part, np.float32) for part in (scene.asking, scene.found))
         arguments = {"r_max": scene.cutoff, "exclude_ii": False}
         self.first = len(asking)

@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from contestant import Call, Contestant, Floats, Halfshell
-from peers import CKDTree, Corrfunc, Freud, _columns
+from contestant import Call, Contestant, Halfshell
+from halfshell._peers.adapters import columns
+from halfshell._peers.library import Floats
+from peers import CKDTree, Corrfunc, Freud
 from scenes import Scene
 
 __all__ = ["PEERS", "OwnHistogram"]
@@ -89,7 +91,7 @@ class FreudHistogram(Freud):
         freud = importlib.import_module("freud")
         freud.parallel.set_num_threads(1)
         points = scene.points.astype(np.float32)
-        box = freud.box.Box.from_matrix(_columns(scene.rows))
+        box = freud.box.Box.from_matrix(columns(scene.rows))
 
         def count() -> int:
             function = freud.density.RDF(bins=scene.bins, r_max=scene.cutoff)

@@ -217,7 +217,7 @@ class Freud(Library):
             length = (high - low).max() + 3.0 * question.cutoff
             box = {2: freud.box.Box.square, 3: freud.box.Box.cube}[question.dim](length)
         else:
-            box = freud.box.Box.from_matrix(_columns(rows))
+            box = freud.box.Box.from_matrix(columns(rows))
         points = np.zeros((question.n, 3), dtype=np.float32)
         points[:, : question.dim] = given
         if rows is not None and not all(question.periodic):
@@ -246,7 +246,7 @@ class Freud(Library):
         return result.vectors
 
 
-def _columns(rows: Floats) -> Floats:
+def columns(rows: Floats) -> Floats:
     """Box vectors as the columns of a 3 by 3 matrix, with a height of 0 for a plane."""
     matrix = np.zeros((3, 3))
     matrix[: len(rows), : len(rows)] = rows.T
