@@ -344,16 +344,17 @@ except KeyboardInterrupt:
 delay = time.perf_counter() - sent[0]
 blocks.close()
 few = points[:2000]
-threading.Timer(0.2, interrupt).start()
-while True:
-    blocks = hs.iter_pairs(few, 0.1, max_pairs=100)
-    total = 0
+inside = False
+while not inside:  # again, if it was interrupted between two iterators
+    threading.Timer(0.2, interrupt).start()
     try:
-        for i, j in blocks:
-            total += len(i)
+        while True:
+            blocks, total, inside = hs.iter_pairs(few, 0.1, max_pairs=100), 0, True
+            for i, j in blocks:
+                total += len(i)
+            inside = False
     except KeyboardInterrupt:
-        total += sum(len(i) for i, j in blocks)
-        break
+        total += sum(len(i) for i, j in blocks) if inside else 0
 print(json.dumps([outcome, delay, total, hs.count_pairs(few, 0.1)]))
 """
     )
