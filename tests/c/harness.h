@@ -13,8 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Under the thread sanitizer, which makes programs some thirty times slower. */
-#if defined(__SANITIZE_THREAD__)
+/* Under the thread sanitizer or in an emulator, which make programs some thirty times slower. */
+#if defined(__SANITIZE_THREAD__) || defined(HS_EMULATED)
 #define IS_SLOW 1
 #elif defined(__has_feature)
 #if __has_feature(thread_sanitizer)
