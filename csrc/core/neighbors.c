@@ -6,6 +6,7 @@
 #include "parallel.h"
 #include "poll.h"
 #include "table.h"
+#include "touch.h"
 
 #include <math.h>
 
@@ -54,6 +55,9 @@ find_rows(hs_pairs *rows, hs_failure *failure)
     }
     if (status == HS_OK) {
         status = make_room(rows, table.offsets[n], failure);
+    }
+    if (status == HS_OK) {
+        status = hs_touch_output(search->team, &search->options, &rows->output);
     }
     return status == HS_OK ? hs_table_fill(&table, failure) : status;
 }
