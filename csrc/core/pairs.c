@@ -3,11 +3,9 @@
 #include "../halfshell.h"
 
 #include "estimate.h"
-#include "fpenv.h"
-#include "pairs.h"
 #include "parallel.h"
-#include "poll.h"
 #include "record.h"
+#include "request.h"
 #include "sort.h"
 
 #include <math.h>
@@ -115,44 +113,33 @@ hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *opti
     return hs_pairs_find_in(&sets, box, options, result, failure);
 }
 
+/* A hs_fill_fn. */
+static hs_status
+fill_pairs(hs_pairs *pairs, hs_failure *failure)
+{
+    const hs_status status = find_pairs(&pairs->search, &pairs->output, failure);
+    return status == HS_OK && !pairs->output.fixed
+               ? hs_output_reserve(&pairs->output, 0, 1.0) /* arrays also without pairs */
+               : status;
+}
+
 hs_status
 hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                  hs_pairs **result, hs_failure *failure)
 {
-    hs_failure ignored;
-    *result = NULL;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    hs_pairs *pairs = hs_pairs_new();
-    if (pairs == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_search     *search = &pairs->search;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status status = hs_search_open(sets, box, options, search, failure);
+    const hs_request request = {.sets = sets, .box = box, .options = options};
+    return hs_request_fill(&request, fill_pairs, result, failure);
+}
+
+/* A hs_use_fn: of pairs, or of those that are ordered where every point is asked for all. */
+static hs_status
+count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    const hs_status status = hs_parallel_count(search, n_pairs, failure);
     if (status == HS_OK) {
-        hs_output_init(&search->account, sets->points->ndim, options->want, options->index_bytes,
-                       &pairs->output);
-        if (options->out != NULL) {
-            hs_output_fix(&pairs->output, options->out);
-        }
-        status = find_pairs(search, &pairs->output, failure);
-        if (status == HS_OK && !pairs->output.fixed) {
-            status = hs_output_reserve(&pairs->output, 0, 1.0); /* arrays also without pairs */
-        }
-        hs_search_report(search, pairs->output.n_pairs);
-        hs_search_close(search);
+        *(int64_t *)context = *n_pairs;
     }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(sets->points, box, search, failure);
-    }
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(pairs);
-        return status;
-    }
-    *result = pairs;
-    return HS_OK;
+    return status;
 }
 
 hs_status
@@ -167,30 +154,11 @@ hs_status
 hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   int64_t *count, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_options counting = *options;
-    hs_search  search;
-    int64_t    found = 0;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
+    hs_options       counting = *options;
+    const hs_request request = {.sets = sets, .box = box, .options = &counting};
     counting.want = 0;
     counting.sorted = false;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(sets, box, &counting, &search, failure);
-    if (status == HS_OK) {
-        status = hs_parallel_count(&search, &found, failure);
-        hs_search_report(&search, found);
-        hs_search_close(&search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(sets->points, box, &search, failure);
-    }
-    hs_account_close(&search.account);
-    hs_fpenv_leave(saved);
-    if (status == HS_OK) {
-        *count = found;
-    }
-    return status;
+    return hs_request_use(&request, count_pairs, count, failure);
 }
 
 int64_t
