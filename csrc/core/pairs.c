@@ -72,10 +72,13 @@ sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     return status;
 }
 
+/* A hs_fill_fn. */
 static hs_status
-find_pairs(hs_search *search, hs_output *output, hs_failure *failure)
+fill_pairs(hs_pairs *pairs, hs_failure *failure)
 {
-    hs_status status = hs_estimate_by_sample(search, failure);
+    hs_search *search = &pairs->search;
+    hs_output *output = &pairs->output;
+    hs_status  status = hs_estimate_by_sample(search, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -87,11 +90,23 @@ find_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
     }
-    if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
-        failure->expected_pairs = (double)output->n_pairs;
-        status = HS_ERR_CAPACITY;
+    return hs_pairs_conclude(output, status, failure);
+}
+
+hs_status
+hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure)
+{
+    if (status != HS_OK) {
+        return status;
     }
-    return status;
+    if (!output->fixed) {
+        return hs_output_reserve(output, 0, 1.0);
+    }
+    if (output->n_pairs > output->capacity) {
+        failure->expected_pairs = (double)output->n_pairs;
+        return HS_ERR_CAPACITY;
+    }
+    return HS_OK;
 }
 
 hs_pairs *
@@ -111,16 +126,6 @@ hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *opti
 {
     const hs_sets sets = {.points = points};
     return hs_pairs_find_in(&sets, box, options, result, failure);
-}
-
-/* A hs_fill_fn. */
-static hs_status
-fill_pairs(hs_pairs *pairs, hs_failure *failure)
-{
-    const hs_status status = find_pairs(&pairs->search, &pairs->output, failure);
-    return status == HS_OK && !pairs->output.fixed
-               ? hs_output_reserve(&pairs->output, 0, 1.0) /* arrays also without pairs */
-               : status;
 }
 
 hs_status
