@@ -348,8 +348,8 @@ void          hs_cells_points(const hs_cells *cells, hs_points *points);
 const hs_box *hs_cells_box(const hs_cells *cells);
 
 /* As hs_pairs_find, hs_pairs_count or, with queries that are not NULL, hs_between_count,
- * hs_neighbors_find and hs_neighbors_count for these points. counters tell what the call took, not
- * what the cells hold. */
+ * hs_neighbors_find, hs_neighbors_count and hs_pairs_histogram for these points. counters tell what
+ * the call took, not what the cells hold. */
 hs_status hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
                          hs_failure *failure);
 hs_status hs_cells_count(const hs_cells *cells, const hs_points *queries,
@@ -359,6 +359,9 @@ hs_status hs_cells_neighbors(const hs_cells *cells, const hs_points *queries,
 hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
                                    const hs_options *options, int64_t *counts,
                                    hs_failure *failure);
+hs_status hs_cells_histogram(const hs_cells *cells, const hs_points *queries,
+                             const hs_options *options, const hs_histogram *histogram,
+                             hs_failure *failure);
 
 /* As hs_stream_open, whose stream must be freed before the cells, and hs_pairs_visit. */
 hs_status hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
