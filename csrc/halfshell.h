@@ -163,6 +163,7 @@ typedef struct hs_options {
     hs_precision precision;
     unsigned     want;         /* HS_WANT_ bits */
     int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
+    double       cell_size;    /* least width of cells, as far as possible; 0: what is quick */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
     int          threads;      /* exactly so many; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
@@ -336,6 +337,7 @@ typedef struct hs_cells hs_cells;
  * points, box, options are borrowed for this call only: the points are copied. options->cutoff is
  * the largest cutoff that the cells are made for; larger ones, and queries much further away than
  * the points or the box reach, are answered as well, by cells that are made for that call.
+ * options->cell_size changes the layout and the time that calls take, no answer.
  */
 hs_status hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
                          hs_cells **cells, hs_failure *failure);
