@@ -22,13 +22,15 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_failure failure;
     hs_cells  *cells = NULL;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS) {
-        PyErr_Format(PyExc_TypeError, "cells_build takes %d arguments", HS_CALL_ARGUMENTS);
+    if (n_arguments != HS_CALL_ARGUMENTS + 1) {
+        PyErr_Format(PyExc_TypeError, "cells_build takes %d arguments", HS_CALL_ARGUMENTS + 1);
         return NULL;
     }
-    if (!hs_call_init(&call, arguments)) {
+    const double cell_size = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS]);
+    if ((cell_size == -1.0 && PyErr_Occurred()) || !hs_call_init(&call, arguments)) {
         return NULL;
     }
+    call.options.cell_size = cell_size;
     hs_call_release(&call);
     const hs_status status =
         hs_cells_build(&call.points, hs_call_box(&call), &call.options, &cells, &failure);

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from halfshell import _core, _inputs
 from halfshell._box import Box
-from halfshell._cutoffs import Rest, count_within
-from halfshell._options import Precision, SearchOptions
+from halfshell._cutoffs import count_within
+from halfshell._options import Precision, Rest, SearchOptions
 from halfshell._pairs import Arrays, Letter
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from halfshell import _core, _inputs
 from halfshell._box import Box
-from halfshell._options import Precision
+from halfshell._options import Precision, Progress, Search
 
 
 class Candidates(NamedTuple):
@@ -22,12 +22,6 @@ class Candidates(NamedTuple):
     """Where each range begins in `CellList.order`; shape (m,)."""
     stop: npt.NDArray[np.int64]
     """Where it ends, not included; shape (m,)."""
-
-
-# The first arguments of every search in the core, where the cells stand for points and box.
-Arguments = tuple[
-    Any, float, None, int, bool, Precision, str | None, float | None, None, int | None
-]
 
 
 class Asking(TypedDict, total=False):
@@ -53,6 +47,7 @@ class CellLayout:
         *,
         box: Any = None,
         periodic: Any = None,
+        cell_size: Any = None,
         precision: Precision = "exact",
         threads: int | None = None,
         memory_limit: float | None = None,
@@ -62,7 +57,8 @@ class CellLayout:
         array, vectors, bits = _inputs.scene(points, box, periodic)
         self.cutoff = _inputs.as_cutoff(cutoff)
         self._cells = _core.cells_build(
-            array, self.cutoff, vectors, bits, True, precision, None, memory_limit, None, threads
+            array, self.cutoff, vectors, bits, True, precision, None, memory_limit, None, threads,
+            _as_cell_size(cell_size),
         )
         self._layout = _core.cells_layout(self._cells)
         self._n_points: int = array.shape[0]
@@ -165,7 +161,9 @@ class CellLayout:
             )
         return array
 
-    def _arguments(self, cutoff: Any, options: Asking) -> Arguments:
+    def _arguments(
+        self, cutoff: Any, options: Asking, progress: Progress = None
+    ) -> Search:
         for name in options.keys() - {"inclusive", "kernel", "threads", "memory_limit"}:
             raise TypeError(f"unexpected keyword argument {name!r}")
         return (
@@ -177,6 +175,18 @@ class CellLayout:
             self._precision,
             options.get("kernel"),
             options.get("memory_limit"),
-            None,
+            progress,
             options.get("threads", self._threads),
         )
+
+
+def _as_cell_size(value: Any) -> float:
+    """The least width of cells; 0: none is asked for."""
+    if value is None:
+        return 0.0
+    array = _inputs.as_real_array(value, "cell_size", "be a number")
+    if array.ndim != 0:
+        raise TypeError(f"cell_size must be a number, got shape {array.shape}")
+    if not (np.isfinite(array) and array > 0.0):
+        raise ValueError(f"cell_size must be finite and greater than 0, got {float(array)}")
+    return float(array)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Unpack, cast
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from halfshell import _callbacks, _core, _inputs
 from halfshell._cell_layout import Asking, CellLayout
 from halfshell._pairs import Arrays
-from halfshell._stream import PairBlocks, most_pairs
+from halfshell._stream import PairBlocks, as_progress, most_pairs
 
 
 class CellPairs(CellLayout):
@@ -62,6 +63,7 @@ class CellPairs(CellLayout):
         max_pairs: int = 1 << 20,
         quantities: str = "ij",
         index_dtype: npt.DTypeLike = np.int64,
+        progress: Callable[[float], object] | None = None,
         **options: Unpack[Asking],
     ) -> PairBlocks[Any]:
         """Iterate over the pairs in blocks of bounded size, as `halfshell.iter_pairs` does.
@@ -70,12 +72,14 @@ class CellPairs(CellLayout):
         ----------
         cutoff : float, optional
             Default: that of the list.
-        max_pairs, quantities, index_dtype, inclusive, kernel, threads, memory_limit
+        max_pairs, quantities, index_dtype, progress, inclusive, kernel, threads, memory_limit
             As in `halfshell.iter_pairs`.
 
         Returns
         -------
         iterator of ndarray or tuple of ndarray
+            Joined, the blocks are what `pairs` returns, in the same order. They come from the
+            cells of the list, which live as long as the iterator.
 
         Examples
         --------
@@ -84,13 +88,12 @@ class CellPairs(CellLayout):
         >>> sum(len(i) for i, j in cells.iter_pairs(max_pairs=1))
         2
         """
-        return cast(
-            PairBlocks[Any],
-            _core.iter_pairs(
-                *self._arguments(cutoff, options), quantities,
-                _inputs.as_index_bytes(index_dtype), most_pairs(max_pairs),
-            ),
+        most = most_pairs(max_pairs)
+        blocks = _core.iter_pairs(
+            *self._arguments(cutoff, options, as_progress(progress)), quantities,
+            _inputs.as_index_bytes(index_dtype), most,
         )
+        return cast(PairBlocks[Any], blocks)
 
     def for_each_pair(
         self,

@@ -21,6 +21,13 @@ class CellList(CellPairs, CellRows, CellCounts):
         larger ones are answered as well, by cells that are made for that call.
     box, periodic, precision
         As in `pairs`.
+    cell_size : float, optional
+        The least width of a cell, in the unit of the points; finite, greater than 0. Each axis is
+        cut into as many equal cells as that allows. It changes the layout, and how long calls
+        take, but no answer; a cell may well be narrower than the cutoff. Cells are wider where
+        there would be more than 2 n + 64 of them, or more than some thousand rows of cells within
+        the cutoff, and a few millionths wider where `cell_size` is the cutoff or a whole part of
+        it. Default: what is quick for this cutoff and this number of points.
     threads : int, optional
         Threads that sort the points; and those that later calls use unless they say otherwise.
 
@@ -53,11 +60,11 @@ class CellList(CellPairs, CellRows, CellCounts):
     Notes
     -----
     A cell list does not change, and any number of threads may ask it at once. Cells are found by a
-    counting sort in O(n + cells), and there are never many more cells than points, however large
+    counting sort in O(n + cells), and there are at most 2 n + 64 of them, however large
     the volume (Hockney and Eastwood, Computer Simulation Using Particles, 1981, section 8-4).
     Answers are those of the functions of the same names, decided exactly; only the order of
-    `pairs` without ``sort=True`` may differ from theirs, since cells that are kept are cut a little
-    differently.
+    `pairs`, `iter_pairs` and `for_each_pair` without ``sort=True`` may differ from theirs, since
+    cells that are kept are cut a little differently.
 
     Examples
     --------
