@@ -337,7 +337,8 @@ typedef struct hs_cells hs_cells;
  * points, box, options are borrowed for this call only: the points are copied. options->cutoff is
  * the largest cutoff that the cells are made for; larger ones, and queries much further away than
  * the points or the box reach, are answered as well, by cells that are made for that call.
- * options->cell_size changes the layout and the time that calls take, no answer.
+ * options->cell_size changes the layout and the time that calls take, but no answer except those of
+ * HS_SINGLE, which goes by cells.
  */
 hs_status hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
                          hs_cells **cells, hs_failure *failure);

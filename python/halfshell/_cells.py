@@ -23,11 +23,12 @@ class CellList(CellPairs, CellRows, CellCounts):
         As in `pairs`.
     cell_size : float, optional
         The least width of a cell, in the unit of the points; finite, greater than 0. Each axis is
-        cut into as many equal cells as that allows. It changes the layout, and how long calls
-        take, but no answer; a cell may well be narrower than the cutoff. Cells are wider where
-        there would be more than 2 n + 64 of them, or more than some thousand rows of cells within
-        the cutoff, and a few millionths wider where `cell_size` is the cutoff or a whole part of
-        it. Default: what is quick for this cutoff and this number of points.
+        cut into as many equal cells as that allows. It changes the layout and how long calls take,
+        but no answer (except with `precision` "single", which goes by cells); a cell may well be
+        narrower than the cutoff. Cells are wider where there would be more than 2 n + 64 of them,
+        or more than some thousand rows of cells within the cutoff, and a few millionths wider where
+        `cell_size` is the cutoff or a whole part of it. Default: what is quick for this cutoff and
+        this number of points.
     threads : int, optional
         Threads that sort the points; and those that later calls use unless they say otherwise.
 
@@ -60,11 +61,11 @@ class CellList(CellPairs, CellRows, CellCounts):
     Notes
     -----
     A cell list does not change, and any number of threads may ask it at once. Cells are found by a
-    counting sort in O(n + cells), and there are at most 2 n + 64 of them, however large
-    the volume (Hockney and Eastwood, Computer Simulation Using Particles, 1981, section 8-4).
-    Answers are those of the functions of the same names, decided exactly; only the order of
-    `pairs`, `iter_pairs` and `for_each_pair` without ``sort=True`` may differ from theirs, since
-    cells that are kept are cut a little differently.
+    counting sort in O(n + cells), and there are at most 2 n + 64 of them, however large the volume
+    (Hockney and Eastwood, Computer Simulation Using Particles, 1981, section 8-4). Answers are
+    those of the functions of the same names, decided exactly; only the order of `pairs` without
+    ``sort=True``, `iter_pairs` and `for_each_pair`, which is the same for the three, may differ
+    from theirs, since cells that are kept are cut a little differently.
 
     Examples
     --------
