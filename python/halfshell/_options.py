@@ -39,6 +39,14 @@ class SearchOptions(TypedDict, total=False):
     memory_limit: float | None
 
 
+class ArrayOptions(SearchOptions, total=False):
+    """The same, and those of functions that return arrays of pairs, without `quantities`."""
+
+    sort: bool
+    index_dtype: npt.DTypeLike
+    out: Any
+
+
 def kernels() -> list[str]:
     """Names of the kernels that this CPU can run, the best one first.
 
