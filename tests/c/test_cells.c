@@ -247,6 +247,35 @@ cells_are_as_wide_as_wanted(void)
     }
 }
 
+/* Counted by the core: a plane costs two columns, and no rows of cells above or below it. */
+static void
+a_plane_has_no_third_coordinate(void)
+{
+    enum { N = 4000 };
+    static double  x[3 * N];
+    harness_random random = {77};
+    hs_counters    counters[2];
+    for (int solid = 0; solid < 2; solid++) {
+        const int   ndim = 2 + solid;
+        brute_scene scene = {.ndim = ndim, .n = N, .x = x, .inclusive = true, .cutoff = 0.5};
+        hs_cells   *cells = NULL;
+        for (int e = 0; e < ndim * N; e++) {
+            x[e] = 10.0 * random_unit(&random);
+        }
+        const hs_points points = points_of(&scene);
+        hs_options      options = options_of(&scene);
+        options.counters = &counters[solid];
+        CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+        hs_cells_free(cells);
+    }
+    const int64_t  column = N * (int64_t)sizeof(double);
+    const int64_t *flat = counters[0].bytes, *deep = counters[1].bytes;
+    CHECK(flat[HS_FOR_POINTS] >= 2 * column && flat[HS_FOR_POINTS] < 2 * column + 4096);
+    CHECK(deep[HS_FOR_POINTS] - flat[HS_FOR_POINTS] == column);
+    CHECK(flat[HS_FOR_ORIGINALS] == 2 * column && deep[HS_FOR_ORIGINALS] == 3 * column);
+    CHECK(flat[HS_FOR_STENCIL] < deep[HS_FOR_STENCIL]);
+}
+
 static void
 points_may_change_once_they_are_in_cells(void)
 {
@@ -297,6 +326,7 @@ test_cells(void)
     RUN(cells_that_are_few_and_far_between);
     RUN(the_layout_is_visible_and_holds_all_neighbours);
     RUN(cells_are_as_wide_as_wanted);
+    RUN(a_plane_has_no_third_coordinate);
     RUN(points_may_change_once_they_are_in_cells);
     RUN(failures_leave_nothing_behind);
 }
