@@ -75,6 +75,9 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
         hs_team_free(search->team);
         search->team = NULL;
     }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
     /* What they point to is the caller's again. */
     hs_search_report(search, 0);
     search->options.poll = NULL;
