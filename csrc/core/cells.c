@@ -160,9 +160,7 @@ hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options
                int64_t *count, hs_failure *failure)
 {
     const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
-    return queries != NULL
-               ? hs_between_count_in(&sets, hs_cells_box(cells), options, count, failure)
-               : hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
+    return hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
 }
 
 hs_status
