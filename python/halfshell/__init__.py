@@ -6,6 +6,7 @@ from halfshell._cache import clear_cache, set_cache_limit
 from halfshell._count import count_pairs
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
+from halfshell._nearest import nearest
 from halfshell._options import kernels
 from halfshell._pairs import pairs
 from halfshell._verify import Verdict, verify
@@ -21,6 +22,7 @@ __all__ = [
     "count_pairs",
     "explain",
     "kernels",
+    "nearest",
     "pairs",
     "set_cache_limit",
     "verify",
