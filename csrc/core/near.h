@@ -17,7 +17,7 @@ typedef struct hs_near {
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
     const hs_tree *asking;      /* the tree of those that ask */
     int64_t        k;           /* points wanted for each */
-    int32_t        of_spot;     /* so many points of one spot, in one image, are all that can count */
+    int32_t        of_spot;     /* of one spot, in one image, no more points than this can count */
     bool           omits_self;  /* without queries: a point is not its own neighbour */
     double         limit;       /* largest distance in the scene's unit; infinity: none */
     hs_metric      within;      /* decides on the largest distance, if there is one */
@@ -68,7 +68,8 @@ void hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near
  * more; in any case not more than can be of use. */
 void hs_near_guess(const hs_near *near, hs_near_group *group);
 
-/* What nothing of use is beyond: all points, or the largest distance. Infinity in periodic boxes. */
+/* What nothing of use is beyond: all points, or the largest distance. In periodic boxes infinity,
+ * unless there is a largest distance. */
 double hs_near_farthest(const hs_near *near, const hs_near_group *group);
 
 /* Owned by a thread: the least squares found so far, and what is left to look at. */

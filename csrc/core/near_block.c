@@ -11,6 +11,8 @@
 /* A group that is so many times as wide as its radius is searched point by point: floats relative
  * to its centre would not tell distances apart. */
 #define WIDEST 512.0
+/* Least radius, in errors of shifted coordinates. */
+#define LEAST_IN_ERRORS 1024.0
 /* Candidates for which there is room at first. */
 #define FIRST_CAPACITY 1024
 /* Images between two polls. */
@@ -100,8 +102,8 @@ add_points(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
     const int32_t image = block->n_images - 1;
     int32_t       n = node->end - node->first;
     n = node->is_spot && n > near->of_spot ? near->of_spot : n;
-    hs_near_run *last = &block->runs[block->n_runs - 1];
-    if (block->n_runs > 0 && last->image == image && last->si + last->n == node->first) {
+    hs_near_run *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
+    if (last != NULL && last->image == image && last->si + last->n == node->first) {
         last->n += n;
         block->n += n;
         return true;
@@ -135,19 +137,22 @@ find_runs(const hs_near *near, const double *low, const double *high, double mos
     for (;;) {
         const hs_tree_node *node = &tree->nodes[number];
         const int32_t       left = node->left;
-        double              gap[2] = {INFINITY, INFINITY};
+        bool                is_near[2] = {false, false};
         if (left != 0) {
+            double gap[2];
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, block->unit, ndim, gap);
+            is_near[0] = gap[0] <= limit;
+            is_near[1] = gap[1] <= limit;
         } else if (!add_points(near, node, block) || block->n >= INT32_MAX / 8) {
             return HS_ERR_MEMORY;
         } else if (block->n > most) {
             return HS_STATUS_END;
         }
-        if (gap[0] <= limit) {
+        if (is_near[0]) {
             block->stack[n_waiting] = left + 1;
-            n_waiting += gap[1] <= limit;
+            n_waiting += is_near[1];
             number = left;
-        } else if (gap[1] <= limit) {
+        } else if (is_near[1]) {
             number = left + 1;
         } else if (n_waiting > 0) {
             number = block->stack[--n_waiting];
@@ -173,30 +178,48 @@ find_in_image(const hs_near *near, const hs_near_group *group, const double *mov
     }
 }
 
+/* Images in reach. A radius that is nothing beside the errors of shifted coordinates is raised to
+ * some of these: a unit as small as that would be of no use. */
+static hs_status
+start_images(const hs_near *near, hs_near_group *group, hs_near_images *images)
+{
+    hs_status    status = hs_near_images_start(near, group, images);
+    const double least = LEAST_IN_ERRORS * images->error;
+    if (status == HS_OK && group->radius < least) {
+        group->radius = least;
+        status = hs_near_images_start(near, group, images);
+    }
+    return status;
+}
+
+/* Unit and errors, for the group's radius. */
+static void
+settle_unit(const hs_near *near, const hs_near_group *group, double error, hs_near_block *block)
+{
+    block->unit = hs_power_of_two(-hs_near_exponent(group->radius));
+    block->reach = group->radius * block->unit;
+    block->error = error * block->unit;
+    /* 2 e |D| + e^2, and what underflow may lose. */
+    const double along = sqrt(near->tree.ndim) * block->error;
+    block->flat_error = 2.1 * along * (block->reach + along) + 0x1p-1000;
+}
+
 /* Runs of all images. */
 static hs_status
 find_candidates(const hs_near *near, const hs_options *options, const hs_near_group *group,
-                double most, hs_near_block *block)
+                double most, hs_near_images *images, hs_near_block *block)
 {
-    hs_near_images images;
-    int            since_poll = 0;
-    hs_status      status = hs_near_images_start(near, group, &images);
-    if (status != HS_OK || images.count > most) {
-        return most < INFINITY ? HS_STATUS_END : HS_ERR_MEMORY;
-    }
-    const double root = sqrt(near->tree.ndim);
-    const double error = root * images.error * block->unit;
-    block->error = images.error * block->unit;
-    /* 2 e |D| + e^2, and what underflow may lose. */
-    block->flat_error = 2.1 * error * (block->reach + error) + 0x1p-1000;
+    const double reach =
+        block->reach * (1.0 + ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
+    int       since_poll = 0;
+    hs_status status = HS_OK;
     block->n = block->n_runs = block->n_images = 0;
-    while (status == HS_OK && hs_near_images_next(&images)) {
+    while (status == HS_OK && hs_near_images_next(images)) {
         const int32_t n = block->n;
-        if (!add_image(near, &images, block)) {
+        if (!add_image(near, images, block)) {
             return HS_ERR_MEMORY;
         }
-        status = find_in_image(near, group, images.moved, most,
-                               block->reach * (1.0 + ROOM) + 4.0 * error, block);
+        status = find_in_image(near, group, images->moved, most, reach, block);
         block->n_images -= block->n == n; /* nothing there */
         if (++since_poll == POLL_IMAGES && status == HS_OK) {
             since_poll = 0;
@@ -257,12 +280,16 @@ gather(const hs_near *near, const hs_near_group *group, hs_near_block *block)
 }
 
 hs_status
-hs_near_block_fill(const hs_near *near, const hs_options *options, const hs_near_group *group,
+hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group *group,
                    double most, hs_near_block *block)
 {
-    double widest = 0.0;
-    block->unit = hs_power_of_two(-hs_near_exponent(group->radius));
-    block->reach = group->radius * block->unit;
+    hs_near_images images;
+    double         widest = 0.0;
+    hs_status      status = start_images(near, group, &images);
+    if (status != HS_OK || images.count > most) {
+        return most < INFINITY ? HS_STATUS_END : HS_ERR_MEMORY;
+    }
+    settle_unit(near, group, images.error, block);
     for (int k = 0; k < near->tree.ndim; k++) {
         widest = hs_larger((group->upper[k] - group->lower[k]) * block->unit, widest);
     }
@@ -271,7 +298,7 @@ hs_near_block_fill(const hs_near *near, const hs_options *options, const hs_near
     }
     /* Beyond the group and the radius, by more than roundings take. */
     block->extent = 0.5 * widest + 4.0;
-    hs_status status = find_candidates(near, options, group, most, block);
+    status = find_candidates(near, options, group, most, &images, block);
     if (status == HS_OK && !reserve(near, block, block->n)) {
         status = HS_ERR_MEMORY;
     }

@@ -47,10 +47,10 @@ typedef struct hs_near_block {
 hs_status hs_near_block_init(const hs_near *near, hs_near_block *block);
 void      hs_near_block_free(const hs_near *near, hs_near_block *block);
 
-/* Fills the block for a group with its radius. HS_STATUS_END: there are more than `most`
- * candidates or images, or the group is far wider than its radius. */
+/* Fills the block for a group with its radius, which may be raised a little. HS_STATUS_END: there
+ * are more than `most` candidates or images, or the group is far wider than its radius. */
 hs_status hs_near_block_fill(const hs_near *near, const hs_options *options,
-                             const hs_near_group *group, double most, hs_near_block *block);
+                             hs_near_group *group, double most, hs_near_block *block);
 
 /* How far |D|^2 in units, as it comes from z, may be from the true one, for any that is not beyond
  * the radius. */

@@ -9,6 +9,9 @@
 #define ROOM 0x1p-20
 /* The density is that of at least so many times the points that are wanted. */
 #define POINTS_PER_WANTED 4.0
+/* Standard deviations of their number that a first radius makes room for. Measured: with 3 or 4 the
+ * search takes 2 to 5 % longer. */
+#define SPREAD 3.5
 
 int
 hs_near_exponent(double radius)
@@ -191,7 +194,7 @@ hs_near_guess(const hs_near *near, hs_near_group *group)
     const hs_tree    *tree = &near->tree;
     const hs_lattice *lattice = &near->search->scene.lattice;
     const double      k = (double)near->k + near->omits_self;
-    const double      wanted = k + 3.0 * sqrt(k) + 1.0;
+    const double      wanted = k + SPREAD * sqrt(k) + 1.0;
     double            away, sides[HS_MAX_DIM];
     const int32_t     number =
         find_node(tree, group, POINTS_PER_WANTED * hs_larger(wanted, 16.0), sides, &away);

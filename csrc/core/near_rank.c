@@ -4,10 +4,6 @@
 
 #include <math.h>
 
-/* Up to here keys are sorted by insertion. */
-#define FEW 24
-/* Up to here each key's place is counted, without a branch. */
-#define COUNTED 64
 /* Of so many times the keys that are wanted, the others are first set aside. */
 #define MANY 3
 
@@ -37,96 +33,11 @@ reserve(hs_near_ranker *ranker, int64_t n)
     return true;
 }
 
-/* Order of two keys: true when b must come before a. */
-typedef bool (*before_fn)(hs_near_ranker *ranker, const hs_near_key *b, const hs_near_key *a);
-
-HS_ALWAYS_INLINE bool
-is_smaller(hs_near_ranker *ranker, const hs_near_key *b, const hs_near_key *a)
-{
-    (void)ranker;
-    return b->square < a->square;
-}
-
-HS_ALWAYS_INLINE void
-insert_all(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, before_fn before)
-{
-    for (int64_t e = 1; e < n; e++) {
-        const hs_near_key key = keys[e];
-        int64_t           at = e;
-        for (; at > 0 && before(ranker, &key, &keys[at - 1]); at--) {
-            keys[at] = keys[at - 1];
-        }
-        keys[at] = key;
-    }
-}
-
-/* Stable, by merging runs of FEW; with few calls of `before` where all is in order already. */
-HS_ALWAYS_INLINE void
-merge_all(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, before_fn before)
-{
-    hs_near_key *left = ranker->spare;
-    for (int64_t begin = 0; begin < n; begin += FEW) {
-        insert_all(ranker, keys + begin, n - begin < FEW ? n - begin : FEW, before);
-    }
-    for (int64_t width = FEW; width < n; width *= 2) {
-        for (int64_t begin = 0; begin + width < n; begin += 2 * width) {
-            hs_near_key  *to = keys + begin, *right = to + width;
-            const int64_t n_right = n - begin - width < width ? n - begin - width : width;
-            if (!before(ranker, right, right - 1)) {
-                continue;
-            }
-            memcpy(left, to, (size_t)width * sizeof *left);
-            for (int64_t l = 0, r = 0; l < width;) {
-                const bool takes_right = r < n_right && before(ranker, &right[r], &left[l]);
-                *to++ = takes_right ? right[r++] : left[l++];
-            }
-        }
-    }
-}
-
-/*
- * Each key goes to the place that is the number of smaller ones: as float32 squares whose last bits
- * are the keys' own numbers, so that no two are equal. Insertion puts in order what these cannot
- * tell, which is next to nothing.
- */
-static void
-sort_by_counting(hs_near_ranker *ranker, int64_t n)
-{
-    const int32_t padded = ((int32_t)n + 7) / 8 * 8;
-    int32_t       rough[COUNTED];
-    for (int32_t e = 0; e < padded; e++) {
-        const float square = e < n ? (float)ranker->keys[e].square : 0.0f;
-        int32_t     bits;
-        memcpy(&bits, &square, sizeof bits);
-        rough[e] = e < n ? (bits & ~(COUNTED - 1)) | e : INT32_MAX;
-    }
-    for (int32_t e = 0; e < n; e++) {
-        const int32_t own = rough[e];
-        int32_t       smaller = 0;
-        for (int32_t f = 0; f < padded; f++) {
-            smaller += rough[f] < own;
-        }
-        ranker->spare[smaller] = ranker->keys[e];
-    }
-    memcpy(ranker->keys, ranker->spare, (size_t)n * sizeof *ranker->keys);
-    insert_all(ranker, ranker->keys, n, is_smaller);
-}
-
 /* Neighbouring keys are told apart if they differ by more. */
 HS_ALWAYS_INLINE double
 closeness(const hs_near_ranker *ranker, double square)
 {
     return 2.0 * hs_near_error(ranker->block, ranker->near->tree.ndim, square);
-}
-
-static void
-sort_by_square(hs_near_ranker *ranker, int64_t n)
-{
-    if (n <= COUNTED) {
-        sort_by_counting(ranker, n);
-    } else {
-        merge_all(ranker, ranker->keys, n, is_smaller);
-    }
 }
 
 bool
@@ -175,8 +86,9 @@ take_origin(const hs_near *near, int32_t si, double *p)
     }
 }
 
-static bool
-is_nearer(hs_near_ranker *ranker, const hs_near_key *b, const hs_near_key *a)
+/* Sign of the difference of two distances. */
+static int
+compare(hs_near_ranker *ranker, const hs_near_key *one, const hs_near_key *other)
 {
     const hs_near *near = ranker->near;
     double         p[HS_MAX_DIM], q[2][HS_MAX_DIM];
@@ -184,18 +96,25 @@ is_nearer(hs_near_ranker *ranker, const hs_near_key *b, const hs_near_key *a)
     take_origin(near, ranker->si, p);
     ranker->n_compared++;
     /* Shifts that pass their range are found when the pair is written; here any order will do. */
-    if (!hs_near_pair(near, ranker->block, ranker->si, b->place, q[0], shift[0], NULL) ||
-        !hs_near_pair(near, ranker->block, ranker->si, a->place, q[1], shift[1], NULL)) {
-        return false;
+    if (!hs_near_pair(near, ranker->block, ranker->si, one->place, q[0], shift[0], NULL) ||
+        !hs_near_pair(near, ranker->block, ranker->si, other->place, q[1], shift[1], NULL)) {
+        return 0;
     }
     return hs_metric_compare(&near->order, &(hs_span){p, q[0], shift[0]},
-                             &(hs_span){p, q[1], shift[1]}, &ranker->stages) < 0;
+                             &(hs_span){p, q[1], shift[1]}, &ranker->stages);
+}
+
+static bool
+is_nearer(void *ranker, const hs_near_key *b, const hs_near_key *a)
+{
+    return compare(ranker, b, a) < 0;
 }
 
 /* By (j, S). Images of one j differ by their shifts over B, which the turns of i and j leave. */
 static bool
-is_listed_before(hs_near_ranker *ranker, const hs_near_key *b, const hs_near_key *a)
+is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
 {
+    const hs_near_ranker *ranker = context;
     const hs_search     *search = ranker->near->search;
     const hs_near_block *block = ranker->block;
     const int32_t        j = search->bins.order[hs_near_number(block, b->place)];
@@ -220,6 +139,31 @@ is_listed_before(hs_near_ranker *ranker, const hs_near_key *b, const hs_near_key
     return false;
 }
 
+/* In exact order, the first `wanted` of n keys that float64 cannot tell; the others behind them. */
+static void
+settle_keys(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, int64_t wanted)
+{
+    const int64_t sorted = n > 4 * wanted ? wanted : n; /* all, unless few of many are wanted */
+    hs_near_merge(ranker, keys, ranker->spare, sorted, is_listed_before);
+    hs_near_merge(ranker, keys, ranker->spare, sorted, is_nearer);
+    for (int64_t e = sorted; e < n; e++) {
+        const hs_near_key key = keys[e];
+        int64_t           at = sorted;
+        while (at > 0) {
+            const int sign = compare(ranker, &key, &keys[at - 1]);
+            if (sign > 0 || (sign == 0 && !is_listed_before(ranker, &key, &keys[at - 1]))) {
+                break;
+            }
+            at--;
+        }
+        if (at < sorted) {
+            keys[e] = keys[sorted - 1];
+            memmove(keys + at + 1, keys + at, (size_t)(sorted - 1 - at) * sizeof *keys);
+            keys[at] = key;
+        }
+    }
+}
+
 /* Sorted keys whose squares are too close to tell, as far as they reach into the first `wanted`. */
 static void
 settle_order(hs_near_ranker *ranker, int64_t n, int64_t wanted)
@@ -232,8 +176,7 @@ settle_order(hs_near_ranker *ranker, int64_t n, int64_t wanted)
             end++;
         }
         if (end - begin > 1) {
-            merge_all(ranker, all + begin, end - begin, is_listed_before);
-            merge_all(ranker, all + begin, end - begin, is_nearer);
+            settle_keys(ranker, all + begin, end - begin, wanted - begin);
         }
     }
 }
@@ -280,36 +223,6 @@ drop_self(hs_near_ranker *ranker, int64_t n)
     return n;
 }
 
-/* Brings the `wanted` keys of least squares to the front, in no order. */
-static void
-select_keys(hs_near_key *keys, int64_t n, int64_t wanted)
-{
-    for (int64_t low = 0, high = n - 1; low < high;) {
-        const double pivot = keys[low + (high - low) / 2].square;
-        int64_t      i = low, j = high;
-        while (i <= j) {
-            while (keys[i].square < pivot) {
-                i++;
-            }
-            while (keys[j].square > pivot) {
-                j--;
-            }
-            if (i <= j) {
-                const hs_near_key key = keys[i];
-                keys[i++] = keys[j];
-                keys[j--] = key;
-            }
-        }
-        if (wanted - 1 <= j) {
-            high = j;
-        } else if (wanted - 1 >= i) {
-            low = i;
-        } else {
-            return;
-        }
-    }
-}
-
 /* Leaves out what surely comes after the first `wanted`. */
 static int64_t
 keep_nearest(hs_near_ranker *ranker, int64_t n, int64_t wanted)
@@ -317,7 +230,7 @@ keep_nearest(hs_near_ranker *ranker, int64_t n, int64_t wanted)
     hs_near_key *keys = ranker->keys;
     double       last = 0.0;
     int64_t      kept = wanted;
-    select_keys(keys, n, wanted);
+    hs_near_select(keys, n, wanted);
     for (int64_t e = 0; e < wanted; e++) {
         last = hs_larger(keys[e].square, last);
     }
@@ -356,10 +269,10 @@ hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si, con
         return HS_OK;
     }
     const int64_t wanted = n < k ? n : k;
-    if (n > MANY * wanted && n > COUNTED) {
+    if (n > MANY * wanted && n > HS_NEAR_COUNTED) {
         n = keep_nearest(ranker, n, wanted);
     }
-    sort_by_square(ranker, n);
+    hs_near_sort(&ranker->keys, &ranker->spare, n);
     if (!group->is_complete && wanted > 0) {
         const double last = ranker->keys[wanted - 1].square;
         if (last + closeness(ranker, last) > reach * (1.0 - 0x1p-40)) {

@@ -8,12 +8,7 @@
 
 #include "exact_order.h"
 #include "near_block.h"
-
-/* A hit: its place in the block, and about |D|^2 in the block's units. */
-typedef struct hs_near_key {
-    double  square;
-    int32_t place;
-} hs_near_key;
+#include "near_sort.h"
 
 /* Owned by a thread. */
 typedef struct hs_near_ranker {

@@ -180,12 +180,14 @@ put_shifts(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_k
             writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
         }
-        const hs_near_image *image = &block->images[block->runs[block->run_of[keys[e].place]].image];
+        const hs_near_run   *run = &block->runs[block->run_of[keys[e].place]];
+        const hs_near_image *image = &block->images[run->image];
         for (int r = 0; r < asking->n_periodic; r++) {
             shift[r] = asking->keeps_originals ? shift[r] : image->shift[r];
             writer->times[r][writer->n + e] = (double)shift[r];
             writer->is_shifted = writer->is_shifted || shift[r] != 0;
-            writer->is_wide = writer->is_wide || shift[r] > WIDEST_SHIFT || shift[r] < -WIDEST_SHIFT;
+            writer->is_wide =
+                writer->is_wide || shift[r] > WIDEST_SHIFT || shift[r] < -WIDEST_SHIFT;
         }
     }
     return HS_OK;
@@ -207,7 +209,8 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
     }
     for (int k = 0; k < bins->ndim; k++) {
         const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
-        const double  own = (asking->keeps_originals ? asking->originals : asking->x)[k][ranker->si];
+        const double  own = asking->keeps_originals ? asking->originals[k][ranker->si]
+                                                    : asking->x[k][ranker->si];
         for (int32_t e = 0; e < n; e++) {
             writer->p[k][begin + e] = own;
             writer->q[k][begin + e] = from[number[e]];

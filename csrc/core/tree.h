@@ -47,8 +47,8 @@ hs_tree_bounds(const hs_tree *tree, int32_t left, const int ndim)
     return tree->bounds + (int64_t)(left - 1) * 2 * ndim;
 }
 
-/* Twice the distance from [low, high] to [lower, upper]. Sums and absolute values alone, all of them
- * exact but the two differences: compilers make vectors of these, not of comparisons. */
+/* Twice the distance from [low, high] to [lower, upper]. Sums and absolute values alone, all of
+ * them exact but the two differences: compilers make vectors of these, not of comparisons. */
 HS_ALWAYS_INLINE double
 hs_tree_apart(double lower, double upper, double low, double high)
 {
