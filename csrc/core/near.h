@@ -25,6 +25,8 @@ typedef struct hs_near {
     double         drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
                                                    * whole periods */
     double         smallest_period; /* infinity without one */
+    bool           has_layer;   /* some axes repeat, others are open and at right angles to these: */
+    double         layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
     hs_output     *rows;        /* borrowed */
     hs_shared     *shared;      /* owned; for what threads need more of */
 } hs_near;
@@ -36,6 +38,7 @@ typedef struct hs_near_group {
     double  upper[HS_MAX_DIM];
     double  t_lower[HS_MAX_DIM]; /* range of t_k along periodic axes */
     double  t_upper[HS_MAX_DIM];
+    double  away;               /* no point is nearer than this, for the open axes alone */
     double  radius;             /* everything up to here is looked at */
     bool    is_complete;        /* and beyond there is nothing that could be wanted */
 } hs_near_group;
@@ -53,6 +56,9 @@ typedef struct hs_near_images {
 
 /* Of rows of the lattice. */
 void hs_near_measure_drift(hs_near *near);
+
+/* Where points lie along open axes, once they are in tree order. */
+void hs_near_measure_layer(hs_near *near);
 
 /* HS_ERR_MEMORY when there are more images than memory could hold points. */
 hs_status hs_near_images_start(const hs_near *near, const hs_near_group *group,

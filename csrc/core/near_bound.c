@@ -10,7 +10,7 @@
 #include <math.h>
 
 /* Relative room, far more than roundings take. */
-#define ROOM 0x1p-20
+#define ROOM 0x1p-36
 /* Nodes and points between two polls: some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)
 /* Squares outside this are near underflow or overflow: another unit is needed. */
@@ -197,10 +197,10 @@ hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *b
     const bool   is_open = near->search->scene.lattice.n_periodic == 0;
     const double farthest = hs_near_farthest(near, group);
     near_probe   probe = {.near = near, .bounder = bounder};
-    double       error;
-    group->radius = hs_smaller(group->radius, near->smallest_period);
+    double       error, along = hs_smaller(group->radius, near->smallest_period);
     for (;;) {
-        /* The radius only says which images are looked at, as yet. */
+        /* The radius only says which images are looked at, as yet: `along` the axes that repeat. */
+        group->radius = group->away > 0.0 ? hypot(group->away, along) : along;
         group->radius = hs_smaller(group->radius, hs_larger(farthest, HS_NEAR_LEAST_RADIUS));
         const hs_status status = walk_scaled(near, options, group, &probe, &error);
         if (status != HS_OK) {
@@ -218,6 +218,6 @@ hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *b
             group->radius = hs_larger(enough, HS_NEAR_LEAST_RADIUS);
             return HS_OK;
         }
-        group->radius = hs_smaller(2.0 * group->radius, enough);
+        along = 2.0 * along;
     }
 }

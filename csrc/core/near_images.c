@@ -9,6 +9,9 @@
 #define SLACK 0x1p-20
 /* ... and of the quotient itself where it is large. */
 #define RELATIVE_SLACK 0x1p-40
+/* Products of unit vectors at right angles, and the room that this takes beside squares. */
+#define UPRIGHT 0x1p-40
+#define LAYER_ROOM 0x1p-36
 /* Shifts are int32, with room for sums of two; and so many images are more than any memory holds
  * points. */
 #define MOST_SHIFTS 0x1p30
@@ -40,6 +43,56 @@ hs_near_measure_drift(hs_near *near)
     }
 }
 
+/* Whether unit normals of axes that repeat are at right angles to those of open ones, as nearly as
+ * rounding lets them. */
+static bool
+is_upright(const hs_lattice *lattice)
+{
+    for (int k = 0; k < lattice->ndim; k++) {
+        for (int open = 0; !lattice->aligned && open < lattice->ndim; open++) {
+            double product = 0.0;
+            for (int c = 0; c < lattice->ndim; c++) {
+                product += lattice->normal[k][c] * lattice->normal[open][c];
+            }
+            if (lattice->row_of_axis[k] >= 0 && lattice->row_of_axis[open] < 0 &&
+                fabs(product) > UPRIGHT) {
+                return false;
+            }
+        }
+    }
+    return lattice->n_periodic > 0 && lattice->n_periodic < lattice->ndim;
+}
+
+void
+hs_near_measure_layer(hs_near *near)
+{
+    const hs_lattice *lattice = &near->search->scene.lattice;
+    const hs_bins    *bins = &near->search->bins;
+    near->has_layer = bins->n > 0 && is_upright(lattice);
+    for (int k = 0; near->has_layer && k < lattice->ndim; k++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t si = 0; lattice->row_of_axis[k] < 0 && si < bins->n; si++) {
+            double x[HS_MAX_DIM];
+            for (int c = 0; c < bins->ndim; c++) {
+                x[c] = bins->x[c][si];
+            }
+            const double t = hs_lattice_coordinate(lattice, x, k);
+            low = hs_smaller(t, low);
+            high = hs_larger(t, high);
+        }
+        near->layer_lower[k] = low;
+        near->layer_upper[k] = high;
+    }
+}
+
+/* How far the group looks along axes that repeat: what its radius leaves of the way to the layer. */
+static double
+reach_along(const hs_near_group *group)
+{
+    const double ratio = hs_smaller(group->away / group->radius, 1.0); /* squares overflow */
+    return group->radius * (sqrt((1.0 - ratio) * (1.0 + ratio) + LAYER_ROOM) + UPRIGHT);
+}
+
 /* Shifts along the row of axis k, for at most most[r] of each row; false when too many. */
 static bool
 set_range(const hs_near *near, const hs_near_group *group, int k, const double *most,
@@ -48,7 +101,7 @@ set_range(const hs_near *near, const hs_near_group *group, int k, const double *
     const hs_scene   *scene = &near->search->scene;
     const hs_lattice *lattice = &scene->lattice;
     const double      period = lattice->period[k];
-    double            reach = group->radius * (1.0 + RELATIVE_SLACK) + 2.0 * scene->t_error[k];
+    double reach = reach_along(group) * (1.0 + RELATIVE_SLACK) + 2.0 * scene->t_error[k];
     for (int r = 0; r < lattice->n_periodic; r++) {
         reach += (most[r] + 1.0) * near->drift[k][r];
     }

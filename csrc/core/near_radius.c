@@ -6,7 +6,7 @@
 #include <math.h>
 
 /* Relative room, far more than roundings take. */
-#define ROOM 0x1p-20
+#define ROOM 0x1p-40
 /* The density is that of at least so many times the points that are wanted. */
 #define POINTS_PER_WANTED 4.0
 /* Standard deviations of their number that a first radius makes room for. Measured: with 3 or 4 the
@@ -48,6 +48,14 @@ hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_grou
         }
         group->t_lower[k] = low;
         group->t_upper[k] = high;
+    }
+    for (int k = 0; near->has_layer && k < bins->ndim; k++) {
+        if (lattice->row_of_axis[k] < 0) {
+            const double apart = hs_larger(near->layer_lower[k] - group->t_upper[k],
+                                           group->t_lower[k] - near->layer_upper[k]);
+            group->away = hs_larger(apart * (1.0 - ROOM) - 4.0 * near->search->scene.t_error[k],
+                                    group->away);
+        }
     }
 }
 

@@ -73,6 +73,9 @@ prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double limit, hs_
                    of_metric < INFINITY ? of_metric : 1.0, true);
     hs_near_measure_drift(near);
     status = build_trees(near, asking, near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS);
+    if (status == HS_OK) {
+        hs_near_measure_layer(near);
+    }
     if (asking != NULL) {
         hs_scene_free(&search->account, asking);
     }

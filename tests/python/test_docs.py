@@ -30,7 +30,7 @@ def test_public_functions_have_examples(name):
     assert ">>>" in doc
 
 
-@pytest.mark.parametrize("name", ["count_pairs", "explain", "pairs", "verify"])
+@pytest.mark.parametrize("name", ["count_pairs", "explain", "nearest", "pairs", "verify"])
 def test_every_argument_is_documented(name):
     function = getattr(hs, name)
     head = inspect.getdoc(function).split("Returns\n")[0]
