@@ -25,7 +25,7 @@ typedef struct hs_near {
     double         drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
                                                    * whole periods */
     double         smallest_period; /* infinity without one */
-    bool           has_layer;   /* some axes repeat, others are open and at right angles to these: */
+    bool           has_layer;   /* some axes repeat, others, upright on them, are open: */
     double         layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
     hs_output     *rows;        /* borrowed */
     hs_shared     *shared;      /* owned; for what threads need more of */

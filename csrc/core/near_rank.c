@@ -187,20 +187,23 @@ fill_keys(hs_near_ranker *ranker, const int32_t *hits, int64_t n, double limit, 
 {
     const hs_near_block *block = ranker->block;
     const hs_bins       *asking = hs_search_asking(ranker->near->search);
-    hs_near_key         *keys = ranker->keys;
-    double               at[HS_MAX_DIM];
-    int64_t              n_keys = 0;
+    hs_near_key *HS_RESTRICT keys = ranker->keys;
+    const double            *z[HS_MAX_DIM], unit = block->unit;
+    double                   at[HS_MAX_DIM];
+    int64_t                  n_keys = 0;
     for (int k = 0; k < ndim; k++) {
         at[k] = asking->x[k][ranker->si];
+        z[k] = block->z[k];
     }
     for (int64_t h = 0; h < n; h++) {
-        double square = 0.0;
+        const int32_t place = hits[h];
+        double        square = 0.0;
         for (int k = 0; k < ndim; k++) {
-            const double along = (block->z[k][hits[h]] - at[k]) * block->unit;
+            const double along = (z[k][place] - at[k]) * unit;
             square += along * along;
         }
         keys[n_keys].square = square;
-        keys[n_keys].place = hits[h];
+        keys[n_keys].place = place;
         n_keys += square <= limit;
     }
     return n_keys;

@@ -8,6 +8,8 @@
 #include <string.h>
 
 #define WIDEST_SHIFT (INT64_C(1) << 53) /* what the batch kernels take */
+#define LINE 64           /* bytes that are fetched at once, */
+#define MOST_EXPECTED 512 /* and of a row */
 #define MOST_SQUARE 0x1p1000
 
 void
@@ -19,6 +21,22 @@ hs_near_writer_init(const hs_near *near, hs_near_writer *writer)
     writer->d = hs_output_column(near->rows, HS_WANT_DISTANCE);
     writer->D = hs_output_column(near->rows, HS_WANT_VECTOR);
     writer->S = hs_output_column(near->rows, HS_WANT_SHIFT);
+}
+
+void
+hs_near_expect(const hs_near_writer *writer, int32_t si)
+{
+    const hs_near *near = writer->near;
+    const int64_t  row = hs_search_asking(near->search)->order[si];
+    const int64_t  bytes[2] = {near->k * near->rows->index_bytes,
+                               near->k * (int64_t)sizeof(double)};
+    char *const    column[2] = {writer->j, (char *)writer->d};
+    for (int c = 0; c < 2; c++) {
+        char *line = column[c] != NULL ? column[c] + row * bytes[c] : NULL;
+        for (int64_t at = 0; line != NULL && at < bytes[c] && at < MOST_EXPECTED; at += LINE) {
+            HS_PREFETCH_WRITE(line + at);
+        }
+    }
 }
 
 HS_ALWAYS_INLINE void
@@ -102,8 +120,8 @@ put_distances(hs_near_writer *writer, double *to)
     }
     for (int32_t e = 0; e < writer->n; e++) {
         const int64_t at = writer->at[e];
-        to[at] = at % writer->near->k == 0 ? writer->distance[e]
-                                           : hs_larger(writer->distance[e], to[at - 1]);
+        to[at] = writer->is_first[e] ? writer->distance[e]
+                                     : hs_larger(writer->distance[e], to[at - 1]);
     }
 }
 
@@ -140,6 +158,10 @@ hs_near_flush(hs_near_writer *writer)
     if (writer->D != NULL) {
         put_vectors(writer, vector, writer->D);
     }
+    if (writer->is_shifted) {
+        memset(writer->times, 0, sizeof writer->times);
+        memset(writer->shift, 0, sizeof writer->shift);
+    }
     writer->n = 0;
     writer->is_shifted = writer->is_wide = false;
 }
@@ -160,30 +182,24 @@ put_shift(const hs_near *near, const int64_t *given, int32_t *to)
 }
 
 /* The metric's shifts, and S where that is wanted, of n entries from place `at` of the output and
- * entry e of the batch on. */
+ * from the batch's next entry on: where they follow from the points' turns. */
 static hs_status
-put_shifts(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
-           int32_t n, int64_t at)
+put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
+          int32_t n, int64_t at)
 {
     const hs_near *near = writer->near;
     const hs_bins *asking = hs_search_asking(near->search);
-    const bool     wants_shift = writer->S != NULL;
-    const bool     as_given = wants_shift || asking->keeps_originals;
     for (int32_t e = 0; e < n; e++) {
-        const hs_near_block *block = ranker->block;
-        int64_t             *shift = writer->shift[writer->n + e];
-        double               q[HS_MAX_DIM];
-        int64_t              given[HS_MAX_DIM];
-        if (as_given &&
-            (!hs_near_pair(near, block, ranker->si, keys[e].place, q, shift, given) ||
-             (wants_shift && !put_shift(near, given, writer->S + (at + e) * asking->ndim)))) {
+        int64_t *shift = writer->shift[writer->n + e];
+        double   q[HS_MAX_DIM];
+        int64_t  given[HS_MAX_DIM];
+        if (!hs_near_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
+            (writer->S != NULL &&
+             !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
             writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
         }
-        const hs_near_run   *run = &block->runs[block->run_of[keys[e].place]];
-        const hs_near_image *image = &block->images[run->image];
         for (int r = 0; r < asking->n_periodic; r++) {
-            shift[r] = asking->keeps_originals ? shift[r] : image->shift[r];
             writer->times[r][writer->n + e] = (double)shift[r];
             writer->is_shifted = writer->is_shifted || shift[r] != 0;
             writer->is_wide =
@@ -193,10 +209,29 @@ put_shifts(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_k
     return HS_OK;
 }
 
+/* The metric's shifts where they are those of the images: few are not zero, as all were before. */
+static void
+put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n)
+{
+    const hs_near_block *block = ranker->block;
+    if (block->n_images == 1 && block->images[0].is_home) {
+        return;
+    }
+    for (int32_t e = 0; e < n; e++) {
+        const hs_near_run   *run = &block->runs[block->run_of[keys[e].place]];
+        const hs_near_image *image = &block->images[run->image];
+        for (int r = 0; !image->is_home && r < writer->near->order.n_rows; r++) {
+            writer->times[r][writer->n + e] = image->shift[r];
+            writer->shift[writer->n + e][r] = image->shift[r];
+            writer->is_shifted = true;
+        }
+    }
+}
+
 /* n entries of the ranker's row, from `at` on; the batch has room for them. */
 static hs_status
 put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
-            int32_t n, int64_t at)
+            int32_t n, int64_t at, bool is_first)
 {
     const hs_near *near = writer->near;
     const hs_bins *bins = &near->search->bins, *asking = hs_search_asking(near->search);
@@ -218,11 +253,14 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
     }
     for (int32_t e = 0; e < n; e++) {
         writer->at[begin + e] = at + e;
+        writer->is_first[begin + e] = is_first && e == 0;
     }
-    const hs_status status =
-        bins->n_periodic > 0 || writer->S != NULL
-            ? put_shifts(writer, ranker, keys, n, at)
-            : HS_OK;
+    hs_status status = HS_OK;
+    if (bins->keeps_originals || writer->S != NULL) {
+        status = put_given(writer, ranker, keys, n, at);
+    } else if (bins->n_periodic > 0) {
+        put_images(writer, ranker, keys, n);
+    }
     writer->n += n;
     return status;
 }
@@ -271,7 +309,7 @@ hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
         const int64_t room = HS_BATCH - writer->n;
         const int32_t n = (int32_t)(count - e < room ? count - e : room);
         const hs_status status =
-            put_entries(writer, ranker, ranker->keys + e, n, row * near->k + e);
+            put_entries(writer, ranker, ranker->keys + e, n, row * near->k + e, e == 0);
         if (status != HS_OK) {
             return status;
         }

@@ -15,12 +15,13 @@ typedef struct hs_near_writer {
     double        *d, *D;
     int32_t       *S;
     int32_t        n;
-    int64_t        at[HS_BATCH];      /* entry of the output */
+    int64_t        at[HS_BATCH];       /* entry of the output */
+    bool           is_first[HS_BATCH]; /* of its row */
     bool           is_shifted, is_wide;
     double         p[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
     double         q[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
-    double         times[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
-    int64_t        shift[HS_BATCH][HS_MAX_DIM]; /* the metric's */
+    double         times[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING]; /* the metric's shifts; ... */
+    int64_t        shift[HS_BATCH][HS_MAX_DIM]; /* ... zeros from the first entry that is free on */
     double         distance[HS_BATCH + HS_BATCH_PADDING];
     double         vector[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
     int32_t        failed; /* the asking point, in the caller's numbers, of HS_ERR_SHIFT_RANGE */
@@ -31,6 +32,9 @@ void hs_near_writer_init(const hs_near *near, hs_near_writer *writer);
 /* The row of the ranker's point: the first `count` of its keys, as far as they are within the
  * largest distance, and then what stands for nothing. HS_ERR_SHIFT_RANGE. */
 hs_status hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count);
+
+/* The row of point si comes soon: rows are far apart, and their memory is fetched meanwhile. */
+void hs_near_expect(const hs_near_writer *writer, int32_t si);
 
 /* The last batch: before the block changes nothing needs to be done. */
 void hs_near_flush(hs_near_writer *writer);
