@@ -85,7 +85,7 @@ hs_near_measure_layer(hs_near *near)
     }
 }
 
-/* How far the group looks along axes that repeat: what the way to the layer leaves of its radius. */
+/* How far the group looks along axes that repeat: what the way to the layer leaves of a radius. */
 static double
 reach_along(const hs_near_group *group)
 {

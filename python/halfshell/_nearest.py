@@ -103,7 +103,7 @@ def nearest(
         As `pairs`.
     MemoryError
         If the result would not fit `memory_limit`; or if a query is so far away from points that
-        repeat, some 10**8 periods, that more of their images are about as near than memory holds.
+        repeat, well beyond 10**8 periods, that more of their images are about as near than memory holds.
 
     See Also
     --------
