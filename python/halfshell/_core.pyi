@@ -306,6 +306,23 @@ def batch_count(
     boxes: npt.NDArray[np.float64] | None,
     /,
 ) -> npt.NDArray[np.int64]: ...
+def nearest(
+    points: npt.NDArray[Any],
+    max_distance: float,
+    box: npt.NDArray[np.float64] | None,
+    periodic: int,
+    inclusive: bool,
+    precision: str,
+    kernel: str | None,
+    memory_limit: float | None,
+    progress: Callable[[float], object] | None,
+    threads: int | None,
+    quantities: str,
+    index_bytes: int,
+    queries: npt.NDArray[Any] | None,
+    k: int,
+    /,
+) -> npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]: ...
 def explain(
     points: npt.NDArray[Any],
     cutoff: float,
