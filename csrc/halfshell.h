@@ -377,6 +377,11 @@ hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queri
                                    const hs_options *options, int64_t *counts,
                                    hs_failure *failure);
 
+/* As hs_nearest_find. The first call builds a tree of the points, which stays with the cells and is
+ * not counted as memory of the call; later calls begin with that. */
+hs_status hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
+                           const hs_options *options, hs_pairs **rows, hs_failure *failure);
+
 /* As hs_stream_open, whose stream must be freed before the cells, and hs_pairs_visit. */
 hs_status hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
                           hs_stream **stream, hs_failure *failure);

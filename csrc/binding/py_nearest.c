@@ -57,8 +57,7 @@ hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     }
     call.options.index_bytes = index_bytes;
     hs_call_release(&call);
-    const hs_status status = hs_nearest_find(&call.points, hs_call_queries(&call),
-                                             hs_call_box(&call), k, &call.options, &rows, &failure);
+    const hs_status status = hs_call_find_nearest(&call, k, &rows, &failure);
     hs_call_acquire(&call);
     if (status != HS_OK) {
         return status == HS_ERR_MEMORY ? raise_memory(&failure)

@@ -13,7 +13,7 @@
 
 typedef struct hs_near {
     hs_search     *search;      /* borrowed: scene, bins, kernel, options */
-    hs_tree        tree;        /* owned; of the points */
+    hs_tree        tree;        /* of the points; owned unless the search is borrowed */
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
     const hs_tree *asking;      /* the tree of those that ask */
     int64_t        k;           /* points wanted for each */

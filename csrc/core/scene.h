@@ -56,6 +56,7 @@ typedef struct hs_sets {
                                 * the points as given */
     bool             is_wide; /* nobody makes float32 of X: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
+    struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (near_kept.h) */
     bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from halfshell import _callbacks, _core, _inputs, _radii
 from halfshell._box import Box
+from halfshell._nearest import as_k, as_max_distance, in_rows
 from halfshell._options import Precision
 from halfshell._pairs import Arrays
 from halfshell._stream import PairBlocks, most_pairs
@@ -33,13 +34,18 @@ _Arguments = tuple[
 ]
 
 
-class _Asking(TypedDict, total=False):
+class _Running(TypedDict, total=False):
     """Keywords of all methods that search."""
 
-    inclusive: bool
     kernel: str | None
     threads: int | None
     memory_limit: float | None
+
+
+class _Asking(_Running, total=False):
+    """Those of methods with a cutoff."""
+
+    inclusive: bool
 
 
 class CellList:
@@ -387,6 +393,56 @@ class CellList:
         """
         asking = None if queries is None else self._queries(queries)
         return _core.coordination(*self._arguments(cutoff, options), asking)
+
+    def nearest(
+        self,
+        k: int,
+        queries: Any = None,
+        *,
+        max_distance: float = np.inf,
+        quantities: str = "jd",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[_Running],
+    ) -> Arrays:
+        """Find the k nearest points of each point or query, as `halfshell.nearest` does.
+
+        The first call makes a tree of the points, which is kept; later calls, with any `k` and
+        any queries, spare that. The cutoff of the list plays no part.
+
+        Parameters
+        ----------
+        k : int
+            How many; 1 or more.
+        queries : array_like of float, shape (q, d), optional
+            Who asks. Default: each point of the list, which is left out of its own row.
+        max_distance, quantities, index_dtype, kernel, threads, memory_limit
+            As in `halfshell.nearest`. The tree that is kept does not count for `memory_limit`
+            together with the rest, but must fit it by itself.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            As `halfshell.nearest`: rows of k entries, in exact order, ties by (j, S).
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=[8.0])
+        >>> j, d = cells.nearest(2)
+        >>> j.tolist(), d.tolist()
+        ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+        >>> cells.nearest(1, [[7.0]], quantities="jS")
+        (array([[0]]), array([[[1]]], dtype=int32))
+        """
+        if "inclusive" in options:
+            raise TypeError("unexpected keyword argument 'inclusive'")
+        asking = None if queries is None else self._queries(queries)
+        number = as_k(k)
+        arrays = _core.nearest(
+            *self._arguments(as_max_distance(max_distance), cast(_Asking, options)), quantities,
+            _inputs.as_index_bytes(index_dtype), asking, number,
+        )
+        return in_rows(arrays, self._n_points if asking is None else len(asking), number)
 
     def iter_pairs(
         self,
