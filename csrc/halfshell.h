@@ -257,6 +257,23 @@ hs_status hs_pairs_histogram(const hs_points *points, const hs_points *queries, 
                              const hs_options *options, const hs_histogram *histogram,
                              hs_failure *failure);
 
+/*
+ * Find the k nearest points of each query, k >= 1, row after row and k entries in each: pairs (i in
+ * queries, j in points, S) with the vector D = points[j] - queries[i] + S * box, ascending by the
+ * exact distance and, where that is the same, by (j, S). In a periodic box each image of a point
+ * counts for itself. queries NULL: of each point among the points, itself left out where S = 0.
+ *
+ * options->cutoff is the largest distance that counts, itself included, and may be infinite. What a
+ * row lacks is j = -1, distance infinity, vector NaN, S = 0. Of options->want, j, distance, vector
+ * and shift are heard; inclusive, sorted, precision and out are ignored. hs_pairs_length is k times
+ * the number of queries. Memory and failures as for hs_neighbors_find; HS_ERR_MEMORY also when a
+ * query is so far from points that repeat that more of their images than memory holds are about as
+ * near.
+ */
+hs_status hs_nearest_find(const hs_points *points, const hs_points *queries, const hs_box *box,
+                          int64_t k, const hs_options *options, hs_pairs **rows,
+                          hs_failure *failure);
+
 /* Rows of a result of hs_neighbors_find, and where each begins: rows + 1 numbers, the last one the
  * length of all; borrowed. NULL when taken, or of another search. */
 int64_t        hs_pairs_rows(const hs_pairs *pairs);
@@ -366,6 +383,11 @@ hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queri
 hs_status hs_cells_histogram(const hs_cells *cells, const hs_points *queries,
                              const hs_options *options, const hs_histogram *histogram,
                              hs_failure *failure);
+
+/* As hs_nearest_find. The first call builds a tree of the points, which stays with the cells and is
+ * not counted as memory of the call; later calls begin with that. */
+hs_status hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
+                           const hs_options *options, hs_pairs **rows, hs_failure *failure);
 
 /* As hs_stream_open, whose stream must be freed before the cells, and hs_pairs_visit. */
 hs_status hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,

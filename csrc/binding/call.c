@@ -188,6 +188,16 @@ hs_call_find_rows(hs_call *call, hs_pairs **rows, hs_failure *failure)
 }
 
 hs_status
+hs_call_find_nearest(hs_call *call, int64_t k, hs_pairs **rows, hs_failure *failure)
+{
+    const hs_points *queries = hs_call_queries(call);
+    return call->cells != NULL
+               ? hs_cells_nearest(call->cells, queries, k, &call->options, rows, failure)
+               : hs_nearest_find(&call->points, queries, hs_call_box(call), k, &call->options,
+                                 rows, failure);
+}
+
+hs_status
 hs_call_count(hs_call *call, int64_t *count, hs_failure *failure)
 {
     const hs_points  *queries = hs_call_queries(call);

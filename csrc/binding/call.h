@@ -41,6 +41,7 @@ void hs_call_acquire(hs_call *call);
 /* The searches of one set or two, in cells where the call has some. */
 hs_status hs_call_find_pairs(hs_call *call, hs_pairs **pairs, hs_failure *failure);
 hs_status hs_call_find_rows(hs_call *call, hs_pairs **rows, hs_failure *failure);
+hs_status hs_call_find_nearest(hs_call *call, int64_t k, hs_pairs **rows, hs_failure *failure);
 hs_status hs_call_count(hs_call *call, int64_t *count, hs_failure *failure);
 hs_status hs_call_count_rows(hs_call *call, int64_t *counts, hs_failure *failure);
 

@@ -38,6 +38,7 @@ static PyMethodDef methods[] = {
      "See CellList.candidates."},
     {"batch_pairs", FASTCALL(hs_py_batch_pairs), METH_FASTCALL, "pairs of many systems."},
     {"batch_count", FASTCALL(hs_py_batch_count), METH_FASTCALL, "count_pairs of many systems."},
+    {"nearest", FASTCALL(hs_py_nearest), METH_FASTCALL, "See halfshell.nearest."},
     {"explain", FASTCALL(hs_py_explain), METH_FASTCALL, "See halfshell.explain."},
     {"kernels", hs_py_kernels, METH_NOARGS, "See halfshell.kernels."},
     {"default_kernel", hs_py_default_kernel, METH_NOARGS, "The kernel where none is named."},

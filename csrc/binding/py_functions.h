@@ -55,6 +55,10 @@ PyObject *hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssi
 /* The arguments of call.h, batch, cutoffs, boxes. */
 PyObject *hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
+/* py_nearest.c. The arguments of call.h (cutoff: the largest distance), then quantities of j d D S,
+ * index_bytes; queries or None, k -> arrays of k entries a query, one query after another. */
+PyObject *hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
 /* py_explain.c. The arguments of call.h, then quantities, sort, index_bytes, measure. */
 PyObject *hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 

@@ -9,8 +9,6 @@
 #include "outputs.h"
 #include "result.h"
 
-#define ROW_LETTERS "jdDS" /* a row says itself what i is */
-
 static bool
 expect_arguments(const char *name, Py_ssize_t n, int expected)
 {
@@ -94,7 +92,7 @@ hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     (void)module;
     if (!expect_arguments("neighbors", n_arguments, HS_CALL_ARGUMENTS + 3) ||
         !hs_call_init_sets(&call, arguments, more[2]) ||
-        !hs_quantities_of(more[0], ROW_LETTERS, &letters, &call.options.want)) {
+        !hs_quantities_of(more[0], HS_ROW_LETTERS, &letters, &call.options.want)) {
         return NULL;
     }
     call.options.index_bytes = (int)PyLong_AsLong(more[1]);

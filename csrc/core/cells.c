@@ -99,12 +99,16 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
         return HS_ERR_MEMORY;
     }
     cells->copy = NULL;
+    cells->trees = hs_near_kept_new();
     cells->has_box = box != NULL;
     if (box != NULL) {
         cells->box = *box;
     }
     const hs_fpenv  saved = hs_fpenv_enter();
-    const hs_status status = build_cells(points, options, cells, failure);
+    hs_status       status = build_cells(points, options, cells, failure);
+    if (status == HS_OK && cells->trees == NULL) {
+        status = HS_ERR_MEMORY;
+    }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
         hs_cells_free(cells);
@@ -123,6 +127,7 @@ hs_cells_free(hs_cells *cells)
     hs_search_close(&cells->search);
     hs_free(&cells->search.account, cells->copy);
     hs_account_close(&cells->search.account);
+    hs_near_kept_free(cells->trees);
     hs_free(NULL, cells);
 }
 
@@ -177,6 +182,16 @@ hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
 {
     const hs_sets sets = hs_cells_sets(cells, queries, true);
     return hs_neighbors_count_in(&sets, hs_cells_box(cells), options, counts, failure);
+}
+
+hs_status
+hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
+                 const hs_options *options, hs_pairs **rows, hs_failure *failure)
+{
+    hs_sets sets = hs_cells_sets(cells, queries, true);
+    sets.is_plain = sets.is_wide = true;
+    sets.trees = cells->trees;
+    return hs_nearest_find_in(&sets, hs_cells_box(cells), k, options, rows, failure);
 }
 
 hs_status

@@ -3,6 +3,7 @@
 #ifndef HS_CELLS_H
 #define HS_CELLS_H
 
+#include "near_kept.h"
 #include "pairs.h"
 
 struct hs_cells {
@@ -11,6 +12,7 @@ struct hs_cells {
     hs_box    box;
     bool      has_box;
     double   *copy;   /* owned; points as given, for cutoffs and queries that need other cells */
+    hs_near_kept *trees; /* owned; for nearest points, which cells are of no use for */
 };
 
 /* Queries, or NULL, among the points of the cells. */

@@ -60,15 +60,16 @@ include_term(exact_sums *sums, const exact_term *term)
 }
 
 HS_ALWAYS_INLINE void
-set_sums(exact_sums *sums, const hs_metric *metric, const double *p, const double *q,
-            const int64_t *shift)
+set_sums(exact_sums *sums, const hs_metric *metric, double cutoff, const hs_span *span)
 {
+    const double  *p = span->p, *q = span->q;
+    const int64_t *shift = span->shift;
     sums->lowest = INT32_MAX;
     sums->highest = INT32_MIN;
     sums->most_terms = 1;
     sums->cutoff.low = sums->cutoff.high = 0;
-    if (metric->cutoff != 0.0) {
-        sums->cutoff = decompose(metric->cutoff);
+    if (cutoff != 0.0) {
+        sums->cutoff = decompose(cutoff);
         include_term(sums, &sums->cutoff);
     }
     for (int k = 0; k < metric->ndim; k++) {
@@ -252,7 +253,7 @@ hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
                    const int64_t *shift)
 {
     exact_sums sums;
-    set_sums(&sums, metric, p, q, shift);
+    set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
     const int n = count_limbs(&sums);
     switch (n) {
     case 0:
@@ -264,6 +265,62 @@ hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
     default:
         return compare_large(&sums, metric->ndim, n);
     }
+}
+
+/* Both squares in 2 n limbs, in the same unit. */
+HS_ALWAYS_INLINE int
+compare_two_sums(const exact_sums *one, const exact_sums *other, int ndim, int n, uint64_t *first,
+                 uint64_t *second, uint64_t *value)
+{
+    for (int i = 0; i < 2 * n; i++) {
+        first[i] = second[i] = 0;
+    }
+    for (int k = 0; k < ndim; k++) {
+        sum_terms(value, one, k, n);
+        add_square(first, value, n);
+        sum_terms(value, other, k, n);
+        add_square(second, value, n);
+    }
+    return compare_limbs(first, second, 2 * n);
+}
+
+static int
+compare_two_medium(const exact_sums *one, const exact_sums *other, int ndim)
+{
+    uint64_t first[4], second[4], value[2];
+    return compare_two_sums(one, other, ndim, 2, first, second, value);
+}
+
+static HS_NO_INLINE int
+compare_two_large(const exact_sums *one, const exact_sums *other, int ndim, int n)
+{
+    uint64_t first[2 * MAX_LIMBS], second[2 * MAX_LIMBS], value[MAX_LIMBS];
+    return compare_two_sums(one, other, ndim, n, first, second, value);
+}
+
+/* The same unit and width for both. */
+static void
+join_units(exact_sums *one, exact_sums *other)
+{
+    const int lowest = one->lowest < other->lowest ? one->lowest : other->lowest;
+    const int highest = one->highest > other->highest ? one->highest : other->highest;
+    const int terms = one->most_terms > other->most_terms ? one->most_terms : other->most_terms;
+    one->lowest = other->lowest = lowest;
+    one->highest = other->highest = highest;
+    one->most_terms = other->most_terms = terms;
+}
+
+int
+hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other)
+{
+    exact_sums a, b;
+    set_sums(&a, metric, 0.0, one);
+    set_sums(&b, metric, 0.0, other);
+    join_units(&a, &b);
+    const int n = count_limbs(&a);
+    return n == 0   ? 0
+           : n <= 2 ? compare_two_medium(&a, &b, metric->ndim)
+                    : compare_two_large(&a, &b, metric->ndim, n);
 }
 
 /* The limbs top, top - 1 and top - 2 as a double-word, in units of the lowest of them. */
@@ -289,7 +346,7 @@ hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
     uint64_t  component[HS_MAX_DIM][MAX_LIMBS];
     bool      negative[HS_MAX_DIM];
     int       top = -1; /* highest limb in use */
-    set_sums(&sums, metric, p, q, shift);
+    set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
     const int n = count_limbs(&sums);
     for (int k = 0; k < metric->ndim; k++) {
         value[k] = (hs_dw){0.0, 0.0};

@@ -9,10 +9,14 @@
 
 #include "doubleword.h"
 #include "exact.h"
+#include "exact_order.h"
 
 /* Sign of |D|^2 - cutoff^2: -1, 0 or 1. shift may be NULL. */
 int hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
                        const int64_t *shift);
+
+/* Sign of |D1|^2 - |D2|^2. */
+int hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other);
 
 /* D: component k is (value[k].hi + value[k].lo) * 2^*exponent within 2^-100 of the largest
  * component, the largest being at least 2^128 and below 2^192, or all of them 0. */

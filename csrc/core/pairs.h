@@ -28,5 +28,7 @@ hs_status hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_
                                hs_pairs **rows, hs_failure *failure);
 hs_status hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                                 int64_t *counts, hs_failure *failure);
+hs_status hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k,
+                             const hs_options *options, hs_pairs **rows, hs_failure *failure);
 
 #endif

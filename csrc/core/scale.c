@@ -7,10 +7,6 @@
 
 /* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
 #define ORDINARY_EXPONENT 20
-/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
- * in float32. What condense.h takes care of does; what remains, coupled by a skewed box, is known
- * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
-#define LARGEST_EXPONENT 56
 /* Points of a skewed box may be 2^51 box vectors away; others are refused. */
 #define FARTHEST 0x1p52
 /* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
@@ -65,14 +61,14 @@ hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 
 int
 hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
-                   bool *extreme)
+                   int largest, bool *extreme)
 {
     int       exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
     const double reach = box->largest > 0.0 ? hs_smaller(FARTHEST * box->largest, cloud->largest)
                                             : cloud->largest;
-    const int largest = exponent_of(hs_larger(box->largest, reach));
-    if (largest - exponent > LARGEST_EXPONENT) {
-        exponent = largest - LARGEST_EXPONENT;
+    const int found = exponent_of(hs_larger(box->largest, reach));
+    if (found - exponent > largest) {
+        exponent = found - largest;
     }
     *extreme = false;
     if (exponent > 0) {

@@ -22,8 +22,16 @@ double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cu
  * its points are. A very small number if all is 0. */
 int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
-/* The exponent to scale by; *extreme: whether that loses digits. unit: as hs_unit_exponent. */
+/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
+ * in float32. What condense.h takes care of does; what remains, coupled by a skewed box, is known
+ * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
+#define HS_LARGEST_EXPONENT 56
+/* Where no float32 is made of them they stay below 2^901, so that sums of a few are finite. */
+#define HS_LARGEST_WIDE_EXPONENT 900
+
+/* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
+ * digits. unit: as hs_unit_exponent. */
 int hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
-                       bool *extreme);
+                       int largest, bool *extreme);
 
 #endif

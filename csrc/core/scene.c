@@ -248,10 +248,11 @@ set_scale(const hs_condensed *condensed, int unit, hs_scene *scene, const hs_sce
                                   : scene->sought;
     scene->extreme = false;
     if (!condensed->is_scaled) {
+        const int largest = scene->is_wide ? HS_LARGEST_WIDE_EXPONENT : HS_LARGEST_EXPONENT;
         exponent =
-            hs_choose_exponent(&scene->cloud, &size, least, unit, &scene->extreme);
+            hs_choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
         if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
-            (void)hs_choose_exponent(&asking->cloud, &size, least, unit, &also_extreme);
+            (void)hs_choose_exponent(&asking->cloud, &size, least, unit, largest, &also_extreme);
         }
     }
     scene->extreme = scene->extreme || also_extreme;
@@ -336,6 +337,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     start_scene(sets->points, scene);
     scene->is_kept = scene->is_asked = sets->is_kept;
     scene->is_plain = sets->is_plain;
+    scene->is_wide = sets->is_wide;
     scene->least_cutoff = sets->least_cutoff;
     if (asking != NULL) {
         start_scene(sets->queries, asking);

@@ -43,6 +43,7 @@ typedef struct hs_scene {
     bool       is_asked;      /* by queries: the bounds above hold for these too */
     bool       is_kept;       /* and for others that come later */
     bool       is_plain;      /* as hs_sets says */
+    bool       is_wide;       /* the same */
     double     least_cutoff;  /* the same */
 } hs_scene;
 
@@ -53,7 +54,9 @@ typedef struct hs_sets {
     bool             is_kept; /* queries come later: bounds with room for them */
     bool             is_plain; /* points are not drawn together (condense.h): images are those of
                                 * the points as given */
+    bool             is_wide; /* nobody makes float32 of X: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
+    struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (near_kept.h) */
     bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */

@@ -9,6 +9,7 @@ from halfshell._count import count_pairs
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
 from halfshell._histogram import pair_histogram
+from halfshell._nearest import nearest
 from halfshell._neighbors import coordination, neighbors
 from halfshell._options import kernels
 from halfshell._pairs import pairs
@@ -38,6 +39,7 @@ __all__ = [
     "for_each_pair",
     "iter_pairs",
     "kernels",
+    "nearest",
     "neighbors",
     "pair_histogram",
     "pairs",

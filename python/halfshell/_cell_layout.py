@@ -24,13 +24,18 @@ class Candidates(NamedTuple):
     """Where it ends, not included; shape (m,)."""
 
 
-class Asking(TypedDict, total=False):
+class Running(TypedDict, total=False):
     """Keywords of all methods that search."""
 
-    inclusive: bool
     kernel: str | None
     threads: int | None
     memory_limit: float | None
+
+
+class Asking(Running, total=False):
+    """Those of methods with a cutoff."""
+
+    inclusive: bool
 
 
 class CellLayout:

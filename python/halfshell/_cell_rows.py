@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The methods of `CellList` that return tables: rows of neighbours of points or queries."""
+"""The methods of `CellList` that return rows: neighbours of points or queries, or the nearest."""
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs, _radii
-from halfshell._cell_layout import Asking, CellLayout
+from halfshell._cell_layout import Asking, CellLayout, Running
+from halfshell._nearest import as_k, as_max_distance, in_rows
+from halfshell._pairs import Arrays
 from halfshell._table import NeighborTable
 
 
@@ -98,6 +100,56 @@ class CellRows(CellLayout):
             search, asking, radii, quantities, inclusive, self._precision == "exact"
         )
         return NeighborTable(arrays, quantities, self._n_points, False)
+
+    def nearest(
+        self,
+        k: int,
+        queries: Any = None,
+        *,
+        max_distance: float = np.inf,
+        quantities: str = "jd",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[Running],
+    ) -> Arrays:
+        """Find the k nearest points of each point or query, as `halfshell.nearest` does.
+
+        The first call makes a tree of the points, which is kept; later calls, with any `k` and
+        any queries, spare that. The cutoff of the list plays no part.
+
+        Parameters
+        ----------
+        k : int
+            How many; 1 or more.
+        queries : array_like of float, shape (q, d), optional
+            Who asks. Default: each point of the list, which is left out of its own row.
+        max_distance, quantities, index_dtype, kernel, threads, memory_limit
+            As in `halfshell.nearest`. The tree that is kept does not count for `memory_limit`
+            together with the rest, but must fit it by itself.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            As `halfshell.nearest`: rows of k entries, in exact order, ties by (j, S).
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=[8.0])
+        >>> j, d = cells.nearest(2)
+        >>> j.tolist(), d.tolist()
+        ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+        >>> cells.nearest(1, [[7.0]], quantities="jS")
+        (array([[0]]), array([[[1]]], dtype=int32))
+        """
+        if "inclusive" in options:
+            raise TypeError("unexpected keyword argument 'inclusive'")
+        asking = None if queries is None else self._queries(queries)
+        number = as_k(k)
+        arrays = _core.nearest(
+            *self._arguments(as_max_distance(max_distance), cast(Asking, options)), quantities,
+            _inputs.as_index_bytes(index_dtype), asking, number,
+        )
+        return in_rows(arrays, self._n_points if asking is None else len(asking), number)
 
     def _arrays(
         self,

@@ -71,6 +71,8 @@ def cells_find(cells: Any, points: npt.NDArray[Any], /) -> npt.NDArray[np.int64]
 def cells_candidates(
     *arguments: *tuple[*_Search, _Queries]
 ) -> tuple[npt.NDArray[np.int64], ...]: ...
+# quantities, index_bytes, queries, k; the cutoff is the largest distance
+def nearest(*arguments: *tuple[*_Search, str, int, _Queries, int]) -> _Arrays: ...
 def verlet_new() -> Any: ...  # a capsule, which comes before the arguments of a search
 
 # skin, rebuild

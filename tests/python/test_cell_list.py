@@ -205,6 +205,60 @@ def test_many_threads_may_ask_at_once():
     assert found == [expected] * 20
 
 
+@pytest.mark.parametrize("name", BOXES)
+def test_nearest_are_those_of_a_search_of_its_own(name):
+    points, scene = random_points(60 if name == "tiny" else 300, 16), scene_of(name)
+    queries = random_points(50, 17, spread=30.0) - 10.0
+    cells = hs.CellList(points, 2.0, **scene)
+    for k in (1, 7, 40):
+        for limit in (np.inf, 1.5):
+            for asking in (None, queries, queries * 100.0, queries[:0]):
+                expected = hs.nearest(
+                    points, k, queries=asking, max_distance=limit, quantities="jdDS", **scene
+                )
+                found = cells.nearest(k, asking, max_distance=limit, quantities="jdDS")
+                assert_same(found, expected)
+
+
+def test_nearest_do_not_depend_on_what_the_cells_are_for():
+    points = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3) * 0.1
+    for cutoff, precision in ((0.0, "exact"), (0.1, "single"), (1e200, "double")):
+        cells = hs.CellList(points, cutoff, precision=precision)
+        assert_same(cells.nearest(14), hs.nearest(points, 14))
+    scene = np.array([[1e300, 0.0], [1e-300, 0.0], [0.0, 3e-300], [0.0, 0.0]])
+    cells = hs.CellList(scene, 1.0)
+    assert_same(cells.nearest(2), hs.nearest(scene, 2))
+    assert_same(cells.nearest(2, scene), hs.nearest(scene, 2, queries=scene))
+    assert_same(
+        cells.nearest(2, max_distance=2e-300), hs.nearest(scene, 2, max_distance=2e-300)
+    )
+
+
+def test_nearest_of_many_threads_at_once():
+    points, queries = random_points(3000, 18), random_points(500, 19)
+    expected = hs.nearest(points, 5, queries=queries, quantities="j").tobytes()
+    for _ in range(5):
+        cells, found = hs.CellList(points, 1.0), []
+
+        def ask(cells=cells, found=found):
+            found.extend(cells.nearest(5, queries, quantities="j").tobytes() for _ in range(3))
+
+        asking = [threading.Thread(target=ask) for _ in range(4)]
+        for thread in asking:
+            thread.start()
+        for thread in asking:
+            thread.join()
+        assert found == [expected] * 12
+
+
+def test_nearest_of_nothing():
+    cells = hs.CellList(np.empty((0, 2)), 1.0, box=[3.0, 3.0])
+    assert cells.nearest(3)[0].shape == (0, 3)
+    j, d = cells.nearest(3, [[0.0, 0.0]])
+    assert j.tolist() == [[-1] * 3] and np.isinf(d).all()
+    assert hs.CellList([[1.0]], 1.0).nearest(2, np.empty((0, 1)))[0].shape == (0, 2)
+
+
 def test_float32_and_ase_atoms():
     ase = pytest.importorskip("ase.build")
     atoms = ase.bulk("NaCl", "rocksalt", a=5.64, cubic=True)
@@ -259,6 +313,15 @@ CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 1.0)
         (lambda: CELLS.candidates([[1e6, 0.0]]), ValueError, "too far"),
         (lambda: CELLS.cell_of([[1.0, 2.0, 3.0]]), ValueError, "2 columns"),
         (lambda: CELLS.count_pairs(kernel="none"), ValueError, "kernel"),
+        (lambda: CELLS.nearest(0), ValueError, "k must be 1 or more"),
+        (lambda: CELLS.nearest(1.0), TypeError, "k must be a whole number"),
+        (lambda: CELLS.nearest(1, [[0.0]]), ValueError, "queries must have 2 columns"),
+        (lambda: CELLS.nearest(1, [[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
+        (lambda: CELLS.nearest(1, max_distance=-1.0), ValueError, "max_distance"),
+        (lambda: CELLS.nearest(1, quantities="ij"), ValueError, "quantities"),
+        (lambda: CELLS.nearest(1, inclusive=False), TypeError, "inclusive"),
+        (lambda: CELLS.nearest(1, wrong=False), TypeError, "wrong"),
+        (lambda: CELLS.nearest(1, memory_limit=10.0), MemoryError, "would not fit"),
     ],
 )
 def test_bad_input_is_named(call, error, message):

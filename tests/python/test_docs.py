@@ -46,8 +46,8 @@ def test_public_functions_have_examples(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "neighbors",
-        "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
+        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "nearest",
+        "neighbors", "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
     ],
 )
 def test_every_argument_is_documented(name):

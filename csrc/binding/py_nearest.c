@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* py_nearest.c: _core.nearest. */
+#include "py_functions.h"
+
+#include "call.h"
+#include "convert.h"
+#include "errors.h"
+#include "outputs.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* Rows are as long as was asked for: what they need is known, and fewer would do. */
+static PyObject *
+raise_memory(const hs_failure *failure)
+{
+    char text[256];
+    if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
+        snprintf(text, sizeof text,
+                 "the result would not fit: %.3g entries (%.3g GB), %.3g GB are allowed; use a "
+                 "smaller k, fewer quantities, or fewer queries at a time",
+                 failure->expected_pairs, failure->expected_bytes / 1e9,
+                 failure->limit_bytes / 1e9);
+    } else {
+        snprintf(text, sizeof text,
+                 "not enough memory for the search: a point is so far from the others, or the box "
+                 "so small, that too many images are about as near");
+    }
+    PyErr_SetString(PyExc_MemoryError, text);
+    return NULL;
+}
+
+PyObject *
+hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    hs_call     call;
+    hs_failure  failure;
+    hs_pairs   *rows = NULL;
+    const char *letters;
+    (void)module;
+    if (n_arguments != HS_CALL_ARGUMENTS + 4) {
+        PyErr_Format(PyExc_TypeError, "nearest takes %d arguments", HS_CALL_ARGUMENTS + 4);
+        return NULL;
+    }
+    PyObject *const *own = arguments + HS_CALL_ARGUMENTS;
+    const int        index_bytes = (int)PyLong_AsLong(own[1]);
+    const long long  k = PyLong_AsLongLong(own[3]);
+    if (k < 1) {
+        if (!PyErr_Occurred()) {
+            PyErr_SetString(PyExc_ValueError, "k must be 1 or more");
+        }
+        return NULL;
+    }
+    if (PyErr_Occurred() || !hs_call_init_sets(&call, arguments, own[2]) ||
+        !hs_quantities_of(own[0], HS_ROW_LETTERS, &letters, &call.options.want)) {
+        return NULL;
+    }
+    call.options.index_bytes = index_bytes;
+    hs_call_release(&call);
+    const hs_status status = hs_call_find_nearest(&call, k, &rows, &failure);
+    hs_call_acquire(&call);
+    if (status != HS_OK) {
+        return status == HS_ERR_MEMORY ? raise_memory(&failure)
+                                       : hs_raise(status, &failure, &call.options);
+    }
+    PyObject *arrays = hs_arrays_of(rows, letters, call.points.ndim, index_bytes);
+    hs_pairs_free(rows);
+    return arrays;
+}

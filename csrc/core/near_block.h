@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * near_block.h: what a group may be near to, gathered from all images: as float32 relative to the
+ * group, for the kernels, and as float64, to be ranked by.
+ */
+#ifndef HS_NEAR_BLOCK_H
+#define HS_NEAR_BLOCK_H
+
+#include "near.h"
+
+/* Candidates that are consecutive points in tree order, in one image. */
+typedef struct hs_near_run {
+    int32_t at, n; /* place of the first, and how many */
+    int32_t si;    /* its number in tree order */
+    int32_t image;
+} hs_near_run;
+
+typedef struct hs_near_image {
+    int32_t shift[HS_MAX_DIM]; /* over the rows of B */
+    double  moved[HS_MAX_DIM];
+    bool    is_home;           /* no shift */
+} hs_near_image;
+
+/* Owned by a thread; arrays grow as needed. Places count candidates. */
+typedef struct hs_near_block {
+    int32_t        n, capacity;
+    double        *z[HS_MAX_DIM]; /* X, moved */
+    float         *y[HS_MAX_DIM]; /* the same less the centre, in units; clamped to `extent` */
+    float         *norm;          /* sum of y^2 */
+    int32_t       *run_of;
+    int32_t       *place;         /* 0, 1, 2, ... */
+    int32_t       *hits;
+    hs_unsure     *unsure;
+    hs_near_run   *runs;
+    hs_near_image *images;
+    int32_t        n_runs, run_capacity, n_images, image_capacity;
+    int32_t       *stack;
+    int64_t        depth;         /* room on it */
+    float          q[HS_MAX_DIM][HS_GROUP_POINTS];
+    double         unit;          /* lengths times this: the radius is between 1 and 2 */
+    double         reach;         /* the radius, times it */
+    double         extent;        /* largest |y| and |q| */
+    double         error;         /* of each component of z - X, times it */
+    double         flat_error;    /* of any |D|^2 from z, beside its relative rounding */
+} hs_near_block;
+
+hs_status hs_near_block_init(const hs_near *near, hs_near_block *block);
+void      hs_near_block_free(const hs_near *near, hs_near_block *block);
+
+/* Fills the block for a group with its radius, which may be raised a little. HS_STATUS_END: there
+ * are more than `most` candidates or images, or the group is far wider than its radius. */
+hs_status hs_near_block_fill(const hs_near *near, const hs_options *options,
+                             hs_near_group *group, double most, hs_near_block *block);
+
+/* How far |D|^2 in units, as it comes from z, may be from the true one, for any that is not beyond
+ * the radius. */
+HS_ALWAYS_INLINE double
+hs_near_error(const hs_near_block *block, int ndim, double square)
+{
+    /* Per axis: two roundings of the difference, one of the square, one of the sum; twice that. */
+    return (ndim + 4) * 0x1p-51 * square + block->flat_error;
+}
+
+/* Hits of the group's points from point `first` on: !(far away), places in block->hits. Returns the
+ * point to go on with; end[t]: where those of point t end. */
+int32_t hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_block *block,
+                           int32_t first, int32_t *end);
+
+#endif

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* nearest.c: the public searches for the k nearest points: trees, then groups (near_search.h). */
+#include "fpenv.h"
+#include "near_prepare.h"
+#include "near_search.h"
+#include "pairs.h"
+#include "poll.h"
+
+/* Room for k entries for each point that asks. */
+static hs_status
+make_room(hs_near *near, int64_t n_asking, hs_failure *failure)
+{
+    const double n = (double)n_asking * (double)near->k;
+    if (n < 0x1p62 && hs_output_reserve(near->rows, n_asking * near->k, 0.0) == HS_OK) {
+        near->rows->n_pairs = n_asking * near->k;
+        return HS_OK;
+    }
+    failure->expected_pairs = n;
+    failure->expected_bytes = n * (double)hs_output_bytes_per_pair(near->rows);
+    failure->limit_bytes = near->search->account.limit;
+    return HS_ERR_MEMORY;
+}
+
+static hs_status
+find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *failure)
+{
+    hs_search    *search = near->search;
+    const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
+    const double  limit = search->options.cutoff;
+    hs_status     status = HS_OK;
+    if (!(limit >= 0.0)) {
+        failure->value = limit;
+        return HS_ERR_CUTOFF;
+    }
+    status = make_room(near, n_asking, failure);
+    if (status == HS_OK) {
+        status = hs_near_prepare(near, sets, box, limit, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_near_search(near, failure);
+    }
+    hs_near_release(near);
+    hs_search_report(search, near->rows->n_pairs);
+    hs_search_close(search);
+    return status;
+}
+
+hs_status
+hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k, const hs_options *options,
+                   hs_pairs **result, hs_failure *failure)
+{
+    hs_failure ignored;
+    *result = NULL;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    hs_pairs *rows = hs_pairs_new();
+    if (rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    HS_ASSERT(k >= 1);
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_options     of_rows = *options;
+    of_rows.sorted = false;
+    of_rows.precision = HS_EXACT;
+    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+    hs_search_begin(&of_rows, &rows->search);
+    hs_output_init(&rows->search.account, sets->points->ndim, of_rows.want, options->index_bytes,
+                   &rows->output);
+    hs_near near = {.search = &rows->search,
+                    .k = k,
+                    .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
+                    .omits_self = sets->queries == NULL,
+                    .rows = &rows->output};
+    const hs_status status = find_nearest(&near, sets, box, failure);
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_pairs_free(rows);
+        return status;
+    }
+    *result = rows;
+    return HS_OK;
+}
+
+hs_status
+hs_nearest_find(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
+                const hs_options *options, hs_pairs **result, hs_failure *failure)
+{
+    const hs_sets sets = {
+        .points = points, .queries = queries, .is_full = true, .is_plain = true, .is_wide = true};
+    return hs_nearest_find_in(&sets, box, k, options, result, failure);
+}

@@ -1,0 +1,326 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * test_nearest.c: which of two is nearer, against integers that share no code with it; and rows of
+ * the nearest, against all neighbours within a cutoff, put in order by such integers.
+ */
+#include "../../csrc/core/exact_integer.h"
+#include "../../csrc/core/exact_order.h"
+#include "../../csrc/core/memory.h"
+#include "harness.h"
+#include "pair_checks.h"
+#include "random_scenes.h"
+
+void test_nearest(void);
+
+/* ---- which is nearer ---- */
+
+typedef struct spans {
+    int     ndim, n_rows;
+    double  p[8], q[2][8], rows[8][8];
+    int64_t shift[2][8];
+} spans;
+
+static int
+true_order(const spans *s)
+{
+    const double(*rows)[8] = (const double(*)[8])s->rows;
+    return big_compare(big_square(s->ndim, s->n_rows, rows, s->p, s->q[0], s->shift[0]),
+                       big_square(s->ndim, s->n_rows, rows, s->p, s->q[1], s->shift[1]));
+}
+
+static bool
+orders_like(const spans *s, int sign, hs_stages *stages)
+{
+    const hs_span one = {s->p, s->q[0], s->shift[0]}, other = {s->p, s->q[1], s->shift[1]};
+    hs_metric     metric;
+    hs_metric_init(&metric, s->ndim, s->n_rows, (const double(*)[8])s->rows, 1.0, true);
+    return hs_metric_compare(&metric, &one, &other, stages) == sign &&
+           hs_metric_compare(&metric, &other, &one, stages) == -sign &&
+           hs_metric_compare(&metric, &one, &one, stages) == 0 &&
+           hs_integer_compare_two(&metric, &one, &other) == sign;
+}
+
+/* The second is the first, mirrored or turned, and then moved by a few last places or not. */
+static void
+make_spans(harness_random *random, spans *s)
+{
+    const int exponent = random_below(random, 8) ? 0 : random_below(random, 1200) - 600;
+    const int numbers = random_below(random, 4), ndim = 1 + random_below(random, HS_MAX_DIM);
+    memset(s, 0, sizeof *s);
+    s->ndim = ndim;
+    s->n_rows = random_below(random, ndim + 1);
+    for (int k = 0; k < ndim; k++) {
+        s->p[k] = ldexp(random_entry(random, numbers, 4.0), exponent);
+        s->q[0][k] = ldexp(random_entry(random, numbers, 4.0), exponent);
+        for (int l = 0; l < s->n_rows; l++)
+            s->rows[l][k] = ldexp(random_entry(random, numbers, 2.0) - 1.0, exponent);
+    }
+    const int turn = random_below(random, ndim);
+    for (int k = 0; k < ndim; k++) {
+        const int other = (k + turn) % ndim;
+        s->q[1][k] = random_below(random, 2) ? s->p[k] + (s->q[0][other] - s->p[other])
+                                             : s->p[k] - (s->q[0][other] - s->p[other]);
+    }
+    for (int steps = random_below(random, 4); steps > 0; steps--)
+        s->q[1][turn] = nextafter(s->q[1][turn], random_below(random, 2) ? -8.0 : 8.0);
+    for (int l = 0; l < s->n_rows; l++) {
+        s->shift[0][l] = random_below(random, 5) - 2;
+        s->shift[1][l] = random_below(random, 3) ? s->shift[0][l] : -s->shift[0][l];
+    }
+    if (s->n_rows > 0 && random_below(random, 50) == 0)
+        s->shift[1][0] = s->shift[0][0] = INT64_MAX - random_below(random, 3);
+}
+
+static void
+order_is_that_of_real_numbers(void)
+{
+    harness_random random = {99};
+    hs_stages      stages = {0};
+    int            ties = 0, wrong = 0;
+    for (int trial = 0; trial < 40000; trial++) {
+        spans s;
+        make_spans(&random, &s);
+        const int sign = true_order(&s);
+        ties += sign == 0;
+        wrong += !orders_like(&s, sign, &stages);
+    }
+    CHECK(wrong == 0);
+    CHECK(ties > 3000);
+    CHECK(stages.by_float64 > 1000 && stages.by_double_word > 1000 && stages.by_integers > 1000);
+}
+
+static void
+order_at_the_ends_of_the_range(void)
+{
+    const double ends[] = {0.0, 5e-324, -5e-324, 1e-310, 0x1p-400, 0x1p-399, 1.0, 0x1p400,
+                           0x1p401, DBL_MAX, -DBL_MAX};
+    enum { ENDS = sizeof ends / sizeof ends[0] };
+    hs_stages stages = {0};
+    int       wrong = 0;
+    for (int e = 0; e < ENDS * ENDS * ENDS; e++) {
+        spans s = {.ndim = 2, .n_rows = 1};
+        s.p[0] = ends[e % ENDS];
+        s.q[0][0] = ends[e / ENDS % ENDS];
+        s.q[1][1] = ends[e / ENDS / ENDS];
+        s.rows[0][0] = ends[(e + 3) % ENDS];
+        s.shift[0][0] = e % 3 - 1;
+        wrong += !orders_like(&s, true_order(&s), &stages);
+    }
+    CHECK(wrong == 0);
+}
+
+/* ---- rows ---- */
+
+static const brute_scene *of_rows; /* what the entries that are put in order belong to */
+static const double      *origin, *targets;
+static double             rows_of_box[8][8];
+
+typedef struct neighbour {
+    int64_t j;
+    int32_t shift[8];
+    big     square;
+} neighbour;
+
+static int
+neighbour_order(const void *a, const void *b)
+{
+    const neighbour *one = a, *other = b;
+    const int        sign = big_compare(one->square, other->square);
+    if (sign != 0)
+        return sign;
+    if (one->j != other->j)
+        return one->j < other->j ? -1 : 1;
+    for (int l = 0; l < of_rows->ndim; l++) {
+        if (one->shift[l] != other->shift[l])
+            return one->shift[l] < other->shift[l] ? -1 : 1;
+    }
+    return 0;
+}
+
+static void
+take_rows(hs_pairs *rows, found_pairs *found)
+{
+    found->n = hs_pairs_length(rows);
+    found->j = hs_pairs_take(rows, HS_WANT_J);
+    found->distance = hs_pairs_take(rows, HS_WANT_DISTANCE);
+    found->vector = hs_pairs_take(rows, HS_WANT_VECTOR);
+    found->shift = hs_pairs_take(rows, HS_WANT_SHIFT);
+}
+
+/* Row i of all neighbours, in order of distance. */
+static int64_t
+sort_row(const found_pairs *all, int64_t begin, int64_t end, int64_t i, neighbour *sorted)
+{
+    const int d = of_rows->ndim;
+    for (int64_t e = begin; e < end; e++) {
+        neighbour *to = &sorted[e - begin];
+        int64_t    shift[8];
+        to->j = all->j[e];
+        for (int l = 0; l < d; l++)
+            shift[l] = to->shift[l] = all->shift[e * d + l];
+        to->square = big_square(d, d, (const double(*)[8])rows_of_box, origin + i * d,
+                                targets + to->j * d, shift);
+    }
+    qsort(sorted, (size_t)(end - begin), sizeof *sorted, neighbour_order);
+    return end - begin;
+}
+
+static bool
+row_is_right(const neighbour *sorted, int64_t n, const found_pairs *found, int64_t first,
+             int64_t k)
+{
+    const int d = of_rows->ndim;
+    for (int64_t e = 0; e < k; e++) {
+        const int64_t at = first + e;
+        if (e >= n) {
+            if (found->j[at] != -1 || found->distance[at] != INFINITY ||
+                found->vector[at * d] == found->vector[at * d] || found->shift[at * d] != 0)
+                return false;
+            continue;
+        }
+        if (found->j[at] != sorted[e].j || found->distance[at] > of_rows->cutoff ||
+            (e > 0 && found->distance[at] < found->distance[at - 1]) ||
+            memcmp(found->shift + at * d, sorted[e].shift, (size_t)d * sizeof(int32_t)) != 0)
+            return false;
+    }
+    return true;
+}
+
+/* split < 0: the points ask; else those before it ask for the others. Returns the entries. */
+static int64_t
+compare_rows(brute_scene *scene, int64_t split, int64_t k, int threads)
+{
+    hs_points   points = points_of(scene), queries = points;
+    hs_options  options = options_of(scene);
+    found_pairs all = {0}, found = {0};
+    hs_pairs   *rows = NULL;
+    bool        right = true;
+    scene->inclusive = options.inclusive = true;
+    options.want = WANT_ALL & ~HS_WANT_I;
+    options.threads = threads;
+    of_rows = scene;
+    memset(rows_of_box, 0, sizeof rows_of_box);
+    for (int l = 0; scene->box != NULL && l < scene->ndim; l++) {
+        if (scene->box->periodic[l])
+            memcpy(rows_of_box[l], scene->box->rows[l], sizeof rows_of_box[l]);
+    }
+    origin = targets = scene->x;
+    if (split >= 0) {
+        queries.n = split;
+        points.n -= split;
+        points.data = targets = scene->x + split * scene->ndim;
+    }
+    const hs_points *asking = split >= 0 ? &queries : NULL;
+    if (hs_neighbors_find(&points, asking, scene->box, &options, &rows, NULL) != HS_OK)
+        return 0;
+    const int64_t n_rows = hs_pairs_rows(rows);
+    int64_t      *offsets = hs_pairs_take_offsets(rows), most = 1;
+    take_rows(rows, &all);
+    hs_pairs_free(rows);
+    CHECK(hs_nearest_find(&points, asking, scene->box, k, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == n_rows * k);
+    take_rows(rows, &found);
+    hs_pairs_free(rows);
+    for (int64_t i = 0; i < n_rows; i++)
+        most = offsets[i + 1] - offsets[i] > most ? offsets[i + 1] - offsets[i] : most;
+    neighbour *sorted = array_of(most, sizeof *sorted);
+    for (int64_t i = 0; i < n_rows && right; i++) {
+        const int64_t n = sort_row(&all, offsets[i], offsets[i + 1], i, sorted);
+        right = row_is_right(sorted, n, &found, i * k, k);
+    }
+    CHECK(right);
+    if (!right)
+        fprintf(stderr, "  d = %d, n = %d, split %d, cutoff %a, k = %d\n", scene->ndim,
+                (int)scene->n, (int)split, scene->cutoff, (int)k);
+    const int64_t n = all.n;
+    free(sorted);
+    hs_array_free(offsets);
+    found_free(&all);
+    found_free(&found);
+    return n;
+}
+
+static void
+rows_are_the_neighbours_in_order(void)
+{
+    harness_random      random = {31415};
+    static random_scene s;
+    const char         *names[16];
+    const int           n_names = hs_kernel_names(names, 16);
+    int64_t             found = 0;
+    for (int trial = 0; trial < 700; trial++) {
+        const int ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
+        const int n = random_below(&random, ndim <= 3 ? 50 : ndim <= 5 ? 10 : 5);
+        kernel_to_check = names[random_below(&random, n_names)];
+        make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 7 ? 4.0 : 400.0,
+                   trial % 11 ? 0 : trial % 2 ? -400 : 300, &s);
+        s.scene.cutoff *= ndim > 5 ? 0.5 : 1.0;
+        found += compare_rows(&s.scene, trial % 3 ? -1 : random_below(&random, n + 1),
+                              1 + random_below(&random, 40), 1 + trial % 2);
+    }
+    kernel_to_check = NULL;
+    CHECK(found > 30000);
+}
+
+static void
+whichever_allocation_fails_nothing_is_left(void)
+{
+    harness_random      random = {2};
+    static random_scene s;
+    bool                ended = false;
+    int                 nth = 0;
+    make_scene(&random, SCENE_TRICLINIC, 3, 60, 4.0, 0, &s);
+    const hs_points points = points_of(&s.scene);
+    hs_options      options = options_of(&s.scene);
+    options.cutoff = INFINITY;
+    options.want = WANT_ALL;
+    while (!ended && nth < 300) {
+        const int64_t before = hs_test_live_blocks();
+        hs_pairs     *rows = NULL;
+        hs_test_fail_allocation(++nth);
+        const hs_status status = hs_nearest_find(&points, NULL, s.scene.box, 100, &options, &rows,
+                                                 NULL);
+        ended = hs_test_failure_is_due();
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+        hs_pairs_free(rows);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(ended && nth > 10);
+}
+
+static bool
+stop_at_once(void *context, double fraction)
+{
+    (void)context;
+    (void)fraction;
+    return false;
+}
+
+static void
+it_can_be_stopped(void)
+{
+    harness_random      random = {3};
+    static random_scene s;
+    hs_pairs           *rows = NULL;
+    make_scene(&random, SCENE_OPEN, 3, 60, 4.0, 0, &s);
+    const hs_points points = points_of(&s.scene);
+    hs_options      options = options_of(&s.scene);
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J;
+    options.poll = stop_at_once;
+    CHECK(hs_nearest_find(&points, NULL, NULL, 3, &options, &rows, NULL) == HS_ERR_INTERRUPTED);
+    CHECK(rows == NULL);
+    options.cutoff = -1.0;
+    CHECK(hs_nearest_find(&points, NULL, NULL, 3, &options, &rows, NULL) == HS_ERR_CUTOFF);
+}
+
+void
+test_nearest(void)
+{
+    RUN(order_is_that_of_real_numbers);
+    RUN(order_at_the_ends_of_the_range);
+    RUN(rows_are_the_neighbours_in_order);
+    RUN(whichever_allocation_fails_nothing_is_left);
+    RUN(it_can_be_stopped);
+}
