@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from c_builds import C_COMPILER, CSRC, ROOT, STRICT, build_extension, compile, needs_c
 
 import halfshell as hs
+from c_builds import C_COMPILER, CSRC, ROOT, STRICT, build_extension, compile, needs_c
 from halfshell import _core
 
 PROBE = Path(__file__).with_name("probe_capi.c")
