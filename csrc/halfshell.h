@@ -177,6 +177,7 @@ typedef struct hs_options {
     hs_precision precision;
     unsigned     want;         /* HS_WANT_ bits */
     int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
+    double       cell_size;    /* least width of cells, as far as possible; 0: what is quick */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
     int          threads;      /* exactly so many; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
@@ -350,6 +351,8 @@ typedef struct hs_cells hs_cells;
  * points, box, options are borrowed for this call only: the points are copied. options->cutoff is
  * the largest cutoff that the cells are made for; larger ones, and queries much further away than
  * the points or the box reach, are answered as well, by cells that are made for that call.
+ * options->cell_size changes the layout and the time that calls take, but no answer except those of
+ * HS_SINGLE, which goes by cells.
  */
 hs_status hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
                          hs_cells **cells, hs_failure *failure);
@@ -362,8 +365,8 @@ void          hs_cells_points(const hs_cells *cells, hs_points *points);
 const hs_box *hs_cells_box(const hs_cells *cells);
 
 /* As hs_pairs_find, hs_pairs_count or, with queries that are not NULL, hs_between_count,
- * hs_neighbors_find and hs_neighbors_count for these points. counters tell what the call took, not
- * what the cells hold. */
+ * hs_neighbors_find, hs_neighbors_count and hs_pairs_histogram for these points. counters tell what
+ * the call took, not what the cells hold. */
 hs_status hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
                          hs_failure *failure);
 hs_status hs_cells_count(const hs_cells *cells, const hs_points *queries,
@@ -373,6 +376,9 @@ hs_status hs_cells_neighbors(const hs_cells *cells, const hs_points *queries,
 hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
                                    const hs_options *options, int64_t *counts,
                                    hs_failure *failure);
+hs_status hs_cells_histogram(const hs_cells *cells, const hs_points *queries,
+                             const hs_options *options, const hs_histogram *histogram,
+                             hs_failure *failure);
 
 /* As hs_stream_open, whose stream must be freed before the cells, and hs_pairs_visit. */
 hs_status hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,

@@ -137,6 +137,9 @@ raise_memory(const hs_failure *failure)
                  failure->expected_pairs, stored ? " (" : "", stored ? needed : "",
                  stored ? ")" : "", search, limit,
                  isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
+    } else if (failure->expected_pairs == 0.0) { /* nothing is known of what is lacking */
+        snprintf(text, sizeof text, "no memory for the search, its cells or its counts: %s %s",
+                 limit, isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
     } else {
         snprintf(text, sizeof text,
                  "the result would not fit: about %.3g pairs (%s) are expected, %s are allowed; "

@@ -7,6 +7,7 @@
 #include "convert.h"
 #include "errors.h"
 #include "outputs.h"
+#include "tuples.h"
 
 static void
 free_cells(PyObject *capsule)
@@ -21,13 +22,15 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_failure failure;
     hs_cells  *cells = NULL;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS) {
-        PyErr_Format(PyExc_TypeError, "cells_build takes %d arguments", HS_CALL_ARGUMENTS);
+    if (n_arguments != HS_CALL_ARGUMENTS + 1) {
+        PyErr_Format(PyExc_TypeError, "cells_build takes %d arguments", HS_CALL_ARGUMENTS + 1);
         return NULL;
     }
-    if (!hs_call_init(&call, arguments)) {
+    const double cell_size = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS]);
+    if ((cell_size == -1.0 && PyErr_Occurred()) || !hs_call_init(&call, arguments)) {
         return NULL;
     }
+    call.options.cell_size = cell_size;
     hs_call_release(&call);
     const hs_status status =
         hs_cells_build(&call.points, hs_call_box(&call), &call.options, &cells, &failure);
@@ -76,36 +79,6 @@ indices_of(const hs_cells *cells, const hs_layout *layout)
     return array;
 }
 
-static PyObject *
-tuple_of_integers(const int64_t *values, int n)
-{
-    PyObject *tuple = PyTuple_New(n);
-    for (int k = 0; tuple != NULL && k < n; k++) {
-        PyObject *value = PyLong_FromLongLong(values[k]);
-        if (value == NULL) {
-            Py_CLEAR(tuple);
-            break;
-        }
-        PyTuple_SET_ITEM(tuple, k, value);
-    }
-    return tuple;
-}
-
-static PyObject *
-tuple_of_reals(const double *values, int n)
-{
-    PyObject *tuple = PyTuple_New(n);
-    for (int k = 0; tuple != NULL && k < n; k++) {
-        PyObject *value = PyFloat_FromDouble(values[k]);
-        if (value == NULL) {
-            Py_CLEAR(tuple);
-            break;
-        }
-        PyTuple_SET_ITEM(tuple, k, value);
-    }
-    return tuple;
-}
-
 static bool
 expect_cells(const hs_cells *cells)
 {
@@ -126,8 +99,8 @@ hs_py_cells_layout(PyObject *module, PyObject *capsule)
     }
     hs_cells_layout(cells, &layout);
     return Py_BuildValue("{s:N,s:N,s:N,s:N,s:N}", /* takes the references */
-                         "shape", tuple_of_integers(layout.shape, layout.ndim),
-                         "cell_sizes", tuple_of_reals(layout.cell_size, layout.ndim),
+                         "shape", hs_tuple_of_integers(layout.shape, layout.ndim),
+                         "cell_sizes", hs_tuple_of_reals(layout.cell_size, layout.ndim),
                          "cell_start", view_of(capsule, layout.start, layout.n_cells + 1),
                          "order", view_of(capsule, layout.order, layout.n_points),
                          "cell_ids", indices_of(cells, &layout));

@@ -5,6 +5,7 @@
 #include "call.h"
 #include "convert.h"
 #include "errors.h"
+#include "tuples.h"
 
 /* Puts a new reference into a dictionary and gives it up; false on failure, also of `value`. */
 static bool
@@ -13,36 +14,6 @@ put(PyObject *dict, const char *key, PyObject *value)
     const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
     Py_XDECREF(value);
     return done;
-}
-
-static PyObject *
-tuple_of_integers(const int64_t *values, int n)
-{
-    PyObject *tuple = PyTuple_New(n);
-    for (int k = 0; tuple != NULL && k < n; k++) {
-        PyObject *value = PyLong_FromLongLong(values[k]);
-        if (value == NULL) {
-            Py_CLEAR(tuple);
-        } else {
-            PyTuple_SET_ITEM(tuple, k, value);
-        }
-    }
-    return tuple;
-}
-
-static PyObject *
-tuple_of_floats(const double *values, int n)
-{
-    PyObject *tuple = PyTuple_New(n);
-    for (int k = 0; tuple != NULL && k < n; k++) {
-        PyObject *value = PyFloat_FromDouble(values[k]);
-        if (value == NULL) {
-            Py_CLEAR(tuple);
-        } else {
-            PyTuple_SET_ITEM(tuple, k, value);
-        }
-    }
-    return tuple;
 }
 
 static bool
@@ -54,10 +25,10 @@ put_plan(PyObject *dict, const hs_plan *plan)
            put(dict, "reduced", PyBool_FromLong(plan->reduced)) &&
            put(dict, "keeps_originals", PyBool_FromLong(plan->keeps_originals)) &&
            put(dict, "all_pairs", PyBool_FromLong(plan->all_pairs)) &&
-           put(dict, "shape", tuple_of_integers(plan->shape, plan->ndim)) &&
-           put(dict, "cell_sizes", tuple_of_floats(plan->cell_size, plan->ndim)) &&
-           put(dict, "reach", tuple_of_integers(plan->reach, plan->ndim)) &&
-           put(dict, "images", tuple_of_integers(plan->images, plan->ndim)) &&
+           put(dict, "shape", hs_tuple_of_integers(plan->shape, plan->ndim)) &&
+           put(dict, "cell_sizes", hs_tuple_of_reals(plan->cell_size, plan->ndim)) &&
+           put(dict, "reach", hs_tuple_of_integers(plan->reach, plan->ndim)) &&
+           put(dict, "images", hs_tuple_of_integers(plan->images, plan->ndim)) &&
            put(dict, "stencil_rows", PyLong_FromLongLong(plan->stencil_rows)) &&
            put(dict, "expected_pairs", PyFloat_FromDouble(plan->expected_pairs)) &&
            put(dict, "threads", PyLong_FromLong(plan->threads)) &&

@@ -28,7 +28,8 @@ PyObject *hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize
 /* The arguments of call.h, queries or None. */
 PyObject *hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
-/* py_cells.c. The arguments of call.h -> cells, which stand for points and box afterwards. */
+/* py_cells.c. The arguments of call.h, the least width of cells or 0 -> cells, which stand for
+ * points and box afterwards. */
 PyObject *hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* cells -> dict of what is visible of them; the arrays are read-only and borrow from the cells. */
 PyObject *hs_py_cells_layout(PyObject *module, PyObject *cells);

@@ -95,9 +95,12 @@ hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
         return NULL;
     }
     hs_call_release(&call);
-    const hs_status status =
-        hs_pairs_histogram(&call.points, hs_call_queries(&call), hs_call_box(&call), &call.options,
-                           &wanted, &failure);
+    const hs_points *queries = hs_call_queries(&call);
+    const hs_status  status =
+        call.cells != NULL
+            ? hs_cells_histogram(call.cells, queries, &call.options, &wanted, &failure)
+            : hs_pairs_histogram(&call.points, queries, hs_call_box(&call), &call.options, &wanted,
+                                 &failure);
     hs_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(array);

@@ -11,10 +11,11 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Owns the stream, and a reference to the progress hook of the call. */
+/* Owns the stream, and references to the cells that it borrows from and to the progress hook. */
 typedef struct pair_stream {
     PyObject_HEAD
     hs_stream *stream;     /* NULL: over */
+    PyObject  *cells;      /* or NULL; as long as there is a stream */
     hs_call    call;       /* points: their number only */
     PyObject  *progress;   /* or NULL */
     char       letters[8]; /* of the quantities */
@@ -44,6 +45,15 @@ leave(pair_stream *self)
     Py_BEGIN_CRITICAL_SECTION(self);
     self->is_running = false;
     Py_END_CRITICAL_SECTION();
+}
+
+/* Gives back all memory: no block follows. */
+static void
+end(pair_stream *self)
+{
+    hs_stream_free(self->stream);
+    self->stream = NULL;
+    Py_CLEAR(self->cells);
 }
 
 static PyObject *
@@ -89,8 +99,7 @@ next_block(pair_stream *self)
                                                     self->call.options.index_bytes);
     hs_pairs_free(block);
     if (arrays == NULL) { /* the last one, or one that is lost: nothing may follow it */
-        hs_stream_free(self->stream);
-        self->stream = NULL;
+        end(self);
     }
     return arrays;
 }
@@ -115,8 +124,7 @@ stream_close(PyObject *object, PyObject *ignored)
     if (!enter(self)) {
         return NULL;
     }
-    hs_stream_free(self->stream);
-    self->stream = NULL;
+    end(self);
     leave(self);
     Py_RETURN_NONE;
 }
@@ -143,7 +151,7 @@ stream_dealloc(PyObject *object)
 {
     PyTypeObject *type = Py_TYPE(object);
     PyObject_GC_UnTrack(object);
-    hs_stream_free(((pair_stream *)object)->stream);
+    end((pair_stream *)object);
     (void)stream_clear(object);
     type->tp_free(object);
     Py_DECREF(type);
@@ -195,6 +203,7 @@ take_arguments(pair_stream *self, PyObject *const *arguments)
     self->max_pairs = PyLong_AsLongLong(arguments[HS_CALL_ARGUMENTS + 2]);
     self->progress = self->call.progress;
     Py_XINCREF(self->progress);
+    self->cells = self->call.cells != NULL ? Py_NewRef(arguments[0]) : NULL;
     return !PyErr_Occurred();
 }
 
@@ -215,8 +224,11 @@ hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
     hs_call *call = &self->call;
     self->is_running = true; /* the hook can get hold of it */
     hs_call_release(call);
-    const hs_status status = hs_stream_open(&call->points, hs_call_box(call), &call->options,
-                                            self->max_pairs, &self->stream, &failure);
+    const hs_status status =
+        call->cells != NULL
+            ? hs_cells_stream(call->cells, &call->options, self->max_pairs, &self->stream, &failure)
+            : hs_stream_open(&call->points, hs_call_box(call), &call->options, self->max_pairs,
+                             &self->stream, &failure);
     hs_call_acquire(call);
     leave(self);
     if (status != HS_OK) {

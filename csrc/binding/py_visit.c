@@ -4,6 +4,7 @@
 
 #include "call.h"
 #include "errors.h"
+#include "tuples.h"
 
 /* A Python callable that several threads may call, and the exception that stopped it. */
 typedef struct callable {
@@ -45,18 +46,13 @@ stop(callable *to_call)
 
 /* A new reference or NULL. */
 static PyObject *
-tuple_of(const int32_t *S, const double *D, int ndim)
+tuple_of_shift(const int32_t *S, int ndim)
 {
-    PyObject *tuple = PyTuple_New(ndim);
-    for (int k = 0; tuple != NULL && k < ndim; k++) {
-        PyObject *entry = S != NULL ? PyLong_FromLong(S[k]) : PyFloat_FromDouble(D[k]);
-        if (entry == NULL) {
-            Py_CLEAR(tuple);
-        } else {
-            PyTuple_SET_ITEM(tuple, k, entry);
-        }
+    int64_t wide[HS_MAX_DIM];
+    for (int k = 0; k < ndim; k++) {
+        wide[k] = S[k];
     }
-    return tuple;
+    return hs_tuple_of_integers(wide, ndim);
 }
 
 /* Whether to go on after pair e; false also with an exception set. */
@@ -67,8 +63,8 @@ call_with(const callable *to_call, const hs_pair_arrays *pairs, int64_t e)
     const double d = pairs->distance[e];
     PyObject    *arguments[5] = {PyLong_FromLongLong(((const int64_t *)pairs->i)[e]),
                                  PyLong_FromLongLong(((const int64_t *)pairs->j)[e]),
-                                 tuple_of(pairs->shift + e * ndim, NULL, ndim),
-                                 tuple_of(NULL, pairs->vector + e * ndim, ndim),
+                                 tuple_of_shift(pairs->shift + e * ndim, ndim),
+                                 hs_tuple_of_reals(pairs->vector + e * ndim, ndim),
                                  PyFloat_FromDouble(d * d)};
     bool complete = true;
     for (int k = 0; k < 5; k++) {

@@ -75,6 +75,9 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
         hs_team_free(search->team);
         search->team = NULL;
     }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
     /* What they point to is the caller's again. */
     hs_search_report(search, 0);
     search->options.poll = NULL;
@@ -157,9 +160,7 @@ hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options
                int64_t *count, hs_failure *failure)
 {
     const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
-    return queries != NULL
-               ? hs_between_count_in(&sets, hs_cells_box(cells), options, count, failure)
-               : hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
+    return hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
 }
 
 hs_status

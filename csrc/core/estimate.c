@@ -124,6 +124,9 @@ hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_searc
 {
     hs_shortage shortage = {0.0, 0.0};
     hs_shortage_add(points, box, search->options.cutoff, &shortage);
+    if (search->is_full) {
+        shortage.pairs *= search->pairs_per_half;
+    }
     hs_shortage_tell(&shortage, &search->options, points->ndim, search->account.limit, failure);
 }
 

@@ -151,11 +151,18 @@ choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double dens
     }
 }
 
-/* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
- * whether it had to. */
-static bool
-cap_counts(int ndim, double cap, double *counts)
+/* The number of cells is in proportion to the points. */
+static double
+most_cells(const hs_scene *scene)
 {
+    return fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
+}
+
+bool
+hs_grid_cap_counts(const hs_scene *scene, double *counts)
+{
+    const double cap = most_cells(scene);
+    const int    ndim = scene->ndim;
     for (bool capped = false;;) {
         double product = 1.0;
         int    divided = 0;
@@ -198,8 +205,8 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
     return HS_OK;
 }
 
-static hs_status
-set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
+hs_status
+hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid)
 {
     grid->n_cells = 1;
     for (int k = 0; k < scene->ndim; k++) {
@@ -244,7 +251,7 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     for (int k = 0; k < scene->ndim; k++) {
         counts[k] = 1.0;
     }
-    if (set_shape(scene, counts, grid) == HS_OK) {
+    if (hs_grid_set_shape(scene, counts, grid) == HS_OK) {
         single_cost = cost_per_point(scene, grid);
     }
     if (single_cost <= SORTING_COST) { /* no grid costs less */
@@ -253,12 +260,11 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     const hs_grid single = *grid;
     /* Narrower rows test fewer pairs that are too far apart, and cost more rows to visit. */
     const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;
-    const double cap = fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
     choose_counts(scene, grid, finer, density, counts, parts);
-    const bool capped = cap_counts(scene->ndim, cap, counts);
-    hs_status  status = set_shape(scene, counts, grid);
+    const bool capped = hs_grid_cap_counts(scene, counts);
+    hs_status  status = hs_grid_set_shape(scene, counts, grid);
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
-        hs_grid_cut_by_faces(scene, parts, cap, grid);
+        hs_grid_cut_by_faces(scene, parts, most_cells(scene), grid);
     }
     if (single_cost < INFINITY &&
         (status != HS_OK || single_cost <= cost_per_point(scene, grid))) {
@@ -290,7 +296,7 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
 }
 
 hs_status
-hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure)
 {
     /* Of the periodic part, times the open extents. */
     double volume = hs_lattice_volume(&scene->lattice, 0);
@@ -305,13 +311,25 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
                       : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
     }
 
-    const double density = (double)scene->n / volume;
-    const double ball = hs_ball_volume(scene->ndim, scene->cutoff);
-    grid->expected_pairs = 0.5 * (double)scene->n * density * ball;
+    *density = (double)scene->n / volume;
+    grid->expected_pairs =
+        0.5 * (double)scene->n * *density * hs_ball_volume(scene->ndim, scene->cutoff);
     if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
     }
-    return choose_shape(scene, density, density * ball, grid, failure);
+    return HS_OK;
+}
+
+hs_status
+hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
+{
+    double          density;
+    const hs_status status = hs_grid_begin(scene, &density, grid, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    const double neighbours = density * hs_ball_volume(scene->ndim, scene->cutoff);
+    return choose_shape(scene, density, neighbours, grid, failure);
 }
 
 hs_status

@@ -32,6 +32,26 @@ double hs_ball_volume(int ndim, double radius);
 /* HS_ERR_MEMORY when a cutoff spans more than 2^31 images. */
 hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
 
+/*
+ * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
+ * there would be too many of them, or too many around each. HS_STATUS_END where there can be none.
+ * grid_width.c.
+ */
+hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
+                            hs_failure *failure);
+
+/* Steps of both. Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the
+ * volume that they are in. */
+hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid,
+                        hs_failure *failure);
+
+/* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
+ * whether it had to. */
+bool hs_grid_cap_counts(const hs_scene *scene, double *counts);
+
+/* So many cells along each axis. HS_ERR_MEMORY as hs_grid_set_axis. */
+hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid);
+
 /* `count` cells of equal width along axis k: sets all but the stride, from the scene's range there
  * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
 hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);

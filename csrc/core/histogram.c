@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* histogram.c: the public histogram of all pairs, which stores none of them. */
+#include "cells.h"
 #include "fpenv.h"
 #include "parallel.h"
 #include "poll.h"
@@ -209,11 +210,13 @@ fill_histogram(hs_search *search, const hs_histogram *histogram, hs_failure *fai
     return status;
 }
 
-hs_status
-hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, const hs_histogram *histogram, hs_failure *failure)
+/* The sets of points as a histogram wants them. */
+static hs_status
+histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
+             const hs_histogram *histogram, hs_failure *failure)
 {
     hs_failure ignored;
+    hs_sets    sets = *among;
     hs_search  search;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
@@ -221,11 +224,8 @@ hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_b
     if (status != HS_OK) {
         return status;
     }
-    const hs_sets sets = {.points = points,
-                          .queries = queries,
-                          .is_full = queries != NULL,
-                          .is_plain = true,
-                          .least_cutoff = smallest_edge(histogram)};
+    sets.is_plain = true;
+    sets.least_cutoff = smallest_edge(histogram);
     const hs_options counting = options_of(histogram, options);
     const hs_fpenv   saved = hs_fpenv_enter();
     status = hs_search_open(&sets, box, &counting, &search, failure);
@@ -236,4 +236,20 @@ hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_b
     hs_account_close(&search.account);
     hs_fpenv_leave(saved);
     return status;
+}
+
+hs_status
+hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_box *box,
+                   const hs_options *options, const hs_histogram *histogram, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points, .queries = queries, .is_full = queries != NULL};
+    return histogram_in(&sets, box, options, histogram, failure);
+}
+
+hs_status
+hs_cells_histogram(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+                   const hs_histogram *histogram, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
+    return histogram_in(&sets, hs_cells_box(cells), options, histogram, failure);
 }

@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* neighbors.c: the public searches for all neighbours of each point, or of each query. */
 #include "estimate.h"
-#include "fpenv.h"
-#include "pairs.h"
-#include "parallel.h"
-#include "poll.h"
+#include "request.h"
 #include "table.h"
+#include "touch.h"
 
 #include <math.h>
 
@@ -37,12 +35,14 @@ make_room(hs_pairs *rows, int64_t n_entries, hs_failure *failure)
     return HS_OK;
 }
 
+/* A hs_fill_fn. */
 static hs_status
 find_rows(hs_pairs *rows, hs_failure *failure)
 {
     hs_search    *search = &rows->search;
     const int64_t n = hs_search_asking(search)->n;
     hs_table      table = {.search = search, .entries = &rows->output};
+    hs_output_init(&search->account, search->scene.ndim, HS_WANT_I, 8, &rows->offsets);
     hs_status     status = hs_estimate_by_sample(search, failure);
     if (status == HS_OK) {
         status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
@@ -54,6 +54,9 @@ find_rows(hs_pairs *rows, hs_failure *failure)
     }
     if (status == HS_OK) {
         status = make_room(rows, table.offsets[n], failure);
+    }
+    if (status == HS_OK) {
+        status = hs_touch_output(search->team, &search->options, &rows->output);
     }
     return status == HS_OK ? hs_table_fill(&table, failure) : status;
 }
@@ -71,72 +74,21 @@ hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *o
                      hs_pairs **result, hs_failure *failure)
 {
     const hs_options of_rows = options_of_rows(options);
-    hs_failure       ignored;
-    *result = NULL;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    hs_pairs *rows = hs_pairs_new();
-    if (rows == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_search     *search = &rows->search;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(sets, box, &of_rows, search, failure);
-    if (status == HS_OK) {
-        hs_output_init(&search->account, sets->points->ndim, options->want, options->index_bytes,
-                       &rows->output);
-        hs_output_init(&search->account, sets->points->ndim, HS_WANT_I, 8, &rows->offsets);
-        if (options->out != NULL) {
-            hs_output_fix(&rows->output, options->out);
-        }
-        status = find_rows(rows, failure);
-        hs_search_report(search, rows->output.n_pairs);
-        hs_search_close(search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(sets->points, box, search, failure);
-    }
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(rows);
-        return status;
-    }
-    *result = rows;
-    return HS_OK;
+    const hs_request request = {.sets = sets, .box = box, .options = &of_rows};
+    return hs_request_fill(&request, find_rows, result, failure);
 }
 
-/* A search that only counts; what it does is up to `count`. */
-typedef hs_status (*count_fn)(hs_search *search, int64_t *counts, hs_failure *failure);
-
+/* A hs_use_fn. */
 static hs_status
-count_with(const hs_sets *sets, const hs_box *box, const hs_options *options, count_fn count,
-           int64_t *counts, hs_failure *failure)
+count_rows(void *context, hs_search *search, int64_t *n_entries, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_options counting = options_of_rows(options);
-    hs_search  search;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    counting.want = 0;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(sets, box, &counting, &search, failure);
-    if (status == HS_OK) {
-        status = count(&search, counts, failure);
-        hs_search_report(&search, search.walked.pairs);
-        hs_search_close(&search);
+    const int64_t   n = hs_search_asking(search)->n;
+    const int64_t  *counts = context;
+    const hs_status status = hs_table_count(search, context, NULL, failure);
+    for (int64_t i = 0; status == HS_OK && i < n; i++) {
+        *n_entries += counts[i];
     }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(sets->points, box, &search, failure);
-    }
-    hs_account_close(&search.account);
-    hs_fpenv_leave(saved);
     return status;
-}
-
-static hs_status
-count_rows(hs_search *search, int64_t *counts, hs_failure *failure)
-{
-    return hs_table_count(search, counts, NULL, failure);
 }
 
 hs_status
@@ -151,7 +103,10 @@ hs_status
 hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                       int64_t *counts, hs_failure *failure)
 {
-    return count_with(sets, box, options, count_rows, counts, failure);
+    hs_options       counting = options_of_rows(options);
+    const hs_request request = {.sets = sets, .box = box, .options = &counting};
+    counting.want = 0;
+    return hs_request_use(&request, count_rows, counts, failure);
 }
 
 hs_status
@@ -159,14 +114,7 @@ hs_between_count(const hs_points *points, const hs_points *queries, const hs_box
                  const hs_options *options, int64_t *count, hs_failure *failure)
 {
     const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    return hs_between_count_in(&sets, box, options, count, failure);
-}
-
-hs_status
-hs_between_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                    int64_t *count, hs_failure *failure)
-{
-    return count_with(sets, box, options, hs_parallel_count, count, failure);
+    return hs_pairs_count_in(&sets, box, options, count, failure);
 }
 
 int64_t

@@ -3,11 +3,9 @@
 #include "../halfshell.h"
 
 #include "estimate.h"
-#include "fpenv.h"
-#include "pairs.h"
 #include "parallel.h"
-#include "poll.h"
 #include "record.h"
+#include "request.h"
 #include "sort.h"
 
 #include <math.h>
@@ -74,10 +72,13 @@ sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     return status;
 }
 
+/* A hs_fill_fn. */
 static hs_status
-find_pairs(hs_search *search, hs_output *output, hs_failure *failure)
+fill_pairs(hs_pairs *pairs, hs_failure *failure)
 {
-    hs_status status = hs_estimate_by_sample(search, failure);
+    hs_search *search = &pairs->search;
+    hs_output *output = &pairs->output;
+    hs_status  status = hs_estimate_by_sample(search, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -89,11 +90,23 @@ find_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
     }
-    if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
-        failure->expected_pairs = (double)output->n_pairs;
-        status = HS_ERR_CAPACITY;
+    return hs_pairs_conclude(output, status, failure);
+}
+
+hs_status
+hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure)
+{
+    if (status != HS_OK) {
+        return status;
     }
-    return status;
+    if (!output->fixed) {
+        return hs_output_reserve(output, 0, 1.0);
+    }
+    if (output->n_pairs > output->capacity) {
+        failure->expected_pairs = (double)output->n_pairs;
+        return HS_ERR_CAPACITY;
+    }
+    return HS_OK;
 }
 
 hs_pairs *
@@ -119,40 +132,19 @@ hs_status
 hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                  hs_pairs **result, hs_failure *failure)
 {
-    hs_failure ignored;
-    *result = NULL;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    hs_pairs *pairs = hs_pairs_new();
-    if (pairs == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_search     *search = &pairs->search;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status status = hs_search_open(sets, box, options, search, failure);
+    const hs_request request = {.sets = sets, .box = box, .options = options};
+    return hs_request_fill(&request, fill_pairs, result, failure);
+}
+
+/* A hs_use_fn: of pairs, or of those that are ordered where every point is asked for all. */
+static hs_status
+count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    const hs_status status = hs_parallel_count(search, n_pairs, failure);
     if (status == HS_OK) {
-        hs_output_init(&search->account, sets->points->ndim, options->want, options->index_bytes,
-                       &pairs->output);
-        if (options->out != NULL) {
-            hs_output_fix(&pairs->output, options->out);
-        }
-        status = find_pairs(search, &pairs->output, failure);
-        if (status == HS_OK && !pairs->output.fixed) {
-            status = hs_output_reserve(&pairs->output, 0, 1.0); /* arrays also without pairs */
-        }
-        hs_search_report(search, pairs->output.n_pairs);
-        hs_search_close(search);
+        *(int64_t *)context = *n_pairs;
     }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(sets->points, box, search, failure);
-    }
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(pairs);
-        return status;
-    }
-    *result = pairs;
-    return HS_OK;
+    return status;
 }
 
 hs_status
@@ -167,30 +159,11 @@ hs_status
 hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   int64_t *count, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_options counting = *options;
-    hs_search  search;
-    int64_t    found = 0;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
+    hs_options       counting = *options;
+    const hs_request request = {.sets = sets, .box = box, .options = &counting};
     counting.want = 0;
     counting.sorted = false;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(sets, box, &counting, &search, failure);
-    if (status == HS_OK) {
-        status = hs_parallel_count(&search, &found, failure);
-        hs_search_report(&search, found);
-        hs_search_close(&search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(sets->points, box, &search, failure);
-    }
-    hs_account_close(&search.account);
-    hs_fpenv_leave(saved);
-    if (status == HS_OK) {
-        *count = found;
-    }
-    return status;
+    return hs_request_use(&request, count_pairs, count, failure);
 }
 
 int64_t

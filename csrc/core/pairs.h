@@ -15,6 +15,10 @@ struct hs_pairs {
 /* One that holds nothing yet; hs_search_begin comes first. NULL when memory is short. */
 hs_pairs *hs_pairs_new(void);
 
+/* When a search ends with this status: arrays also where there are no pairs; HS_ERR_CAPACITY where
+ * those of the caller had no room for all. */
+hs_status hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure);
+
 /* The functions of halfshell.h of these names, for sets of points. */
 hs_status hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                            hs_pairs **pairs, hs_failure *failure);
@@ -24,7 +28,5 @@ hs_status hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_
                                hs_pairs **rows, hs_failure *failure);
 hs_status hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                                 int64_t *counts, hs_failure *failure);
-hs_status hs_between_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                              int64_t *count, hs_failure *failure);
 
 #endif

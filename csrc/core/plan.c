@@ -2,13 +2,7 @@
 /* plan.c: what a search of a scene would do, read off the same structures that would do it. */
 #include "../halfshell.h"
 
-#include "estimate.h"
-#include "fpenv.h"
-#include "poll.h"
-#include "search.h"
-
-#include <math.h>
-
+#include "request.h"
 static void
 fill_plan(const hs_search *search, hs_plan *plan)
 {
@@ -35,25 +29,21 @@ fill_plan(const hs_search *search, hs_plan *plan)
     }
 }
 
+/* A hs_use_fn. */
+static hs_status
+use_search(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    (void)n_pairs;
+    (void)failure;
+    fill_plan(search, context);
+    return HS_OK;
+}
+
 hs_status
 hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *options,
              hs_plan *plan, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_search  search;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    const hs_fpenv saved = hs_fpenv_enter();
-    const hs_sets  sets = {.points = points};
-    hs_status      status = hs_search_open(&sets, box, options, &search, failure);
-    if (status == HS_OK) {
-        fill_plan(&search, plan);
-        hs_search_close(&search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        hs_shortage_of_search(points, box, &search, failure);
-    }
-    hs_account_close(&search.account);
-    hs_fpenv_leave(saved);
-    return status;
+    const hs_sets    sets = {.points = points};
+    const hs_request request = {.sets = &sets, .box = box, .options = options};
+    return hs_request_use(&request, use_search, plan, failure);
 }

@@ -25,18 +25,27 @@ borrow(const hs_search *built, hs_search *search)
     search->is_borrowed = true;
 }
 
-/* Whether cells for one cutoff serve another. What is kept of the points depends on the precision
- * that they were meant for. */
+/* Whether the scale of the cells keeps all digits of a length up to theirs. */
 static bool
-serves(const hs_search *built, const hs_options *options)
+keeps_digits(const hs_search *built, double length)
+{
+    return length == 0.0 || hs_scale_apply(built->scene.scale, length) >= SMALLEST_CUTOFF;
+}
+
+/* Whether cells for one cutoff serve another, and a least one where there are several. What is kept
+ * of the points depends on the precision that they were meant for. */
+static bool
+serves(const hs_search *built, const hs_options *options, double least_cutoff)
 {
     const double before = built->options.cutoff, cutoff = options->cutoff;
-    const double scaled = hs_scale_apply(built->scene.scale, cutoff);
     if (options->precision != built->options.precision) {
         return false;
     }
-    return cutoff == before || (!built->scene.extreme && cutoff >= 0.0 && cutoff < before &&
-                                (cutoff == 0.0 || scaled >= SMALLEST_CUTOFF));
+    if (built->scene.extreme) { /* digits are lost, and kept beside */
+        return cutoff == before;
+    }
+    return keeps_digits(built, least_cutoff) &&
+           (cutoff == before || (cutoff >= 0.0 && cutoff < before && keeps_digits(built, cutoff)));
 }
 
 /* Cells for the cutoff of the options, and the queries in them. */
@@ -82,7 +91,7 @@ hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *searc
 {
     const hs_search *built = sets->built;
     const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
-    if (!serves(built, options)) {
+    if (!serves(built, options, sets->least_cutoff)) {
         return HS_STATUS_END;
     }
     hs_search_begin(options, search);

@@ -23,12 +23,22 @@ hs_search_threads(int64_t n_points, const hs_options *options)
     return n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
 }
 
-/* The dense grid, or where points crowd in few of its cells one that stores occupied cells only. */
+/* The dense grid, with cells as wide as the caller wants them or as is best. Where points crowd in
+ * few of its cells one that stores occupied cells only, unless the caller has what he wants. */
 static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {
-    hs_status status = hs_grid_init(&search->scene, &search->grid, failure);
-    if (status == HS_OK) {
+    const double wanted = search->options.cell_size;
+    hs_status    status = HS_STATUS_END;
+    bool         may_be_sparse = true;
+    if (wanted > 0.0) {
+        status = hs_grid_init_wide(&search->scene, hs_scale_apply(search->scene.scale, wanted),
+                                   &search->grid, &may_be_sparse, failure);
+    }
+    if (status == HS_STATUS_END) {
+        status = hs_grid_init(&search->scene, &search->grid, failure);
+    }
+    if (status == HS_OK && may_be_sparse) {
         const double width = hs_sparse_choose(&search->scene, &search->grid);
         const hs_grid dense = search->grid;
         search->is_sparse =

@@ -136,13 +136,7 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
         hs_output_fix(output, options->out);
     }
     hs_status status = search_systems(&crew, total, failure);
-    if (status == HS_OK && !output->fixed) {
-        status = hs_output_reserve(output, 0, 1.0); /* arrays also without pairs */
-    }
-    if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
-        failure->expected_pairs = (double)output->n_pairs;
-        status = HS_ERR_CAPACITY;
-    }
+    status = hs_pairs_conclude(output, status, failure);
     hs_search_report(total, output->n_pairs);
     hs_fpenv_leave(saved);
     if (status != HS_OK) {

@@ -56,14 +56,7 @@ find_pairs(hs_refilter *refilter, hs_output *output, hs_failure *failure)
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
         failure->limit_bytes = search->account.limit;
     }
-    if (status == HS_OK && output->fixed && output->n_pairs > output->capacity) {
-        failure->expected_pairs = (double)output->n_pairs;
-        status = HS_ERR_CAPACITY;
-    }
-    if (status == HS_OK && !output->fixed) {
-        status = hs_output_reserve(output, 0, 1.0); /* arrays also without pairs */
-    }
-    return status;
+    return hs_pairs_conclude(output, status, failure);
 }
 
 /* A search that has everything but a scene. */

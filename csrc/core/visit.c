@@ -4,8 +4,8 @@
 
 #include "fpenv.h"
 #include "parallel.h"
-#include "poll.h"
 #include "record.h"
+#include "request.h"
 
 #include <string.h>
 
@@ -112,39 +112,41 @@ visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failu
     return status == STOPPED ? HS_OK : status;
 }
 
+/* What one search calls, and how many pairs it has handed over. */
+typedef struct visiting {
+    const hs_visit *visit;
+    int64_t        *n_visited;
+} visiting;
+
+/* A hs_use_fn. */
+static hs_status
+visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    const visiting *doing = context;
+    if (!doing->visit->thread_safe) { /* threads only make the search ready */
+        hs_team_free(search->team);
+        search->team = NULL;
+    }
+    const hs_status status = visit_all(search, doing->visit, n_pairs, failure);
+    *doing->n_visited = *n_pairs;
+    return status;
+}
+
 hs_status
 hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_options visiting = *options;
+    visiting   doing = {.visit = visit, .n_visited = n_visited};
+    hs_options of_visit = *options;
     hs_sets    of_pairs = *sets;
-    hs_search  search;
-    int64_t    n = 0;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    visiting.want = WANTED;
-    visiting.sorted = false;
-    visiting.out = NULL;
+    *n_visited = 0;
+    of_visit.want = WANTED;
+    of_visit.sorted = false;
+    of_visit.out = NULL;
     of_pairs.keeps_none = true;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_open(&of_pairs, box, &visiting, &search, failure);
-    if (status == HS_OK) {
-        if (!visit->thread_safe) { /* threads only make the search ready */
-            hs_team_free(search.team);
-            search.team = NULL;
-        }
-        status = visit_all(&search, visit, &n, failure);
-        hs_search_report(&search, n);
-        hs_search_close(&search);
-    }
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = search.account.limit;
-    }
-    hs_account_close(&search.account);
-    hs_fpenv_leave(saved);
-    *n_visited = n;
-    return status;
+    const hs_request request = {
+        .sets = &of_pairs, .box = box, .options = &of_visit, .keeps_no_pairs = true};
+    return hs_request_use(&request, visit_pairs, &doing, failure);
 }
 
 hs_status

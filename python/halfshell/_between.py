@@ -10,17 +10,9 @@ import numpy.typing as npt
 
 from halfshell import _core, _inputs
 from halfshell._box import Box
-from halfshell._cutoffs import Rest, count_within
-from halfshell._options import Precision, SearchOptions
+from halfshell._cutoffs import count_within
+from halfshell._options import ArrayOptions, Precision, Rest
 from halfshell._pairs import Arrays, Letter
-
-
-class _BetweenOptions(SearchOptions, total=False):
-    """The keywords of `pairs_between`, without `quantities`."""
-
-    sort: bool
-    index_dtype: npt.DTypeLike
-    out: Any
 
 
 @overload
@@ -30,25 +22,15 @@ def pairs_between(
     cutoff: Any,
     *,
     quantities: Literal["ij"] = "ij",
-    **options: Unpack[_BetweenOptions],
+    **options: Unpack[ArrayOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def pairs_between(
-    queries: Any,
-    points: Any,
-    cutoff: Any,
-    *,
-    quantities: Letter,
-    **options: Unpack[_BetweenOptions],
+    queries: Any, points: Any, cutoff: Any, *, quantities: Letter, **options: Unpack[ArrayOptions]
 ) -> npt.NDArray[Any]: ...
 @overload
 def pairs_between(
-    queries: Any,
-    points: Any,
-    cutoff: Any,
-    *,
-    quantities: str,
-    **options: Unpack[_BetweenOptions],
+    queries: Any, points: Any, cutoff: Any, *, quantities: str, **options: Unpack[ArrayOptions]
 ) -> Arrays: ...
 def pairs_between(
     queries: Any,

@@ -4,373 +4,89 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-def pairs(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    sort: bool,
-    index_bytes: int,
-    out: Any,
-    /,
-) -> npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]: ...
-def count_pairs(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    /,
-) -> int: ...
-def iter_pairs(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    index_bytes: int,
-    max_pairs: int,
-    /,
-) -> Any: ...  # a PairBlocks
-def for_each_pair(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    callback: Callable[..., object] | int,
-    user_data: int,
-    thread_safe: bool,
-    /,
-) -> int: ...
-def plain_pairs(
-    points: Any,
-    cutoff: Any,
-    box: Any,
-    periodic: Any,
-    inclusive: Any,
-    precision: Any,
-    kernel: Any,
-    memory_limit: Any,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: Any,
-    sort: Any,
-    index_dtype: Any,
-    out: Any,
-    /,
-) -> Any: ...  # as pairs, or NotImplemented
-def plain_count(
-    points: Any,
-    cutoff: Any,
-    box: Any,
-    periodic: Any,
-    inclusive: Any,
-    precision: Any,
-    kernel: Any,
-    memory_limit: Any,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    /,
-) -> Any: ...  # as count_pairs, or NotImplemented
-def pairs_between(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    sort: bool,
-    index_bytes: int,
-    out: Any,
-    queries: npt.NDArray[Any],
-    /,
-) -> npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]: ...
-def count_between(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    queries: npt.NDArray[Any],
-    /,
-) -> int: ...
+_Floats = npt.NDArray[np.float64]
+_Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+
+# Every search begins with ten arguments: points (or cells of cells_build, with None and 0 as the
+# next two), cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress, threads.
+_Search = tuple[
+    Any, float, _Floats | None, int, bool, str, str | None, float | None,
+    Callable[[float], object] | None, int | None,
+]  # fmt: skip
+# The same as a caller gives them. What needs a conversion is answered with NotImplemented.
+_Plain = tuple[
+    Any, Any, Any, Any, Any, Any, Any, Any, Callable[[float], object] | None, int | None
+]
+_Queries = npt.NDArray[Any] | None
+# Functions that return arrays go on with quantities, sort, index_bytes (or index_dtype), out.
+_Result = tuple[str, bool, int, Any]
+_PlainResult = tuple[Any, Any, Any, Any]
+# Those for many systems end with batch, cutoffs, boxes.
+_Batch = tuple[npt.NDArray[np.int64], _Floats | None, _Floats | None]
+
+def pairs(*arguments: *tuple[*_Search, *_Result]) -> _Arrays: ...
+def count_pairs(*arguments: *_Search) -> int: ...
+def pairs_between(*arguments: *tuple[*_Search, *_Result, _Queries]) -> _Arrays: ...
+def count_between(*arguments: *tuple[*_Search, _Queries]) -> int: ...
+def coordination(*arguments: *tuple[*_Search, _Queries]) -> npt.NDArray[np.int64]: ...
+def batch_pairs(*arguments: *tuple[*_Search, *_Result, *_Batch]) -> _Arrays: ...
+def batch_count(*arguments: *tuple[*_Search, *_Batch]) -> npt.NDArray[np.int64]: ...
+
+# quantities, index_bytes, queries -> offsets first
 def neighbors(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    index_bytes: int,
-    queries: npt.NDArray[Any] | None,
-    /,
-) -> tuple[npt.NDArray[Any], ...]: ...  # offsets first
-def coordination(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    queries: npt.NDArray[Any] | None,
-    /,
-) -> npt.NDArray[np.int64]: ...
-def plain_between(
-    points: Any,
-    cutoff: Any,
-    box: Any,
-    periodic: Any,
-    inclusive: Any,
-    precision: Any,
-    kernel: Any,
-    memory_limit: Any,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: Any,
-    sort: Any,
-    index_dtype: Any,
-    out: Any,
-    queries: Any,
-    /,
-) -> Any: ...  # as pairs_between, or NotImplemented
-def plain_count_between(
-    points: Any,
-    cutoff: Any,
-    box: Any,
-    periodic: Any,
-    inclusive: Any,
-    precision: Any,
-    kernel: Any,
-    memory_limit: Any,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    queries: Any,
-    /,
-) -> Any: ...  # as count_between, or NotImplemented
-def plain_coordination(
-    points: Any,
-    cutoff: Any,
-    box: Any,
-    periodic: Any,
-    inclusive: Any,
-    precision: Any,
-    kernel: Any,
-    memory_limit: Any,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    queries: Any,
-    /,
-) -> Any: ...  # as coordination, or NotImplemented
-def plain_neighbors(
-    points: Any,
-    cutoff: Any,
-    box: Any,
-    periodic: Any,
-    inclusive: Any,
-    precision: Any,
-    kernel: Any,
-    memory_limit: Any,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: Any,
-    index_dtype: Any,
-    queries: Any,
-    /,
-) -> Any: ...  # as neighbors, or NotImplemented
+    *arguments: *tuple[*_Search, str, int, _Queries]
+) -> tuple[npt.NDArray[Any], ...]: ...
+
+# quantities, index_bytes, max_pairs -> a PairBlocks
+def iter_pairs(*arguments: *tuple[*_Search, str, int, int]) -> Any: ...
+
+# callback, user_data, thread_safe
+def for_each_pair(
+    *arguments: *tuple[*_Search, Callable[..., object] | int, int, bool]
+) -> int: ...
+
+# edges, last_inclusive, queries, n_types; types and weights of the points, then of the queries
 def histogram(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    edges: npt.NDArray[np.float64],
-    last_inclusive: bool,
-    queries: npt.NDArray[Any] | None,
-    n_types: int,
-    types: npt.NDArray[np.int32] | None,
-    weights: npt.NDArray[np.float64] | None,
-    query_types: npt.NDArray[np.int32] | None,
-    query_weights: npt.NDArray[np.float64] | None,
-    /,
-) -> npt.NDArray[Any]: ...
-def cells_build(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    /,
-) -> Any: ...  # a capsule, which stands for points and box in the searches above
+    *arguments: *tuple[
+        *_Search, _Floats, bool, _Queries, int,
+        npt.NDArray[np.int32] | None, _Floats | None, npt.NDArray[np.int32] | None, _Floats | None,
+    ]
+) -> npt.NDArray[Any]: ...  # fmt: skip
+
+# quantities, sort, index_bytes, measure
+def explain(*arguments: *tuple[*_Search, str, bool, int, bool]) -> dict[str, Any]: ...
+def plain_pairs(*arguments: *tuple[*_Plain, *_PlainResult]) -> Any: ...
+def plain_count(*arguments: *_Plain) -> Any: ...
+def plain_between(*arguments: *tuple[*_Plain, *_PlainResult, Any]) -> Any: ...
+def plain_count_between(*arguments: *tuple[*_Plain, Any]) -> Any: ...
+def plain_coordination(*arguments: *tuple[*_Plain, Any]) -> Any: ...
+
+# quantities, index_dtype, queries
+def plain_neighbors(*arguments: *tuple[*_Plain, Any, Any, Any]) -> Any: ...
+
+# cell_size, or 0 -> a capsule
+def cells_build(*arguments: *tuple[*_Search, float]) -> Any: ...
 def cells_layout(cells: Any, /) -> dict[str, Any]: ...
 def cells_find(cells: Any, points: npt.NDArray[Any], /) -> npt.NDArray[np.int64]: ...
 def cells_candidates(
-    cells: Any,
-    cutoff: float,
-    box: None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    queries: npt.NDArray[Any] | None,
-    /,
+    *arguments: *tuple[*_Search, _Queries]
 ) -> tuple[npt.NDArray[np.int64], ...]: ...
-def batch_pairs(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    sort: bool,
-    index_bytes: int,
-    out: Any,
-    batch: npt.NDArray[np.int64],
-    cutoffs: npt.NDArray[np.float64] | None,
-    boxes: npt.NDArray[np.float64] | None,
-    /,
-) -> npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]: ...
-def batch_count(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    batch: npt.NDArray[np.int64],
-    cutoffs: npt.NDArray[np.float64] | None,
-    boxes: npt.NDArray[np.float64] | None,
-    /,
-) -> npt.NDArray[np.int64]: ...
-def explain(
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    sort: bool,
-    index_bytes: int,
-    measure: bool,
-    /,
-) -> dict[str, Any]: ...
+def verlet_new() -> Any: ...  # a capsule, which comes before the arguments of a search
+
+# skin, rebuild
+def verlet_update(*arguments: *tuple[Any, *_Search, float, bool]) -> bool: ...
+def verlet_pairs(*arguments: *tuple[Any, *_Search, *_Result]) -> _Arrays: ...
+def verlet_look(list: Any, /) -> dict[str, Any]: ...
 def kernels() -> tuple[str, ...]: ...
 def default_kernel() -> str: ...
 _C_API: Any  # a PyCapsule; see csrc/halfshell_capi.h
 
 def build_info() -> dict[str, Any]: ...
 def available_memory() -> float: ...
-def box_measure(
-    box: npt.NDArray[np.float64], periodic: int, /
-) -> tuple[npt.NDArray[np.float64], float]: ...
+def box_measure(box: _Floats, periodic: int, /) -> tuple[_Floats, float]: ...
 def box_wrap(
-    points: npt.NDArray[Any], box: npt.NDArray[np.float64], periodic: int, /
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]: ...
+    points: npt.NDArray[Any], box: _Floats, periodic: int, /
+) -> tuple[_Floats, npt.NDArray[np.int64]]: ...
 def clear_cache() -> None: ...
 def set_cache_limit(bytes: int, /) -> int: ...
 def cache_held() -> int: ...
-def verlet_new() -> Any: ...  # a capsule
-def verlet_update(
-    list: Any,
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    skin: float,
-    rebuild: bool,
-    /,
-) -> bool: ...
-def verlet_pairs(
-    list: Any,
-    points: npt.NDArray[Any],
-    cutoff: float,
-    box: npt.NDArray[np.float64] | None,
-    periodic: int,
-    inclusive: bool,
-    precision: str,
-    kernel: str | None,
-    memory_limit: float | None,
-    progress: Callable[[float], object] | None,
-    threads: int | None,
-    quantities: str,
-    sort: bool,
-    index_bytes: int,
-    out: Any,
-    /,
-) -> npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]: ...
-def verlet_look(list: Any, /) -> dict[str, Any]: ...

@@ -3,25 +3,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
-from halfshell._options import Precision
-
-# What the core takes from `inclusive` to `threads`.
-Rest = tuple[bool, Precision, str | None, float | None, None, int | None]
+from halfshell._options import Rest
 
 
 def count_within(
     cutoffs: _inputs.FloatArray,
-    points: _inputs.PointArray,
+    points: Any,
     box: _inputs.FloatArray | None,
     bits: int,
     rest: Rest,
     queries: _inputs.PointArray | None = None,
 ) -> npt.NDArray[np.int64]:
-    """How many pairs are within each of the cutoffs, which ascend and are at least 0."""
+    """How many pairs are within each of the cutoffs, which ascend and are at least 0.
+
+    points: an array, or cells of the core in place of points and box.
+    """
     if rest[1] == "exact" and len(cutoffs) > 1:
         edges = np.ascontiguousarray(cutoffs)
         between: npt.NDArray[np.int64] = _core.histogram(

@@ -10,11 +10,12 @@ import numpy.typing as npt
 
 from halfshell import _core, _inputs
 from halfshell._box import Box
+from halfshell._options import Search
 
 _Column = npt.NDArray[Any] | None
 
 
-class _Marks(NamedTuple):
+class Marks(NamedTuple):
     """Types and weights of the points and of the queries, as the core takes them."""
 
     n_types: int
@@ -109,17 +110,23 @@ def pair_histogram(
     [-1.0, 0.0]
     """
     asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    limits = as_edges(edges)
-    marks = _as_marks(
-        len(array), None if asking is None else len(asking), types, query_types, weights,
-        query_weights,
+    search: Search = (
+        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
     )
-    found = _core.histogram(
-        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads, limits,
-        True, asking, *marks,
-    )
+    marks = as_marks(len(array), asking, types, query_types, weights, query_weights)
+    return binned(search, as_edges(edges), asking, marks)
+
+
+def binned(
+    search: Search,
+    edges: _inputs.FloatArray,
+    queries: _inputs.PointArray | None,
+    marks: Marks,
+) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
+    """The histogram of points or cells, given as the first arguments of every search."""
+    found = _core.histogram(*search, edges, True, queries, *marks)
     # What the core counts first are the pairs closer than the first edge.
-    return np.ascontiguousarray(found[0, 0, 1:] if types is None else found[:, :, 1:])
+    return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])
 
 
 def as_sets(
@@ -171,20 +178,25 @@ def _as_weights(values: npt.ArrayLike, name: str, n: int) -> _inputs.FloatArray:
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def _as_marks(
-    n: int, n_queries: int | None, types: Any, query_types: Any, weights: Any, query_weights: Any
-) -> _Marks:
-    """Types and weights; `n_queries` None: there are no queries."""
-    if n_queries is None and (query_types is not None or query_weights is not None):
+def as_marks(
+    n: int,
+    queries: _inputs.PointArray | None,
+    types: Any,
+    query_types: Any,
+    weights: Any = None,
+    query_weights: Any = None,
+) -> Marks:
+    """Types and weights of n points and of the queries."""
+    if queries is None and (query_types is not None or query_weights is not None):
         name = "query_types" if query_types is not None else "query_weights"
         raise ValueError(f"{name} needs queries")
-    if n_queries is not None and (types is None) != (query_types is None):
+    if queries is not None and (types is None) != (query_types is None):
         raise ValueError("with queries, types and query_types must be given together")
-    q = n_queries or 0
+    q = 0 if queries is None else len(queries)
     own = None if types is None else as_types(types, "types", n)
     asking = None if query_types is None else as_types(query_types, "query_types", q)
     largest = max((int(t.max(initial=0)) for t in (own, asking) if t is not None), default=0)
-    return _Marks(
+    return Marks(
         1 + largest,
         own,
         None if weights is None else _as_weights(weights, "weights", n),

@@ -11,19 +11,16 @@ import numpy.typing as npt
 
 from halfshell import _batch, _core, _inputs
 from halfshell._box import Box
-from halfshell._options import Precision, SearchOptions
+from halfshell._options import ArrayOptions, Precision
 
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 Letter = Literal["i", "j", "d", "D", "S", "P"]
 
 
-class _PairOptions(SearchOptions, total=False):
+class _PairOptions(ArrayOptions, total=False):
     """The keywords of `pairs`, without `quantities`, on which the type of the result depends."""
 
     batch: npt.ArrayLike | None
-    sort: bool
-    index_dtype: npt.DTypeLike
-    out: Any
 
 
 @overload

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _histogram, _inputs
+from halfshell._options import Search
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,9 +69,10 @@ class RadialDistribution:
         if self.g.ndim == 1:
             ax.step(self.r, self.g, where="mid")
         else:
-            pairs = [(a, b) for a in range(len(self.g)) for b in range(a, len(self.g))]
-            for a, b in pairs:
-                ax.step(self.r, self.g[a, b], where="mid", label=f"{a}-{b}")
+            twice = np.array_equal(self.g, self.g.swapaxes(0, 1), equal_nan=True)
+            for a, b in np.ndindex(self.g.shape[:2]):
+                if a <= b or not twice:
+                    ax.step(self.r, self.g[a, b], where="mid", label=f"{a}-{b}")
             ax.legend(title="types")
         ax.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
         ax.set_xlim(float(self.edges[0]), float(self.edges[-1]))
@@ -95,6 +97,7 @@ def rdf(
     *,
     queries: Any = None,
     types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
     box: Any = None,
     periodic: Any = None,
     kernel: str | None = None,
@@ -114,9 +117,12 @@ def rdf(
         Bins of equal width from 0 to `r_max`.
     queries : array_like of float, shape (q, d), optional
         g(r) of the points around these instead. A query that lies on a point finds it at distance
-        0, in the first bin. Not with `types`.
+        0, in the first bin.
     types : array_like of int, shape (n,), optional
         The type of each point, from 0 on: g(r) for each pair of types.
+    query_types : array_like of int, shape (q,), optional
+        The types of the queries: given if both `types` and `queries` are. [a, b] is then g(r) of
+        points of type b around queries of type a.
     box : array_like of float, shape (d,) or (d, d), or Box
         As in `pairs`. It must repeat along every axis, for a density is needed.
     periodic : bool or sequence of bool, shape (d,), optional
@@ -129,14 +135,15 @@ def rdf(
 
         g is the mean number of neighbours in a shell over what the density of all points, n / V,
         would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two different types it
-        is ``counts / (n_a * n_b / V * shell)``, for queries ``counts / (q * n / V * shell)``. A
-        shell is the length, area, volume, ... between two spheres, in any number of dimensions.
+        is ``counts / (n_a * n_b / V * shell)``, for queries ``counts / (q * n / V * shell)``, with
+        types ``counts / (q_a * n_b / V * shell)``. A shell is the length, area, volume, ... between
+        two spheres, in any number of dimensions.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pair_histogram`; ValueError also if there is no box or an axis does not repeat, if
-        `r_max` or `bins` is not positive, or for `types` with `queries`.
+        As `pair_histogram`; ValueError also if there is no box or an axis does not repeat, or if
+        `r_max` or `bins` is not positive.
 
     See Also
     --------
@@ -161,15 +168,14 @@ def rdf(
     True
     """
     edges = _edges(r_max, bins)
-    if types is not None and queries is not None:
-        raise ValueError("types and queries cannot be given together")
     asking, array, vectors, bits = _histogram.as_sets(queries, points, box, periodic)
     volume = _volume(vectors, bits, array.shape[1])
-    counts = _histogram.pair_histogram(
-        points, edges, queries=queries, types=types, box=box, periodic=periodic, kernel=kernel,
-        threads=threads, memory_limit=memory_limit,
+    search: Search = (
+        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
     )
-    ideal = _partners(len(array), asking, types) * (_shells(edges, array.shape[1]) / volume)
+    marks = _histogram.as_marks(len(array), asking, types, query_types)
+    counts = _histogram.binned(search, edges, asking, marks)
+    ideal = _partners(len(array), asking, marks) * (_shells(edges, array.shape[1]) / volume)
     with np.errstate(invalid="ignore"):
         g = counts / ideal
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -208,15 +214,16 @@ def _shells(edges: _inputs.FloatArray, ndim: int) -> _inputs.FloatArray:
 
 
 def _partners(
-    n: int, queries: _inputs.PointArray | None, types: npt.ArrayLike | None
+    n: int, queries: _inputs.PointArray | None, marks: _histogram.Marks
 ) -> npt.NDArray[np.float64]:
     """Pairs that each shell would share out, with types of each two of them; one axis more for
     shells."""
-    if queries is not None:
-        return np.array([float(len(queries)) * n])
-    if types is None:
-        return np.array([0.5 * n * n])
-    of_type = np.bincount(_histogram.as_types(types, "types", n), minlength=1).astype(np.float64)
-    pairs: npt.NDArray[np.float64] = np.outer(of_type, of_type)
-    pairs[np.diag_indices(len(of_type))] *= 0.5
+    if marks.types is None:
+        return np.array([0.5 * n * n if queries is None else float(len(queries)) * n])
+    of_points = np.bincount(marks.types, minlength=marks.n_types).astype(np.float64)
+    if marks.query_types is not None:
+        of_queries = np.bincount(marks.query_types, minlength=marks.n_types)
+        return np.outer(of_queries, of_points)[:, :, np.newaxis]
+    pairs: npt.NDArray[np.float64] = np.outer(of_points, of_points)
+    pairs[np.diag_indices(len(of_points))] *= 0.5
     return pairs[:, :, np.newaxis]

@@ -127,12 +127,10 @@ def iter_pairs(
     True
     """
     most = most_pairs(max_pairs)
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     array, vectors, bits = _inputs.scene(points, box, periodic)
     blocks = _core.iter_pairs(
         array, _inputs.as_cutoff(cutoff), vectors, bits, _inputs.as_flag(inclusive, "inclusive"),
-        precision, kernel, memory_limit, progress, threads, quantities,
+        precision, kernel, memory_limit, as_progress(progress), threads, quantities,
         _inputs.as_index_bytes(index_dtype), most,
     )
     return cast(PairBlocks[Any], blocks)
@@ -141,3 +139,10 @@ def iter_pairs(
 def most_pairs(max_pairs: Any) -> int:
     """A number of pairs from 1 on, as the core takes it."""
     return min(_inputs.as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
+
+
+def as_progress(progress: Any) -> Callable[[float], object] | None:
+    """What can be called, or None."""
+    if progress is None or callable(progress):
+        return cast("Callable[[float], object] | None", progress)
+    raise TypeError(f"progress must be callable, got {type(progress).__name__}")

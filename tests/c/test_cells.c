@@ -68,6 +68,14 @@ compare_rows(const hs_cells *cells, const brute_scene *scene, const hs_points *q
     hs_pairs_free(fresh);
 }
 
+/* 0: as is quick. */
+static double
+wanted_width(int trial, double cutoff)
+{
+    static const double widths[] = {0.0, 1.0, 0.5, 0.07, 3.0, 0x1p-1000, INFINITY};
+    return cutoff > 0.0 ? cutoff * widths[trial % 7] : widths[trial % 7];
+}
+
 static void
 any_cutoff_and_any_queries(void)
 {
@@ -83,7 +91,9 @@ any_cutoff_and_any_queries(void)
         const hs_points points = points_of(&s.scene), queries = points_of(&other.scene);
         hs_options      options = options_of(&s.scene);
         options.precision = trial % 9 == 0 ? HS_DOUBLE : HS_EXACT;
+        options.cell_size = wanted_width(trial, s.scene.cutoff);
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
+        options.cell_size = 0.0;
         const double cutoffs[] = {s.scene.cutoff, 0.5 * s.scene.cutoff, 0.01 * s.scene.cutoff,
                                   0.0, 1.25 * s.scene.cutoff};
         options.want = WANT_ALL;
@@ -187,7 +197,9 @@ the_layout_is_visible_and_holds_all_neighbours(void)
         const hs_points *asking = trial % 2 ? &queries : NULL;
         hs_options       options = options_of(&s.scene);
         options.cutoff *= 0.5;
+        options.cell_size = wanted_width(trial, options.cutoff);
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
+        options.cell_size = 0.0;
         hs_cells_layout(cells, &layout);
         check_layout(cells, &points, &layout);
         options.want = HS_WANT_J;
@@ -198,6 +210,70 @@ the_layout_is_visible_and_holds_all_neighbours(void)
         hs_pairs_free(ranges);
         hs_cells_free(cells);
     }
+}
+
+/* No narrower than wanted, unless there is one only; as many as fit, but not more than memory of the
+ * order of the points holds. */
+static void
+cells_are_as_wide_as_wanted(void)
+{
+    enum { N = 500 };
+    static double  x[8 * N];
+    harness_random random = {5};
+    for (int e = 0; e < 8 * N; e++) {
+        x[e] = random_unit(&random);
+    }
+    for (int ndim = 1; ndim <= HS_MAX_DIM; ndim++) {
+        brute_scene     scene = {.ndim = ndim, .n = N, .x = x, .inclusive = true, .cutoff = 0.1};
+        const hs_points points = points_of(&scene);
+        hs_options      options = options_of(&scene);
+        for (double width = 0x1p-40; width < 4.0; width *= 1.5) {
+            hs_cells *cells = NULL;
+            hs_layout layout;
+            double    as_wanted = 1.0;
+            options.cell_size = width;
+            CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+            hs_cells_layout(cells, &layout);
+            CHECK(layout.n_cells <= 2 * N + 64 && !layout.occupied_only);
+            for (int k = 0; k < ndim; k++) {
+                CHECK(layout.shape[k] == 1 || layout.cell_size[k] >= width);
+                as_wanted *= floor(fmax(0.99 / width, 1.0));
+            }
+            if (ndim <= 3 && width >= 0.02 && as_wanted <= 2 * N) {
+                CHECK(layout.n_cells >= as_wanted);
+            }
+            hs_cells_free(cells);
+        }
+    }
+}
+
+/* Counted by the core: a plane costs two columns, and no rows of cells above or below it. */
+static void
+a_plane_has_no_third_coordinate(void)
+{
+    enum { N = 4000 };
+    static double  x[3 * N];
+    harness_random random = {77};
+    hs_counters    counters[2];
+    for (int solid = 0; solid < 2; solid++) {
+        const int   ndim = 2 + solid;
+        brute_scene scene = {.ndim = ndim, .n = N, .x = x, .inclusive = true, .cutoff = 0.5};
+        hs_cells   *cells = NULL;
+        for (int e = 0; e < ndim * N; e++) {
+            x[e] = 10.0 * random_unit(&random);
+        }
+        const hs_points points = points_of(&scene);
+        hs_options      options = options_of(&scene);
+        options.counters = &counters[solid];
+        CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+        hs_cells_free(cells);
+    }
+    const int64_t  column = N * (int64_t)sizeof(double);
+    const int64_t *flat = counters[0].bytes, *deep = counters[1].bytes;
+    CHECK(flat[HS_FOR_POINTS] >= 2 * column && flat[HS_FOR_POINTS] < 2 * column + 4096);
+    CHECK(deep[HS_FOR_POINTS] - flat[HS_FOR_POINTS] == column);
+    CHECK(flat[HS_FOR_ORIGINALS] == 2 * column && deep[HS_FOR_ORIGINALS] == 3 * column);
+    CHECK(flat[HS_FOR_STENCIL] < deep[HS_FOR_STENCIL]);
 }
 
 static void
@@ -249,6 +325,8 @@ test_cells(void)
     RUN(any_cutoff_and_any_queries);
     RUN(cells_that_are_few_and_far_between);
     RUN(the_layout_is_visible_and_holds_all_neighbours);
+    RUN(cells_are_as_wide_as_wanted);
+    RUN(a_plane_has_no_third_coordinate);
     RUN(points_may_change_once_they_are_in_cells);
     RUN(failures_leave_nothing_behind);
 }

@@ -25,6 +25,7 @@ typedef struct trial {
     int64_t       expected[N_TYPES * N_TYPES * MOST_EDGES], found[N_TYPES * N_TYPES * MOST_EDGES];
     double        expected_sums[N_TYPES * N_TYPES * MOST_EDGES];
     double        sums[N_TYPES * N_TYPES * MOST_EDGES];
+    int           n_built; /* times that cells were made */
 } trial;
 
 static int
@@ -134,8 +135,30 @@ expect_all(trial *t)
     return true;
 }
 
+/* The same histogram of cells that were made for another cutoff: as large, larger, smaller. */
 static hs_status
-find_all(trial *t, int threads, hs_counters *counters)
+find_in_cells(trial *t, const hs_points *points, const hs_points *queries,
+              const hs_options *options, const hs_histogram *wanted)
+{
+    static const double factors[] = {1.0, 1.75, 0x1p40, 0.5};
+    hs_options          building = *options;
+    hs_cells           *cells = NULL;
+    building.cutoff = t->edges[t->n_edges - 1] * factors[t->n_built++ % 4];
+    building.counters = NULL;
+    hs_status status = isfinite(building.cutoff)
+                           ? hs_cells_build(points, t->s->scene.box, &building, &cells, NULL)
+                           : HS_ERR_MEMORY;
+    if (status != HS_OK) { /* a box of so many images that no cells are made for them */
+        CHECK(status == HS_ERR_MEMORY);
+        return hs_pairs_histogram(points, queries, t->s->scene.box, options, wanted, NULL);
+    }
+    status = hs_cells_histogram(cells, queries, options, wanted, NULL);
+    hs_cells_free(cells);
+    return status;
+}
+
+static hs_status
+find_all(trial *t, bool in_cells, int threads, hs_counters *counters)
 {
     const brute_scene *scene = &t->s->scene;
     const int64_t      first = t->split < 0 ? 0 : t->split;
@@ -155,21 +178,21 @@ find_all(trial *t, int threads, hs_counters *counters)
     queries.n = first;
     points.n -= first;
     points.data = scene->x + first * scene->ndim;
+    if (in_cells) {
+        return find_in_cells(t, &points, t->split < 0 ? NULL : &queries, &options, &wanted);
+    }
     return hs_pairs_histogram(&points, t->split < 0 ? NULL : &queries, scene->box, &options,
                               &wanted, NULL);
 }
 
 /* Returns the pairs that were found. */
 static int64_t
-compare(trial *t, int threads)
+compare_once(trial *t, bool in_cells, int threads)
 {
     const size_t n = (size_t)(t->n_types * t->n_types * t->n_edges);
     hs_counters  counters;
-    if (!expect_all(t)) {
-        return 0;
-    }
     memset(t->found, 0xff, sizeof t->found);
-    CHECK(find_all(t, threads, &counters) == HS_OK);
+    CHECK(find_all(t, in_cells, threads, &counters) == HS_OK);
     const bool same = memcmp(t->found, t->expected, n * sizeof(int64_t)) == 0;
     bool       same_sums = true;
     for (size_t k = 0; k < n; k++) {
@@ -177,11 +200,23 @@ compare(trial *t, int threads)
     }
     CHECK(same && same_sums);
     if (!same || !same_sums) {
-        fprintf(stderr, "  d = %d, n = %d, %d edges to %a, %d types, split %d\n",
+        fprintf(stderr, "  d = %d, n = %d, %d edges to %a, %d types, split %d%s\n",
                 t->s->scene.ndim, (int)t->s->scene.n, t->n_edges, t->edges[t->n_edges - 1],
-                t->n_types, (int)t->split);
+                t->n_types, (int)t->split, in_cells ? ", in cells" : "");
     }
     return counters.pairs;
+}
+
+/* The same, also in cells that are kept. */
+static int64_t
+compare(trial *t, int threads)
+{
+    if (!expect_all(t)) {
+        return 0;
+    }
+    const int64_t found = compare_once(t, false, threads);
+    CHECK(compare_once(t, true, threads) == found);
+    return found;
 }
 
 static void
@@ -374,7 +409,7 @@ allocations_may_fail(void)
     while (!ended && nth < 300) {
         const int64_t before = hs_test_live_blocks();
         hs_test_fail_allocation(++nth);
-        status = find_all(&t, 2, NULL);
+        status = find_all(&t, false, 2, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);

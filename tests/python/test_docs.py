@@ -24,6 +24,19 @@ def test_examples_in_docstrings_run(name):
     assert failures == 0
 
 
+@pytest.mark.parametrize(
+    "name",
+    [name for name in dir(hs.CellList) if callable(getattr(hs.CellList, name)) and name[0] != "_"],
+)
+def test_methods_of_a_cell_list_are_documented(name):
+    method = getattr(hs.CellList, name)
+    doc = inspect.getdoc(method)
+    head = doc.split("Returns\n")[0]
+    for argument in set(inspect.signature(method).parameters) - {"self", "options"}:
+        assert re.search(rf"\b{argument}\b", head), argument
+    assert ">>>" in doc
+
+
 @pytest.mark.parametrize("name", [name for name in hs.__all__ if name != "Verdict"])
 def test_public_functions_have_examples(name):
     doc = inspect.getdoc(getattr(hs, name))
@@ -56,10 +69,13 @@ def test_readme_notebook_example_runs(capsys):
 
 def test_example_of_tables_runs():
     text = (ROOT / "docs/neighbors.md").read_text()
-    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    tables, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     names = {}
-    exec(compile(ast.parse(code), "neighbors.md", "exec"), names)
+    exec(compile(ast.parse(tables), "neighbors.md", "exec"), names)
     assert len(names["table"]) == 1000 and len(names["first"]) == 100
+    exec(compile(ast.parse(cells), "neighbors.md", "exec"), names)
+    assert len(names["near"]) == 10 and len(names["each"]) == 3
+    assert names["within"][-1] == hs.count_pairs(names["points"], 1.0, box=[10.0] * 3)
 
 
 def test_examples_of_streaming_run():
@@ -83,6 +99,7 @@ def test_example_of_histograms_runs():
     names = {}
     exec(compile(ast.parse(code), "histograms.md", "exec"), names)
     assert names["counts"].sum() == names["within"][-1] == names["result"].counts.sum()
+    assert names["near"].sum() == names["within"][1] and names["far"].shape == (2, 2, 50)
 
 
 def test_readme_commands_create_what_they_need():

@@ -44,6 +44,23 @@ def test_types_are_weighted_by_their_numbers(rng):
     assert np.allclose(result.g[0, 1], cross.g, rtol=1e-12)
 
 
+def test_types_around_queries(rng):
+    points, queries = rng.random((900, 2)), rng.random((400, 2))
+    types, query_types = np.arange(900) % 3, np.repeat([0, 1], [100, 300])
+    result = hs.rdf(
+        points, 0.3, bins=3, queries=queries, types=types, query_types=query_types, box=[1.0, 1.0]
+    )
+    assert result.g.shape == (3, 3, 3) and np.isnan(result.g[2]).all()
+    for a in (0, 1):
+        for b in range(3):
+            some = hs.rdf(
+                points[types == b], 0.3, bins=3, queries=queries[query_types == a], box=[1.0, 1.0]
+            )
+            assert np.array_equal(result.counts[a, b], some.counts)
+            assert np.allclose(result.g[a, b], some.g, rtol=1e-12)
+    assert np.all(np.abs(result.g[:2] - 1.0) < 0.2)
+
+
 def test_an_atoms_object_brings_its_box():
     build = pytest.importorskip("ase.build")
     atoms = build.bulk("Cu", cubic=True)
@@ -94,6 +111,10 @@ def test_plots(rng):
     typed = hs.rdf(points, 0.4, bins=20, types=np.arange(200) % 3, box=[1.0] * 3)
     assert typed.plot(own) is own
     assert len(own.get_legend().get_texts()) == 6
+    own.clear()
+    queries = {"queries": points[:50], "query_types": np.arange(50) % 2}
+    typed = hs.rdf(points, 0.4, bins=20, types=np.arange(200) % 2, box=[1.0] * 3, **queries)
+    assert len(typed.plot(own).get_legend().get_texts()) == 4  # [a, b] is not [b, a]
     pyplot.close(figure)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -77,7 +78,7 @@ class Question:
         return bool(np.any(heights / 2.0 <= self.cutoff / sizes))
 
 
-class Library:
+class Library(ABC):
     """What is known about a library, and how it is called.
 
     A question is a `Question` or a scene of the benchmarks.
@@ -129,9 +130,9 @@ class Library:
             return f"quantities {''.join(sorted(lacking)) or question.quantities}"
         return None
 
+    @abstractmethod
     def prepare(self, question: Any) -> Call:
         """Convert the input, and return the call that is to be timed."""
-        raise NotImplementedError
 
     def indices(self, result: Any) -> tuple[Any, Any]:
         """Return i and j of a result. Default: the first two arrays."""

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* tuples.c: see tuples.h. */
+#include "tuples.h"
+
+/* Puts entry k into the tuple and gives it up; where it is NULL, *tuple is given up. */
+static void
+put_entry(PyObject **tuple, int k, PyObject *entry)
+{
+    if (entry == NULL) {
+        Py_CLEAR(*tuple);
+    } else {
+        PyTuple_SET_ITEM(*tuple, k, entry);
+    }
+}
+
+PyObject *
+hs_tuple_of_integers(const int64_t *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        put_entry(&tuple, k, PyLong_FromLongLong(values[k]));
+    }
+    return tuple;
+}
+
+PyObject *
+hs_tuple_of_reals(const double *values, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        put_entry(&tuple, k, PyFloat_FromDouble(values[k]));
+    }
+    return tuple;
+}

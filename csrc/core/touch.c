@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* touch.c: see touch.h. */
+#include "touch.h"
+
+#include "poll.h"
+
+/* Of the smallest pages there are. Larger ones are written to several times, which costs little. */
+#define PAGE 4096
+/* What one thread touches between two questions: some 10 milliseconds. */
+#define PART_BYTES ((size_t)1 << 23)
+/* Less than this is cleared in a tenth of a second. */
+#define LEAST_BYTES (8 * PART_BYTES)
+
+typedef struct toucher {
+    volatile char *bytes; /* volatile: what is written is never read, and written all the same */
+    size_t         first, end;
+} toucher;
+
+/* A hs_task_fn: part number `task` from the first byte on. */
+static void
+touch_part(void *context, int64_t task)
+{
+    const toucher *doing = context;
+    const size_t   begin = doing->first + (size_t)task * PART_BYTES;
+    const size_t   left = doing->end - begin;
+    const size_t   end = begin + (left < PART_BYTES ? left : PART_BYTES);
+    for (size_t at = begin; at < end; at += PAGE) {
+        doing->bytes[at] = 0;
+    }
+}
+
+static hs_status
+touch(hs_team *team, const hs_options *options, void *bytes, size_t n_bytes)
+{
+    const int n_workers = hs_team_size(team);
+    toucher   doing = {.bytes = bytes, .end = n_bytes};
+    hs_status status = HS_OK;
+    while (status == HS_OK && doing.first < n_bytes) {
+        const size_t  parts = (n_bytes - doing.first + PART_BYTES - 1) / PART_BYTES;
+        const int64_t n = parts < (size_t)n_workers ? (int64_t)parts : n_workers;
+        hs_team_run(team, n, touch_part, &doing);
+        doing.first += (size_t)n * PART_BYTES;
+        status = hs_poll(options, 0.0);
+    }
+    return status;
+}
+
+hs_status
+hs_touch_output(hs_team *team, const hs_options *options, hs_output *output)
+{
+    hs_status status = HS_OK;
+    for (int k = 0; k < HS_COLUMNS && status == HS_OK; k++) {
+        const unsigned bit = 1u << k;
+        void          *column = hs_output_column(output, bit);
+        const size_t   n_bytes = (size_t)output->n_pairs * hs_output_width(output, bit);
+        if (column != NULL && n_bytes >= LEAST_BYTES) {
+            status = touch(team, options, column, n_bytes);
+        }
+    }
+    return status;
+}

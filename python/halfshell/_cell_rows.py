@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The methods of `CellList` that return tables: rows of neighbours of points or queries."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core, _inputs, _radii
+from halfshell._cell_layout import Asking, CellLayout
+from halfshell._table import NeighborTable
+
+
+class CellRows(CellLayout):
+    """Full lists among the points in cells."""
+
+    __slots__ = ()
+
+    def neighbors(
+        self,
+        cutoff: Any = None,
+        *,
+        quantities: str = "j",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[Asking],
+    ) -> NeighborTable:
+        """All neighbours of each point, as `halfshell.neighbors` finds them.
+
+        Parameters
+        ----------
+        cutoff : float, optional
+            Default: that of the list.
+        quantities, index_dtype, inclusive, kernel, threads, memory_limit
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+            A row for each point, ascending by (j, S).
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> [row.tolist() for row in cells.neighbors()]
+        [[1], [0, 2], [1]]
+        """
+        return self._rows(None, cutoff, quantities, index_dtype, options)
+
+    def query(
+        self,
+        queries: Any,
+        radius: Any = None,
+        *,
+        quantities: str = "j",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[Asking],
+    ) -> NeighborTable:
+        """All points within a radius of each query.
+
+        Parameters
+        ----------
+        queries : array_like of float, shape (q, d)
+            Coordinates that ask; they may lie anywhere.
+        radius : float or array_like of float, shape (q,), optional
+            One for all queries, or one for each. Default: the cutoff of the list. Up to that the
+            kept cells answer; larger radii cost a search of their own.
+        quantities, index_dtype, inclusive, kernel, threads, memory_limit
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+            A row for each query, ascending by (j, S). A point at the place of a query is its
+            neighbour at distance 0.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> [row.tolist() for row in cells.query([[0.5], [9.0]])]
+        [[0, 1], []]
+        >>> [row.tolist() for row in cells.query([[0.0], [0.0]], [0.5, 3.0])]
+        [[0], [0, 1, 2]]
+        """
+        asking = self._queries(queries)
+        radii = _radii.as_radii(radius, len(asking))
+        if radii is None or isinstance(radii, float):
+            return self._rows(asking, radii, quantities, index_dtype, options)
+
+        def search(part: _inputs.PointArray, one: float, letters: str) -> _radii.Arrays:
+            return self._arrays(part, one, letters, index_dtype, options)
+
+        inclusive = _inputs.as_flag(options.get("inclusive", True), "inclusive")
+        arrays = _radii.search_each(search, asking, radii, quantities, inclusive)
+        return NeighborTable(arrays, quantities, self._n_points, False)
+
+    def _arrays(
+        self,
+        asking: _inputs.PointArray | None,
+        cutoff: Any,
+        quantities: str,
+        index_dtype: npt.DTypeLike,
+        options: Asking,
+    ) -> tuple[npt.NDArray[Any], ...]:
+        """Offsets of the rows and an array for each quantity."""
+        return _core.neighbors(
+            *self._arguments(cutoff, options), quantities, _inputs.as_index_bytes(index_dtype),
+            asking,
+        )
+
+    def _rows(
+        self,
+        asking: _inputs.PointArray | None,
+        cutoff: Any,
+        quantities: str,
+        index_dtype: npt.DTypeLike,
+        options: Asking,
+    ) -> NeighborTable:
+        arrays = self._arrays(asking, cutoff, quantities, index_dtype, options)
+        return NeighborTable(arrays, quantities, self._n_points, asking is None)
