@@ -58,6 +58,7 @@ typedef enum hs_status {
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
     HS_ERR_TYPES,         /* a type is none of those that there are: failure.row */
     HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
+    HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or data NULL */
     HS_STATUS_END         /* number of codes, not a code; it grows with them */
 } hs_status;
 

@@ -120,6 +120,9 @@ typedef struct hs_capi {
     size_t (*pool_held)(void);
     void (*pool_clear)(void);
     int (*kernel_names)(const char **names, int capacity);
+    hs_status (*cells_histogram)(const hs_cells *cells, const hs_points *queries,
+                                 const hs_options *options, const hs_histogram *histogram,
+                                 hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -7,7 +7,8 @@ module that was compiled against an older header must not misread what a newer c
                                            HS_CAPI_VERSION was raised because something changed
 
 Sizes and places of struct members, values of enums, and the order of the functions in the table.
---write refuses to write a change under the same HS_CAPI_VERSION.
+--write refuses to write a change under the same HS_CAPI_VERSION. Until the first release nobody has
+compiled anything: delete the file, and it may be written anew.
 """
 
 from __future__ import annotations

@@ -58,6 +58,7 @@ static const hs_capi table = {
     .pool_held = hs_pool_held,
     .pool_clear = hs_pool_clear,
     .kernel_names = hs_kernel_names,
+    .cells_histogram = hs_cells_histogram,
 };
 
 int

@@ -64,7 +64,7 @@ def probe(tmp_path_factory):
 
 
 def test_the_table_has_every_function_of_the_header():
-    assert capi_layout.declared() == capi_layout.table()
+    assert sorted(capi_layout.declared()) == sorted(capi_layout.table())
     assert len(capi_layout.table()) >= 50
 
 
