@@ -48,6 +48,7 @@ typedef enum hs_status {
     HS_ERR_NOT_FINITE,    /* a coordinate is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_FINITE,    /* a box entry is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent */
+    HS_ERR_BOX_SKEWED,    /* and one is so long that float64 does not tell points along others */
     HS_ERR_TOO_MANY,      /* 2^31 points or more, or more pairs than int64 counts */
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */

@@ -65,8 +65,11 @@ take_threads(PyObject *object, hs_options *options)
         hs_refuse(PyExc_ValueError, THREADS_MUST_BE, object);
         return false;
     }
-    const int most = hs_most_threads();
-    options->threads = n > most ? most : (int)n;
+    options->threads = (int)n;
+    if (n > HS_THREADS_PER_CORE) {
+        const int most = hs_most_threads();
+        options->threads = n > most ? most : (int)n;
+    }
     return true;
 }
 

@@ -89,17 +89,37 @@ raise_cutoff_of_system(const hs_failure *failure)
     return NULL;
 }
 
+/* "box", or which one of many. */
+static const char *
+name_box(const hs_failure *failure, char *name, size_t size)
+{
+    if (failure->system < 0) {
+        return "box";
+    }
+    snprintf(name, size, "box[%lld]", (long long)failure->system);
+    return name;
+}
+
 static PyObject *
 raise_dependent(const hs_failure *failure)
 {
-    char name[32] = "box";
-    if (failure->system >= 0) {
-        snprintf(name, sizeof name, "box[%lld]", (long long)failure->system);
-    }
+    char name[32];
     PyErr_Format(PyExc_ValueError,
                  "the periodic vectors of %s must be linearly independent; these are exactly "
                  "dependent",
-                 name);
+                 name_box(failure, name, sizeof name));
+    return NULL;
+}
+
+static PyObject *
+raise_skewed(const hs_failure *failure)
+{
+    char name[32];
+    PyErr_Format(PyExc_ValueError,
+                 "%s is too skewed, or its vectors differ too much in length: float64 does not "
+                 "place points along the short ones; give an equivalent, less skewed box, or one "
+                 "along the coordinate axes",
+                 name_box(failure, name, sizeof name));
     return NULL;
 }
 
@@ -212,6 +232,7 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
     case HS_ERR_BOX_FINITE:
         return failure->system >= 0 ? raise_box_of_system(failure) : raise_box(failure);
     case HS_ERR_BOX_DEPENDENT: return raise_dependent(failure);
+    case HS_ERR_BOX_SKEWED: return raise_skewed(failure);
     case HS_ERR_TOO_MANY:
         return raise_with_number(PyExc_OverflowError,
                                  "fewer than 2**31 points and 2**62 pairs can be searched, got %R",

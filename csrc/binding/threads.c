@@ -16,9 +16,6 @@
 #endif
 
 #define MOST_THREADS 256 /* more would only wait for their turn to write */
-/* Threads for each core at most: more of them make nothing quicker, and would keep the caller's own
- * from the processor, which is the one that sees Ctrl-C. */
-#define PER_CORE 4
 
 static long
 count_cores(void)
@@ -37,7 +34,7 @@ int
 hs_most_threads(void)
 {
     const long cores = count_cores();
-    const long most = PER_CORE * (cores < 1 ? 1 : cores);
+    const long most = HS_THREADS_PER_CORE * (cores < 1 ? 1 : cores);
     return most > MOST_THREADS ? MOST_THREADS : (int)most;
 }
 

@@ -7,6 +7,10 @@
  * run on; at least 1. */
 int hs_default_threads(void);
 
+/* More of them make nothing quicker, and would keep the caller's own thread from the processor,
+ * which is the one that sees Ctrl-C. */
+#define HS_THREADS_PER_CORE 4
+
 /* What more of them would only make slower: a few for each core. */
 int hs_most_threads(void);
 

@@ -7,6 +7,9 @@
 #include <math.h>
 #include <string.h>
 
+/* Of the square of the cutoff: far above what rounding can do to the sum of 8 squares. */
+#define SCALED_MARGIN 0x1p-47
+
 /* Takes the first n of scan->unsure from the hits of points [first, next). */
 static void
 remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
@@ -42,27 +45,32 @@ decide_pair(hs_walker *walker, const hs_metric *metric, int32_t e, bool others_f
 }
 
 /*
- * Where squares would leave float64's range, by the components alone: rounding is monotone, so one
- * that is rounded to more than the cutoff is more than it, and where all are zero so is |D|. Pairs
- * without a shift only.
+ * Where squares would leave float64's range: the same on differences that are scaled so that the
+ * cutoff is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is
+ * near r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
  */
 static void
-judge_components(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict,
-                 hs_stages *stages)
+judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, hs_stages *stages)
 {
-    const uint8_t zero = metric->cutoff > 0.0 || metric->inclusive ? HS_WITHIN : HS_BEYOND;
-    double        largest[HS_BATCH] = {0.0};
+    const hs_scale scale = hs_scale_of(metric->cutoff > 0.0 ? ilogb(metric->cutoff) : 0);
+    const double   r = hs_scale_apply(scale, metric->cutoff);
+    const double   in = r * r * (1.0 - SCALED_MARGIN), out = r * r * (1.0 + SCALED_MARGIN);
+    double         square[HS_BATCH] = {0.0}, size[HS_BATCH] = {0.0};
     for (int k = 0; k < metric->ndim; k++) {
         for (int32_t e = 0; e < trace->n; e++) {
-            const double size = fabs(trace->q[k][e] - trace->p[k][e]);
-            largest[e] = size > largest[e] ? size : largest[e];
+            const double component = trace->q[k][e] - trace->p[k][e];
+            const double scaled = hs_scale_apply(scale, component);
+            square[e] += scaled * scaled;
+            size[e] += fabs(component); /* for cutoff 0: 0 only if all are */
         }
     }
     for (int32_t e = 0; e < trace->n; e++) {
-        verdict[e] = largest[e] == 0.0              ? zero
-                     : largest[e] > metric->cutoff ? (uint8_t)HS_BEYOND
-                                                    : (uint8_t)HS_UNDECIDED;
-        stages->by_float64 += verdict[e] != HS_UNDECIDED;
+        const bool within = r > 0.0 ? square[e] < in : size[e] == 0.0 && metric->inclusive;
+        const bool beyond = r > 0.0 ? square[e] > out : !within;
+        verdict[e] = within   ? (uint8_t)HS_WITHIN
+                     : beyond ? (uint8_t)HS_BEYOND
+                              : (uint8_t)HS_UNDECIDED;
+        stages->by_float64 += within || beyond;
     }
 }
 
@@ -73,7 +81,7 @@ hs_decide_traced(hs_walker *walker, const hs_metric *metric, uint8_t *within)
     const bool      by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
     uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
     if (by_batch && !metric->floats_usable && !trace->is_shifted) {
-        judge_components(metric, trace, verdict, &walker->stages);
+        judge_scaled(metric, trace, verdict, &walker->stages);
     } else if (by_batch) {
         const hs_batch batch = hs_trace_batch(trace);
         walker->search->kernel->judge(metric, &batch, verdict, &walker->stages);

@@ -57,7 +57,8 @@ void hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, in
 
 /*
  * In any lattice: points [first, last) of the columns r go wrapped to the columns x, which may be
- * the same. few_turns: hs_fold_turns() says that no point is more than HS_FOLD_TURNS away.
+ * the same. few_turns: hs_fold_turns() says that no point is more than HS_FOLD_TURNS away; or else
+ * it is looked at.
  */
 void hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
                     int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded);

@@ -228,13 +228,40 @@ put_turns(const hs_turns *turns, int row, int64_t begin, const tile *work)
     }
 }
 
-/* The quick way. Returns false where some points may need a second pass. */
+/* Whether no point of the tile has more than so many turns, over all rows of B together. */
 static bool
-fold_tile(const hs_lattice *lattice, const double *const *x, const hs_turns *turns, int64_t begin,
-          tile *work, hs_folded *folded)
+turns_are_few(const tile *work, double most)
+{
+    int many = 0;
+    for (int i = 0; i < work->n; i++) {
+        many |= !(work->moved[i] <= most); /* also where overflow has left no number */
+    }
+    return many == 0;
+}
+
+/* Turns over B that make at most HS_FOLD_TURNS over any row as given. */
+static double
+most_turns(const hs_lattice *lattice)
+{
+    double largest = 1.0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            largest = fmax(largest, fabs((double)lattice->U[r][l]));
+        }
+    }
+    return HS_FOLD_TURNS / largest;
+}
+
+/* The quick way. Returns false where some points have too many turns or may need a second pass. */
+static bool
+fold_tile(const hs_lattice *lattice, double most, const double *const *x, const hs_turns *turns,
+          int64_t begin, tile *work, hs_folded *folded)
 {
     hs_folded found = *folded;
     count_turns(lattice, x, work);
+    if (!turns_are_few(work, most)) {
+        return false;
+    }
     for (int k = 0; k < lattice->ndim; k++) {
         move_inside(lattice, k, x[k], work, &found);
     }
@@ -252,14 +279,15 @@ void
 hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
                int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded)
 {
-    tile work;
+    tile         work;
+    const double most = few_turns ? INFINITY : most_turns(lattice);
     for (int64_t begin = first; begin < last; begin += TILE) {
         const double *from[HS_MAX_DIM];
         work.n = (int)(last - begin < TILE ? last - begin : TILE);
         for (int k = 0; k < lattice->ndim; k++) {
             from[k] = r[k] + begin;
         }
-        if (!few_turns || !fold_tile(lattice, from, turns, begin, &work, folded)) {
+        if (!fold_tile(lattice, most, from, turns, begin, &work, folded)) {
             const int failed = fold_one_by_one(lattice, from, turns, begin, &work, folded);
             if (failed >= 0) {
                 folded->failed = begin + failed;

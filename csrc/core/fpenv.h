@@ -26,8 +26,8 @@ void hs_fpenv_leave(hs_fpenv saved);
  */
 void hs_fpenv_flush(bool on);
 
-/* Whether this thread has met a subnormal number since it last entered or changed flushing; false
- * where that is not known. */
+/* Whether this thread has met a subnormal number since it last entered or set flushing, on or off;
+ * false where that is not known. */
 bool hs_fpenv_met_subnormal(void);
 
 #endif

@@ -8,6 +8,8 @@
  */
 #include "grid.h"
 
+#include "skew.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -19,18 +21,12 @@
 /* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
  * more; walks put cells together where these are fewer. */
 #define POINTS_PER_CELL 12.0
+/* Where cells are wider than need be, rows of few cells hold so many points at least: there is
+ * nothing to put together along them. */
+#define FEW_CELLS 4.0
+#define POINTS_PER_ROW 8.0
 /* Of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
-
-static double
-largest_entry(const double *row, int ndim)
-{
-    double largest = 0.0;
-    for (int k = 0; k < ndim; k++) {
-        largest = hs_larger(fabs(row[k]), largest);
-    }
-    return largest;
-}
 
 /* Largest number of images per row of B that a pair can be apart; `drift` as below. */
 static void
@@ -56,17 +52,18 @@ measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
     const hs_lattice *lattice = &scene->lattice;
     for (int k = 0; k < scene->ndim; k++) {
         for (int r = 0; r < lattice->n_periodic; r++) {
-            double along = 0.0;
+            double along = 0.0, rounding = 0.0;
             for (int c = 0; c < scene->ndim; c++) {
-                along += lattice->normal[k][c] * lattice->rows[r][c];
+                const double term = lattice->normal[k][c] * lattice->rows[r][c];
+                along += term;
+                rounding += (scene->ndim + 2) * UNIT * fabs(term) +
+                            fabs(lattice->normal[k][c]) * lattice->row_error[r];
             }
             if (lattice->row_of_axis[k] == r) {
                 along -= lattice->period[k];
+                rounding += UNIT * lattice->period[k];
             }
-            const double rounding = (scene->ndim + 2) * scene->ndim * UNIT *
-                                        largest_entry(lattice->rows[r], scene->ndim) +
-                                    scene->ndim * lattice->row_error[r];
-            drift_of_row[k][r] = fabs(along) + rounding;
+            drift_of_row[k][r] = fabs(along) + rounding * (1.0 + SLACK);
         }
     }
 }
@@ -158,11 +155,11 @@ most_cells(const hs_scene *scene)
     return fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
 }
 
-bool
-hs_grid_cap_counts(const hs_scene *scene, double *counts)
+/* Fewer cells, evenly over the axes, until there are no more than `cap`. Returns whether it had
+ * to. */
+static bool
+cap_counts(int ndim, double cap, double *counts)
 {
-    const double cap = most_cells(scene);
-    const int    ndim = scene->ndim;
     for (bool capped = false;;) {
         double product = 1.0;
         int    divided = 0;
@@ -180,6 +177,12 @@ hs_grid_cap_counts(const hs_scene *scene, double *counts)
             counts[k] = fmax(1.0, floor(fmin(counts[k] * factor, counts[k] - 1.0)));
         }
     }
+}
+
+bool
+hs_grid_cap_counts(const hs_scene *scene, double *counts)
+{
+    return cap_counts(scene->ndim, most_cells(scene), counts);
 }
 
 hs_status
@@ -241,10 +244,16 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
+/* More than any memory holds: the cutoff spans them, or the box could not be reduced. */
+static hs_status
+too_many_images(const hs_scene *scene)
+{
+    return hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
+}
+
 /* One cell, or a grid of cells where that is cheaper. */
 static hs_status
-choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid,
-             hs_failure *failure)
+choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid)
 {
     double counts[HS_MAX_DIM], parts[HS_MAX_DIM];
     double single_cost = INFINITY;
@@ -262,7 +271,11 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;
     choose_counts(scene, grid, finer, density, counts, parts);
     const bool capped = hs_grid_cap_counts(scene, counts);
-    hs_status  status = hs_grid_set_shape(scene, counts, grid);
+    if (capped && counts[0] < FEW_CELLS) {
+        const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
+        (void)cap_counts(scene->ndim, counts[0] * rows, counts);
+    }
+    hs_status status = hs_grid_set_shape(scene, counts, grid);
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
         hs_grid_cut_by_faces(scene, parts, most_cells(scene), grid);
     }
@@ -271,28 +284,35 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
         *grid = single;
         status = HS_OK;
     }
-    if (status != HS_OK) {
-        failure->expected_pairs = failure->expected_bytes = INFINITY;
-    }
-    return status;
+    return status == HS_OK ? HS_OK : too_many_images(scene);
 }
 
 /* How far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more images
- * than can be counted. */
+ * than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
 static hs_status
 set_ranges(const hs_scene *scene, hs_grid *grid)
 {
     double images[HS_MAX_DIM], drift[HS_MAX_DIM];
     bound_drift(scene, images, drift);
+    if (hs_skew_blurs(scene, drift)) {
+        return HS_ERR_BOX_SKEWED;
+    }
     for (int k = 0; k < scene->ndim; k++) {
         const int r = scene->lattice.row_of_axis[k];
         grid->range[k] = (scene->radius + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
         if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
-            return HS_ERR_MEMORY;
+            return too_many_images(scene);
         }
     }
     grid->shift_error = bound_shift_error(scene, images);
     return HS_OK;
+}
+
+/* There would be more pairs than any memory holds. */
+static void
+tell_endless(hs_failure *failure)
+{
+    failure->expected_pairs = failure->expected_bytes = INFINITY;
 }
 
 hs_status
@@ -301,11 +321,8 @@ hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure 
     /* Of the periodic part, times the open extents. */
     double volume = hs_lattice_volume(&scene->lattice, 0);
     *grid = (hs_grid){.ndim = scene->ndim};
-    if (set_ranges(scene, grid) != HS_OK) {
-        failure->expected_pairs = failure->expected_bytes = INFINITY;
-        return HS_ERR_MEMORY;
-    }
-    for (int k = 0; k < scene->ndim; k++) {
+    hs_status status = set_ranges(scene, grid);
+    for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
         volume *= scene->lattice.row_of_axis[k] >= 0
                       ? 1.0
                       : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
@@ -317,29 +334,33 @@ hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure 
     if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
     }
-    return HS_OK;
+    if (status == HS_ERR_MEMORY) {
+        tell_endless(failure);
+    }
+    return status;
 }
 
 hs_status
 hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
 {
-    double          density;
-    const hs_status status = hs_grid_begin(scene, &density, grid, failure);
-    if (status != HS_OK) {
-        return status;
+    double    density;
+    hs_status status = hs_grid_begin(scene, &density, grid, failure);
+    if (status == HS_OK) {
+        const double neighbours = density * hs_ball_volume(scene->ndim, scene->cutoff);
+        status = choose_shape(scene, density, neighbours, grid);
+        if (status == HS_ERR_MEMORY) {
+            tell_endless(failure);
+        }
     }
-    const double neighbours = density * hs_ball_volume(scene->ndim, scene->cutoff);
-    return choose_shape(scene, density, neighbours, grid, failure);
+    return status;
 }
 
 hs_status
 hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_grid *grid)
 {
     const double ratio = cutoff_before > 0.0 ? scene->cutoff / cutoff_before : 1.0;
-    if (set_ranges(scene, grid) != HS_OK) {
-        return HS_ERR_MEMORY;
-    }
-    for (int k = 0; k < scene->ndim; k++) {
+    const hs_status status = set_ranges(scene, grid);
+    for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
         HS_ASSERT(!grid->by_faces[k]);
         const double cells = grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) +
                              0x1p-50 * (double)grid->shape[k];
@@ -348,5 +369,5 @@ hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_g
         }
         grid->expected_pairs *= ratio;
     }
-    return HS_OK;
+    return status;
 }

@@ -29,7 +29,7 @@ typedef struct hs_grid {
 /* Volume of a ball in ndim dimensions. */
 double hs_ball_volume(int ndim, double radius);
 
-/* HS_ERR_MEMORY when a cutoff spans more than 2^31 images. */
+/* HS_ERR_MEMORY when a cutoff spans more than 2^31 images, HS_ERR_BOX_SKEWED when rounding does. */
 hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
 
 /*
@@ -63,7 +63,7 @@ hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *
 void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
 
 /* The same cells, not cut by faces, for a scene whose cutoff was `cutoff_before` and is smaller
- * now. HS_ERR_MEMORY as above. */
+ * now. Fails as above. */
 hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before,
                          hs_grid *grid);
 

@@ -11,6 +11,12 @@
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 21)
 
+/* Of a group that meets nobody, in candidates. */
+#define LONE_GROUP 64
+
+/* Blocks with subnormal numbers before the filter flushes: some lie behind the last candidate. */
+#define FEW_SUBNORMAL 16
+
 /*
  * Hits after which a scan stops, so that they can be written out. Measured: the stores of a short
  * burst drain to memory while the next one is scanned; with bursts of thousands the two take turns,
@@ -100,7 +106,6 @@ set_scan(const hs_walker *walker, hs_scan *scan)
     scan->most_unsure = block->capacity;
 }
 
-/* The filter alone may flush; precision="single" is decided by it. */
 static void
 set_flushing(const hs_walker *walker, bool on)
 {
@@ -116,6 +121,17 @@ run_scan(const hs_walker *walker, hs_scan *scan, int32_t first)
     const int32_t next = walker->scan(scan, first);
     set_flushing(walker, false);
     return next;
+}
+
+/* precision="single" is decided by the filter: it must not flush. */
+static void
+note_subnormals(hs_walker *walker)
+{
+    if (!walker->flushes && hs_fpenv_met_subnormal()) {
+        hs_fpenv_flush(false); /* forgets it */
+        walker->flushes = walker->options.precision != HS_SINGLE &&
+                          ++walker->n_subnormal > FEW_SUBNORMAL;
+    }
 }
 
 /* Hands the hits of points [first, next) of the group to the visitor. */
@@ -164,18 +180,10 @@ empty_block(hs_walker *walker)
     walker->blocks++;
 }
 
-/* What was tested, and whether to go on. */
+/* Whether to go on. */
 static hs_status
-finish_block(hs_walker *walker, int64_t n_points)
+end_block(hs_walker *walker)
 {
-    const hs_block *block = &walker->block;
-    const int64_t   skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
-    walker->n_candidates += n_points * block->n - skipped;
-    walker->work_since_poll += n_points * block->n;
-    empty_block(walker);
-    if (!walker->flushes && hs_fpenv_met_subnormal()) {
-        walker->flushes = walker->options.precision != HS_SINGLE;
-    }
     if (walker->n_candidates > walker->candidate_limit || walker->leaves) {
         return HS_STATUS_END;
     }
@@ -186,6 +194,26 @@ finish_block(hs_walker *walker, int64_t n_points)
     return HS_OK;
 }
 
+/* What was tested. */
+static hs_status
+finish_block(hs_walker *walker, int64_t n_points)
+{
+    const hs_block *block = &walker->block;
+    const int64_t   skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
+    walker->n_candidates += n_points * block->n - skipped;
+    walker->work_since_poll += n_points * block->n;
+    empty_block(walker);
+    note_subnormals(walker);
+    return end_block(walker);
+}
+
+/* Nobody has been appended but the one point of the group itself, if that. */
+static bool
+is_lone(const hs_walker *walker)
+{
+    return walker->block.n == (walker->block_is_first ? 1 : 0);
+}
+
 hs_status
 hs_scan_block(hs_walker *walker)
 {
@@ -194,6 +222,11 @@ hs_scan_block(hs_walker *walker)
     if (walker->blocks < walker->blocks_to_skip) {
         empty_block(walker);
         return HS_OK;
+    }
+    if (is_lone(walker)) {
+        empty_block(walker);
+        walker->work_since_poll += LONE_GROUP;
+        return end_block(walker);
     }
     hs_status status = fill_block(walker);
     set_scan(walker, &scan);

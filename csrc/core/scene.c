@@ -101,7 +101,7 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
     return HS_OK;
 }
 
-/* A period that scaling brought to nothing: more images than any memory holds. */
+/* A period that scaling brought to nothing. */
 static bool
 box_is_vanishing(const hs_lattice *lattice)
 {
@@ -128,7 +128,10 @@ fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_sce
 {
     double magnitude = 0.0, of_asking = 0.0;
     if (box_is_vanishing(&scene->lattice)) {
-        failure->expected_pairs = failure->expected_bytes = INFINITY;
+        if (!scene->lattice.aligned) {
+            return HS_ERR_BOX_SKEWED;
+        }
+        failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
         return HS_ERR_MEMORY;
     }
     hs_status status = wrap_points(account, team, options, scene, &magnitude, failure);

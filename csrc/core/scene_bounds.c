@@ -26,25 +26,29 @@ hs_scene_settle_ranges(hs_scene *scene)
     }
 }
 
+/* Component by component, because those of a long box vector may be known far less well than those
+ * of a short one. */
 void
 hs_scene_bound_errors(hs_scene *scene, double magnitude)
 {
     const hs_lattice *lattice = &scene->lattice;
-    double            largest = 0.0;
-    for (int k = 0; k < scene->ndim; k++) {
-        largest = hs_larger(scene->x_largest[k], largest);
+    const double      lost = scene->extreme ? HS_SCALING_LOSS : 0.0;
+    const double      terms = 2 * lattice->n_periodic + 2;
+    double            error[HS_MAX_DIM];
+    scene->x_error = lost;
+    for (int c = 0; c < scene->ndim; c++) {
+        error[c] = lattice->aligned ? lost
+                                    : lost + 2.0 * UNIT * scene->x_largest[c] +
+                                          terms * terms * 0x1p-104 * magnitude;
+        scene->x_error = hs_larger(error[c], scene->x_error);
     }
-    scene->x_error = scene->extreme ? HS_SCALING_LOSS : 0.0;
-    if (!lattice->aligned) {
-        const double terms = 2 * lattice->n_periodic + 2;
-        scene->x_error += 2.0 * UNIT * largest + terms * terms * 0x1p-104 * magnitude;
-    }
     for (int k = 0; k < scene->ndim; k++) {
-        /* |normal| is 1 to rounding, so the error of a dot product is at most sqrt(d) x_error, plus
-         * its own rounding. */
-        scene->t_error[k] = lattice->aligned
-                                ? scene->x_error
-                                : 3.0 * scene->x_error + 4.0 * (scene->ndim + 2) * UNIT * largest;
+        double along = 0.0; /* what the dot product carries on, and its own rounding */
+        for (int c = 0; c < scene->ndim && !lattice->aligned; c++) {
+            along += fabs(lattice->normal[k][c]) *
+                     (error[c] + (scene->ndim + 2) * UNIT * scene->x_largest[c]);
+        }
+        scene->t_error[k] = lattice->aligned ? lost : along * (1.0 + 0x1p-40);
     }
 }
 

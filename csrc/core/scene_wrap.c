@@ -2,6 +2,7 @@
 /* scene_wrap.c: the pass over all points that wraps them into the box. See scene.h, fold.h. */
 #include "scene.h"
 
+#include "skew.h"
 #include "slabs.h"
 
 #include <math.h>
@@ -89,10 +90,11 @@ hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double 
     for (int slab = 0; slab < wrap.n_slabs; slab++) {
         wrap.folded[slab] = hs_folded_none();
     }
-    const hs_status status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+    hs_status       status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
     const hs_folded folded = join_slabs(&wrap);
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = folded.failed;
+        status = hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : status;
     }
     *magnitude = folded.magnitude;
     for (int k = 0; k < scene->ndim; k++) {

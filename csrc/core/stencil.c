@@ -10,6 +10,7 @@
 #include "stencil.h"
 
 #include "poll.h"
+#include "skew.h"
 
 #include <math.h>
 #include <string.h>
@@ -264,7 +265,7 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
         set_triangular_frame(&scene->lattice, &of.axes);
     }
     if (bound > (of.axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
-        return HS_ERR_MEMORY;
+        return hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
     }
     const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
     stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));

@@ -60,7 +60,8 @@ struct hs_walker {
     hs_thresholds    direct;
     hs_expanded      expanded;
     double           extent;
-    bool             flushes;  /* the filter has met subnormal numbers: it goes on without them */
+    int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
+    bool             flushes;  /* too many: gathering and scanning, nothing else, go on without */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;

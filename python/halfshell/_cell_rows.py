@@ -94,7 +94,9 @@ class CellRows(CellLayout):
             return self._arrays(part, one, letters, index_dtype, options)
 
         inclusive = _inputs.as_flag(options.get("inclusive", True), "inclusive")
-        arrays = _radii.search_each(search, asking, radii, quantities, inclusive)
+        arrays = _radii.search_each(
+            search, asking, radii, quantities, inclusive, self._precision == "exact"
+        )
         return NeighborTable(arrays, quantities, self._n_points, False)
 
     def _arrays(

@@ -130,7 +130,8 @@ def pairs(
     ValueError
         If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
         finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
-        linearly dependent, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
+        linearly dependent or so skewed or different in length that float64 does not place points
+        along the short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
         or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
         without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
         not ascending or has a negative number or one that there is no box or cutoff for.

@@ -47,20 +47,31 @@ def search_each(
     radii: npt.NDArray[np.float64],
     quantities: str,
     inclusive: bool,
+    is_exact: bool = True,
 ) -> Arrays:
-    """Offsets and arrays of all rows, in the order of the queries."""
+    """Offsets and arrays of all rows, in the order of the queries.
+
+    is_exact: the search decides exactly. Otherwise distances do not tell what it would decide, and
+    only queries with the same radius are searched at once.
+    """
     letters = quantities if "d" in quantities else quantities + "d"
-    octaves = np.frexp(radii)[1]
-    octaves[radii == 0.0] = np.iinfo(octaves.dtype).min
+    groups = _octaves(radii) if is_exact else np.unique(radii, return_inverse=True)[1]
     parts = []
-    for octave in np.unique(octaves):
-        members = np.flatnonzero(octaves == octave)
+    for group in np.unique(groups):
+        members = np.flatnonzero(groups == group)
         largest = float(radii[members].max())
         arrays = search(queries[members], largest, letters)
         parts += _split(search, queries, radii, members, largest, arrays, letters, inclusive)
     if not parts:
         parts = [(np.empty(0, np.intp), search(queries, 0.0, letters))]
     return _join(parts, len(queries), len(quantities))
+
+
+def _octaves(radii: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+    """The same number for radii within a factor of two, and one of its own for 0."""
+    octaves = np.frexp(radii)[1]
+    octaves[radii == 0.0] = np.iinfo(octaves.dtype).min
+    return octaves
 
 
 def _split(

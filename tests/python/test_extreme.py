@@ -142,6 +142,35 @@ def test_crowds_far_smaller_than_the_cutoff(rng, kernel):
         check_large(points, cutoff, kernel=kernel)
 
 
+def long_boxes(aspect):
+    """Skewed boxes with one vector, or two, so many times as long as the others."""
+    yield np.array([[aspect, 0, 0], [0, 1, 0.3], [0, 0, 1]])
+    yield np.array([[aspect, 0.3, 0], [0, 1, 0], [0, 0, 1]])
+    yield np.array([[1, 0, 0], [0.3, aspect, 0], [0, 0, aspect]])
+
+
+@pytest.mark.parametrize("aspect", [1e6, 1e12, 1e16, 1e19, 1e25])
+def test_long_skewed_boxes(rng, kernel, aspect):
+    for box in long_boxes(aspect):
+        points = rng.uniform(-1, 2, (25, 3)) @ box
+        points[15:] = points[:10] + rng.uniform(-0.6, 0.6, (10, 3))
+        for cutoff in (0.3, 0.9):
+            check(points, cutoff, box, kernel=kernel)
+    report = hs.explain(rng.random((2000, 3)) @ box, 0.3, box=box, measure=True)
+    assert report.measured["candidates"] < 300 * 2000
+
+
+def test_boxes_that_float64_does_not_place_points_in(rng):
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    sheared = np.array([[1.0, 0, 0], [1e12, 1, 0], [-3e11, 7e11, 1]])
+    for box in (np.diag([1e17, 1, 1]) @ turned, np.diag([1e30, 1, 1]) @ turned, sheared):
+        with pytest.raises(ValueError, match="box is too skewed, or its vectors differ"):
+            hs.count_pairs(rng.random((100, 3)), 0.1, box=box)
+    # What the cutoff blurs anyway is no matter.
+    box = np.diag([1e12, 1, 1]) @ turned
+    check(rng.random((12, 3)) @ box, 0.4, box)
+
+
 # ---- work, counted -------------------------------------------------------------------------
 
 
@@ -163,6 +192,7 @@ WIDE = {
     "subnormal": lambda u: (u * 1e-310, 0.05 * 1e-310, None),
     "exponential": lambda u: (10.0 ** (620 * u - 320), 1e-300, None),
     "exponential, large cutoff": lambda u: (10.0 ** (303 * u - 3), 1e100, None),
+    "exponential, largest cutoff": lambda u: (10.0 ** (620 * u[:1500] - 320), 1e290, None),
 }
 
 
