@@ -11,7 +11,11 @@
  * Rules: nothing here prints, reads the environment or, but for hs_pool_*, keeps state between
  * calls. Every function may be called from several threads at once. On failure a result is NULL and
  * a number is untouched, but arrays that the caller provides (options->out, counts, wrapped, shift)
- * may hold anything; `hs_failure` says what was wrong.
+ * may hold anything; `hs_failure` says what was wrong. A pointer may be NULL only where it is said.
+ * Functions that return hs_status may return any that fits; those that return none cannot fail.
+ *
+ * Link the core statically: compile csrc/core/ and csrc/kernels/ into the program, or call it from
+ * an extension module through halfshell_capi.h. docs/c-interface.md shows both.
  */
 #ifndef HALFSHELL_H
 #define HALFSHELL_H
@@ -23,6 +27,16 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* The version of this header: that of the package. Within one MAJOR.MINOR what is declared here is
+ * only added to: new functions, new members of enums; structs stay as they are. */
+#define HS_VERSION_MAJOR 0
+#define HS_VERSION_MINOR 1
+#define HS_VERSION_PATCH 0
+#define HS_VERSION (HS_VERSION_MAJOR * 10000 + HS_VERSION_MINOR * 100 + HS_VERSION_PATCH)
+
+/* HS_VERSION of the core as it was compiled: not that of the caller's header, if they differ. */
+int hs_version(void);
 
 #define HS_MAX_DIM 8
 
@@ -38,17 +52,18 @@ typedef enum hs_status {
     HS_ERR_TOO_MANY,      /* 2^31 points or more, or more pairs than int64 counts */
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */
-    HS_ERR_KERNEL,        /* no kernel of that name on this CPU */
+    HS_ERR_KERNEL,        /* no kernel of that name on this CPU, or none compiled as it must be */
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
     HS_ERR_FAR,           /* queries lie too far away for cells that were made without them */
     HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
     HS_ERR_TYPES,         /* a type is none of those that there are: failure.row */
     HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
-    HS_STATUS_END         /* number of codes, not a code */
+    HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or data NULL */
+    HS_STATUS_END         /* number of codes, not a code; it grows with them */
 } hs_status;
 
-/* One plain sentence for a status; never NULL, static storage. */
+/* One plain sentence for a status, also for a number that is none; never NULL, static storage. */
 const char *hs_status_text(hs_status status);
 
 /* Details of a failure, as far as its status uses them. */

@@ -276,6 +276,7 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
         }
         return NULL;
     case HS_OK:
+    case HS_ERR_ARGUMENT: /* all of these are checked before, in Python */
     case HS_STATUS_END: break;
     }
     PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status,

@@ -65,7 +65,10 @@ module_exec(PyObject *module)
     PyObject **stream_type = PyModule_GetState(module);
     hs_environment_read();
     *stream_type = hs_py_stream_type(module);
-    return *stream_type == NULL ? -1 : PyArray_ImportNumPyAPI();
+    if (*stream_type == NULL || hs_py_add_capi(module) < 0) {
+        return -1;
+    }
+    return PyArray_ImportNumPyAPI();
 }
 
 static int

@@ -62,6 +62,9 @@ PyObject *hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t
 /* py_explain.c. The arguments of call.h, then quantities, sort, index_bytes, measure. */
 PyObject *hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
+/* capi.c. Adds _C_API to the module; -1 with an exception set. */
+int hs_py_add_capi(PyObject *module);
+
 /* py_info.c. */
 PyObject *hs_py_kernels(PyObject *module, PyObject *ignored);
 PyObject *hs_py_default_kernel(PyObject *module, PyObject *ignored);

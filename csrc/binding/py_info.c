@@ -55,11 +55,20 @@ hs_py_default_kernel(PyObject *module, PyObject *ignored)
 #define COMPILER "unknown"
 #endif
 
+/* Of the core as compiled, which may be older than the Python files beside it. */
+static PyObject *
+version(void)
+{
+    const int number = hs_version();
+    return PyUnicode_FromFormat("%d.%d.%d", number / 10000, number / 100 % 100, number % 100);
+}
+
 PyObject *
 hs_py_build_info(PyObject *module, PyObject *ignored)
 {
     PyObject *dict = PyDict_New();
     if (dict != NULL &&
+        put(dict, "core", version()) &&
         put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
 #ifdef NDEBUG
         put(dict, "assertions", PyBool_FromLong(0)) &&

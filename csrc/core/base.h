@@ -9,12 +9,25 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Results must not depend on the compiler's mood: no fused multiply-add unless it is written. */
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
+/*
+ * Results must not depend on the compiler's mood: no sum in another order, no fused multiply-add
+ * unless it is written. Whatever the flags, the code is right, is refused here, or is refused when
+ * it runs (hs_rounds_products). gcc fuses in its GNU modes unless told otherwise; it knows no
+ * FP_CONTRACT, and says by __GCC_IEC_559 that it was told to fuse in a strict one.
+ */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
+    (defined(__GCC_IEC_559) && __GCC_IEC_559 == 0) || defined(_M_FP_FAST)
+#error "halfshell decides by the rules of IEEE 754; -ffast-math and the like break them"
 #endif
-#ifdef __FAST_MATH__
-#error "halfshell decides by the rules of IEEE 754; -ffast-math breaks them"
+#if defined(__clang__)
+#if __clang_major__ >= 12
+#pragma float_control(precise, on)
+#endif
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && !defined(__STRICT_ANSI__)
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
 #endif
 
 #if defined(_MSC_VER)
@@ -80,6 +93,20 @@ hs_power_of_two(int exponent)
     double         power;
     memcpy(&power, &bits, sizeof power);
     return power;
+}
+
+/*
+ * Whether a product is rounded before something is added to it, in the code of the function that
+ * this is inlined into. Not so where clang was given -ffp-contract=fast, which no pragma takes
+ * back: such a kernel must not be used. Holds in any rounding mode.
+ */
+HS_ALWAYS_INLINE bool
+hs_rounds_products(void)
+{
+    volatile double x = 0x1.0000002p27; /* 2^27 + 1: its square takes 55 bits */
+    volatile double minus_square = -0x1p54;
+    volatile double square = x * x;
+    return x * x + minus_square == square + minus_square;
 }
 
 /* States what the programmer guarantees, never what a user may get wrong. */

@@ -2,6 +2,7 @@
 /* box.c: the public functions of a box alone: measure and wrap. */
 #include "../halfshell.h"
 
+#include "arguments.h"
 #include "fpenv.h"
 #include "lattice.h"
 #include "points.h"
@@ -35,7 +36,10 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_box_check(box, failure);
+    hs_status      status = hs_check_box(box, box->ndim);
+    if (status == HS_OK) {
+        status = hs_box_check(box, failure);
+    }
     if (status == HS_OK) {
         const hs_scale scale = scale_of_box(box);
         const hs_scale back = hs_scale_of(-scale.exponent);
@@ -156,10 +160,13 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     hs_cloud   cloud;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_box_check(box, failure);
+    const hs_options options = hs_options_default();
+    const hs_fpenv   saved = hs_fpenv_enter();
+    hs_status        status = hs_check_arguments(points, NULL, box, &options);
     if (status == HS_OK) {
-        const hs_options options = hs_options_default();
+        status = hs_box_check(box, failure);
+    }
+    if (status == HS_OK) {
         status = hs_cloud_load(NULL, NULL, points, &options, &cloud, failure);
     }
     if (status == HS_OK) {

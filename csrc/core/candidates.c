@@ -3,6 +3,7 @@
  * candidates.c: what cells say without a distance test: where points are, which points the cells
  * around a query hold. See halfshell.h.
  */
+#include "arguments.h"
 #include "cells.h"
 #include "fpenv.h"
 #include "poll.h"
@@ -73,8 +74,11 @@ hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_
     *failure = HS_NO_FAILURE;
     options.cutoff = cells->search.options.cutoff;
     hs_account_init(&account, &options);
-    const hs_status status =
-        hs_scene_wrapped_like(&account, &cells->search.scene, points, &options, &scene, failure);
+    hs_status status = hs_check_arguments(&cells->points, points, NULL, &options);
+    if (status == HS_OK) {
+        status = hs_scene_wrapped_like(&account, &cells->search.scene, points, &options, &scene,
+                                       failure);
+    }
     if (status == HS_OK) {
         int64_t hint = 0;
         for (int64_t i = 0; i < points->n; i++) {
@@ -248,7 +252,12 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
     }
     hs_search     *search = &rows->search;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_search_reuse(&sets, options, search, failure);
+    hs_status      status = hs_check_arguments(&cells->points, queries, NULL, options);
+    if (status == HS_OK) {
+        status = hs_search_reuse(&sets, options, search, failure);
+    } else {
+        hs_search_begin(options, search); /* for hs_pairs_free */
+    }
     if (status == HS_OK) {
         hs_output_init(&search->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8,
                        &rows->output);

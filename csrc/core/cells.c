@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
+#include "arguments.h"
 #include "cells.h"
 #include "fpenv.h"
 #include "poll.h"
@@ -67,7 +68,11 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     const hs_options of_cells = options_of_cells(options);
     hs_search       *search = &cells->search;
     hs_search_begin(&of_cells, search);
-    hs_status status = keep_points(points, cells, failure);
+    hs_status status =
+        hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells);
+    if (status == HS_OK) {
+        status = keep_points(points, cells, failure);
+    }
     if (status == HS_OK) {
         const hs_sets sets = {.points = &cells->points, .is_kept = true};
         search->team = hs_team_create(hs_search_threads(points->n, options));

@@ -220,7 +220,7 @@ histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
     hs_search  search;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
-    hs_status status = check_edges(histogram, failure);
+    hs_status status = histogram->n_types >= 1 ? check_edges(histogram, failure) : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         return status;
     }

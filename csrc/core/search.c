@@ -2,6 +2,7 @@
 /* search.c: see search.h. */
 #include "search.h"
 
+#include "arguments.h"
 #include "estimate.h"
 
 #include <stddef.h>
@@ -168,6 +169,12 @@ hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                hs_search *search, hs_failure *failure)
 {
+    const hs_status sound = hs_check_arguments(sets->points, sets->queries, box, options);
+    if (sound != HS_OK) {
+        hs_search_begin(options, search);
+        hs_search_report(search, 0);
+        return sound;
+    }
     if (sets->built != NULL) {
         const hs_status status = hs_search_reuse(sets, options, search, failure);
         if (status != HS_STATUS_END) {

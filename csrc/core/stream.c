@@ -205,6 +205,9 @@ hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     of_pairs.keeps_none = true;
+    if (max_pairs < 1) {
+        return HS_ERR_ARGUMENT;
+    }
     hs_stream *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return HS_ERR_MEMORY;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* systems.c: the public searches of many systems: find and count. Threads take ranges of them. */
+#include "arguments.h"
 #include "estimate.h"
 #include "fpenv.h"
 #include "pairs.h"
@@ -50,6 +51,9 @@ static hs_status
 check_shared(const hs_points *points, const hs_systems *systems, const hs_options *options,
              hs_failure *failure)
 {
+    if (hs_check_arguments(points, NULL, systems->box, options) != HS_OK || systems->n < 0) {
+        return HS_ERR_ARGUMENT;
+    }
     if (points->n > INT32_MAX) {
         failure->value = (double)points->n;
         return HS_ERR_TOO_MANY;

@@ -2,6 +2,7 @@
 /* verlet.c: the public functions of a list that is used for many steps; docs/verlet.md. */
 #include "verlet.h"
 
+#include "arguments.h"
 #include "fpenv.h"
 #include "lattice.h"
 #include "memory.h"
@@ -125,7 +126,13 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
                                                                              : options->cutoff;
         return HS_ERR_CUTOFF;
     }
-    hs_status status = hs_box_check(box, failure);
+    hs_status status = hs_check_points(points);
+    if (status == HS_OK) {
+        status = hs_check_box(box, points->ndim);
+    }
+    if (status == HS_OK) {
+        status = hs_box_check(box, failure);
+    }
     if (status == HS_OK) {
         status = hs_frame_take(points, box, options, &list->frames[next], failure);
     }

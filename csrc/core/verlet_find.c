@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* verlet_find.c: the pairs of the last step from a list that is used for many. */
+#include "arguments.h"
 #include "fpenv.h"
 #include "pairs.h"
 #include "poll.h"
@@ -67,6 +68,10 @@ open_search(const hs_verlet *list, const hs_options *options, hs_search *search)
     hs_search_begin(options, search);
     search->options.cutoff = list->cutoff;
     search->options.precision = HS_EXACT;
+    const hs_status status = hs_check_options(&search->options);
+    if (status != HS_OK) {
+        return status;
+    }
     search->kernel = hs_kernel_select(options->kernel);
     if (search->kernel == NULL) {
         return HS_ERR_KERNEL;

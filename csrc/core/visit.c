@@ -142,8 +142,12 @@ hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     *n_visited = 0;
     of_visit.want = WANTED;
     of_visit.sorted = false;
+    of_visit.index_bytes = 8;
     of_visit.out = NULL;
     of_pairs.keeps_none = true;
+    if (visit->pair == NULL && visit->pairs == NULL) {
+        return HS_ERR_ARGUMENT;
+    }
     const hs_request request = {
         .sets = &of_pairs, .box = box, .options = &of_visit, .keeps_no_pairs = true};
     return hs_request_use(&request, visit_pairs, &doing, failure);

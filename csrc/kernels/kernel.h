@@ -125,7 +125,7 @@ typedef void (*hs_emit_fn)(const hs_hits *hits, void *i, void *j);
 
 typedef struct hs_kernel {
     const char *name;
-    bool (*supported)(void);
+    bool (*supported)(void); /* by this CPU, and compiled as it must be */
     hs_gather_fn  gather;
     hs_scan_fn    list; /* expanded */
     hs_scan_fn    count;

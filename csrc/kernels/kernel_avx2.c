@@ -12,11 +12,23 @@ HS_TARGET_BEGIN("avx2,fma,popcnt")
 
 #include "copy_template.h"
 #include "scan_template.h"
+
+static HS_NO_INLINE bool
+sound(void)
+{
+    return hs_rounds_products();
+}
 HS_TARGET_END
+
+static bool
+supported(void)
+{
+    return hs_cpu_has_avx2() && sound(); /* in this order: its instructions must be there */
+}
 
 const hs_kernel hs_kernel_avx2 = {
     .name = "avx2",
-    .supported = hs_cpu_has_avx2,
+    .supported = supported,
     HS_KERNEL_LOOPS,
     .judge = hs_judge_avx2,
     .measure = hs_measure_avx2,

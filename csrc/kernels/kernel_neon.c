@@ -12,14 +12,14 @@
 #include "scan_template.h"
 
 static bool
-always(void)
+supported(void)
 {
-    return true;
+    return hs_rounds_products();
 }
 
 const hs_kernel hs_kernel_neon = {
     .name = "neon",
-    .supported = always,
+    .supported = supported,
     HS_KERNEL_LOOPS,
     .judge = hs_judge_baseline, /* NEON is the baseline */
     .measure = hs_measure_baseline,

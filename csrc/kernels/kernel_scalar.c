@@ -246,14 +246,14 @@ emit_int64(const hs_hits *hits, void *i, void *j)
 }
 
 static bool
-always(void)
+supported(void)
 {
-    return true;
+    return hs_rounds_products();
 }
 
 const hs_kernel hs_kernel_scalar = {
     .name = "scalar",
-    .supported = always,
+    .supported = supported,
     HS_KERNEL_LOOPS,
     .judge = hs_judge_baseline,
     .measure = hs_measure_baseline,

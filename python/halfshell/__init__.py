@@ -9,6 +9,7 @@ from halfshell._count import count_pairs
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
 from halfshell._histogram import pair_histogram
+from halfshell._include import get_include
 from halfshell._nearest import nearest
 from halfshell._neighbors import coordination, neighbors
 from halfshell._options import kernels
@@ -37,6 +38,7 @@ __all__ = [
     "count_pairs",
     "explain",
     "for_each_pair",
+    "get_include",
     "iter_pairs",
     "kernels",
     "nearest",

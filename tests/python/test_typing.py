@@ -66,6 +66,7 @@ verdict: hs.Verdict = hs.verify(p, 1.0, i, j)
 box = hs.Box.orthorhombic(1.0, 1.0)
 assert_type(box.vectors, npt.NDArray[np.float64])
 assert_type(box.wrap(p), tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]])
+assert_type(hs.get_include(), str)
 """
 
 BAD = {

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * halfshell_capi.h: the functions of halfshell.h for other extension modules, without linking: a
+ * table of pointers that the Python package holds out in a capsule. Include Python.h before it.
+ *
+ *     static const hs_capi *halfshell;                      once, when the module is initialised:
+ *     halfshell = hs_capi_import();                         NULL: an exception is set
+ *     status = halfshell->pairs_find(&points, NULL, &options, &pairs, &failure);
+ *
+ * Member `pairs_find` is hs_pairs_find, and so on: halfshell.h says what each does. Do not call the
+ * functions by their own names, unless you link a core of your own; never free by one of the two
+ * what came from the other.
+ *
+ * The table is constant, shared by all threads, and stays as long as the process, also when modules
+ * are removed from sys.modules. Its functions need no GIL: release it around those that search. A
+ * hs_poll_fn, hs_pair_fn or hs_pairs_fn that uses Python must take it back first; it is called from
+ * threads that Python has not seen only if hs_visit.thread_safe allows it.
+ */
+#ifndef HALFSHELL_CAPI_H
+#define HALFSHELL_CAPI_H
+
+#ifndef Py_PYTHON_H
+#error "include Python.h before halfshell_capi.h"
+#endif
+
+#include "halfshell.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Of the structs, enums and signatures in halfshell.h. It grows when one changes such that modules
+ * that were compiled before would misread it; not when functions are appended to the table. */
+#define HS_CAPI_VERSION 1
+
+#define HS_CAPI_NAME "halfshell._core._C_API"
+
+/* New members are appended, and only there; none is taken away. */
+typedef struct hs_capi {
+    uint32_t abi_version; /* HS_CAPI_VERSION of the core; the first two members stay for ever */
+    uint32_t size;        /* bytes of this table: what lies beyond is not there */
+    int (*version)(void);
+    const char *(*status_text)(hs_status status);
+    hs_options (*options_default)(void);
+    hs_status (*pairs_find)(const hs_points *points, const hs_box *box, const hs_options *options,
+                            hs_pairs **pairs, hs_failure *failure);
+    hs_status (*pairs_count)(const hs_points *points, const hs_box *box, const hs_options *options,
+                             int64_t *count, hs_failure *failure);
+    hs_status (*neighbors_find)(const hs_points *points, const hs_points *queries,
+                                const hs_box *box, const hs_options *options, hs_pairs **rows,
+                                hs_failure *failure);
+    hs_status (*neighbors_count)(const hs_points *points, const hs_points *queries,
+                                 const hs_box *box, const hs_options *options, int64_t *counts,
+                                 hs_failure *failure);
+    hs_status (*between_count)(const hs_points *points, const hs_points *queries, const hs_box *box,
+                               const hs_options *options, int64_t *count, hs_failure *failure);
+    hs_status (*pairs_histogram)(const hs_points *points, const hs_points *queries,
+                                 const hs_box *box, const hs_options *options,
+                                 const hs_histogram *histogram, hs_failure *failure);
+    int64_t (*pairs_rows)(const hs_pairs *pairs);
+    const int64_t *(*pairs_offsets)(const hs_pairs *pairs);
+    int64_t *(*pairs_take_offsets)(hs_pairs *pairs);
+    int64_t (*pairs_length)(const hs_pairs *pairs);
+    const void *(*pairs_array)(const hs_pairs *pairs, unsigned which);
+    void *(*pairs_take)(hs_pairs *pairs, unsigned which);
+    void (*array_free)(void *array);
+    void (*pairs_free)(hs_pairs *pairs);
+    hs_status (*stream_open)(const hs_points *points, const hs_box *box, const hs_options *options,
+                             int64_t max_pairs, hs_stream **stream, hs_failure *failure);
+    hs_status (*stream_next)(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
+                             hs_failure *failure);
+    void (*stream_free)(hs_stream *stream);
+    hs_status (*pairs_visit)(const hs_points *points, const hs_box *box, const hs_options *options,
+                             const hs_visit *visit, int64_t *n_visited, hs_failure *failure);
+    hs_status (*cells_build)(const hs_points *points, const hs_box *box, const hs_options *options,
+                             hs_cells **cells, hs_failure *failure);
+    void (*cells_free)(hs_cells *cells);
+    void (*cells_points)(const hs_cells *cells, hs_points *points);
+    const hs_box *(*cells_box)(const hs_cells *cells);
+    hs_status (*cells_pairs)(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
+                             hs_failure *failure);
+    hs_status (*cells_count)(const hs_cells *cells, const hs_points *queries,
+                             const hs_options *options, int64_t *count, hs_failure *failure);
+    hs_status (*cells_neighbors)(const hs_cells *cells, const hs_points *queries,
+                                 const hs_options *options, hs_pairs **rows, hs_failure *failure);
+    hs_status (*cells_neighbors_count)(const hs_cells *cells, const hs_points *queries,
+                                       const hs_options *options, int64_t *counts,
+                                       hs_failure *failure);
+    hs_status (*cells_stream)(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
+                              hs_stream **stream, hs_failure *failure);
+    hs_status (*cells_visit)(const hs_cells *cells, const hs_options *options,
+                             const hs_visit *visit, int64_t *n_visited, hs_failure *failure);
+    void (*cells_layout)(const hs_cells *cells, hs_layout *layout);
+    void (*cells_indices)(const hs_cells *cells, int64_t *indices);
+    hs_status (*cells_find)(const hs_cells *cells, const hs_points *points, int64_t *cell,
+                            hs_failure *failure);
+    hs_status (*cells_candidates)(const hs_cells *cells, const hs_points *queries,
+                                  const hs_options *options, hs_pairs **ranges,
+                                  hs_failure *failure);
+    hs_status (*systems_find)(const hs_points *points, const hs_systems *systems,
+                              const hs_options *options, hs_pairs **pairs, hs_failure *failure);
+    hs_status (*systems_count)(const hs_points *points, const hs_systems *systems,
+                               const hs_options *options, int64_t *counts, hs_failure *failure);
+    hs_verlet *(*verlet_new)(void);
+    hs_status (*verlet_update)(hs_verlet *list, const hs_points *points, const hs_box *box,
+                               const hs_options *options, double skin, bool rebuild, bool *rebuilt,
+                               hs_failure *failure);
+    hs_status (*verlet_find)(const hs_verlet *list, const hs_options *options, hs_pairs **pairs,
+                             hs_failure *failure);
+    hs_verlet_state (*verlet_look)(const hs_verlet *list);
+    void (*verlet_free)(hs_verlet *list);
+    hs_status (*plan_make)(const hs_points *points, const hs_box *box, const hs_options *options,
+                           hs_plan *plan, hs_failure *failure);
+    hs_status (*box_measure)(const hs_box *box, double *heights, double *volume,
+                             hs_failure *failure);
+    hs_status (*box_wrap)(const hs_box *box, const hs_points *points, double *wrapped,
+                          int64_t *shift, hs_failure *failure);
+    size_t (*pool_limit)(void);
+    void (*pool_set_limit)(size_t bytes);
+    size_t (*pool_held)(void);
+    void (*pool_clear)(void);
+    int (*kernel_names)(const char **names, int capacity);
+    hs_status (*cells_histogram)(const hs_cells *cells, const hs_points *queries,
+                                 const hs_options *options, const hs_histogram *histogram,
+                                 hs_failure *failure);
+} hs_capi;
+
+/* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not
+ * installed, was compiled for other structs, or is too old to have all that this header declares.
+ * Needs the GIL; call it once and keep the pointer, which is borrowed for ever. */
+static inline const hs_capi *
+hs_capi_import(void)
+{
+    const hs_capi *table = (const hs_capi *)PyCapsule_Import(HS_CAPI_NAME, 0);
+    if (table == NULL) {
+        return NULL;
+    }
+    if (table->abi_version != HS_CAPI_VERSION) {
+        PyErr_Format(PyExc_ImportError,
+                     "this module was compiled for version %d of the C interface of halfshell, "
+                     "the installed one has version %lu: compile the module again",
+                     HS_CAPI_VERSION, (unsigned long)table->abi_version);
+        return NULL;
+    }
+    if (table->size < sizeof(hs_capi)) {
+        PyErr_Format(PyExc_ImportError,
+                     "this module was compiled for halfshell %d.%d or later, the installed one "
+                     "lacks functions: update halfshell",
+                     HS_VERSION_MAJOR, HS_VERSION_MINOR);
+        return NULL;
+    }
+    return table;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif
