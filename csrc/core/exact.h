@@ -6,7 +6,7 @@
  *
  * The stages, cheapest first (docs/exactness.md derives each bound):
  *   float64       one squared distance with a proven error bound
- *   double-word   the same in pairs of doubles
+ *   double-word   the same in pairs of doubles, then without what is too small to be summed
  *   integers      every input is an integer times a power of two: exact, always decides
  *
  * Callers must have set round to nearest without flushing (fpenv.h) when calling in here.
@@ -44,7 +44,7 @@ void hs_metric_init(hs_metric *metric, int ndim, int n_rows,
 bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 
-/* The same by the last stage alone, for pairs that the others have left undecided. */
+/* The same for pairs that the float64 and double-word stages have left undecided. */
 bool hs_metric_settle(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 

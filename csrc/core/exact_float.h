@@ -161,4 +161,39 @@ hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference,
     return HS_UNDECIDED;
 }
 
+/* Of the cutoff: components below this are a hair, and what their squares sum to, of its square:
+ * eight of them are below 2^-125. */
+#define HS_HAIR 0x1p-64
+#define HS_HAIR_SQUARES 0x1p-120
+
+/*
+ * Third stage, from a watched difference: ties that are broken by a hair. The squares of components
+ * so small cannot be summed with the others, and need not be: if |D|^2 without them is exact, then
+ * its difference to R^2 decides, unless that is negative and as small as they are.
+ */
+HS_ALWAYS_INLINE hs_verdict
+hs_hair_verdict(const hs_metric *metric, const hs_difference *difference, int ndim)
+{
+    hs_difference broad = *difference;
+    double        hair = 0.0;
+    bool          exact;
+    for (int k = 0; k < ndim; k++) {
+        const double size = fabs(difference->component[k].hi);
+        if (size < HS_HAIR * metric->cutoff) {
+            hair += size;
+            broad.component[k] = (hs_dw){0.0, 0.0};
+        }
+    }
+    if (hair == 0.0) {
+        return HS_UNDECIDED;
+    }
+    const hs_dw  square = hs_double_word_square_watched(&broad, ndim, &exact);
+    const hs_dw  excess = hs_dw_add(square, (hs_dw){-metric->square_hi, -metric->square_lo});
+    const double sure = HS_HAIR_SQUARES * metric->square_hi;
+    if (!exact || (excess.hi < 0.0 && excess.hi >= -sure)) {
+        return HS_UNDECIDED;
+    }
+    return excess.hi < 0.0 ? HS_WITHIN : HS_BEYOND;
+}
+
 #endif
