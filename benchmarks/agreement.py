@@ -8,7 +8,7 @@ in rational arithmetic, so that a difference is never put down to the wrong side
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from scenes import Scene
 
-__all__ = ["Verdict", "compare", "compare_counts", "half_keys", "is_pair"]
+__all__ = ["Verdict", "compare", "compare_counts", "compare_nearest", "half_keys", "is_pair"]
 
 Keys = NDArray[np.int64]
 
@@ -126,6 +126,30 @@ def compare(scene: Scene, ours: Keys, theirs: Keys, inclusive: bool, band: float
 def compare_counts(ours: int, theirs: int) -> Verdict:
     """Compare two numbers of pairs; which pairs differ is not known."""
     return Verdict(missed=max(ours - theirs, 0), spurious=max(theirs - ours, 0))
+
+
+def compare_nearest(
+    scene: Scene, ours: tuple[Any, Any], theirs: tuple[Any, Any], float_bits: int
+) -> Verdict:
+    """Compare distances and numbers of the nearest points, row by row.
+
+    Ties may come in any order, so that distances decide. An entry of theirs that is further away
+    than ours is missed, one that is nearer is spurious: unless the point is where they say, which
+    means that ours is wrong.
+    """
+    d, other = np.asarray(ours[0]), np.asarray(theirs[0], dtype=np.float64)
+    # Differences, squares and a sum are rounded; and coordinates, where they are wrapped or become
+    # float32.
+    moves = scene.box is not None or float_bits < 53
+    extent = float(np.abs(scene.points).max()) if moves else 0.0
+    room = 32.0 * 2.0**-float_bits * (d + extent)
+    missed, spurious = np.argwhere(other > d + room), np.argwhere(other < d - room)
+    wrong = 0
+    for i, e in spurious[:_JUDGED]:
+        nearer = replace(scene, cutoff=float(d[i, e]))
+        wrong += is_pair(nearer, int(i), int(theirs[1][i, e]), None, False)[0]
+    judged = len(missed) + len(spurious)
+    return Verdict(len(missed), len(spurious), 0, judged, wrong, judged)
 
 
 def is_pair(

@@ -30,6 +30,8 @@ def count_pairs(scene: Scene) -> int:
 def _count_one(scene: Scene) -> int:
     from scipy.spatial import cKDTree
 
+    if scene.task == "nearest":
+        return scene.n * scene.nearest  # all rows are full
     if scene.task == "between":
         tree = cKDTree(scene.asking, boxsize=np.diag(scene.rows))
         other = cKDTree(scene.found, boxsize=np.diag(scene.rows))

@@ -61,6 +61,10 @@ class Contestant(Library):
             return int(result)
         return len(self.indices(result)[0]) // (2 if self.full else 1)
 
+    def nearest(self, scene: Scene, result: Any) -> tuple[Any, Any]:
+        """Return distances and numbers of the nearest, shape (n, k), where it finds these."""
+        raise NotImplementedError
+
     def for_batch(self) -> Contestant:
         """Return the contestant for scenes of many systems. Default: a loop over them."""
         return Looped(self)

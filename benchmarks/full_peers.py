@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 import histogram_peers
+import nearest_peers
 from contestant import Call, Contestant, Halfshell
 from halfshell._peers import in_space
 from halfshell._peers.adapters import columns
@@ -200,6 +201,8 @@ def for_scene(peer: Contestant, scene: Scene) -> Contestant:
     """Return the peer as it is asked for this scene. Raises KeyError where it has no such list."""
     if scene.bins:
         return histogram_peers.PEERS[peer.name]
+    if scene.nearest:
+        return nearest_peers.PEERS[peer.name]
     if scene.task in _PEERS:
         return _PEERS[scene.task][peer.name]
     return peer if scene.batch is None else peer.for_batch()
@@ -210,6 +213,8 @@ def ours_for(ours: Halfshell | None, scene: Scene) -> Halfshell | None:
     kinds = {"rows": OwnRows, "between": OwnBetween}
     if ours is not None and scene.bins:
         return histogram_peers.OwnHistogram(ours.options)
+    if ours is not None and scene.nearest:
+        return nearest_peers.OwnNearest(ours.options)
     if ours is None or scene.task not in kinds:
         return ours
     return kinds[scene.task](ours.options)

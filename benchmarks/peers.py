@@ -103,6 +103,17 @@ class Corrfunc(Contestant):
         return lambda: int(count(1, 1, edges, x, y, z, **options)["npairs"].sum()) // 2
 
 
+class PyKDTree(Contestant):
+    """pykdtree: the nearest points alone (nearest_peers.py)."""
+
+    name = distribution = module = "pykdtree"
+    counts_alone = True
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Refuse all that nearest_peers.py does not ask for."""
+        return "no pairs"
+
+
 PEERS: dict[str, Contestant] = {
     peer.name: peer
     for peer in (
@@ -115,5 +126,6 @@ PEERS: dict[str, Contestant] = {
         Pymatgen(),
         Ase(),
         Corrfunc(),
+        PyKDTree(),
     )
 }

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from agreement import Verdict, compare, compare_counts
+from agreement import Verdict, compare, compare_counts, compare_nearest
 from contestant import Call, Contestant, Halfshell
 from full_peers import for_scene, ours_for
 from measure import Turn, plan_turn, single_calls, take_turns
@@ -127,6 +127,11 @@ def _check(
     answer = same_rule.prepare(plain)()
     if scene.task == "count":
         return pairs, compare_counts(int(answer), pairs)
+    if scene.nearest:
+        return pairs, compare_nearest(
+            scene, same_rule.nearest(scene, answer), contestant.nearest(scene, result),
+            contestant.float_bits,
+        )  # fmt: skip
     verdict = compare(
         scene, same_rule.keys(plain, answer), contestant.keys(scene, result),
         contestant.inclusive, contestant.band(scene), scene.has_images,

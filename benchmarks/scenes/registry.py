@@ -40,6 +40,7 @@ TITLES = {
     "S12": "histograms of distances",
     "S13": "input order: random, sorted, and the worst",
     "S14": "one thread and two",
+    "S15": "the k nearest points",
 }
 GROUPS: dict[str, list[str]] = {group: [] for group in TITLES}
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "COUNT_PEERS", "FAST_PEERS", "HISTOGRAM_PEERS", "LIST_PEERS", "Floats", "Limit", "Scene",
+    "COUNT_PEERS", "FAST_PEERS", "HISTOGRAM_PEERS", "LIST_PEERS", "NEAREST_PEERS", "Floats",
+    "Limit", "Scene",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,7 @@ LIST_PEERS = (
 # Enough for families of many scenes: one of these was the fastest wherever all were measured.
 FAST_PEERS = ("vesin", "cKDTree", "neighborlist-rs", "pymatgen")
 HISTOGRAM_PEERS = ("Corrfunc", "cKDTree", "freud")
+NEAREST_PEERS = ("pykdtree", "cKDTree", "freud")
 COUNT_PEERS = ("Corrfunc", "cKDTree", "vesin", "neighborlist-rs")
 
 
@@ -77,7 +79,7 @@ class Scene:
     cutoff: float
     box: Floats | None = None  # lengths (d,), row vectors (d, d), or None: open space
     periodic: tuple[bool, ...] = ()
-    task: Literal["pairs", "count", "rows", "between"] = "pairs"
+    task: Literal["pairs", "count", "rows", "between", "nearest"] = "pairs"
     quantities: str = "ij"
     index_dtype: str = "int64"
     n_pairs: int | None = None  # the exact answer, a pair at the cutoff included
@@ -87,6 +89,7 @@ class Scene:
     peers: tuple[str, ...] = LIST_PEERS
     batch: NDArray[np.int64] | None = None  # (n,) ascending numbers of systems
     n_queries: int = 0
+    nearest: int = 0  # with the task "nearest": so many of each point; there is no cutoff
     bins: int = 0  # with the task "count": so many bins of equal width, or one number
     threads: int = 1
     latency: bool = False  # whether single calls are timed one by one as well
@@ -162,6 +165,8 @@ class Scene:
             state.update(self.batch.tobytes())
         if self.n_queries > 0:
             state.update(str(self.n_queries).encode())
+        if self.nearest > 0:
+            state.update(f"nearest {self.nearest}".encode())
         return state.hexdigest()
 
     def bytes_of_output(self) -> int:

@@ -14,7 +14,7 @@ import pytest
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 MODULES = (
-    "scenes", "agreement", "contestant", "peers", "histogram_peers", "full_peers",
+    "scenes", "agreement", "contestant", "peers", "histogram_peers", "nearest_peers", "full_peers",
     "measure", "machine", "report",
     "results", "runner", "run", "stages", "footprint", "check_scenes", "extreme", "compare",
     "plot", "marks", "fill_docs", "fill_errors", "reproduce",

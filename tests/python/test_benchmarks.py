@@ -353,3 +353,35 @@ def test_memory_cases_name_a_scene_and_quantities(bench: SimpleNamespace) -> Non
     assert parse("growth-1e5:ijdDS") == ("growth-1e5", "ijdDS")
     with pytest.raises(Exception, match="no scene 'nothing'"):
         parse("nothing:ij")
+
+
+def test_nearest_points_are_compared_by_their_distances(bench: SimpleNamespace) -> None:
+    scene = bench.scenes.Scene(
+        "row", "", np.array([[0.0], [1.0], [3.0], [7.0]]), 0.0, task="nearest", nearest=1,
+    )  # fmt: skip
+    ours = np.array([[1.0], [1.0], [2.0], [4.0]]), np.array([[1], [0], [1], [2]])
+    assert bench.agreement.compare_nearest(scene, ours, ours, 53).complete
+    d = ours[0] + [[1e-16], [1e-9], [0.0], [-1.0]]
+    verdict = bench.agreement.compare_nearest(scene, ours, (d, ours[1]), 53)
+    assert (verdict.missed, verdict.spurious, verdict.ours_wrong) == (1, 1, 0)
+    assert not verdict.complete
+    assert bench.agreement.compare_nearest(scene, ours, (d, ours[1]), 24).missed == 0
+    far = np.array([[3.0], [1.0], [2.0], [4.0]]), np.array([[2], [0], [1], [2]])
+    assert bench.agreement.compare_nearest(scene, far, ours, 53).ours_wrong == 1
+
+
+def test_nearest_points_are_measured_like_pairs(
+    bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench.measure, "touch_memory", lambda n_bytes: None)
+    whole = bench.scenes.load("nearest-1e5-periodic")
+    scene = replace(whole, points=whole.points[:500], n_pairs=6000)
+    patience = bench.runner.Patience(repeats=2, seconds=0.05, quick=True)
+    tree = bench.peers.PEERS["cKDTree"]
+    rows, correct = bench.runner.measure_scene(
+        scene, bench.contestant.Halfshell(), [tree, bench.peers.PEERS["pykdtree"]], patience
+    )
+    assert correct
+    assert [(row.contestant, row.pairs, row.agreement) for row in rows] == [
+        ("halfshell", 6000, "not compared"), ("cKDTree", 6000, "same"),
+    ]  # fmt: skip
