@@ -11,12 +11,14 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Owns the stream, and a reference to the progress hook of the call. */
+/* Owns the stream, and references to the progress hook of the call and to the cells, if any, that
+ * the stream searches. */
 typedef struct pair_stream {
     PyObject_HEAD
     hs_stream *stream;     /* NULL: over */
     hs_call    call;       /* points: their number only */
     PyObject  *progress;   /* or NULL */
+    PyObject  *cells;      /* or NULL; outlives the stream */
     char       letters[8]; /* of the quantities */
     int64_t    max_pairs;
     bool       is_running; /* somebody is in a call of the core */
@@ -135,7 +137,7 @@ stream_clear(PyObject *object)
     pair_stream *self = (pair_stream *)object;
     self->call.progress = NULL;
     Py_CLEAR(self->progress);
-    return 0;
+    return 0; /* a capsule of cells refers to nothing, and the stream may need it */
 }
 
 static void
@@ -145,6 +147,7 @@ stream_dealloc(PyObject *object)
     PyObject_GC_UnTrack(object);
     hs_stream_free(((pair_stream *)object)->stream);
     (void)stream_clear(object);
+    Py_XDECREF(((pair_stream *)object)->cells);
     type->tp_free(object);
     Py_DECREF(type);
 }
@@ -195,7 +198,22 @@ take_arguments(pair_stream *self, PyObject *const *arguments)
     self->max_pairs = PyLong_AsLongLong(arguments[HS_CALL_ARGUMENTS + 2]);
     self->progress = self->call.progress;
     Py_XINCREF(self->progress);
+    if (self->call.cells != NULL) {
+        Py_INCREF(arguments[0]);
+        self->cells = arguments[0];
+    }
     return !PyErr_Occurred();
+}
+
+/* A stream of the points, or in the cells, of the call. */
+static hs_status
+open_stream(pair_stream *self, hs_failure *failure)
+{
+    const hs_call *call = &self->call;
+    return call->cells != NULL ? hs_cells_stream(call->cells, &call->options, self->max_pairs,
+                                                 &self->stream, failure)
+                               : hs_stream_open(&call->points, hs_call_box(call), &call->options,
+                                                self->max_pairs, &self->stream, failure);
 }
 
 PyObject *
@@ -215,8 +233,7 @@ hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
     hs_call *call = &self->call;
     self->is_running = true; /* the hook can get hold of it */
     hs_call_release(call);
-    const hs_status status = hs_stream_open(&call->points, hs_call_box(call), &call->options,
-                                            self->max_pairs, &self->stream, &failure);
+    const hs_status status = open_stream(self, &failure);
     hs_call_acquire(call);
     leave(self);
     if (status != HS_OK) {

@@ -107,7 +107,7 @@ class CellList:
     """
 
     __slots__ = (
-        "_cells", "_layout", "_n_points", "_ndim", "_precision", "_threads", "cutoff",
+        "_cells", "_cutoff", "_layout", "_n_points", "_ndim", "_precision", "_threads",
     )
 
     def __init__(
@@ -124,9 +124,9 @@ class CellList:
         if type(box) is Box:
             box = box.vectors
         array, vectors, bits = _inputs.scene(points, box, periodic)
-        self.cutoff = _inputs.as_cutoff(cutoff)
+        self._cutoff = _inputs.as_cutoff(cutoff)
         self._cells = _core.cells_build(
-            array, self.cutoff, vectors, bits, True, precision, None, memory_limit, None, threads
+            array, self._cutoff, vectors, bits, True, precision, None, memory_limit, None, threads
         )
         self._layout = _core.cells_layout(self._cells)
         self._n_points: int = array.shape[0]
@@ -142,6 +142,19 @@ class CellList:
         cells = len(self.cell_start) - 1
         kind = "cells" if self.cell_ids is None else "occupied cells"
         return f"CellList({self._n_points} points, {cells} {kind}, cutoff {self.cutoff!r})"
+
+    def __copy__(self) -> CellList:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CellList:
+        return self  # it does not change
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError("a CellList cannot be pickled: pickle its points, and make it again")
+
+    @property
+    def cutoff(self) -> float:
+        return self._cutoff
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -402,7 +415,8 @@ class CellList:
         Parameters
         ----------
         cutoff : float, optional
-            Default: that of the list.
+            Default: that of the list. Up to that the kept cells are searched, which the iterator
+            keeps alive.
         max_pairs, quantities, index_dtype, inclusive, kernel, threads, memory_limit
             As in `halfshell.iter_pairs`.
 
@@ -478,7 +492,7 @@ class CellList:
             raise TypeError(f"unexpected keyword argument {name!r}")
         return (
             self._cells,
-            self.cutoff if cutoff is None else _inputs.as_cutoff(cutoff),
+            self._cutoff if cutoff is None else _inputs.as_cutoff(cutoff),
             None,
             0,
             _inputs.as_flag(options.get("inclusive", True), "inclusive"),

@@ -11,6 +11,9 @@ import numpy.typing as npt
 from halfshell import _core, _inputs
 from halfshell._box import Box
 
+# The counts of one thread, of two numbers for each bin; their sum; and the result.
+_COPIES = 4
+
 _Column = npt.NDArray[Any] | None
 
 
@@ -114,6 +117,11 @@ def pair_histogram(
         len(array), None if asking is None else len(asking), types, query_types, weights,
         query_weights,
     )
+    n_counts = marks.n_types**2 * len(limits)
+    _inputs.refuse_unavailable(
+        _COPIES * 8 * n_counts,
+        f"counts for {len(limits) - 1} bins between edges and {marks.n_types}**2 pairs of types",
+    )
     found = _core.histogram(
         array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads, limits,
         True, asking, *marks,
@@ -135,11 +143,14 @@ def as_sets(
 
 def as_edges(values: npt.ArrayLike) -> _inputs.FloatArray:
     """Two or more limits of bins: finite, not negative, not descending."""
-    array = _inputs.as_real_array(values, "edges").astype(np.float64)
+    array = _inputs.as_real_array(values, "edges")
     if array.ndim != 1 or len(array) < 2:
         raise ValueError(
             f"edges must have shape (bins + 1,), with one bin at least, got {array.shape}"
         )
+    # The array, the one that it is checked with, and the counts.
+    _inputs.refuse_unavailable(_COPIES * 8 * len(array), f"edges of shape {array.shape}")
+    array = array.astype(np.float64)
     for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
         raise ValueError(f"edges must be finite and not negative, got edges[{k}] = {array[k]}")
     for k in np.flatnonzero(array[1:] < array[:-1]):

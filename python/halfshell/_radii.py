@@ -25,10 +25,12 @@ _DOUBT = 4  # ulps of a radius: more than the 1 ulp of a distance and the roundi
 
 def as_radii(radius: Any, n: int) -> npt.NDArray[np.float64] | float | None:
     """None, one number, or an array of one for each of n queries; finite and not negative."""
-    if radius is None or isinstance(radius, float):
-        return radius
+    if radius is None:
+        return None
     array = _inputs.as_real_array(radius, "radius", "be a number").astype(np.float64)
     if array.ndim == 0:
+        if not (np.isfinite(array) and array >= 0.0):
+            raise ValueError(f"radius must be finite and not negative, got {float(array)}")
         return float(array)
     if array.shape != (n,):
         raise ValueError(

@@ -11,7 +11,7 @@ from typing import Any, Literal, SupportsIndex, overload
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _table_forms
+from halfshell import _inputs, _table_forms
 
 Array = npt.NDArray[Any]
 Row = Array | tuple[Array, ...]
@@ -294,7 +294,7 @@ class NeighborTable:
         AttributeError
             If the table has no distances.
         ValueError
-            If `by` is something else.
+            If `by` is another word.
 
         Examples
         --------
@@ -303,8 +303,7 @@ class NeighborTable:
         >>> table[2][0].tolist(), table.sort(by="distance")[2][0].tolist()
         ([0, 1], [1, 0])
         """
-        if by != "distance":
-            raise ValueError(f"by must be 'distance', got {by!r}")
+        _inputs.as_choice(by, "by", ("distance",))
         # A stable sort keeps (j, S) ascending where distances are equal.
         order = _table_forms.order_by_distance(self.offsets, self.distances)
         return self._with(self.offsets, order, self._is_complete, False)
@@ -348,6 +347,7 @@ class NeighborTable:
         ([0, 1], [1, 2])
         """
         _table_forms.check_letters(quantities)
+        half = _inputs.as_flag(half, "half")
         rows = self._row_numbers()
         columns = {"i": rows}
         if "P" in quantities:
@@ -390,8 +390,7 @@ class NeighborTable:
         >>> table.to_scipy().toarray().tolist()
         [[0.0, 1.0, 0.0], [1.0, 0.0, 2.0], [0.0, 2.0, 0.0]]
         """
-        if duplicates not in ("raise", "min"):
-            raise ValueError(f"duplicates must be 'raise' or 'min', got {duplicates!r}")
+        _inputs.as_choice(duplicates, "duplicates", ("raise", "min"))
         indices, distances = self.indices, self.distances
         if not self._is_in_order:
             order = _table_forms.order_by_neighbor(self.offsets, indices)
@@ -441,8 +440,7 @@ class NeighborTable:
         ...     print(error.needed)
         2
         """
-        if quantity not in ("j", "d", "D", "S"):
-            raise ValueError(f"quantity must be one of j d D S, got {quantity!r}")
+        _inputs.as_choice(quantity, "quantity", ("j", "d", "D", "S"))
         return _table_forms.padded(self.offsets, self._column(quantity), capacity, fill)
 
     def edge_index(self) -> Array:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`CellList` answers as the functions do, for any cutoff and any queries, and shows its layout."""
 
+import copy
 import gc
+import pickle
 import threading
 import weakref
 
@@ -235,6 +237,44 @@ def test_a_list_can_be_collected():
     assert gone() is None
 
 
+@pytest.mark.parametrize("built_for", [0.5, 1.0, 1.01, 2.0])
+@pytest.mark.parametrize("tilt", [None, 0.0, 0.3])
+def test_blocks_and_visits_have_the_order_of_the_pairs(built_for, tilt):
+    for n, cutoff in ((20, 0.45), (1000, 0.3), (20000, 0.1)):
+        points = np.random.default_rng(n).random((n, 3))
+        box = None if tilt is None else np.eye(3) + tilt * np.eye(3, k=-1)
+        cells = hs.CellList(points, built_for * cutoff, box=box)
+        expected = cells.pairs(cutoff, quantities="P")
+        blocks = list(cells.iter_pairs(cutoff, quantities="P", max_pairs=1000))
+        assert_array_equal(np.concatenate(blocks), expected)
+        if n < 20000:
+            seen = []
+            cells.for_each_pair(lambda i, j, *_: seen.append((i, j)), cutoff)  # noqa: B023
+            assert_array_equal(seen, expected)
+
+
+def test_an_iterator_keeps_its_cells():
+    points = random_points(2000, 16)
+    cells = hs.CellList(points, 1.0)
+    expected = cells.pairs(quantities="P")
+    blocks = cells.iter_pairs(quantities="P", max_pairs=100)
+    abandoned = cells.iter_pairs(max_pairs=100)
+    next(abandoned)
+    del cells, abandoned
+    gc.collect()
+    assert_array_equal(np.concatenate(list(blocks)), expected)
+    blocks.close()
+
+
+def test_a_list_does_not_change():
+    cells = hs.CellList(random_points(10, 17), 1.0)
+    with pytest.raises(AttributeError):
+        cells.cutoff = 2.0
+    assert copy.copy(cells) is cells and copy.deepcopy([cells])[0] is cells
+    with pytest.raises(TypeError, match="a CellList cannot be pickled"):
+        pickle.dumps(cells)
+
+
 CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 1.0)
 
 
@@ -247,7 +287,7 @@ CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 1.0)
         (lambda: hs.CellList("ab", 1.0), TypeError, "points"),
         (lambda: CELLS.query([[0.0]]), ValueError, "queries must have 2 columns"),
         (lambda: CELLS.query([[0.0, np.inf]]), ValueError, r"queries\[0, 1\]"),
-        (lambda: CELLS.query([[0.0, 0.0]], -1.0), ValueError, "cutoff|radius"),
+        (lambda: CELLS.query([[0.0, 0.0]], -1.0), ValueError, "radius must be"),
         (lambda: CELLS.query([[0.0, 0.0]], [1.0, 2.0]), ValueError, r"shape \(1,\)"),
         (lambda: CELLS.query([[0.0, 0.0]], [-1.0]), ValueError, r"radius\[0\]"),
         (lambda: CELLS.query([[0.0, 0.0]], "a"), TypeError, "radius"),
