@@ -253,6 +253,23 @@ def test_blocks_and_visits_have_the_order_of_the_pairs(built_for, tilt):
             assert_array_equal(seen, expected)
 
 
+def test_more_pairs_than_memory_holds_are_counted_and_streamed():
+    points = np.random.default_rng(18).random((2000, 3))
+    cells = hs.CellList(points, 1.5, box=[1.0] * 3, memory_limit=5e6)
+    assert next(cells.iter_pairs(max_pairs=10))[0].shape == (10,)
+    assert cells.count_pairs(0.1) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
+    with pytest.raises(MemoryError, match="pairs"):
+        cells.pairs(memory_limit=5e6)
+
+
+def test_candidates_take_the_memory_of_their_ranges_only():
+    # 2e11 pairs would take terabytes.
+    cells = hs.CellList(np.random.default_rng(19).random((1_000_000, 1)), 1000.0, box=[1.0])
+    block = cells.candidates(np.zeros((100, 1)))
+    assert (block.stop - block.start).sum() >= 100 * 1_999 * 1_000_000
+    assert block.offsets[-1] == len(block.start)
+
+
 def test_an_iterator_keeps_its_cells():
     points = random_points(2000, 16)
     cells = hs.CellList(points, 1.0)
