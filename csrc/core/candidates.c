@@ -157,15 +157,19 @@ add_queries(range_list *list)
 {
     const hs_search *search = list->search;
     const hs_bins   *asking = hs_search_asking(search);
+    int64_t unpolled = HS_POLL_POINTS; /* rows of cells: there may be thousands for one query */
     for (int64_t si = 0; si < asking->n; si++) {
         hs_row       row;
         hs_row_group group;
-        if (si % HS_POLL_POINTS == 0 &&
-            hs_poll(&search->options, (double)si / (double)asking->n) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
+        if (unpolled >= HS_POLL_POINTS) {
+            if (hs_poll(&search->options, (double)si / (double)asking->n) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
+            unpolled = 0;
         }
         hs_row_open_at(search, (int32_t)si, &row, &group);
         const int64_t n_links = hs_row_links(search, &row, list->links, list->hints);
+        unpolled += search->stencil.n_rows + 1;
         for (int64_t l = 0; l < n_links; l++) {
             hs_link *link = &list->links[l];
             add_window(list, asking->order[si], link, group.x_first + link->first,
@@ -190,7 +194,7 @@ sum_counts(int64_t n, int64_t *counts, int64_t *offsets)
 }
 
 static hs_status
-find_ranges(hs_pairs *rows, range_list *list)
+find_ranges(hs_pairs *rows, range_list *list, hs_failure *failure)
 {
     const int64_t n = hs_search_asking(list->search)->n;
     int64_t      *offsets = NULL;
@@ -203,6 +207,7 @@ find_ranges(hs_pairs *rows, range_list *list)
     }
     if (status == HS_OK) {
         const int64_t n_ranges = sum_counts(n, list->counts, offsets);
+        failure->search_bytes = (double)n_ranges * 2.0 * sizeof(int64_t);
         status = hs_output_reserve(&rows->output, n_ranges, 0.0);
         rows->output.n_pairs = status == HS_OK ? n_ranges : 0;
     }
@@ -217,7 +222,7 @@ find_ranges(hs_pairs *rows, range_list *list)
 
 /* With an open search: room to work in, and the ranges. */
 static hs_status
-list_ranges(hs_pairs *rows)
+list_ranges(hs_pairs *rows, hs_failure *failure)
 {
     hs_search    *search = &rows->search;
     hs_account   *account = &search->account;
@@ -229,7 +234,7 @@ list_ranges(hs_pairs *rows)
     hs_status status = HS_ERR_MEMORY;
     if (list.links != NULL && list.hints != NULL && list.counts != NULL) {
         memset(list.hints, 0, (size_t)n_links * sizeof *list.hints);
-        status = find_ranges(rows, &list);
+        status = find_ranges(rows, &list, failure);
     }
     hs_free(account, list.counts);
     hs_free(account, list.hints);
@@ -241,11 +246,12 @@ hs_status
 hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
                     hs_pairs **result, hs_failure *failure)
 {
-    const hs_sets sets = hs_cells_sets(cells, queries, true);
-    hs_failure    ignored;
+    hs_sets    sets = hs_cells_sets(cells, queries, true);
+    hs_failure ignored;
     *result = NULL;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
+    sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_pairs *rows = hs_pairs_new();
     if (rows == NULL) {
         return HS_ERR_MEMORY;
@@ -262,7 +268,8 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
         hs_output_init(&search->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8,
                        &rows->output);
         hs_output_init(&search->account, cells->points.ndim, HS_WANT_I, 8, &rows->offsets);
-        status = list_ranges(rows);
+        status = list_ranges(rows, failure);
+        failure->limit_bytes = search->account.limit;
         hs_search_report(search, 0);
         hs_search_close(search);
     } else if (status == HS_STATUS_END) {

@@ -74,7 +74,8 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
         status = keep_points(points, cells, failure);
     }
     if (status == HS_OK) {
-        const hs_sets sets = {.points = &cells->points, .is_kept = true};
+        /* Pairs are for later calls to keep, or only to count. */
+        const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
         search->team = hs_team_create(hs_search_threads(points->n, options));
         status = hs_search_build(&sets, cells->has_box ? &cells->box : NULL, search, failure);
         hs_team_free(search->team);

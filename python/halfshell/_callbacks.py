@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from halfshell._foreign import kind_of, shown, told, whole_number
+
 EXPECTED = "int (int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)"
 
 # The same as kind and bytes; each argument in all the forms that are taken.
@@ -36,6 +38,7 @@ _C_TYPES = {
 }
 
 _PYTHON_CALLS = 4  # ctypes: functions that must be called with Python's lock
+_NATIVE = f"__ctype_{sys.byteorder[0]}e__"  # ctypes: the type as this machine has it
 _MOST_ADDRESS = 2 * sys.maxsize + 1
 
 
@@ -50,7 +53,7 @@ class Target:
 
 def target_of(callback: Any, user_data: Any) -> Target:
     """TypeError for what cannot be called, or would be called with the wrong arguments."""
-    if isinstance(callback, tuple) and type(callback).__name__ == "LowLevelCallable":
+    if isinstance(callback, tuple) and _is_from(callback, "scipy"):
         return _of_low_level(callback, user_data)
     user, keeps = _address_of_data(user_data)
     if _is_from(callback, "numba") and hasattr(callback, "_sig") and hasattr(callback, "address"):
@@ -133,6 +136,10 @@ def _ctypes_name(declared: Any) -> str:
     """As C writes it; sizes count, for c_int64 is another type on each platform."""
     if declared is None:
         return "void"
+    if not issubclass(type(declared), type):  # a converter, not a type
+        return kind_of(declared)
+    if getattr(declared, _NATIVE, declared) is not declared:
+        return f"{declared.__name__} of the other byte order"
     if declared in (ctypes.c_void_p, ctypes.c_char_p):
         return "void*"
     if issubclass(declared, ctypes._Pointer):
@@ -173,9 +180,12 @@ def _address_of_data(user_data: Any) -> tuple[int, object]:
     if user_data is None:
         return 0, None
     if isinstance(user_data, (int, np.integer)) and not isinstance(user_data, bool):
-        if not 0 <= user_data <= _MOST_ADDRESS:
-            raise ValueError(f"user_data must be an address, got {user_data}")
-        return int(user_data), None
+        address = whole_number(user_data, "user_data")
+        if address is None:
+            raise TypeError(f"user_data must be an address, got {kind_of(user_data)}")
+        if not 0 <= address <= _MOST_ADDRESS:
+            raise ValueError(f"user_data must be an address, got {shown(address)}")
+        return address, None
     if isinstance(user_data, (ctypes.c_void_p, ctypes._Pointer, ctypes.c_char_p)):
         return ctypes.cast(user_data, ctypes.c_void_p).value or 0, user_data
     if _is_from(user_data, "_cffi_backend"):
@@ -186,11 +196,13 @@ def _address_of_data(user_data: Any) -> tuple[int, object]:
 def _address_of_buffer(user_data: Any) -> tuple[int, object]:
     try:
         view = memoryview(user_data)
-    except TypeError:
+    except MemoryError:
+        raise
+    except Exception as error:  # arrays of some types refuse, and objects may raise anything
         raise TypeError(
             "user_data must be a ctypes or cffi pointer, an address or a buffer, "
-            f"got {type(user_data).__name__}"
-        ) from None
+            f"got {kind_of(user_data)}: {told(error)}"
+        ) from error
     if not view.c_contiguous:
         raise ValueError("user_data must be contiguous in memory")
     return int(np.asarray(view).ctypes.data), view

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypedDict, cast
+from typing import Any, NamedTuple, Self, TypedDict, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ class CellLayout:
     """Points in cells, as `CellList` documents them."""
 
     __slots__ = (
-        "_cells", "_layout", "_n_points", "_ndim", "_precision", "_threads", "cutoff",
+        "_cells", "_cutoff", "_layout", "_n_points", "_ndim", "_precision", "_threads",
     )
 
     def __init__(
@@ -60,9 +60,9 @@ class CellLayout:
         if type(box) is Box:
             box = box.vectors
         array, vectors, bits = _inputs.scene(points, box, periodic)
-        self.cutoff = _inputs.as_cutoff(cutoff)
+        self._cutoff = _inputs.as_cutoff(cutoff)
         self._cells = _core.cells_build(
-            array, self.cutoff, vectors, bits, True, precision, None, memory_limit, None, threads,
+            array, self._cutoff, vectors, bits, True, precision, None, memory_limit, None, threads,
             _as_cell_size(cell_size),
         )
         self._layout = _core.cells_layout(self._cells)
@@ -79,6 +79,19 @@ class CellLayout:
         cells = len(self.cell_start) - 1
         kind = "cells" if self.cell_ids is None else "occupied cells"
         return f"CellList({self._n_points} points, {cells} {kind}, cutoff {self.cutoff!r})"
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self  # it does not change
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError("a CellList cannot be pickled: pickle its points, and make it again")
+
+    @property
+    def cutoff(self) -> float:
+        return self._cutoff
 
     @property
     def shape(self) -> tuple[int, ...]:

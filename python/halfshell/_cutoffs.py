@@ -24,16 +24,17 @@ def count_within(
 
     points: an array, or cells of the core in place of points and box.
     """
-    if rest[1] == "exact" and len(cutoffs) > 1:
+    if isinstance(rest[1], str) and rest[1] == "exact" and len(cutoffs) > 1:
         edges = np.ascontiguousarray(cutoffs)
         between: npt.NDArray[np.int64] = _core.histogram(
             points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None
         )
         return np.cumsum(between[0, 0])
+    # Without any, all else is checked as ever.
     counts = [
         _core.count_pairs(points, one, box, bits, *rest)
         if queries is None
         else _core.count_between(points, one, box, bits, *rest, queries)
-        for one in cutoffs.tolist()
+        for one in cutoffs.tolist() or [0.0]
     ]
-    return np.array(counts, dtype=np.int64)
+    return np.array(counts[: len(cutoffs)], dtype=np.int64)

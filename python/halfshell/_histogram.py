@@ -12,6 +12,9 @@ from halfshell import _core, _inputs
 from halfshell._box import Box
 from halfshell._options import Search
 
+# The counts of one thread, of two numbers for each bin; their sum; and the result.
+_COPIES = 4
+
 _Column = npt.NDArray[Any] | None
 
 
@@ -124,6 +127,10 @@ def binned(
     marks: Marks,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of points or cells, given as the first arguments of every search."""
+    _inputs.refuse_unavailable(
+        _COPIES * 8 * marks.n_types**2 * len(edges),
+        f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
+    )
     found = _core.histogram(*search, edges, True, queries, *marks)
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])
@@ -142,11 +149,14 @@ def as_sets(
 
 def as_edges(values: npt.ArrayLike) -> _inputs.FloatArray:
     """Two or more limits of bins: finite, not negative, not descending."""
-    array = _inputs.as_real_array(values, "edges").astype(np.float64)
+    array = _inputs.as_real_array(values, "edges")
     if array.ndim != 1 or len(array) < 2:
         raise ValueError(
             f"edges must have shape (bins + 1,), with one bin at least, got {array.shape}"
         )
+    # The array, the one that it is checked with, and the counts.
+    _inputs.refuse_unavailable(_COPIES * 8 * len(array), f"edges of shape {array.shape}")
+    array = array.astype(np.float64)
     for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
         raise ValueError(f"edges must be finite and not negative, got edges[{k}] = {array[k]}")
     for k in np.flatnonzero(array[1:] < array[:-1]):

@@ -136,6 +136,28 @@ def _refuse_masked_items(values: list[Any] | tuple[Any, ...], name: str) -> None
             _unmasked(item, f"{name}[{k}]")
 
 
+def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
+    """One of some words."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name} must be a string, got {kind_of(value)}")
+    if value not in choices:
+        few = len(choices) <= 2
+        words = " or ".join(map(repr, choices)) if few else f"one of {' '.join(choices)}"
+        raise ValueError(f"{name} must be {words}, got {shown(value)}")
+    return value
+
+
+def refuse_unavailable(needed: int, what: str) -> None:
+    """MemoryError before results that would make the machine swap, or fit no address space."""
+    if needed > _SMALL_COPY and needed > _core.available_memory():
+        raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than there is")
+
+
+def gigabytes(n_bytes: int) -> str:
+    """For a message; also for numbers that are no float64."""
+    return f"{n_bytes / 1e9:.3g}" if n_bytes < 2**1000 else "more than 1e+290"
+
+
 def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
     """MemoryError before a copy that would make the machine swap: views may be huge."""
     if needed > _SMALL_COPY and needed > _core.available_memory():
@@ -289,11 +311,12 @@ def as_flag(value: Any, name: str) -> bool:
 
 def as_count(value: Any, name: str) -> int:
     """A whole number from 1 on."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name} must be a whole number, got {value!r}")
-    if value < 1:
-        raise ValueError(f"{name} must be 1 or more, got {value}")
-    return int(value)
+    number = exact_number(value)
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise TypeError(f"{name} must be a whole number, got {shown(value)}")
+    if number < 1:
+        raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
+    return number
 
 
 def as_index_bytes(index_dtype: Any) -> int:

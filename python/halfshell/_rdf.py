@@ -13,6 +13,8 @@ import numpy.typing as npt
 from halfshell import _core, _histogram, _inputs
 from halfshell._options import Search
 
+_COLUMNS = 10
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -27,7 +29,8 @@ class RadialDistribution:
         The middle of each bin, in the unit of the points.
     g : ndarray of float64, shape (bins,) or (t, t, bins)
         g(r): 1 on average where points ignore each other. NaN where there is nothing to divide by:
-        without points, or without points of a type.
+        without points, or without points of a type, or where a shell is so small a part of the box
+        that float64 does not hold it (there infinite if it has pairs).
     counts : ndarray of int64, the shape of `g`
         Pairs in each bin, as `pair_histogram` counts them.
     edges : ndarray of float64, shape (bins + 1,)
@@ -169,48 +172,52 @@ def rdf(
     """
     edges = _edges(r_max, bins)
     asking, array, vectors, bits = _histogram.as_sets(queries, points, box, periodic)
-    volume = _volume(vectors, bits, array.shape[1])
+    shares = _shares(vectors, bits, edges)
     search: Search = (
         array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
     )
     marks = _histogram.as_marks(len(array), asking, types, query_types)
     counts = _histogram.binned(search, edges, asking, marks)
-    ideal = _partners(len(array), asking, marks) * (_shells(edges, array.shape[1]) / volume)
-    with np.errstate(invalid="ignore"):
-        g = counts / ideal
+    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+        g = counts / (_partners(len(array), asking, marks) * shares)
     middle = 0.5 * (edges[1:] + edges[:-1])
     return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
 
 
 def _edges(r_max: Any, bins: Any) -> _inputs.FloatArray:
-    if isinstance(bins, (bool, np.bool_)) or not isinstance(bins, (int, np.integer)):
-        raise TypeError(f"bins must be a whole number, got {type(bins).__name__}")
-    if bins < 1:
-        raise ValueError(f"bins must be at least 1, got {bins}")
+    n_bins = _inputs.as_count(bins, "bins")
     array = _inputs.as_real_array(r_max, "r_max", "be a number")
     if array.ndim != 0:
         raise TypeError(f"r_max must be a number, got shape {array.shape}")
     if not (np.isfinite(array) and array > 0.0):
         raise ValueError(f"r_max must be finite and greater than 0, got {float(array)}")
-    return np.linspace(0.0, float(array), int(bins) + 1)
+    # Of float64: edges, what numpy needs to make them, r, g and the shells.
+    _inputs.refuse_unavailable(_COLUMNS * 8 * n_bins, "r, g and counts for so many bins")
+    return np.linspace(0.0, float(array), n_bins + 1)
 
 
-def _volume(vectors: _inputs.FloatArray | None, bits: int, ndim: int) -> float:
-    if vectors is None or bits != (1 << ndim) - 1:
+def _shares(
+    vectors: _inputs.FloatArray | None, bits: int, edges: _inputs.FloatArray
+) -> _inputs.FloatArray:
+    """The part of the box that lies between two spheres, for each bin.
+
+    In a unit of about the size of the box, a power of two: volumes of boxes in other units may be
+    too large or too small for a float64.
+    """
+    if vectors is None or bits != (1 << len(vectors)) - 1:
         raise ValueError(
             "rdf needs a box that repeats along every axis, for the density of the points; "
             "pair_histogram counts without one"
         )
-    return _core.box_measure(vectors, bits)[1]
-
-
-def _shells(edges: _inputs.FloatArray, ndim: int) -> _inputs.FloatArray:
-    """What lies between two spheres, for each bin."""
+    power = -int(np.frexp(np.abs(vectors).max())[1])
+    volume: float = _core.box_measure(np.ldexp(vectors, power), bits)[1]
+    ndim = len(vectors)
     unit_ball = 2.0 if ndim % 2 else 1.0
     for k in range(2 + ndim % 2, ndim + 1, 2):
         unit_ball *= 2.0 * math.pi / k
-    shells: _inputs.FloatArray = unit_ball * np.diff(edges**ndim)
-    return shells
+    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+        shells: _inputs.FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
+        return unit_ball * shells / volume
 
 
 def _partners(

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _table_forms
+from halfshell import _inputs, _table_forms
 from halfshell._table_rows import Array, Row, TableRows
 
 
@@ -130,7 +130,7 @@ class NeighborTable(TableRows):
         AttributeError
             If the table has no distances.
         ValueError
-            If `by` is something else.
+            If `by` is another word.
 
         Examples
         --------
@@ -139,8 +139,7 @@ class NeighborTable(TableRows):
         >>> table[2][0].tolist(), table.sort(by="distance")[2][0].tolist()
         ([0, 1], [1, 0])
         """
-        if by != "distance":
-            raise ValueError(f"by must be 'distance', got {by!r}")
+        _inputs.as_choice(by, "by", ("distance",))
         # A stable sort keeps (j, S) ascending where distances are equal.
         order = _table_forms.order_by_distance(self.offsets, self.distances)
         return self._with(self.offsets, order, self._is_complete, False)
@@ -184,6 +183,7 @@ class NeighborTable(TableRows):
         ([0, 1], [1, 2])
         """
         _table_forms.check_letters(quantities)
+        half = _inputs.as_flag(half, "half")
         rows = self._row_numbers()
         columns = {"i": rows}
         if "P" in quantities:
@@ -226,8 +226,7 @@ class NeighborTable(TableRows):
         >>> table.to_scipy().toarray().tolist()
         [[0.0, 1.0, 0.0], [1.0, 0.0, 2.0], [0.0, 2.0, 0.0]]
         """
-        if duplicates not in ("raise", "min"):
-            raise ValueError(f"duplicates must be 'raise' or 'min', got {duplicates!r}")
+        _inputs.as_choice(duplicates, "duplicates", ("raise", "min"))
         indices, distances = self.indices, self.distances
         if not self._is_in_order:
             order = _table_forms.order_by_neighbor(self.offsets, indices)
@@ -277,8 +276,7 @@ class NeighborTable(TableRows):
         ...     print(error.needed)
         2
         """
-        if quantity not in ("j", "d", "D", "S"):
-            raise ValueError(f"quantity must be one of j d D S, got {quantity!r}")
+        _inputs.as_choice(quantity, "quantity", ("j", "d", "D", "S"))
         return _table_forms.padded(self.offsets, self._column(quantity), capacity, fill)
 
     def edge_index(self) -> Array:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import importlib
-import operator
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from halfshell import _inputs
 from halfshell._errors import CapacityError
+from halfshell._foreign import kind_of, shown, whole_number
 
 Array = npt.NDArray[Any]
 Positions = npt.NDArray[np.int64]
@@ -74,18 +75,21 @@ def padded(offsets: Array, column: Array, capacity: Any, fill: Any) -> Array:
             needed,
         )
     shape = (len(counts), length, *column.shape[1:])
+    # And a bool for each entry.
+    n_rows = max(len(counts), 1)
+    needed_bytes = n_rows * math.prod(shape[1:]) * column.dtype.itemsize + n_rows * length
+    _inputs.refuse_unavailable(needed_bytes, f"rows padded to a capacity of {shown(length)}")
     array = np.full(shape, _as_fill(fill, column.dtype), column.dtype)
     array[np.arange(length) < counts[:, None]] = column
     return array
 
 
 def _as_capacity(value: Any) -> int:
-    try:
-        capacity = operator.index(value)
-    except TypeError:
-        raise TypeError(f"capacity must be a whole number, got {type(value).__name__}") from None
+    capacity = whole_number(value, "capacity")
+    if capacity is None or isinstance(capacity, bool):
+        raise TypeError(f"capacity must be a whole number, got {kind_of(value)}")
     if capacity < 0:
-        raise ValueError(f"capacity must not be negative, got {capacity}")
+        raise ValueError(f"capacity must not be negative, got {shown(capacity)}")
     return capacity
 
 

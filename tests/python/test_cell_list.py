@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`CellList` answers as the functions do, for any cutoff and any queries, and shows its layout."""
 
+import copy
 import gc
+import pickle
 import threading
 import weakref
 
@@ -287,6 +289,61 @@ def test_a_list_can_be_collected():
     del owner
     gc.collect()
     assert gone() is None
+
+
+@pytest.mark.parametrize("built_for", [0.5, 1.0, 1.01, 2.0])
+@pytest.mark.parametrize("tilt", [None, 0.0, 0.3])
+def test_blocks_and_visits_have_the_order_of_the_pairs(built_for, tilt):
+    for n, cutoff in ((20, 0.45), (1000, 0.3), (20000, 0.1)):
+        points = np.random.default_rng(n).random((n, 3))
+        box = None if tilt is None else np.eye(3) + tilt * np.eye(3, k=-1)
+        cells = hs.CellList(points, built_for * cutoff, box=box)
+        expected = cells.pairs(cutoff, quantities="P")
+        blocks = list(cells.iter_pairs(cutoff, quantities="P", max_pairs=1000))
+        assert_array_equal(np.concatenate(blocks), expected)
+        if n < 20000:
+            seen = []
+            cells.for_each_pair(lambda i, j, *_: seen.append((i, j)), cutoff)  # noqa: B023
+            assert_array_equal(seen, expected)
+
+
+def test_more_pairs_than_memory_holds_are_counted_and_streamed():
+    points = np.random.default_rng(18).random((2000, 3))
+    cells = hs.CellList(points, 1.5, box=[1.0] * 3, memory_limit=5e6)
+    assert next(cells.iter_pairs(max_pairs=10))[0].shape == (10,)
+    assert cells.count_pairs(0.1) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
+    with pytest.raises(MemoryError, match="pairs"):
+        cells.pairs(memory_limit=5e6)
+
+
+def test_candidates_take_the_memory_of_their_ranges_only():
+    # 2e11 pairs would take terabytes.
+    cells = hs.CellList(np.random.default_rng(19).random((1_000_000, 1)), 1000.0, box=[1.0])
+    block = cells.candidates(np.zeros((100, 1)))
+    assert (block.stop - block.start).sum() >= 100 * 1_999 * 1_000_000
+    assert block.offsets[-1] == len(block.start)
+
+
+def test_an_iterator_keeps_its_cells():
+    points = random_points(2000, 16)
+    cells = hs.CellList(points, 1.0)
+    expected = cells.pairs(quantities="P")
+    blocks = cells.iter_pairs(quantities="P", max_pairs=100)
+    abandoned = cells.iter_pairs(max_pairs=100)
+    next(abandoned)
+    del cells, abandoned
+    gc.collect()
+    assert_array_equal(np.concatenate(list(blocks)), expected)
+    blocks.close()
+
+
+def test_a_list_does_not_change():
+    cells = hs.CellList(random_points(10, 17), 1.0)
+    with pytest.raises(AttributeError):
+        cells.cutoff = 2.0
+    assert copy.copy(cells) is cells and copy.deepcopy([cells])[0] is cells
+    with pytest.raises(TypeError, match="a CellList cannot be pickled"):
+        pickle.dumps(cells)
 
 
 CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 1.0)

@@ -69,3 +69,19 @@ def test_count_of_a_large_scene_by_every_precision(rng):
         rounded = hs.count_pairs(points, cutoff, box=box, precision=precision)
         assert abs(rounded - exact) <= 1e-5 * exact
     assert exact == len(hs.pairs(points, cutoff, box=box, quantities="i"))
+
+
+@pytest.mark.parametrize("odd", [np.zeros(2), np.zeros(0), np.zeros(2, "V3"), 5, b"exact"])
+def test_precision_may_be_anything(odd):
+    with pytest.raises(TypeError, match="precision"):
+        hs.count_pairs([[0.0], [1.0]], [0.5, 1.0], precision=odd)
+
+
+def test_without_cutoffs_all_else_is_checked():
+    assert hs.count_pairs([[0.0], [1.0]], []).tolist() == []
+    with pytest.raises(ValueError, match=r"points\[0, 0\]"):
+        hs.count_pairs([[np.nan]], [])
+    with pytest.raises(ValueError, match="kernel"):
+        hs.count_pairs([[0.0]], [], kernel="none")
+    with pytest.raises(ValueError, match="queries"):
+        hs.count_pairs([[0.0]], [], queries=[[np.inf]])

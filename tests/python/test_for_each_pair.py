@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import sys
 import threading
 
 import numpy as np
@@ -382,3 +383,35 @@ print(json.dumps(outcomes))
     for outcome, delay in outcomes:
         assert outcome == "interrupted"
         assert delay < 1.0
+
+
+@pytest.mark.parametrize(
+    "types",
+    [
+        (lambda value: value, I64),
+        (ctypes.c_int, I64.__ctype_le__ if sys.byteorder == "big" else I64.__ctype_be__),
+        (ctypes.c_int, object()),
+        (ctypes.c_int, np.ctypeslib.ndpointer(np.int64)),
+    ],
+    ids=["result is converted", "byte order", "no type", "ndpointer"],
+)
+def test_odd_types_of_ctypes_are_refused(types):
+    class Function:
+        def from_param(self, value):
+            return value
+
+    function = ctypes.CDLL(None).abs if sys.platform != "win32" else ctypes.cdll.msvcrt.abs
+    restype, first = types
+    function.restype = restype
+    first = Function() if type(first) is object else first
+    function.argtypes = [first, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p]
+    with pytest.raises(TypeError, match="callback must have the C signature"):
+        hs.for_each_pair(POINTS, 0.1, function)
+
+
+@pytest.mark.parametrize(
+    "data", [np.timedelta64(1, "s"), np.zeros(2, "M8[s]"), True, 1.5, "text", [1]], ids=str
+)
+def test_other_data_are_refused(data):
+    with pytest.raises(TypeError, match="user_data"):
+        hs.for_each_pair(POINTS, 0.1, SIGNATURE(lambda *_: 0), data)

@@ -282,3 +282,14 @@ BAD_MARKS = {
 def test_bad_types_and_weights_are_refused(marks, error, text):
     with pytest.raises(error, match=text):
         hs.pair_histogram([[0.0], [1.0]], [0.0, 1.0], **marks)
+
+
+def test_results_beyond_memory_are_refused_at_once():
+    points = np.zeros((2, 1))
+    for last in (10**5, 2**31 - 2):
+        with pytest.raises(MemoryError, match="types"):
+            hs.pair_histogram(points, [0.0, 1.0], types=[0, last])
+    with pytest.raises(MemoryError, match="edges"):
+        hs.pair_histogram(points, np.broadcast_to(1.0, 2**40))
+    with pytest.raises(ValueError, match="edges must have shape"):  # before it is copied
+        hs.pair_histogram(points, np.broadcast_to(1.0, (2**30, 2**10)))

@@ -123,3 +123,21 @@ def test_without_matplotlib_an_error_names_the_extra(monkeypatch):
     result = hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0])
     with pytest.raises(ImportError, match=r"halfshell\[cli\]"):
         result.plot()
+
+
+@pytest.mark.parametrize("bins", [2**40, 2**63, 10**400])
+def test_bins_beyond_memory_are_refused_at_once(bins):
+    with pytest.raises(MemoryError, match="so many bins"):
+        hs.rdf([[0.0]], 1.0, bins, box=[2.0])
+
+
+@pytest.mark.parametrize("power", [-600, -300, 300, 600])
+@pytest.mark.filterwarnings("error")
+def test_the_unit_of_length_changes_nothing(power):
+    points, box = np.random.default_rng(1).random((50, 3)), np.eye(3) + 0.3 * np.eye(3, k=1)
+    plain = hs.rdf(points, 0.7, 9, box=box)
+    scaled = hs.rdf(
+        np.ldexp(points, power), math.ldexp(0.7, power), 9, box=np.ldexp(box, power)
+    )
+    assert scaled.g.tobytes() == plain.g.tobytes()
+    assert scaled.counts.tobytes() == plain.counts.tobytes()

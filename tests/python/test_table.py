@@ -3,6 +3,7 @@
 import copy
 import itertools
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -422,3 +423,25 @@ def test_reverse_refuses_what_has_none(table):
         lambda: hs.neighbors(POINTS, 1.0, quantities="d").reverse(), AttributeError, "'j'"
     )
     assert hs.neighbors(np.empty((0, 2)), 1.0).reverse().shape == (0,)
+
+
+def test_words_and_flags_may_be_anything(table):
+    class Hostile:
+        def __eq__(self, other):
+            raise RuntimeError("never asked")
+
+        __bool__ = __repr__ = __hash__ = __eq__
+
+    for odd in (Hostile(), np.zeros(3), np.zeros(0), np.zeros(3, "V2"), None, 5):
+        assert_refused(partial(table.to_scipy, odd), TypeError, "duplicates")
+        assert_refused(partial(table.sort, odd), TypeError, "by")
+        assert_refused(partial(table.to_padded, quantity=odd), TypeError, "quantity")
+        assert_refused(partial(table.to_pairs, half=odd), TypeError, "half")
+
+
+@pytest.mark.parametrize("n", [0, 7])
+def test_rows_longer_than_memory_are_refused(n):
+    table = hs.neighbors(np.arange(float(n)).reshape(n, 1), 1.0)
+    for capacity in (2**40, 2**62, 2**63, 10**400):
+        assert_refused(partial(table.to_padded, capacity), MemoryError, "capacity")
+    assert_refused(partial(table.to_padded, True), TypeError, "capacity")
