@@ -8,8 +8,10 @@
 
 #include <string.h>
 
-#define AHEAD         32   /* points, about two groups, between asking for a row and writing it */
-#define MOST_EXPECTED 2048 /* bytes of it */
+#define AHEAD         32   /* points between asking for a row and writing it; twice that for where
+                            * it is */
+#define MOST_EXPECTED 2048 /* bytes of a row that are asked for */
+#define NO_POINT      INT32_MAX /* more than any point's number */
 #define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
 /* A hs_visit_fn; each point belongs to one thread. */
@@ -61,68 +63,73 @@ typedef struct filler {
     const hs_table *table;
     hs_output       part;     /* owned; measures of the hits of one visit */
     hs_recorder     recorder; /* owned; of the part */
-    int32_t        *numbers;  /* owned; of the hits of one point */
+    int32_t        *numbers;  /* owned; of the hits of one point, where hits are places */
 } filler;
 
-/* Entries [at, at + n) of the table, a row or a part of it. */
-typedef struct stretch {
-    int64_t        at;
+/* The row of one point. */
+typedef struct row {
+    int64_t        at;      /* entries [at, at + n) of the table */
     int32_t        n;
     int32_t        point;
-    int32_t        hit;     /* the first one, among those of the visit */
-    const int32_t *numbers; /* of the hits, from that one on */
-} stretch;
+    int32_t        itself;  /* what is left out once: the point's number, or NO_POINT */
+    const int32_t *numbers; /* of the hits, ascending; n + 1 may be read */
+} row;
 
-/* numbers[0 ... n - 1], or where that is NULL n times `same`, to every `step`-th entry from `at`
- * on. */
+/* Every `step`-th entry of a column from `at` on: the row's numbers, or n times the point. What
+ * follows the point itself moves up by one. */
 HS_ALWAYS_INLINE void
-put_numbers(void *column, int index_bytes, int64_t at, const int32_t *numbers, int32_t same,
-            int32_t n, const int step)
+put_numbers(void *column, int index_bytes, int64_t at, const row *of, const bool is_j,
+            const int step)
 {
-    int64_t *wide = (int64_t *)column + at;
-    int32_t *narrow = (int32_t *)column + at;
+    const int32_t *HS_RESTRICT numbers = of->numbers;
+    const int32_t              n = of->n, point = of->point, itself = of->itself;
     if (index_bytes == 8) {
-        for (int64_t h = 0; h < n; h++) {
-            wide[h * step] = numbers != NULL ? numbers[h] : same;
+        int64_t *HS_RESTRICT wide = (int64_t *)column + at;
+        for (int32_t h = 0; h < n; h++) {
+            wide[h * (int64_t)step] = !is_j                 ? point
+                                      : numbers[h] < itself ? numbers[h]
+                                                            : numbers[h + 1];
         }
     } else {
-        for (int64_t h = 0; h < n; h++) {
-            narrow[h * step] = numbers != NULL ? numbers[h] : same;
+        int32_t *HS_RESTRICT narrow = (int32_t *)column + at;
+        for (int32_t h = 0; h < n; h++) {
+            narrow[h * (int64_t)step] = !is_j                 ? point
+                                        : numbers[h] < itself ? numbers[h]
+                                                              : numbers[h + 1];
         }
     }
 }
 
 /* i, j, or both side by side. */
 static void
-put_ends(const hs_output *entries, const stretch *part)
+put_ends(const hs_output *entries, const row *of)
 {
     void     *i = hs_output_column(entries, HS_WANT_I), *j = hs_output_column(entries, HS_WANT_J);
     void     *both = hs_output_column(entries, HS_WANT_BOTH);
     const int bytes = entries->index_bytes;
     if (i != NULL) {
-        put_numbers(i, bytes, part->at, NULL, part->point, part->n, 1);
+        put_numbers(i, bytes, of->at, of, false, 1);
     }
     if (j != NULL) {
-        put_numbers(j, bytes, part->at, part->numbers, 0, part->n, 1);
+        put_numbers(j, bytes, of->at, of, true, 1);
     }
     if (both != NULL) {
-        put_numbers(both, bytes, 2 * part->at, NULL, part->point, part->n, 2);
-        put_numbers(both, bytes, 2 * part->at + 1, part->numbers, 0, part->n, 2);
+        put_numbers(both, bytes, 2 * of->at, of, false, 2);
+        put_numbers(both, bytes, 2 * of->at + 1, of, true, 2);
     }
 }
 
+/* Measures of hits [hit, hit + n) of the visit, as entries from `at` on. */
 static void
-put_stretch(const filler *fill, const stretch *part)
+put_measures(const filler *fill, int64_t at, int32_t hit, int32_t n)
 {
     const hs_output *entries = fill->table->entries;
-    put_ends(entries, part);
     for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT; bit <<= 1) {
         char *to = hs_output_column(entries, bit);
         if (to != NULL) {
             const size_t width = hs_output_width(entries, bit);
             const char  *from = hs_output_column(&fill->part, bit);
-            memcpy(to + (size_t)part->at * width, from + (size_t)part->hit * width,
-                   (size_t)part->n * width);
+            memcpy(to + (size_t)at * width, from + (size_t)hit * width, (size_t)n * width);
         }
     }
 }
@@ -147,23 +154,6 @@ own_place(const hs_walker *walker)
     return -1;
 }
 
-/* The row of one point, which has n hits from number `hit` of the visit on; the one at `own` is the
- * point itself, unless there is none. */
-static void
-put_row(const filler *fill, int32_t point, int32_t hit, int32_t n, int32_t own)
-{
-    stretch part = {.at = fill->table->offsets[point], .n = own, .point = point, .hit = hit};
-    part.numbers = fill->numbers;
-    put_stretch(fill, &part);
-    if (own < n) {
-        part.at += own;
-        part.n = n - own - 1;
-        part.hit += own + 1;
-        part.numbers += own + 1;
-        put_stretch(fill, &part);
-    }
-}
-
 /* Measures of all hits of a visit, as the part. */
 static hs_status
 fill_part(filler *fill, hs_walker *walker, int32_t first, const hs_hits *hits)
@@ -173,53 +163,61 @@ fill_part(filler *fill, hs_walker *walker, int32_t first, const hs_hits *hits)
     return status == HS_OK ? hs_put_measures(&fill->recorder, walker, first, hits) : status;
 }
 
-/* Which of n ascending numbers is the first that is not below this one, or n. */
+/* How many of n numbers are below this one. Not by halving, though they ascend: its branches cost
+ * more than looking at all the numbers of a row, which are to be copied anyway. */
 static int32_t
-find_number(const int32_t *numbers, int32_t n, int32_t number)
+count_below(const int32_t *numbers, int32_t n, int32_t number)
 {
-    int32_t low = 0;
-    for (int32_t left = n; left > 0; left /= 2) {
-        const int32_t middle = low + left / 2;
-        if (numbers[middle] < number) {
-            low = middle + 1;
-            left--;
-        }
+    int32_t below = 0;
+    for (int32_t h = 0; h < n; h++) {
+        below += numbers[h] < number;
     }
-    return low;
+    return below;
 }
 
-/* The numbers of a point's hits; returns which of these is the point itself, or n. own: its place,
- * if hits are places. */
+/* Which of a point's hits is the point itself, or n. place: its own. */
 static int32_t
-find_numbers(filler *fill, const hs_walker *walker, const int32_t *hits, int32_t n, int32_t point,
-             int32_t own)
+find_self(const filler *fill, const hs_walker *walker, const int32_t *hits, int32_t n,
+          int32_t point, int32_t place)
 {
-    const bool has_self = !walker->search->has_queries;
-    int32_t   *numbers = fill->numbers;
-    if (walker->use == HS_BLOCK_LISTS_IDS) {
-        memcpy(numbers, hits, (size_t)n * sizeof *hits);
-        return has_self ? find_number(numbers, n, point) : n;
-    }
-    for (int32_t h = 0; h < n; h++) {
-        numbers[h] = walker->block.id[hits[h]];
-    }
-    int32_t self = has_self ? find_number(numbers, n, point) : n;
-    while (self < n && hits[self] != own) { /* images of the point come before it */
+    int32_t self = walker->search->has_queries ? n : count_below(fill->numbers, n, point);
+    while (self < n && hits[self] != place) { /* images of the point come before it */
         self++;
     }
     return self;
 }
 
-/* Rows lie anywhere in the result: asks for the memory of one that is soon to be written. */
-HS_ALWAYS_INLINE void
-expect_row(const hs_table *table, int64_t si)
+/* The row of a point whose n hits, from number `hit` of the visit on, are places. */
+static void
+put_places(const filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t hit,
+           int32_t n, int32_t place, row *of)
 {
-    const hs_bins   *asking = hs_search_asking(table->search);
-    const hs_output *entries = table->entries;
-    const size_t     width = hs_output_width(entries, HS_WANT_J);
-    const char      *j = hs_output_column(entries, HS_WANT_J);
-    if (j != NULL && si < asking->n) {
-        const int64_t *row = table->offsets + asking->order[si];
+    const int32_t *places = hits->label + hit;
+    for (int32_t h = 0; h < n; h++) {
+        fill->numbers[h] = walker->block.id[places[h]];
+    }
+    const int32_t self = find_self(fill, walker, places, n, of->point, place);
+    of->numbers = fill->numbers;
+    put_ends(fill->table->entries, of);
+    put_measures(fill, of->at, hit, self);
+    if (self < n) {
+        put_measures(fill, of->at + self, hit + self + 1, n - self - 1);
+    }
+}
+
+/* Rows lie anywhere in the result: asks for the memory of one that is soon to be written, and for
+ * where another one will be. */
+HS_ALWAYS_INLINE void
+expect_rows(const filler *fill, const hs_bins *asking, int64_t si)
+{
+    const int64_t *offsets = fill->table->offsets;
+    char          *j = hs_output_column(fill->table->entries, HS_WANT_J);
+    if (si + 2 * AHEAD < asking->n) {
+        HS_PREFETCH(offsets + asking->order[si + 2 * AHEAD]);
+    }
+    if (j != NULL && si + AHEAD < asking->n) {
+        const size_t   width = (size_t)fill->table->entries->index_bytes;
+        const int64_t *row = offsets + asking->order[si + AHEAD];
         const char    *end = j + (size_t)row[1] * width;
         const char    *most = j + (size_t)row[0] * width + MOST_EXPECTED;
         for (j += (size_t)row[0] * width; j < end && j < most; j += HS_ALIGNMENT) {
@@ -232,9 +230,11 @@ expect_row(const hs_table *table, int64_t si)
 static hs_status
 fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
-    filler       *fill = context;
-    const bool    by_place = walker->use == HS_BLOCK_LISTS_PLACES;
-    const int32_t own = by_place && !walker->search->has_queries ? own_place(walker) : 0;
+    filler        *fill = context;
+    const bool     by_place = walker->use == HS_BLOCK_LISTS_PLACES;
+    const bool     has_self = !walker->search->has_queries;
+    const hs_bins *asking = hs_search_asking(walker->search);
+    const int32_t  own = by_place && has_self ? own_place(walker) : 0;
     if (by_place) {
         const hs_status status = fill_part(fill, walker, first, hits);
         if (status != HS_OK) {
@@ -243,10 +243,16 @@ fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
     }
     for (int32_t t = 0, hit = 0; t < hits->n; t++) {
         const int32_t point = hits->point[t], n = hits->end[t] - hit;
-        const int32_t place = own + first + t - walker->group.first;
-        expect_row(fill->table, (int64_t)first + t + AHEAD);
-        put_row(fill, point, hit, n,
-                find_numbers(fill, walker, hits->label + hit, n, point, place));
+        row           of = {.at = fill->table->offsets[point], .point = point};
+        of.n = n - (has_self && n > 0);
+        of.itself = has_self ? point : NO_POINT;
+        of.numbers = hits->label + hit;
+        expect_rows(fill, asking, (int64_t)first + t);
+        if (by_place) {
+            put_places(fill, walker, hits, hit, n, own + first + t - walker->group.first, &of);
+        } else {
+            put_ends(fill->table->entries, &of);
+        }
         hit = hits->end[t];
     }
     return HS_OK;
