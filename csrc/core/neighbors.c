@@ -136,7 +136,7 @@ count_with(const hs_sets *sets, const hs_box *box, const hs_options *options, co
 static hs_status
 count_rows(hs_search *search, int64_t *counts, hs_failure *failure)
 {
-    return hs_table_count(search, counts, NULL, failure);
+    return hs_table_count(search, counts, failure);
 }
 
 hs_status

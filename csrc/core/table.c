@@ -29,17 +29,29 @@ count_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 }
 
 hs_status
-hs_table_count(hs_search *search, int64_t *counts, hs_neighbourhood *most, hs_failure *failure)
+hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 {
     const int64_t     n = hs_search_asking(search)->n;
     const hs_visitors visitors = {
-        .use = HS_BLOCK_LISTS_IDS, .visit = count_hits, .contexts = counts};
+        .use = HS_BLOCK_COUNTS, .visit = count_hits, .contexts = counts};
     memset(counts, 0, (size_t)n * sizeof *counts);
-    const hs_status status = hs_parallel_visit(search, &visitors, most, failure);
+    const hs_status status = hs_parallel_visit(search, &visitors, NULL, failure);
     for (int64_t i = 0; !search->has_queries && i < n; i++) {
         counts[i] -= counts[i] > 0; /* the point itself; none at all below a cutoff of zero */
     }
     return status;
+}
+
+/* The largest neighbourhood; in a small scene the largest that there could be, which is small. */
+static hs_status
+find_most(hs_table *table, hs_failure *failure)
+{
+    const hs_visitors sizes = {.use = HS_BLOCK_SIZES, .contexts = table};
+    const int32_t     capacity = hs_walker_capacity(table->search);
+    table->most = (hs_neighbourhood){.candidates = capacity, .runs = capacity};
+    return capacity < HS_BLOCK_CANDIDATES
+               ? HS_OK
+               : hs_parallel_visit(table->search, &sizes, &table->most, failure);
 }
 
 hs_status
@@ -47,7 +59,7 @@ hs_table_measure(hs_table *table, hs_failure *failure)
 {
     const int64_t   n = hs_search_asking(table->search)->n;
     int64_t        *offsets = table->offsets;
-    const hs_status status = hs_table_count(table->search, offsets, &table->most, failure);
+    hs_status       status = hs_table_count(table->search, offsets, failure);
     int64_t         sum = 0;
     for (int64_t i = 0; i < n; i++) {
         const int64_t count = offsets[i];
@@ -55,7 +67,7 @@ hs_table_measure(hs_table *table, hs_failure *failure)
         sum += count;
     }
     offsets[n] = sum;
-    return status;
+    return status == HS_OK ? find_most(table, failure) : status;
 }
 
 /* What one thread fills rows with. */
@@ -67,18 +79,18 @@ typedef struct filler {
 } filler;
 
 /* The row of one point. */
-typedef struct row {
+typedef struct table_row {
     int64_t        at;      /* entries [at, at + n) of the table */
     int32_t        n;
     int32_t        point;
     int32_t        itself;  /* what is left out once: the point's number, or NO_POINT */
     const int32_t *numbers; /* of the hits, ascending; n + 1 may be read */
-} row;
+} table_row;
 
 /* Every `step`-th entry of a column from `at` on: the row's numbers, or n times the point. What
  * follows the point itself moves up by one. */
 HS_ALWAYS_INLINE void
-put_numbers(void *column, int index_bytes, int64_t at, const row *of, const bool is_j,
+put_numbers(void *column, int index_bytes, int64_t at, const table_row *of, const bool is_j,
             const int step)
 {
     const int32_t *HS_RESTRICT numbers = of->numbers;
@@ -102,7 +114,7 @@ put_numbers(void *column, int index_bytes, int64_t at, const row *of, const bool
 
 /* i, j, or both side by side. */
 static void
-put_ends(const hs_output *entries, const row *of)
+put_ends(const hs_output *entries, const table_row *of)
 {
     void     *i = hs_output_column(entries, HS_WANT_I), *j = hs_output_column(entries, HS_WANT_J);
     void     *both = hs_output_column(entries, HS_WANT_BOTH);
@@ -190,7 +202,7 @@ find_self(const filler *fill, const hs_walker *walker, const int32_t *hits, int3
 /* The row of a point whose n hits, from number `hit` of the visit on, are places. */
 static void
 put_places(const filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t hit,
-           int32_t n, int32_t place, row *of)
+           int32_t n, int32_t place, table_row *of)
 {
     const int32_t *places = hits->label + hit;
     for (int32_t h = 0; h < n; h++) {
@@ -217,10 +229,10 @@ expect_rows(const filler *fill, const hs_bins *asking, int64_t si)
     }
     if (j != NULL && si + AHEAD < asking->n) {
         const size_t   width = (size_t)fill->table->entries->index_bytes;
-        const int64_t *row = offsets + asking->order[si + AHEAD];
-        const char    *end = j + (size_t)row[1] * width;
-        const char    *most = j + (size_t)row[0] * width + MOST_EXPECTED;
-        for (j += (size_t)row[0] * width; j < end && j < most; j += HS_ALIGNMENT) {
+        const int64_t *place = offsets + asking->order[si + AHEAD];
+        const char    *end = j + (size_t)place[1] * width;
+        const char    *most = j + (size_t)place[0] * width + MOST_EXPECTED;
+        for (j += (size_t)place[0] * width; j < end && j < most; j += HS_ALIGNMENT) {
             HS_PREFETCH_WRITE(j);
         }
     }
@@ -243,7 +255,7 @@ fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
     }
     for (int32_t t = 0, hit = 0; t < hits->n; t++) {
         const int32_t point = hits->point[t], n = hits->end[t] - hit;
-        row           of = {.at = fill->table->offsets[point], .point = point};
+        table_row     of = {.at = fill->table->offsets[point], .point = point};
         of.n = n - (has_self && n > 0);
         of.itself = has_self ? point : NO_POINT;
         of.numbers = hits->label + hit;

@@ -16,15 +16,14 @@ typedef struct hs_table {
     hs_search       *search;  /* borrowed */
     int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
     hs_output       *entries; /* borrowed; columns for what is wanted */
-    hs_neighbourhood most;    /* set by hs_table_count */
+    hs_neighbourhood most;    /* set by hs_table_measure */
 } hs_table;
 
 /* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE
  * sets failure->row. */
-hs_status hs_table_count(hs_search *search, int64_t *counts, hs_neighbourhood *most,
-                         hs_failure *failure);
+hs_status hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure);
 
-/* Fills offsets. */
+/* Fills offsets, and finds the largest neighbourhood. */
 hs_status hs_table_measure(hs_table *table, hs_failure *failure);
 
 /* Then the entries, which have room for offsets[rows]. */

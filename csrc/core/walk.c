@@ -67,14 +67,14 @@ static hs_status
 visit_group(hs_walker *walker, const hs_row_group *group)
 {
     const hs_search *search = walker->search;
-    walker->n_groups++;
+    walker->n_groups += walker->use != HS_BLOCK_SIZES;
     walker->blocks = 0;
     walker->block.n = 0;
     walker->block.n_runs = 0;
     walker->block_is_first = !search->is_full;
     walker->of_group = (hs_neighbourhood){0, 0};
     hs_group_start(hs_search_asking(search), group->first, group->last, &walker->group);
-    if (search->is_full || walker->blocks_to_skip > 0) {
+    if ((search->is_full || walker->blocks_to_skip > 0) && walker->use != HS_BLOCK_SIZES) {
         hs_group_load(hs_search_asking(search), &walker->group);
     }
     for (int64_t l = 0; l < walker->n_links; l++) {
@@ -111,7 +111,7 @@ open_row(hs_walker *walker, int64_t number)
     walker->has_next = walker->row.first < walker->row.end;
     if (walker->has_next) {
         set_links(walker, &walker->row);
-        walker->has_next = hs_row_next(walker->search, &walker->row, &walker->next);
+        walker->has_next = hs_row_next(walker->search, walker->target, &walker->row, &walker->next);
     }
 }
 
@@ -128,7 +128,7 @@ walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
     while (walker->has_next && walker->next.first < to) {
         const hs_row_group group = walker->next;
         walker->last_first = group.first;
-        walker->has_next = hs_row_next(walker->search, &walker->row, &walker->next);
+        walker->has_next = hs_row_next(walker->search, walker->target, &walker->row, &walker->next);
         if (group.first >= from) {
             const hs_status status = visit_group(walker, &group);
             if (status != HS_OK) {
@@ -218,6 +218,7 @@ init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_
     walker->search = search;
     walker->options = search->options;
     walker->use = use;
+    walker->target = hs_row_target(search, use == HS_BLOCK_SIZES);
     walker->extent = -1.0;
     walker->row_number = -1;
     walker->candidate_limit = INT64_MAX;
@@ -264,6 +265,7 @@ hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourho
         status = hs_order_init(&search->account, &walker->block, &walker->order);
     }
     walker->is_ordered = true;
+    walker->target = hs_row_target(search, true);
     walker->visit = visit;
     walker->visit_context = context;
     if (status != HS_OK) {
