@@ -50,12 +50,19 @@ find_rows(hs_pairs *rows, hs_failure *failure)
     if (status == HS_OK) {
         rows->offsets.n_pairs = n + 1;
         table.offsets = hs_output_column(&rows->offsets, HS_WANT_I);
+        status = hs_table_prepare(&table, failure);
+    }
+    if (status == HS_OK) {
         status = hs_table_measure(&table, failure);
     }
     if (status == HS_OK) {
         status = make_room(rows, table.offsets[n], failure);
     }
-    return status == HS_OK ? hs_table_fill(&table, failure) : status;
+    if (status == HS_OK) {
+        status = hs_table_fill(&table, failure);
+    }
+    hs_table_free(&table);
+    return status;
 }
 
 hs_status

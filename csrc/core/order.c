@@ -197,11 +197,29 @@ arrange(int ndim, hs_block_use use, hs_block *block, const hs_order *order)
     }
 }
 
+/* Whether each number is above the one before, as in one cell, or where points are numbered as they
+ * lie. */
+static bool
+is_ascending(const int32_t *numbers, int32_t n)
+{
+    int32_t descents = 0;
+    for (int32_t c = 1; c < n; c++) {
+        descents += numbers[c] <= numbers[c - 1];
+    }
+    return descents == 0;
+}
+
 hs_status
 hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_order *order)
 {
     for (int32_t c = 0; c < block->n; c++) {
         order->entries[c] = (uint64_t)c;
+    }
+    if (is_ascending(block->id, block->n)) {
+        for (int32_t c = 0; c < block->n; c++) {
+            block->origin[c] = c;
+        }
+        return HS_OK;
     }
     const bool twice = sort_by_number(block, order);
     if (twice && use == HS_BLOCK_LISTS_PLACES) {

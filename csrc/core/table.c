@@ -11,6 +11,8 @@
 #define AHEAD         32   /* points between asking for a row and writing it; twice that for where
                             * it is */
 #define MOST_EXPECTED 2048 /* bytes of a row that are asked for */
+#define MOST_KEPT     (6 << 20) /* bytes of rows that wait for their places ... */
+#define MOST_EXPECTED_KEPT (4 << 20) /* ... where no more than these were expected */
 #define NO_POINT      INT32_MAX /* more than any point's number */
 #define MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
@@ -42,37 +44,33 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
     return status;
 }
 
-/* The largest neighbourhood; in a small scene the largest that there could be, which is small. */
-static hs_status
-find_most(hs_table *table, hs_failure *failure)
+/* In a small scene, the largest that there could be, which is small. */
+hs_status
+hs_table_prepare(hs_table *table, hs_failure *failure)
 {
     const hs_visitors sizes = {.use = HS_BLOCK_SIZES, .contexts = table};
-    const int32_t     capacity = hs_walker_capacity(table->search);
-    table->most = (hs_neighbourhood){.candidates = capacity, .runs = capacity};
-    return capacity < HS_BLOCK_CANDIDATES
+    return hs_walker_bound(table->search, &table->most)
                ? HS_OK
                : hs_parallel_visit(table->search, &sizes, &table->most, failure);
 }
 
-hs_status
-hs_table_measure(hs_table *table, hs_failure *failure)
+/* From the number of each row's entries to where it begins. */
+static void
+sum_counts(int64_t *offsets, int64_t n)
 {
-    const int64_t   n = hs_search_asking(table->search)->n;
-    int64_t        *offsets = table->offsets;
-    hs_status       status = hs_table_count(table->search, offsets, failure);
-    int64_t         sum = 0;
+    int64_t sum = 0;
     for (int64_t i = 0; i < n; i++) {
         const int64_t count = offsets[i];
         offsets[i] = sum;
         sum += count;
     }
     offsets[n] = sum;
-    return status == HS_OK ? find_most(table, failure) : status;
 }
 
 /* What one thread fills rows with. */
 typedef struct filler {
-    const hs_table *table;
+    hs_table       *table;
+    hs_output      *to;       /* borrowed; where the rows go */
     hs_output       part;     /* owned; measures of the hits of one visit */
     hs_recorder     recorder; /* owned; of the part */
     int32_t        *numbers;  /* owned; of the hits of one point, where hits are places */
@@ -133,9 +131,9 @@ put_ends(const hs_output *entries, const table_row *of)
 
 /* Measures of hits [hit, hit + n) of the visit, as entries from `at` on. */
 static void
-put_measures(const filler *fill, int64_t at, int32_t hit, int32_t n)
+put_measures(const filler *fill, int64_t at, int64_t hit, int32_t n)
 {
-    const hs_output *entries = fill->table->entries;
+    const hs_output *entries = fill->to;
     for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT; bit <<= 1) {
         char *to = hs_output_column(entries, bit);
         if (to != NULL) {
@@ -210,7 +208,7 @@ put_places(const filler *fill, const hs_walker *walker, const hs_hits *hits, int
     }
     const int32_t self = find_self(fill, walker, places, n, of->point, place);
     of->numbers = fill->numbers;
-    put_ends(fill->table->entries, of);
+    put_ends(fill->to, of);
     put_measures(fill, of->at, hit, self);
     if (self < n) {
         put_measures(fill, of->at + self, hit + self + 1, n - self - 1);
@@ -238,46 +236,83 @@ expect_rows(const filler *fill, const hs_bins *asking, int64_t si)
     }
 }
 
-/* A hs_visit_fn of ordered walkers: whole rows. */
+/* What is needed before the rows of a visit: measures, and the place of the group's first point. */
+static hs_status
+begin_visit(filler *fill, hs_walker *walker, int32_t first, const hs_hits *hits, int32_t *own)
+{
+    *own = 0;
+    if (walker->use != HS_BLOCK_LISTS_PLACES) {
+        return HS_OK;
+    }
+    *own = walker->search->has_queries ? 0 : own_place(walker);
+    *own += first - walker->group.first;
+    return fill_part(fill, walker, first, hits);
+}
+
+/* The row of point t of a visit, whose n hits begin at number `hit`. */
+HS_ALWAYS_INLINE void
+put_row(const filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t hit, int32_t n,
+        int32_t place, table_row *of)
+{
+    const bool has_self = !walker->search->has_queries;
+    of->n = n - (has_self && n > 0);
+    of->itself = has_self ? of->point : NO_POINT;
+    of->numbers = hits->label + hit;
+    if (walker->use == HS_BLOCK_LISTS_PLACES) {
+        put_places(fill, walker, hits, hit, n, place, of);
+    } else {
+        put_ends(fill->to, of);
+    }
+}
+
+/* A hs_visit_fn of ordered walkers: whole rows, to their places. */
 static hs_status
 fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
-    filler        *fill = context;
-    const bool     by_place = walker->use == HS_BLOCK_LISTS_PLACES;
-    const bool     has_self = !walker->search->has_queries;
-    const hs_bins *asking = hs_search_asking(walker->search);
-    const int32_t  own = by_place && has_self ? own_place(walker) : 0;
-    if (by_place) {
-        const hs_status status = fill_part(fill, walker, first, hits);
-        if (status != HS_OK) {
-            return status;
-        }
-    }
-    for (int32_t t = 0, hit = 0; t < hits->n; t++) {
-        const int32_t point = hits->point[t], n = hits->end[t] - hit;
+    filler         *fill = context;
+    const hs_bins  *asking = hs_search_asking(walker->search);
+    int32_t         own;
+    const hs_status status = begin_visit(fill, walker, first, hits, &own);
+    for (int32_t t = 0, hit = 0; t < hits->n && status == HS_OK; t++) {
+        const int32_t point = hits->point[t];
         table_row     of = {.at = fill->table->offsets[point], .point = point};
-        of.n = n - (has_self && n > 0);
-        of.itself = has_self ? point : NO_POINT;
-        of.numbers = hits->label + hit;
         expect_rows(fill, asking, (int64_t)first + t);
-        if (by_place) {
-            put_places(fill, walker, hits, hit, n, own + first + t - walker->group.first, &of);
-        } else {
-            put_ends(fill->table->entries, &of);
-        }
+        put_row(fill, walker, hits, hit, hits->end[t] - hit, own + t, &of);
         hit = hits->end[t];
     }
-    return HS_OK;
+    return status;
+}
+
+/* The same: whole rows, one behind another, and their lengths as offsets. HS_STATUS_END when they
+ * are more than was expected. */
+static hs_status
+keep_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+{
+    filler       *fill = context;
+    hs_output    *kept = fill->to;
+    const int32_t n = hits->end[hits->n - 1];
+    int32_t       own;
+    hs_status     status = hs_output_reserve(kept, n, 0.0);
+    if (status == HS_OK) {
+        status = begin_visit(fill, walker, first, hits, &own);
+    }
+    for (int32_t t = 0, hit = 0; t < hits->n && status == HS_OK; t++) {
+        table_row of = {.at = kept->n_pairs, .point = hits->point[t]};
+        put_row(fill, walker, hits, hit, hits->end[t] - hit, own + t, &of);
+        fill->table->offsets[of.point] = of.n;
+        kept->n_pairs += of.n;
+        hit = hits->end[t];
+    }
+    const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > MOST_KEPT;
+    return status == HS_OK && is_much ? HS_STATUS_END : status;
 }
 
 static hs_status
-open_filler(hs_table *table, filler *fill)
+open_filler(hs_table *table, hs_output *to, filler *fill)
 {
-    hs_account      *account = &table->search->account;
-    const hs_output *entries = table->entries;
-    *fill = (filler){.table = table};
-    hs_output_init(NULL, entries->ndim, entries->columns & MEASURES, entries->index_bytes,
-                   &fill->part);
+    hs_account *account = &table->search->account;
+    *fill = (filler){.table = table, .to = to};
+    hs_output_init(NULL, to->ndim, to->columns & MEASURES, to->index_bytes, &fill->part);
     fill->numbers = hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1,
                              sizeof *fill->numbers);
     /* It keeps no numbers of hits: there are none to be turned round. */
@@ -293,8 +328,80 @@ close_filler(hs_table *table, filler *fill)
     hs_output_free(&fill->part);
 }
 
+/* Whether one walk, by this thread, shall do: its rows are kept for a while. */
+static bool
+will_keep(hs_table *table)
+{
+    hs_search       *search = table->search;
+    const hs_output *entries = table->entries;
+    const double     n = search->grid.expected_pairs * search->pairs_per_half;
+    hs_output_init(NULL, entries->ndim, (entries->columns & MEASURES) | HS_WANT_J, 4, &table->kept);
+    const double bytes = n * (double)hs_output_bytes_per_pair(&table->kept);
+    return search->team == NULL && bytes < MOST_EXPECTED_KEPT &&
+           hs_account_allows(&search->account, 2.0 * MOST_KEPT);
+}
+
+/* HS_STATUS_END: there were too many entries, and none is kept. */
+static hs_status
+keep_all(hs_table *table, hs_failure *failure)
+{
+    hs_search    *search = table->search;
+    const int64_t n = hs_search_asking(search)->n;
+    hs_walker     walker;
+    filler        fill;
+    memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
+    hs_status status = open_filler(table, &table->kept, &fill);
+    if (status == HS_OK) {
+        status = hs_walker_init_ordered(search, hs_record_use(table->kept.columns), &table->most,
+                                        keep_rows, &fill, &walker);
+    }
+    if (status == HS_OK) {
+        status = hs_walk(&walker, 0, (int32_t)n);
+        if (status == HS_ERR_SHIFT_RANGE) {
+            failure->row = walker.failed_point;
+            failure->in_queries = search->has_queries;
+        }
+        hs_walker_close(search, &walker);
+    }
+    close_filler(table, &fill);
+    return status;
+}
+
 hs_status
-hs_table_fill(hs_table *table, hs_failure *failure)
+hs_table_measure(hs_table *table, hs_failure *failure)
+{
+    hs_status status = will_keep(table) ? keep_all(table, failure) : HS_STATUS_END;
+    if (status == HS_STATUS_END) {
+        hs_table_free(table);
+        status = hs_table_count(table->search, table->offsets, failure);
+    }
+    sum_counts(table->offsets, hs_search_asking(table->search)->n);
+    return status;
+}
+
+/* The rows that were kept, to their places. */
+static void
+move_rows(hs_table *table)
+{
+    const hs_bins *asking = hs_search_asking(table->search);
+    const int32_t *numbers = hs_output_column(&table->kept, HS_WANT_J);
+    const filler   fill = {.table = table, .to = table->entries, .part = table->kept};
+    int64_t        from = 0;
+    for (int64_t si = 0; si < asking->n; si++) {
+        const int64_t *place = table->offsets + asking->order[si];
+        table_row      of = {.at = place[0], .n = (int32_t)(place[1] - place[0])};
+        of.point = asking->order[si];
+        of.itself = NO_POINT;
+        of.numbers = numbers + from;
+        expect_rows(&fill, asking, si);
+        put_ends(fill.to, &of);
+        put_measures(&fill, of.at, from, of.n);
+        from += of.n;
+    }
+}
+
+static hs_status
+fill_all(hs_table *table, hs_failure *failure)
 {
     hs_account *account = &table->search->account;
     const int   n_fillers = hs_team_size(table->search->team);
@@ -305,7 +412,7 @@ hs_table_fill(hs_table *table, hs_failure *failure)
         return HS_ERR_MEMORY;
     }
     while (opened < n_fillers && status == HS_OK) {
-        status = open_filler(table, &fillers[opened++]);
+        status = open_filler(table, table->entries, &fillers[opened++]);
     }
     if (status == HS_OK) {
         const hs_visitors visitors = {.use = hs_record_use(table->entries->columns),
@@ -320,4 +427,21 @@ hs_table_fill(hs_table *table, hs_failure *failure)
     }
     hs_free(account, fillers);
     return status;
+}
+
+hs_status
+hs_table_fill(hs_table *table, hs_failure *failure)
+{
+    if (table->kept.columns == 0) {
+        return fill_all(table, failure);
+    }
+    move_rows(table);
+    return HS_OK;
+}
+
+void
+hs_table_free(hs_table *table)
+{
+    hs_output_free(&table->kept);
+    table->kept.columns = 0;
 }

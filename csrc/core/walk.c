@@ -189,6 +189,20 @@ hs_walker_capacity(const hs_search *search)
     return most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
 }
 
+bool
+hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
+{
+    const hs_grid *grid = &search->grid;
+    const double   candidates = most_candidates(search);
+    const bool     turns = search->scene.lattice.row_of_axis[0] >= 0;
+    /* Of each row of the stencil, in each image along the first axis. */
+    const double   runs = (double)search->stencil.n_rows *
+                        (turns ? 2.0 * (double)(grid->reach[0] / grid->shape[0]) + 3.0 : 1.0);
+    most->candidates = candidates < HS_BLOCK_CANDIDATES ? (int64_t)candidates : 0;
+    most->runs = (int64_t)hs_smaller(runs, candidates);
+    return candidates < HS_BLOCK_CANDIDATES;
+}
+
 static hs_status
 init_links(hs_search *search, hs_walker *walker)
 {

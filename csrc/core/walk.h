@@ -80,6 +80,10 @@ struct hs_walker {
 /* Candidates that a block of hs_walker_init has room for. */
 int32_t hs_walker_capacity(const hs_search *search);
 
+/* A bound on the neighbourhood of any group. False where it is larger than one block has room for:
+ * then a walk with HS_BLOCK_SIZES can tell. */
+bool hs_walker_bound(const hs_search *search, hs_neighbourhood *most);
+
 /* `visit` NULL: hits are only counted, in n_found; with HS_BLOCK_SIZES not even that, but `most` is
  * found, for the groups of hs_walker_init_ordered. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
