@@ -17,7 +17,7 @@ typedef struct hs_table {
     int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
     hs_output       *entries; /* borrowed; columns for what is wanted */
     hs_neighbourhood most;    /* set by hs_table_prepare */
-    hs_output        kept;    /* owned; rows in cell order, int32, while there is no place for them */
+    hs_output        kept;    /* owned; rows in cell order, int32, until they have places */
 } hs_table;
 
 /* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE

@@ -3,7 +3,7 @@
  * walk.h: the walk over groups of points. Rows of cells in order, cells along each row, at most
  * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every
  * point of the group, decided, and the hits are handed to a visitor. Groups depend on the scene
- * alone, never on who walks them.
+ * and on whether neighbourhoods are put in order, never on who walks them.
  */
 #ifndef HS_WALK_H
 #define HS_WALK_H
@@ -18,8 +18,8 @@ typedef struct hs_walker hs_walker;
 /*
  * The decided hits of points [first, first + hits->n) in cell order against the present block, as
  * entries of walker->block: point numbers, or places when walker->use says so; with HS_BLOCK_COUNTS
- * only where they would end. With HS_BLOCK_LISTS_SQUARES they are not decided, and walker->block.squares are theirs. Anything but
- * HS_OK ends the walk with that status.
+ * only where they would end. With HS_BLOCK_LISTS_SQUARES they are not decided, and
+ * walker->block.squares are theirs. Anything but HS_OK ends the walk with that status.
  */
 typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
                                  const hs_hits *hits);
