@@ -123,6 +123,11 @@ typedef struct hs_capi {
     hs_status (*cells_histogram)(const hs_cells *cells, const hs_points *queries,
                                  const hs_options *options, const hs_histogram *histogram,
                                  hs_failure *failure);
+    hs_status (*nearest_find)(const hs_points *points, const hs_points *queries, const hs_box *box,
+                              int64_t k, const hs_options *options, hs_pairs **rows,
+                              hs_failure *failure);
+    hs_status (*cells_nearest)(const hs_cells *cells, const hs_points *queries, int64_t k,
+                               const hs_options *options, hs_pairs **rows, hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -59,6 +59,8 @@ static const hs_capi table = {
     .pool_clear = hs_pool_clear,
     .kernel_names = hs_kernel_names,
     .cells_histogram = hs_cells_histogram,
+    .nearest_find = hs_nearest_find,
+    .cells_nearest = hs_cells_nearest,
 };
 
 int

@@ -30,6 +30,19 @@ remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
     }
 }
 
+/* The same when hits are only counted. */
+static void
+remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
+{
+    int32_t removed = 0;
+    for (int32_t t = first; t < next; t++) {
+        while (removed < n && scan->unsure[removed].t == t) {
+            removed++;
+        }
+        scan->end[t] -= removed;
+    }
+}
+
 /* One pair of the batch, by all stages or by the last alone. */
 static bool
 decide_pair(hs_walker *walker, const hs_metric *metric, int32_t e, bool others_failed)
@@ -134,7 +147,9 @@ hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next)
         }
     }
     walker->n_ambiguous += scan->n_unsure;
-    if (walker->use != HS_BLOCK_COUNTS && n_beyond > 0) {
+    if (n_beyond > 0 && walker->use == HS_BLOCK_COUNTS) {
+        remove_counts(scan, n_beyond, first, next);
+    } else if (n_beyond > 0) {
         remove_hits(scan, n_beyond, first, next);
     }
     scan->n_hits -= n_beyond;

@@ -38,6 +38,7 @@ typedef struct hs_block {
 
 /* What a block has room for. */
 typedef enum hs_block_use {
+    HS_BLOCK_SIZES, /* nothing: candidates are appended, and not looked at */
     HS_BLOCK_COUNTS,
     HS_BLOCK_LISTS_IDS,
     HS_BLOCK_LISTS_PLACES,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* nearest.c: the public searches for the k nearest points: trees, then groups (near_search.h). */
+#include "arguments.h"
 #include "fpenv.h"
 #include "near_prepare.h"
 #include "near_search.h"
@@ -27,7 +28,10 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
     hs_search    *search = near->search;
     const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
     const double  limit = search->options.cutoff;
-    hs_status     status = HS_OK;
+    hs_status     status = hs_check_arguments(sets->points, sets->queries, box, &search->options);
+    if (status != HS_OK || near->k < 1) {
+        return HS_ERR_ARGUMENT;
+    }
     if (!(limit >= 0.0)) {
         failure->value = limit;
         return HS_ERR_CUTOFF;
@@ -57,7 +61,6 @@ hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k, const hs_o
     if (rows == NULL) {
         return HS_ERR_MEMORY;
     }
-    HS_ASSERT(k >= 1);
     const hs_fpenv saved = hs_fpenv_enter();
     hs_options     of_rows = *options;
     of_rows.sorted = false;

@@ -50,6 +50,9 @@ find_rows(hs_pairs *rows, hs_failure *failure)
     if (status == HS_OK) {
         rows->offsets.n_pairs = n + 1;
         table.offsets = hs_output_column(&rows->offsets, HS_WANT_I);
+        status = hs_table_prepare(&table, failure);
+    }
+    if (status == HS_OK) {
         status = hs_table_measure(&table, failure);
     }
     if (status == HS_OK) {
@@ -58,7 +61,11 @@ find_rows(hs_pairs *rows, hs_failure *failure)
     if (status == HS_OK) {
         status = hs_touch_output(search->team, &search->options, &rows->output);
     }
-    return status == HS_OK ? hs_table_fill(&table, failure) : status;
+    if (status == HS_OK) {
+        status = hs_table_fill(&table, failure);
+    }
+    hs_table_free(&table);
+    return status;
 }
 
 hs_status
@@ -84,7 +91,7 @@ count_rows(void *context, hs_search *search, int64_t *n_entries, hs_failure *fai
 {
     const int64_t   n = hs_search_asking(search)->n;
     const int64_t  *counts = context;
-    const hs_status status = hs_table_count(search, context, NULL, failure);
+    const hs_status status = hs_table_count(search, context, failure);
     for (int64_t i = 0; status == HS_OK && i < n; i++) {
         *n_entries += counts[i];
     }

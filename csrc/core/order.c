@@ -7,9 +7,11 @@
 
 #include <string.h>
 
-#define DIGIT_BITS 9 /* of a digit, at most: two kB of counts stay in the nearest cache */
-#define FEW 24       /* candidates that are quicker sorted by insertion */
-#define CROWD 12     /* entries with the same leading digit, beyond which insertion does not pay */
+#define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the nearest cache */
+#define LEAD_BITS 8   /* of the only digit that few candidates are sorted by; one more for others */
+#define FEW 24        /* candidates that are quicker sorted by insertion */
+#define MANY 160      /* from here on two digits are quicker than one and insertion */
+#define CROWD 12      /* entries with the same leading digit, beyond which insertion does not pay */
 
 hs_status
 hs_order_init(hs_account *account, hs_block *block, hs_order *order)
@@ -93,14 +95,17 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
         sort_few(order->entries, n);
         return;
     }
-    /* The leading digit alone tells nearly all apart, when keys are spread evenly. */
-    const int most = n < 1 << (DIGIT_BITS - 1) ? DIGIT_BITS - 1 : DIGIT_BITS;
-    const int lead = bits < most ? bits : most;
-    if (sort_digit(order, n, 32 + bits - lead, lead) <= CROWD) {
-        sort_few(order->entries, n);
-        return;
-    }
+    /* The leading digit alone tells nearly all apart, when keys are spread evenly. Where two tell
+     * all of them apart, they do so without the branches of an insertion. */
     const int digits = (bits + DIGIT_BITS - 1) / DIGIT_BITS;
+    if (n < MANY || digits > 2) {
+        const int most = n < 1 << LEAD_BITS ? LEAD_BITS : LEAD_BITS + 1;
+        const int lead = bits < most ? bits : most;
+        if (sort_digit(order, n, 32 + bits - lead, lead) <= CROWD) {
+            sort_few(order->entries, n);
+            return;
+        }
+    }
     for (int digit = 0, from = 0; digit < digits; digit++) {
         const int width = (bits - from + digits - digit - 1) / (digits - digit);
         (void)sort_digit(order, n, 32 + from, width);
@@ -192,11 +197,29 @@ arrange(int ndim, hs_block_use use, hs_block *block, const hs_order *order)
     }
 }
 
+/* Whether each number is above the one before, as in one cell, or where points are numbered as they
+ * lie. */
+static bool
+is_ascending(const int32_t *numbers, int32_t n)
+{
+    int32_t descents = 0;
+    for (int32_t c = 1; c < n; c++) {
+        descents += numbers[c] <= numbers[c - 1];
+    }
+    return descents == 0;
+}
+
 hs_status
 hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_order *order)
 {
     for (int32_t c = 0; c < block->n; c++) {
         order->entries[c] = (uint64_t)c;
+    }
+    if (is_ascending(block->id, block->n)) {
+        for (int32_t c = 0; c < block->n; c++) {
+            block->origin[c] = c;
+        }
+        return HS_OK;
     }
     const bool twice = sort_by_number(block, order);
     if (twice && use == HS_BLOCK_LISTS_PLACES) {

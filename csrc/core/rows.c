@@ -2,12 +2,23 @@
 /* rows.c: see rows.h. */
 #include "rows.h"
 
+#include <math.h>
+
 /*
- * Points that consecutive cells of a dense row are put together for. More pay better for finding
- * and gathering a neighbourhood, fewer have a smaller one. The best number depends little on
- * density: the costs of a neighbourhood and of its candidates are in the ratio of some hundreds.
+ * More points pay better for finding and gathering a neighbourhood, fewer have a smaller one. The
+ * best number depends little on density: the costs of a neighbourhood and of its candidates are in
+ * the ratio of some hundreds.
  */
 #define TARGET_POINTS 20
+
+/*
+ * Where neighbourhoods are sorted, more pay when rows are crowded. Along its row a group is w cells
+ * long, with p points of each w, and has candidates from w + 2 of them: its points share the 2, but
+ * each meets these as well. With 40 tests for the price of gathering and sorting a candidate, and
+ * 250 tests more for one group of a row, w p is best at the root of 90 p + 250.
+ */
+#define SHARED_PER_POINT 90.0
+#define SHARED 250.0
 
 /* The rows and cells of the points that ask, in a sparse grid. */
 static const hs_sparse *
@@ -84,8 +95,20 @@ hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *g
                                                        : hs_grid_index(&search->grid, 0, t);
 }
 
+int32_t
+hs_row_target(const hs_search *search, bool is_ordered)
+{
+    const hs_grid *grid = &search->grid;
+    if (!is_ordered || search->is_sparse) {
+        return TARGET_POINTS;
+    }
+    const double in_cell = (double)hs_search_asking(search)->n / (double)grid->n_cells;
+    const double target = sqrt(SHARED_PER_POINT * in_cell * (double)grid->reach[0] + SHARED);
+    return target < HS_GROUP_POINTS ? (int32_t)target : HS_GROUP_POINTS;
+}
+
 bool
-hs_row_next(const hs_search *search, hs_row *row, hs_row_group *group)
+hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group)
 {
     if (search->is_sparse) {
         const bool found =
@@ -104,7 +127,7 @@ hs_row_next(const hs_search *search, hs_row *row, hs_row_group *group)
     }
     int64_t last = row->x;
     /* A cell more, while they are few; none beside the rest of a crowded one. */
-    while (last + 1 < n_x && start[last + 2] - row->next <= TARGET_POINTS) {
+    while (last + 1 < n_x && start[last + 2] - row->next <= target) {
         last++;
     }
     const int32_t end = start[last + 1];

@@ -44,8 +44,13 @@ void hs_row_open(const hs_search *search, int64_t number, hs_row *row);
 /* The row and the cell along it of point si, taken as a group of its own. */
 void hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_row_group *group);
 
-/* The next group; false after the last. Groups depend on the scene alone. */
-bool hs_row_next(const hs_search *search, hs_row *row, hs_row_group *group);
+/* Points that consecutive cells of a dense row are put together for, by walkers that put their
+ * candidates in order (order.h) or others. */
+int32_t hs_row_target(const hs_search *search, bool is_ordered);
+
+/* The next group, with this target; false after the last. Groups depend on the scene and the target
+ * alone. */
+bool hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group);
 
 /*
  * Settles which rows neighbour this one, for half lists its own first; returns how many. links:

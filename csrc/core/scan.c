@@ -10,6 +10,7 @@
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 21)
+#define WORK_OF_RUN 32 /* candidates that could be tested while a run of them is found */
 
 /* Of a group that meets nobody, in candidates. */
 #define LONE_GROUP 64
@@ -152,8 +153,6 @@ fill_block(hs_walker *walker)
 {
     hs_block *block = &walker->block;
     walker->n_blocks++;
-    walker->of_group.candidates += block->n;
-    walker->of_group.runs += block->n_runs;
     set_flushing(walker, true);
     hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
                     &walker->group);
@@ -171,6 +170,16 @@ fill_block(hs_walker *walker)
     return status;
 }
 
+static hs_status
+poll_sometimes(hs_walker *walker)
+{
+    if (walker->work_since_poll > POLL_WORK) {
+        walker->work_since_poll = 0;
+        return hs_poll(&walker->options, hs_walk_fraction(walker));
+    }
+    return HS_OK;
+}
+
 static void
 empty_block(hs_walker *walker)
 {
@@ -180,6 +189,17 @@ empty_block(hs_walker *walker)
     walker->blocks++;
 }
 
+/* Of the block alone. */
+static hs_status
+note_size(hs_walker *walker)
+{
+    walker->of_group.candidates += walker->block.n;
+    walker->of_group.runs += walker->block.n_runs;
+    walker->work_since_poll += WORK_OF_RUN * (int64_t)walker->block.n_runs;
+    empty_block(walker);
+    return poll_sometimes(walker);
+}
+
 /* Whether to go on. */
 static hs_status
 end_block(hs_walker *walker)
@@ -187,11 +207,7 @@ end_block(hs_walker *walker)
     if (walker->n_candidates > walker->candidate_limit || walker->leaves) {
         return HS_STATUS_END;
     }
-    if (walker->work_since_poll > POLL_WORK) {
-        walker->work_since_poll = 0;
-        return hs_poll(&walker->options, hs_walk_fraction(walker));
-    }
-    return HS_OK;
+    return poll_sometimes(walker);
 }
 
 /* What was tested. */
@@ -222,6 +238,9 @@ hs_scan_block(hs_walker *walker)
     if (walker->blocks < walker->blocks_to_skip) {
         empty_block(walker);
         return HS_OK;
+    }
+    if (walker->use == HS_BLOCK_SIZES) {
+        return note_size(walker);
     }
     if (is_lone(walker)) {
         empty_block(walker);

@@ -67,14 +67,14 @@ static hs_status
 visit_group(hs_walker *walker, const hs_row_group *group)
 {
     const hs_search *search = walker->search;
-    walker->n_groups++;
+    walker->n_groups += walker->use != HS_BLOCK_SIZES;
     walker->blocks = 0;
     walker->block.n = 0;
     walker->block.n_runs = 0;
     walker->block_is_first = !search->is_full;
     walker->of_group = (hs_neighbourhood){0, 0};
     hs_group_start(hs_search_asking(search), group->first, group->last, &walker->group);
-    if (search->is_full || walker->blocks_to_skip > 0) {
+    if ((search->is_full || walker->blocks_to_skip > 0) && walker->use != HS_BLOCK_SIZES) {
         hs_group_load(hs_search_asking(search), &walker->group);
     }
     for (int64_t l = 0; l < walker->n_links; l++) {
@@ -111,7 +111,7 @@ open_row(hs_walker *walker, int64_t number)
     walker->has_next = walker->row.first < walker->row.end;
     if (walker->has_next) {
         set_links(walker, &walker->row);
-        walker->has_next = hs_row_next(walker->search, &walker->row, &walker->next);
+        walker->has_next = hs_row_next(walker->search, walker->target, &walker->row, &walker->next);
     }
 }
 
@@ -128,7 +128,7 @@ walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
     while (walker->has_next && walker->next.first < to) {
         const hs_row_group group = walker->next;
         walker->last_first = group.first;
-        walker->has_next = hs_row_next(walker->search, &walker->row, &walker->next);
+        walker->has_next = hs_row_next(walker->search, walker->target, &walker->row, &walker->next);
         if (group.first >= from) {
             const hs_status status = visit_group(walker, &group);
             if (status != HS_OK) {
@@ -189,6 +189,20 @@ hs_walker_capacity(const hs_search *search)
     return most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
 }
 
+bool
+hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
+{
+    const hs_grid *grid = &search->grid;
+    const double   candidates = most_candidates(search);
+    const bool     turns = search->scene.lattice.row_of_axis[0] >= 0;
+    /* Of each row of the stencil, in each image along the first axis. */
+    const double   runs = (double)search->stencil.n_rows *
+                        (turns ? 2.0 * (double)(grid->reach[0] / grid->shape[0]) + 3.0 : 1.0);
+    most->candidates = candidates < HS_BLOCK_CANDIDATES ? (int64_t)candidates : 0;
+    most->runs = (int64_t)hs_smaller(runs, candidates);
+    return candidates < HS_BLOCK_CANDIDATES;
+}
+
 static hs_status
 init_links(hs_search *search, hs_walker *walker)
 {
@@ -218,6 +232,7 @@ init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_
     walker->search = search;
     walker->options = search->options;
     walker->use = use;
+    walker->target = hs_row_target(search, use == HS_BLOCK_SIZES);
     walker->extent = -1.0;
     walker->row_number = -1;
     walker->candidate_limit = INT64_MAX;
@@ -264,6 +279,7 @@ hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourho
         status = hs_order_init(&search->account, &walker->block, &walker->order);
     }
     walker->is_ordered = true;
+    walker->target = hs_row_target(search, true);
     walker->visit = visit;
     walker->visit_context = context;
     if (status != HS_OK) {

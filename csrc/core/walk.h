@@ -3,7 +3,7 @@
  * walk.h: the walk over groups of points. Rows of cells in order, cells along each row, at most
  * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every
  * point of the group, decided, and the hits are handed to a visitor. Groups depend on the scene
- * alone, never on who walks them.
+ * and on whether neighbourhoods are put in order, never on who walks them.
  */
 #ifndef HS_WALK_H
 #define HS_WALK_H
@@ -17,9 +17,9 @@ typedef struct hs_walker hs_walker;
 
 /*
  * The decided hits of points [first, first + hits->n) in cell order against the present block, as
- * entries of walker->block: point numbers, or places when walker->use says so. With
- * HS_BLOCK_LISTS_SQUARES they are not decided, and walker->block.squares are theirs. Anything but
- * HS_OK ends the walk with that status.
+ * entries of walker->block: point numbers, or places when walker->use says so; with HS_BLOCK_COUNTS
+ * only where they would end. With HS_BLOCK_LISTS_SQUARES they are not decided, and
+ * walker->block.squares are theirs. Anything but HS_OK ends the walk with that status.
  */
 typedef hs_status (*hs_visit_fn)(void *context, hs_walker *walker, int32_t first,
                                  const hs_hits *hits);
@@ -46,6 +46,7 @@ struct hs_walker {
     hs_order         order;
     hs_group         group;
     hs_trace         trace;
+    int32_t          target;     /* of groups, for hs_row_next */
     hs_row           row;        /* being walked: */
     int64_t          row_number; /* its number, or -1 */
     int32_t          last_first; /* first point of the last group that was taken, or -1 */
@@ -80,14 +81,19 @@ struct hs_walker {
 /* Candidates that a block of hs_walker_init has room for. */
 int32_t hs_walker_capacity(const hs_search *search);
 
-/* `visit` NULL: hits are only counted, in n_found. */
+/* A bound on the neighbourhood of any group. False where it is larger than one block has room for:
+ * then a walk with HS_BLOCK_SIZES can tell. */
+bool hs_walker_bound(const hs_search *search, hs_neighbourhood *most);
+
+/* `visit` NULL: hits are only counted, in n_found; with HS_BLOCK_SIZES not even that, but `most` is
+ * found, for the groups of hs_walker_init_ordered. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                          hs_walker *walker);
 
 /*
  * The same for a full search that lists: each point's hits come in one visit, ascending by the
- * candidate's number and then by S. most: the largest neighbourhood, as another walk over all
- * groups has found it.
+ * candidate's number and then by S. most: the largest neighbourhood, as a walk with HS_BLOCK_SIZES
+ * over all groups has found it.
  */
 hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use,
                                  const hs_neighbourhood *most, hs_visit_fn visit, void *context,

@@ -79,7 +79,7 @@ typedef struct hs_scan {
  * first for which the hits or unsure ones might not have fitted. For each point, lists
  * label[c] for every candidate c with !(s > out), ascending. hits begin at entry 0 with those
  * of point `first`; unsure ones, with !(s < in), are ascending too. NaN counts as a hit and unsure.
- * Counting leaves hits and end alone.
+ * Counting leaves hits alone; end is as in listing.
  *
  * `squares` lists as the direct form does, and writes s of each hit, fused or not. It does not look
  * at `in`, notes none as unsure and leaves unsure and n_unsure alone.

@@ -113,9 +113,7 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
                 count += near[c];
             }
         }
-        if (lists) {
-            scan->end[t] = n_listed;
-        }
+        scan->end[t] = (int32_t)(lists ? n_listed : count);
     }
     scan->n_hits = lists ? n_listed : count;
     return t;

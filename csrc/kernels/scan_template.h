@@ -98,9 +98,7 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
                 count += popcount(near);
             }
         }
-        if (lists) {
-            scan->end[t] = (int32_t)(hit - scan->hits);
-        }
+        scan->end[t] = (int32_t)(lists ? hit - scan->hits : count);
     }
     scan->n_hits = lists ? hit - scan->hits : count;
     return t;
