@@ -67,7 +67,7 @@ static void
 put_measures(const hs_filler *fill, int64_t at, int64_t hit, int32_t n)
 {
     const hs_output *entries = fill->to;
-    for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT; bit <<= 1) {
+    for (unsigned bit = HS_WANT_DISTANCE; bit <= HS_WANT_SHIFT && n > 0; bit <<= 1) {
         char *to = hs_output_column(entries, bit);
         if (to != NULL) {
             const size_t width = hs_output_width(entries, bit);
