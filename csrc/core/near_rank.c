@@ -275,7 +275,7 @@ hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si, con
     if (n > MANY * wanted && n > HS_NEAR_COUNTED) {
         n = keep_nearest(ranker, n, wanted);
     }
-    hs_near_sort(&ranker->keys, &ranker->spare, n);
+    hs_near_sort(&ranker->keys, &ranker->spare, n, limit);
     if (!group->is_complete && wanted > 0) {
         const double last = ranker->keys[wanted - 1].square;
         if (last + closeness(ranker, last) > reach * (1.0 - 0x1p-40)) {

@@ -17,8 +17,9 @@ typedef bool (*hs_near_before_fn)(void *context, const hs_near_key *b, const hs_
 #define HS_NEAR_FEW 24     /* up to here keys are sorted by insertion */
 #define HS_NEAR_COUNTED 64 /* up to here each key's place is counted, without a branch */
 
-/* By their squares. *spare: room for n keys; the two may change places. */
-void hs_near_sort(hs_near_key **keys, hs_near_key **spare, int64_t n);
+/* By their squares, none of which is above `largest`. *spare: room for n keys; the two may change
+ * places. */
+void hs_near_sort(hs_near_key **keys, hs_near_key **spare, int64_t n, double largest);
 
 /* Brings the `wanted` keys of least squares to the front, in no order. */
 void hs_near_select(hs_near_key *keys, int64_t n, int64_t wanted);
