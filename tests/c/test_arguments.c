@@ -45,6 +45,9 @@ status_of_all(const hs_points *points, const hs_points *queries, const hs_box *b
     hs_pairs_free(pairs);
     CHECK(hs_neighbors_count(points, queries, box, options, counts, NULL) == status);
     CHECK(hs_pairs_histogram(points, queries, box, options, &histogram, NULL) == status);
+    CHECK(hs_nearest_find(points, queries, box, 1, options, &pairs, NULL) == status);
+    hs_pairs_free(pairs);
+    CHECK(hs_nearest_find(points, queries, box, 0, options, &pairs, NULL) == HS_ERR_ARGUMENT);
     if (queries != NULL) {
         CHECK(hs_between_count(points, queries, box, options, &count, NULL) == status);
         return status;
