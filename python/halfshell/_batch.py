@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _inputs
+from halfshell._available import refuse_large
 from halfshell._foreign import is_a
 
 # What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
@@ -38,7 +39,7 @@ def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
             f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one a system "
             f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
         )
-    _inputs.refuse_large(8 * array.size, array, "box")
+    refuse_large(8 * array.size, array, "box")
     return _inputs.in_order(array, np.float64)
 
 
@@ -76,7 +77,7 @@ def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
         raise ValueError(
             f"cutoff must be a number or, one a system, have shape (s,), got {array.shape}"
         )
-    _inputs.refuse_large(8 * array.size, array, "cutoff")
+    refuse_large(8 * array.size, array, "cutoff")
     return 0.0, _inputs.in_order(array, np.float64)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
+from halfshell._available import refuse_large
 
 
 class Box:
@@ -243,7 +244,7 @@ class Box:
         ndim = self.vectors.shape[0]
         if array.shape[1] != ndim:
             raise ValueError(f"points must have shape (n, {ndim}) for this box, got {array.shape}")
-        _inputs.refuse_large(16 * array.size, array, "points")
+        refuse_large(16 * array.size, array, "points")
         return _core.box_wrap(
             array, self.vectors, _inputs.as_periodic_bits(periodic, ndim, default=True)
         )

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
+from halfshell._available import refuse_unavailable
 from halfshell._box import Box
 from halfshell._options import Search
 
@@ -127,7 +128,7 @@ def binned(
     marks: Marks,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of points or cells, given as the first arguments of every search."""
-    _inputs.refuse_unavailable(
+    refuse_unavailable(
         _COPIES * 8 * marks.n_types**2 * len(edges),
         f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
     )
@@ -155,7 +156,7 @@ def as_edges(values: npt.ArrayLike) -> _inputs.FloatArray:
             f"edges must have shape (bins + 1,), with one bin at least, got {array.shape}"
         )
     # The array, the one that it is checked with, and the counts.
-    _inputs.refuse_unavailable(_COPIES * 8 * len(array), f"edges of shape {array.shape}")
+    refuse_unavailable(_COPIES * 8 * len(array), f"edges of shape {array.shape}")
     array = array.astype(np.float64)
     for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
         raise ValueError(f"edges must be finite and not negative, got edges[{k}] = {array[k]}")

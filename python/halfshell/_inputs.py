@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell._available import refuse_large
 from halfshell._foreign import (
     attribute,
     exact_number,
@@ -26,7 +26,6 @@ from halfshell._foreign import (
 
 MAX_DIM = 8
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
-_SMALL_COPY = 1 << 26  # bytes; what is left is not asked for below
 _MISSING = object()
 
 FloatArray = npt.NDArray[np.float64]
@@ -145,26 +144,6 @@ def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
         words = " or ".join(map(repr, choices)) if few else f"one of {' '.join(choices)}"
         raise ValueError(f"{name} must be {words}, got {shown(value)}")
     return value
-
-
-def refuse_unavailable(needed: int, what: str) -> None:
-    """MemoryError before results that would make the machine swap, or fit no address space."""
-    if needed > _SMALL_COPY and needed > _core.available_memory():
-        raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than there is")
-
-
-def gigabytes(n_bytes: int) -> str:
-    """For a message; also for numbers that are no float64."""
-    return f"{n_bytes / 1e9:.3g}" if n_bytes < 2**1000 else "more than 1e+290"
-
-
-def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
-    """MemoryError before a copy that would make the machine swap: views may be huge."""
-    if needed > _SMALL_COPY and needed > _core.available_memory():
-        raise MemoryError(
-            f"{name} of shape {array.shape} and dtype {array.dtype} must be copied, which takes "
-            f"{needed / 1e9:.3g} GB, more than there is"
-        )
 
 
 def _element(name: str, where: Iterable[Any]) -> str:

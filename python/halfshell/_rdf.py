@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _histogram, _inputs
+from halfshell._available import refuse_unavailable
 from halfshell._options import Search
 
 _COLUMNS = 10
@@ -192,7 +193,7 @@ def _edges(r_max: Any, bins: Any) -> _inputs.FloatArray:
     if not (np.isfinite(array) and array > 0.0):
         raise ValueError(f"r_max must be finite and greater than 0, got {float(array)}")
     # Of float64: edges, what numpy needs to make them, r, g and the shells.
-    _inputs.refuse_unavailable(_COLUMNS * 8 * n_bins, "r, g and counts for so many bins")
+    refuse_unavailable(_COLUMNS * 8 * n_bins, "r, g and counts for so many bins")
     return np.linspace(0.0, float(array), n_bins + 1)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _inputs
+from halfshell._available import refuse_unavailable
 from halfshell._errors import CapacityError
 from halfshell._foreign import kind_of, shown, whole_number
 
@@ -78,7 +79,7 @@ def padded(offsets: Array, column: Array, capacity: Any, fill: Any) -> Array:
     # And a bool for each entry.
     n_rows = max(len(counts), 1)
     needed_bytes = n_rows * math.prod(shape[1:]) * column.dtype.itemsize + n_rows * length
-    _inputs.refuse_unavailable(needed_bytes, f"rows padded to a capacity of {shown(length)}")
+    refuse_unavailable(needed_bytes, f"rows padded to a capacity of {shown(length)}")
     array = np.full(shape, _as_fill(fill, column.dtype), column.dtype)
     array[np.arange(length) < counts[:, None]] = column
     return array
