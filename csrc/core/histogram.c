@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* histogram.c: the public histogram of all pairs, which stores none of them. */
 #include "cells.h"
-#include "fpenv.h"
 #include "parallel.h"
 #include "poll.h"
+#include "request.h"
 #include "tally.h"
 
 #include <math.h>
@@ -193,20 +193,17 @@ options_of(const hs_histogram *histogram, const hs_options *options)
     return counting;
 }
 
+/* A hs_use_fn. */
 static hs_status
-fill_histogram(hs_search *search, const hs_histogram *histogram, hs_failure *failure)
+fill_histogram(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
-    hs_tally_plan plan = {.account = NULL};
-    int64_t       n_pairs = 0;
-    hs_status     status = open_plan(search, histogram, &plan, failure);
+    const hs_histogram *histogram = context;
+    hs_tally_plan       plan = {.account = NULL};
+    hs_status           status = open_plan(search, histogram, &plan, failure);
     if (status == HS_OK) {
-        status = count_pairs(search, &plan, histogram, &n_pairs, failure);
-    }
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = search->account.limit;
+        status = count_pairs(search, &plan, histogram, n_pairs, failure);
     }
     close_plan(&plan);
-    hs_search_report(search, n_pairs);
     return status;
 }
 
@@ -215,27 +212,22 @@ static hs_status
 histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
              const hs_histogram *histogram, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_sets    sets = *among;
-    hs_search  search;
+    hs_failure   ignored;
+    hs_sets      sets = *among;
+    hs_histogram filled = *histogram;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
-    hs_status status = histogram->n_types >= 1 ? check_edges(histogram, failure) : HS_ERR_ARGUMENT;
+    const hs_status status =
+        histogram->n_types >= 1 ? check_edges(histogram, failure) : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         return status;
     }
     sets.is_plain = true;
     sets.least_cutoff = smallest_edge(histogram);
     const hs_options counting = options_of(histogram, options);
-    const hs_fpenv   saved = hs_fpenv_enter();
-    status = hs_search_open(&sets, box, &counting, &search, failure);
-    if (status == HS_OK) {
-        status = fill_histogram(&search, histogram, failure);
-        hs_search_close(&search);
-    }
-    hs_account_close(&search.account);
-    hs_fpenv_leave(saved);
-    return status;
+    const hs_request request = {
+        .sets = &sets, .box = box, .options = &counting, .keeps_no_pairs = true};
+    return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 
 hs_status
