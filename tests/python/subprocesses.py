@@ -27,10 +27,13 @@ def resident():
 """
 
 
+# Whoever starts the tests in the background may have SIGINT ignored, which is inherited.
+HEARS_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
+
 def run(script, timeout=120):
     """Run a script that prints one line of JSON at its end; return what it printed."""
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=timeout
-    )
+    command = [sys.executable, "-c", HEARS_INTERRUPTS + script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-3000:]}"
     return json.loads(done.stdout.splitlines()[-1])
