@@ -113,6 +113,10 @@ class PyKDTree(Contestant):
         """Refuse all that nearest_peers.py does not ask for."""
         return "no pairs"
 
+    def prepare(self, scene: Scene) -> Call:
+        """Fail: whoever is refused is not asked."""
+        raise ValueError(f"{self.name} finds no pairs")
+
 
 PEERS: dict[str, Contestant] = {
     peer.name: peer

@@ -48,7 +48,7 @@ typedef enum hs_status {
     HS_ERR_NOT_FINITE,    /* a coordinate is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_FINITE,    /* a box entry is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent */
-    HS_ERR_BOX_SKEWED,    /* and one is so long that float64 does not tell points along others */
+    HS_ERR_BOX_SKEWED,    /* independent, but float64 does not tell points along the short ones */
     HS_ERR_TOO_MANY,      /* 2^31 points or more, or more pairs than int64 counts */
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */
@@ -182,7 +182,7 @@ typedef struct hs_options {
     double       cell_size;    /* least width of cells, as far as possible; 0: what is quick */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
-    int          threads;      /* exactly so many; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
+    int          threads;      /* so many, 0 as 1; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
     double       memory_limit; /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;
@@ -289,8 +289,9 @@ hs_status hs_nearest_find(const hs_points *points, const hs_points *queries, con
                           int64_t k, const hs_options *options, hs_pairs **rows,
                           hs_failure *failure);
 
-/* Rows of a result of hs_neighbors_find, and where each begins: rows + 1 numbers, the last one the
- * length of all; borrowed. NULL when taken, or of another search. */
+/* Rows of a result of hs_neighbors_find, hs_cells_neighbors or hs_cells_candidates, and where each
+ * begins: rows + 1 numbers, the last one the length of all; borrowed. 0 and NULL when taken, or of
+ * another search. */
 int64_t        hs_pairs_rows(const hs_pairs *pairs);
 const int64_t *hs_pairs_offsets(const hs_pairs *pairs);
 

@@ -123,12 +123,15 @@ raise_skewed(const hs_failure *failure)
     return NULL;
 }
 
-/* Bytes in the largest unit of which there is one. */
-static const char *
-format_bytes(double bytes, char *text, size_t size)
+const char *
+hs_format_bytes(double bytes, char *text, size_t size)
 {
     static const char *const units[] = {"bytes", "kB", "MB", "GB"};
     int                      unit = 0;
+    if (isinf(bytes)) {
+        snprintf(text, size, "no more");
+        return text;
+    }
     for (; unit < 3 && bytes >= 999.5; unit++) {
         bytes /= 1e3;
     }
@@ -139,13 +142,11 @@ format_bytes(double bytes, char *text, size_t size)
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
-    char text[320], needed[32], search[32], limit[32] = "no more";
-    format_bytes(failure->expected_bytes, needed, sizeof needed);
+    char text[320], needed[32], search[32], limit[32];
+    hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
     const bool stored = failure->expected_bytes > 0.0; /* and not only counted */
-    format_bytes(failure->search_bytes, search, sizeof search);
-    if (!isinf(failure->limit_bytes)) {
-        format_bytes(failure->limit_bytes, limit, sizeof limit);
-    }
+    hs_format_bytes(failure->search_bytes, search, sizeof search);
+    hs_format_bytes(failure->limit_bytes, limit, sizeof limit);
     if (isinf(failure->expected_bytes)) {
         snprintf(text, sizeof text,
                  "the result would not fit: the cutoff spans more images of the box than any "

@@ -11,4 +11,8 @@
  * HS_ERR_INTERRUPTED expects that poll() has set one. options may be NULL. */
 PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options *options);
 
+/* Bytes in the largest unit of which there is one, such as "1.5 GB"; "no more" of infinitely many,
+ * for what may be taken. Returns text, of so many bytes; 32 suffice. */
+const char *hs_format_bytes(double bytes, char *text, size_t size);
+
 #endif

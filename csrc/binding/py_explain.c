@@ -7,32 +7,23 @@
 #include "errors.h"
 #include "tuples.h"
 
-/* Puts a new reference into a dictionary and gives it up; false on failure, also of `value`. */
-static bool
-put(PyObject *dict, const char *key, PyObject *value)
-{
-    const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
-    Py_XDECREF(value);
-    return done;
-}
-
 static bool
 put_plan(PyObject *dict, const hs_plan *plan)
 {
-    return put(dict, "ndim", PyLong_FromLong(plan->ndim)) &&
-           put(dict, "n_periodic", PyLong_FromLong(plan->n_periodic)) &&
-           put(dict, "aligned", PyBool_FromLong(plan->aligned)) &&
-           put(dict, "reduced", PyBool_FromLong(plan->reduced)) &&
-           put(dict, "keeps_originals", PyBool_FromLong(plan->keeps_originals)) &&
-           put(dict, "all_pairs", PyBool_FromLong(plan->all_pairs)) &&
-           put(dict, "shape", hs_tuple_of_integers(plan->shape, plan->ndim)) &&
-           put(dict, "cell_sizes", hs_tuple_of_reals(plan->cell_size, plan->ndim)) &&
-           put(dict, "reach", hs_tuple_of_integers(plan->reach, plan->ndim)) &&
-           put(dict, "images", hs_tuple_of_integers(plan->images, plan->ndim)) &&
-           put(dict, "stencil_rows", PyLong_FromLongLong(plan->stencil_rows)) &&
-           put(dict, "expected_pairs", PyFloat_FromDouble(plan->expected_pairs)) &&
-           put(dict, "threads", PyLong_FromLong(plan->threads)) &&
-           put(dict, "kernel", PyUnicode_FromString(plan->kernel));
+    return hs_dict_put(dict, "ndim", PyLong_FromLong(plan->ndim)) &&
+           hs_dict_put(dict, "n_periodic", PyLong_FromLong(plan->n_periodic)) &&
+           hs_dict_put(dict, "aligned", PyBool_FromLong(plan->aligned)) &&
+           hs_dict_put(dict, "reduced", PyBool_FromLong(plan->reduced)) &&
+           hs_dict_put(dict, "keeps_originals", PyBool_FromLong(plan->keeps_originals)) &&
+           hs_dict_put(dict, "all_pairs", PyBool_FromLong(plan->all_pairs)) &&
+           hs_dict_put(dict, "shape", hs_tuple_of_integers(plan->shape, plan->ndim)) &&
+           hs_dict_put(dict, "cell_sizes", hs_tuple_of_reals(plan->cell_size, plan->ndim)) &&
+           hs_dict_put(dict, "reach", hs_tuple_of_integers(plan->reach, plan->ndim)) &&
+           hs_dict_put(dict, "images", hs_tuple_of_integers(plan->images, plan->ndim)) &&
+           hs_dict_put(dict, "stencil_rows", PyLong_FromLongLong(plan->stencil_rows)) &&
+           hs_dict_put(dict, "expected_pairs", PyFloat_FromDouble(plan->expected_pairs)) &&
+           hs_dict_put(dict, "threads", PyLong_FromLong(plan->threads)) &&
+           hs_dict_put(dict, "kernel", PyUnicode_FromString(plan->kernel));
 }
 
 static bool
@@ -47,7 +38,7 @@ put_bytes(PyObject *dict, const hs_counters *counters)
         [HS_FOR_SHIFTS] = "shifts",         [HS_FOR_SORTING] = "sorting",
     };
     for (int p = 0; p < HS_PURPOSE_END; p++) {
-        if (!put(dict, names[p], PyLong_FromLongLong(counters->bytes[p]))) {
+        if (!hs_dict_put(dict, names[p], PyLong_FromLongLong(counters->bytes[p]))) {
             return false;
         }
     }
@@ -62,15 +53,15 @@ put_counters(PyObject *dict, const hs_counters *counters)
         Py_XDECREF(bytes);
         return false;
     }
-    return put(dict, "bytes", bytes) &&
-           put(dict, "bytes_peak", PyLong_FromLongLong(counters->bytes_peak)) &&
-           put(dict, "groups", PyLong_FromLongLong(counters->groups)) &&
-           put(dict, "candidates", PyLong_FromLongLong(counters->candidates)) &&
-           put(dict, "pairs", PyLong_FromLongLong(counters->pairs)) &&
-           put(dict, "ambiguous", PyLong_FromLongLong(counters->ambiguous)) &&
-           put(dict, "by_float64", PyLong_FromLongLong(counters->by_float64)) &&
-           put(dict, "by_double_word", PyLong_FromLongLong(counters->by_double_word)) &&
-           put(dict, "by_integers", PyLong_FromLongLong(counters->by_integers));
+    return hs_dict_put(dict, "bytes", bytes) &&
+           hs_dict_put(dict, "bytes_peak", PyLong_FromLongLong(counters->bytes_peak)) &&
+           hs_dict_put(dict, "groups", PyLong_FromLongLong(counters->groups)) &&
+           hs_dict_put(dict, "candidates", PyLong_FromLongLong(counters->candidates)) &&
+           hs_dict_put(dict, "pairs", PyLong_FromLongLong(counters->pairs)) &&
+           hs_dict_put(dict, "ambiguous", PyLong_FromLongLong(counters->ambiguous)) &&
+           hs_dict_put(dict, "by_float64", PyLong_FromLongLong(counters->by_float64)) &&
+           hs_dict_put(dict, "by_double_word", PyLong_FromLongLong(counters->by_double_word)) &&
+           hs_dict_put(dict, "by_integers", PyLong_FromLongLong(counters->by_integers));
 }
 
 /* A new dictionary; NULL on failure. counters: NULL when nothing was measured. */

@@ -3,18 +3,11 @@
  * memory. */
 #include "py_functions.h"
 
+#include "tuples.h"
+
 #include "../halfshell.h"
 #include "available.h"
 #include "environment.h"
-
-/* Puts a new reference into a dictionary and gives it up; false on failure, also of `value`. */
-static bool
-put(PyObject *dict, const char *key, PyObject *value)
-{
-    const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
-    Py_XDECREF(value);
-    return done;
-}
 
 PyObject *
 hs_py_kernels(PyObject *module, PyObject *ignored)
@@ -68,14 +61,14 @@ hs_py_build_info(PyObject *module, PyObject *ignored)
 {
     PyObject *dict = PyDict_New();
     if (dict != NULL &&
-        put(dict, "core", version()) &&
-        put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
+        hs_dict_put(dict, "core", version()) &&
+        hs_dict_put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
 #ifdef NDEBUG
-        put(dict, "assertions", PyBool_FromLong(0)) &&
+        hs_dict_put(dict, "assertions", PyBool_FromLong(0)) &&
 #else
-        put(dict, "assertions", PyBool_FromLong(1)) &&
+        hs_dict_put(dict, "assertions", PyBool_FromLong(1)) &&
 #endif
-        put(dict, "kernels", hs_py_kernels(module, ignored))) {
+        hs_dict_put(dict, "kernels", hs_py_kernels(module, ignored))) {
         return dict;
     }
     Py_XDECREF(dict);

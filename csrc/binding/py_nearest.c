@@ -14,17 +14,20 @@
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
-    char text[256];
+    char        text[320], needed[32], limit[32];
+    const char *verb = isinf(failure->limit_bytes) ? "is to be had" : "are allowed";
+    hs_format_bytes(failure->limit_bytes, limit, sizeof limit);
     if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
+        hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
         snprintf(text, sizeof text,
-                 "the result would not fit: %.3g entries (%.3g GB), %.3g GB are allowed; use a "
-                 "smaller k, fewer quantities, or fewer queries at a time",
-                 failure->expected_pairs, failure->expected_bytes / 1e9,
-                 failure->limit_bytes / 1e9);
+                 "the result would not fit: %.3g entries (%s), %s %s; use a smaller k, fewer "
+                 "quantities, or fewer queries at a time",
+                 failure->expected_pairs, needed, limit, verb);
     } else {
         snprintf(text, sizeof text,
-                 "not enough memory for the search: a point is so far from the others, or the box "
-                 "so small, that too many images are about as near");
+                 "no memory for the search: %s %s; perhaps a point is so far from the others, or "
+                 "the box so small, that too many images are about as near",
+                 limit, verb);
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;

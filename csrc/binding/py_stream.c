@@ -59,18 +59,12 @@ end(pair_stream *self)
 static PyObject *
 raise_block_too_large(const pair_stream *self, const hs_failure *failure)
 {
-    char text[160];
-    if (isfinite(failure->limit_bytes)) {
-        snprintf(text, sizeof text,
-                 "no memory for blocks of max_pairs = %lld pairs: %.3g GB are allowed; use a "
-                 "smaller max_pairs or fewer quantities",
-                 (long long)self->max_pairs, failure->limit_bytes / 1e9);
-    } else {
-        snprintf(text, sizeof text,
-                 "no memory for blocks of max_pairs = %lld pairs; use a smaller max_pairs or "
-                 "fewer quantities",
-                 (long long)self->max_pairs);
-    }
+    char text[192], limit[32];
+    snprintf(text, sizeof text,
+             "no memory for blocks of max_pairs = %lld pairs: %s %s; use a smaller max_pairs or "
+             "fewer quantities",
+             (long long)self->max_pairs, hs_format_bytes(failure->limit_bytes, limit, sizeof limit),
+             isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
 }

@@ -32,3 +32,11 @@ hs_tuple_of_reals(const double *values, int n)
     }
     return tuple;
 }
+
+bool
+hs_dict_put(PyObject *dict, const char *key, PyObject *value)
+{
+    const bool done = value != NULL && PyDict_SetItemString(dict, key, value) == 0;
+    Py_XDECREF(value);
+    return done;
+}

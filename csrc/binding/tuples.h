@@ -1,12 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tuples.h: a few numbers of the core as a tuple of Python. */
+/* tuples.h: what the core knows as small objects of Python: tuples, entries of dictionaries. */
 #ifndef HS_TUPLES_H
 #define HS_TUPLES_H
 
 #include "numpy_api.h"
 
+#include <stdbool.h>
+
 /* n numbers; a new reference, or NULL with an exception set. */
 PyObject *hs_tuple_of_integers(const int64_t *values, int n);
 PyObject *hs_tuple_of_reals(const double *values, int n);
+
+/* Puts a new reference into a dictionary and gives it up; false with an exception set, also where
+ * `value` is NULL. */
+bool hs_dict_put(PyObject *dict, const char *key, PyObject *value);
 
 #endif

@@ -2,6 +2,8 @@
 /* arguments.c: see arguments.h. */
 #include "arguments.h"
 
+#include <limits.h>
+
 #define ALL_WANTS 63u /* every HS_WANT_ bit */
 
 static hs_status
@@ -63,6 +65,8 @@ hs_check_options(const hs_options *options)
     return status_of((want & ~ALL_WANTS) == 0 &&
                      (want == 0 || is_index_size(options->index_bytes)) &&
                      (want == 0 || out == NULL || can_hold(out, want)) &&
+                     options->threads > INT_MIN &&
+                     options->cell_size >= 0.0 && options->memory_limit >= 0.0 &&
                      (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
                       options->precision == HS_SINGLE));
 }

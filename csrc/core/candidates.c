@@ -269,7 +269,6 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
                        &rows->output);
         hs_output_init(&search->account, cells->points.ndim, HS_WANT_I, 8, &rows->offsets);
         status = list_ranges(rows, failure);
-        failure->limit_bytes = search->account.limit;
         hs_search_report(search, 0);
         hs_search_close(search);
     } else if (status == HS_STATUS_END) {
@@ -278,6 +277,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
     }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
+        failure->limit_bytes = search->account.limit;
         hs_pairs_free(rows);
         return status;
     }

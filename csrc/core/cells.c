@@ -195,7 +195,6 @@ hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
                  const hs_options *options, hs_pairs **rows, hs_failure *failure)
 {
     hs_sets sets = hs_cells_sets(cells, queries, true);
-    sets.is_plain = sets.is_wide = true;
     sets.trees = cells->trees;
     return hs_nearest_find_in(&sets, hs_cells_box(cells), k, options, rows, failure);
 }

@@ -251,10 +251,10 @@ hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
 }
 
 void
-hs_filler_close(hs_table *table, hs_filler *fill)
+hs_filler_close(hs_filler *fill)
 {
-    hs_recorder_free(&table->search->account, &fill->recorder);
-    hs_free(&table->search->account, fill->numbers);
+    hs_recorder_free(&fill->table->search->account, &fill->recorder);
+    hs_free(&fill->table->search->account, fill->numbers);
     hs_output_free(&fill->part);
 }
 

@@ -26,7 +26,7 @@ typedef struct hs_filler {
 
 /* After hs_table_prepare. On failure hs_filler_close. */
 hs_status hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill);
-void      hs_filler_close(hs_table *table, hs_filler *fill);
+void      hs_filler_close(hs_filler *fill);
 
 /* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
 hs_status hs_fill_rows(void *filler, hs_walker *walker, int32_t first, const hs_hits *hits);

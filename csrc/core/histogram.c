@@ -7,13 +7,15 @@
 #include "tally.h"
 
 #include <math.h>
-#include <string.h>
 
 #define MOST_EDGES (INT64_C(1) << 30) /* slots are int32 */
 
 static hs_status
 check_edges(const hs_histogram *histogram, hs_failure *failure)
 {
+    if (histogram->n_edges < 1 || histogram->n_edges >= MOST_EDGES) {
+        return HS_ERR_EDGES;
+    }
     for (int64_t k = 0; k < histogram->n_edges; k++) {
         const double edge = histogram->edges[k];
         if (!isfinite(edge) || edge < 0.0 || (k > 0 && edge < histogram->edges[k - 1])) {
@@ -22,7 +24,7 @@ check_edges(const hs_histogram *histogram, hs_failure *failure)
             return HS_ERR_EDGES;
         }
     }
-    return histogram->n_edges >= 1 && histogram->n_edges < MOST_EDGES ? HS_OK : HS_ERR_EDGES;
+    return HS_OK;
 }
 
 static double
@@ -223,10 +225,10 @@ histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
         return status;
     }
     sets.is_plain = true;
+    sets.keeps_none = true;
     sets.least_cutoff = smallest_edge(histogram);
     const hs_options counting = options_of(histogram, options);
-    const hs_request request = {
-        .sets = &sets, .box = box, .options = &counting, .keeps_no_pairs = true};
+    const hs_request request = {.sets = &sets, .box = box, .options = &counting};
     return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 

@@ -2,8 +2,6 @@
 /* near_rank.c: see near_rank.h. */
 #include "near_rank.h"
 
-#include <math.h>
-
 /* Of so many times the keys that are wanted, the others are first set aside. */
 #define MANY 3
 

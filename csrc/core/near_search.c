@@ -261,9 +261,7 @@ run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
         close_worker(crew, &crew->workers[w]);
     }
     if (crew->commits != NULL) {
-        hs_failure      of_crew = *failure;
-        const hs_status ended = hs_commits_end(account, crew->commits, &of_crew);
-        *failure = of_crew;
+        const hs_status ended = hs_commits_end(account, crew->commits, failure);
         status = status == HS_OK ? ended : status;
     }
     hs_free(account, crew->workers);

@@ -2,8 +2,6 @@
 /* near_sort.c: see near_sort.h. */
 #include "near_sort.h"
 
-#include <string.h>
-
 HS_ALWAYS_INLINE bool
 is_smaller(void *context, const hs_near_key *b, const hs_near_key *a)
 {

@@ -36,7 +36,7 @@ hs_status hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t 
 /* The row of point si comes soon: rows are far apart, and their memory is fetched meanwhile. */
 void hs_near_expect(const hs_near_writer *writer, int32_t si);
 
-/* The last batch: before the block changes nothing needs to be done. */
+/* Writes what is left of the batch: needed once, at the end. Entries do not refer to the block. */
 void hs_near_flush(hs_near_writer *writer);
 
 /* Nothing, from the given entry of a row of the caller's point `row` on. */

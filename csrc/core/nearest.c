@@ -50,10 +50,11 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
 }
 
 hs_status
-hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k, const hs_options *options,
+hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_options *options,
                    hs_pairs **result, hs_failure *failure)
 {
     hs_failure ignored;
+    hs_sets    sets = *among;
     *result = NULL;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
@@ -61,20 +62,22 @@ hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k, const hs_o
     if (rows == NULL) {
         return HS_ERR_MEMORY;
     }
+    sets.is_plain = sets.is_wide = true;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_options     of_rows = *options;
     of_rows.sorted = false;
+    of_rows.out = NULL;
     of_rows.precision = HS_EXACT;
     of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
     hs_search_begin(&of_rows, &rows->search);
-    hs_output_init(&rows->search.account, sets->points->ndim, of_rows.want, options->index_bytes,
+    hs_output_init(&rows->search.account, sets.points->ndim, of_rows.want, options->index_bytes,
                    &rows->output);
     hs_near near = {.search = &rows->search,
                     .k = k,
                     .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
-                    .omits_self = sets->queries == NULL,
+                    .omits_self = sets.queries == NULL,
                     .rows = &rows->output};
-    const hs_status status = find_nearest(&near, sets, box, failure);
+    const hs_status status = find_nearest(&near, &sets, box, failure);
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
         hs_pairs_free(rows);
@@ -88,7 +91,6 @@ hs_status
 hs_nearest_find(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
                 const hs_options *options, hs_pairs **result, hs_failure *failure)
 {
-    const hs_sets sets = {
-        .points = points, .queries = queries, .is_full = true, .is_plain = true, .is_wide = true};
+    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
     return hs_nearest_find_in(&sets, box, k, options, result, failure);
 }

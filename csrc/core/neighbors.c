@@ -5,8 +5,6 @@
 #include "table.h"
 #include "touch.h"
 
-#include <math.h>
-
 /* Rows have an order of their own. */
 static hs_options
 options_of_rows(const hs_options *options)

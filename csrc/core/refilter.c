@@ -4,9 +4,6 @@
 
 #include "poll.h"
 
-#include <math.h>
-#include <string.h>
-
 /* Slabs of a round for each thread: enough that none waits long for the others, and their pairs
  * still lie in the second-level cache when they are written. */
 #define SLABS_A_THREAD 8

@@ -6,11 +6,11 @@
 #include "fpenv.h"
 #include "poll.h"
 
-/* What the caller is told when memory is short. */
+/* What the caller is told when memory is short. Where no pairs are kept their number is not why. */
 static void
 tell_shortage(const hs_request *request, const hs_search *search, hs_failure *failure)
 {
-    if (request->keeps_no_pairs) {
+    if (request->sets->keeps_none) {
         failure->limit_bytes = search->account.limit;
     } else {
         hs_shortage_of_search(request->sets->points, request->box, search, failure);

@@ -13,7 +13,6 @@ typedef struct hs_request {
     const hs_sets    *sets;
     const hs_box     *box;
     const hs_options *options;
-    bool              keeps_no_pairs; /* when memory is short, it is not for the number of these */
 } hs_request;
 
 /* Uses an open search; *n_pairs, zero before, is how many it found. */

@@ -8,8 +8,6 @@
 
 #include "estimate.h"
 
-#include <math.h>
-
 /* Scaled cutoffs as small as this keep all their digits. */
 #define SMALLEST_CUTOFF 0x1p-500
 

@@ -8,8 +8,6 @@
 #include "poll.h"
 #include "sparse.h"
 
-#include <string.h>
-
 typedef struct build {
     hs_account       *account;
     const hs_options *options;

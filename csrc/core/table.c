@@ -96,7 +96,7 @@ keep_all(hs_table *table, hs_failure *failure)
         }
         hs_walker_close(search, &walker);
     }
-    hs_filler_close(table, &fill);
+    hs_filler_close(&fill);
     return status;
 }
 
@@ -135,7 +135,7 @@ fill_all(hs_table *table, hs_failure *failure)
         status = hs_parallel_visit(table->search, &visitors, NULL, failure);
     }
     while (opened > 0) {
-        hs_filler_close(table, &fillers[--opened]);
+        hs_filler_close(&fillers[--opened]);
     }
     hs_free(account, fillers);
     return status;

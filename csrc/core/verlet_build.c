@@ -11,7 +11,6 @@
 #include "pieces.h"
 
 #include <math.h>
-#include <string.h>
 
 /* A search, and what it has found in cell order. */
 typedef struct building {

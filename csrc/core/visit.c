@@ -4,10 +4,9 @@
 
 #include "fpenv.h"
 #include "parallel.h"
+#include "poll.h"
 #include "record.h"
 #include "request.h"
-
-#include <string.h>
 
 #define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
@@ -146,10 +145,12 @@ hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     of_visit.out = NULL;
     of_pairs.keeps_none = true;
     if (visit->pair == NULL && visit->pairs == NULL) {
+        if (failure != NULL) {
+            *failure = HS_NO_FAILURE;
+        }
         return HS_ERR_ARGUMENT;
     }
-    const hs_request request = {
-        .sets = &of_pairs, .box = box, .options = &of_visit, .keeps_no_pairs = true};
+    const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_visit};
     return hs_request_use(&request, visit_pairs, &doing, failure);
 }
 

@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from halfshell import _core
 
-_SMALL_COPY = 1 << 26  # bytes; what is left is not asked for below
+_SMALL = 1 << 26  # bytes; what is left is not asked for below
 
 
 def refuse_unavailable(needed: int, what: str) -> None:
     """MemoryError before results that would make the machine swap, or fit no address space."""
-    if needed > _SMALL_COPY and needed > _core.available_memory():
+    if needed > _SMALL and needed > _core.available_memory():
         raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than there is")
 
 
@@ -25,8 +25,4 @@ def gigabytes(n_bytes: int) -> str:
 
 def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
     """MemoryError before a copy that would make the machine swap: views may be huge."""
-    if needed > _SMALL_COPY and needed > _core.available_memory():
-        raise MemoryError(
-            f"{name} of shape {array.shape} and dtype {array.dtype} must be copied, which takes "
-            f"{needed / 1e9:.3g} GB, more than there is"
-        )
+    refuse_unavailable(needed, f"{name} of shape {array.shape} and dtype {array.dtype}, copied,")

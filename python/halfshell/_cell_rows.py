@@ -114,7 +114,8 @@ class CellRows(CellLayout):
         """Find the k nearest points of each point or query, as `halfshell.nearest` does.
 
         The first call makes a tree of the points, which is kept; later calls, with any `k` and
-        any queries, spare that. The cutoff of the list plays no part.
+        any queries, spare that. The cutoff and the precision of the list play no part: the order is
+        always exact.
 
         Parameters
         ----------

@@ -31,6 +31,8 @@ class CellList(CellPairs, CellRows, CellCounts):
         this number of points.
     threads : int, optional
         Threads that sort the points; and those that later calls use unless they say otherwise.
+    memory_limit : float, optional
+        Bytes that the cells may take; later calls have limits of their own. As in `pairs`.
 
     Attributes
     ----------

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core, _inputs
+from halfshell._pairs import Arrays
 
-Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 _MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
 
 

@@ -5,6 +5,9 @@
 
 #include "../../csrc/halfshell.h"
 
+#include <limits.h>
+#include <math.h>
+
 void test_arguments(void);
 
 static const double numbers[16] = {0.0, 0.0, 0.0, 0.5, 0.5, 0.5};
@@ -123,12 +126,17 @@ bad_options_are_refused(void)
     hs_pairs       *pairs;
     int64_t         i[1];
     hs_pair_arrays  out = {.capacity = 1, .index_bytes = 8, .i = i};
-    hs_options      bad[] = {good_options(), good_options(), good_options(), good_options()};
+    const hs_options good = good_options();
+    hs_options       bad[] = {good, good, good, good, good, good, good, good};
     bad[0].index_bytes = 2;
     bad[1].want = 64;
     bad[2].out = &out; /* and j is missing */
     bad[3].precision = (hs_precision)3;
-    for (int b = 0; b < 4; b++) {
+    bad[4].threads = INT_MIN;
+    bad[5].cell_size = NAN;
+    bad[6].cell_size = -1.0;
+    bad[7].memory_limit = NAN;
+    for (int b = 0; b < 8; b++) {
         CHECK(hs_pairs_find(&points, NULL, &bad[b], &pairs, NULL) == HS_ERR_ARGUMENT);
         CHECK(pairs == NULL);
     }

@@ -102,6 +102,16 @@ def test_example_of_histograms_runs():
     assert names["near"].sum() == names["within"][1] and names["far"].shape == (2, 2, 50)
 
 
+def test_examples_of_nearest_run():
+    text = (ROOT / "docs/nearest.md").read_text()
+    searches, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(searches), "nearest.md", "exec"), names)
+    assert names["j"].shape == (1, 4) and names["S"].shape == (1, 4, 3)
+    exec(compile(ast.parse(cells), "nearest.md", "exec"), names)
+    assert names["j"].shape == (10, 3) and (np.diff(names["d"]) >= 0.0).all()
+
+
 def test_readme_commands_create_what_they_need():
     text = (ROOT / "README.md").read_text()
     commands = re.findall(r"```bash\n(.*?)\n```", text)
