@@ -19,6 +19,7 @@ struct hs_commits {
     hs_condition     changed;    /* due, n_copying or status */
     int64_t          due;        /* the range whose pairs are next in the output */
     int              n_copying;  /* threads that write to columns: these must not move then */
+    int              n_working;  /* threads that may still have a range */
     hs_status        status;
     hs_failure       failure;
     int64_t          failed_range;
@@ -87,6 +88,9 @@ hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
                 hs_committer *committer)
 {
     *committer = (hs_committer){.commits = commits, .options = options, .pairs = pairs};
+    hs_mutex_lock(&commits->mutex);
+    commits->n_working++;
+    hs_mutex_unlock(&commits->mutex);
     if (!hs_thread_is(commits->caller)) {
         options->poll = goes_on;
         options->poll_context = commits;
@@ -247,6 +251,24 @@ hs_commit(hs_committer *committer, double fraction, bool ends)
                        !ends || committer->n_parts == HS_COMMIT_PARTS || bytes >= HS_COMMIT_BYTES);
 }
 
+/* There is no range left for this thread. The caller's goes on polling for the others. */
+static hs_status
+leave(hs_committer *committer)
+{
+    hs_commits *commits = committer->commits;
+    const bool  waits = committer->options->poll != goes_on;
+    hs_status   status = HS_OK;
+    hs_mutex_lock(&commits->mutex);
+    commits->n_working--;
+    hs_condition_wake(&commits->changed);
+    while (waits && status == HS_OK && commits->status == HS_OK && commits->n_working > 0) {
+        const double left = (double)commits->n_working / (double)commits->n_ranges;
+        status = wait_for_change(commits, committer, hs_larger(1.0 - left, 0.0));
+    }
+    hs_mutex_unlock(&commits->mutex);
+    return status;
+}
+
 void
 hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
                 const hs_failure *failure)
@@ -258,6 +280,10 @@ hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
     if (status == HS_OK && committer->n_parts > 0) {
         status = write_parts(committer, true);
     }
+    if (status != HS_OK) {
+        fail(committer, status, failure);
+    }
+    status = leave(committer);
     if (status != HS_OK) {
         fail(committer, status, failure);
     }

@@ -66,7 +66,8 @@ void hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
 
 /*
  * Takes ranges as long as there are any and nobody has failed, and waits until all that was
- * committed has been written. Everybody stops when a range fails; `failure` tells why it did.
+ * committed has been written. Everybody stops when a range fails; `failure` tells why it did. The
+ * caller's thread then waits for the others, and polls meanwhile.
  */
 void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
                      const hs_failure *failure);

@@ -18,6 +18,13 @@
 /* Images between two polls. */
 #define POLL_IMAGES 4096
 
+/* After a step that every candidate took part in. */
+static hs_status
+poll_if_large(const hs_options *options, const hs_near_block *block)
+{
+    return block->n > HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
+}
+
 /* Room for n candidates, and what kernels read and write beyond. */
 static bool
 reserve(const hs_near *near, hs_near_block *block, int64_t n)
@@ -259,17 +266,20 @@ gather_axis(const hs_near *near, int k, double centre, hs_near_block *block)
     }
 }
 
-static void
-gather(const hs_near *near, const hs_near_group *group, hs_near_block *block)
+static hs_status
+gather(const hs_near *near, const hs_options *options, const hs_near_group *group,
+       hs_near_block *block)
 {
     const hs_bins *asking = hs_search_asking(near->search);
-    for (int k = 0; k < near->tree.ndim; k++) {
+    hs_status      status = poll_if_large(options, block);
+    for (int k = 0; k < near->tree.ndim && status == HS_OK; k++) {
         const double centre = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
         gather_axis(near, k, centre, block);
         for (int32_t t = 0; t < group->last - group->first; t++) {
             block->q[k][t] =
                 relative(asking->x[k][group->first + t], centre, block->unit, block->extent);
         }
+        status = poll_if_large(options, block);
     }
     for (int32_t r = 0; r < block->n_runs; r++) {
         int32_t *run_of = block->run_of + block->runs[r].at;
@@ -277,6 +287,7 @@ gather(const hs_near *near, const hs_near_group *group, hs_near_block *block)
             run_of[c] = r;
         }
     }
+    return status;
 }
 
 hs_status
@@ -299,13 +310,13 @@ hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group
     /* Beyond the group and the radius, by more than roundings take. */
     block->extent = 0.5 * widest + 4.0;
     status = find_candidates(near, options, group, most, &images, block);
+    if (status == HS_OK) {
+        status = poll_if_large(options, block);
+    }
     if (status == HS_OK && !reserve(near, block, block->n)) {
         status = HS_ERR_MEMORY;
     }
-    if (status == HS_OK) {
-        gather(near, group, block);
-    }
-    return status;
+    return status == HS_OK ? gather(near, options, group, block) : status;
 }
 
 int32_t

@@ -4,6 +4,8 @@
 
 /* Of so many times the keys that are wanted, the others are first set aside. */
 #define MANY 3
+/* Of keys that float64 cannot tell, up to so many of very many are found by insertion. */
+#define MOST_INSERTED 64
 
 void
 hs_near_ranker_free(hs_near_ranker *ranker)
@@ -141,10 +143,11 @@ is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
 static void
 settle_keys(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, int64_t wanted)
 {
-    const int64_t sorted = n > 4 * wanted ? wanted : n; /* all, unless few of many are wanted */
-    hs_near_merge(ranker, keys, ranker->spare, sorted, is_listed_before);
-    hs_near_merge(ranker, keys, ranker->spare, sorted, is_nearer);
-    for (int64_t e = sorted; e < n; e++) {
+    hs_near_pace *pace = &ranker->pace;
+    const int64_t sorted = wanted <= MOST_INSERTED && n > 4 * wanted ? wanted : n;
+    hs_near_merge(pace, ranker, keys, ranker->spare, sorted, is_listed_before);
+    hs_near_merge(pace, ranker, keys, ranker->spare, sorted, is_nearer);
+    for (int64_t e = sorted; e < n && hs_near_goes_on(pace, 1); e++) {
         const hs_near_key key = keys[e];
         int64_t           at = sorted;
         while (at > 0) {
@@ -266,6 +269,9 @@ hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si, con
     default: n = fill_keys(ranker, hits, n, limit, d);
     }
     n = ranker->near->omits_self ? drop_self(ranker, n) : n;
+    if (!hs_near_goes_on(&ranker->pace, n)) {
+        return ranker->pace.status;
+    }
     if (n < k && !group->is_complete) {
         return HS_OK;
     }
@@ -273,7 +279,7 @@ hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si, con
     if (n > MANY * wanted && n > HS_NEAR_COUNTED) {
         n = keep_nearest(ranker, n, wanted);
     }
-    hs_near_sort(&ranker->keys, &ranker->spare, n, limit);
+    hs_near_sort(&ranker->pace, &ranker->keys, &ranker->spare, n, limit);
     if (!group->is_complete && wanted > 0) {
         const double last = ranker->keys[wanted - 1].square;
         if (last + closeness(ranker, last) > reach * (1.0 - 0x1p-40)) {
@@ -282,5 +288,5 @@ hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si, con
     }
     settle_order(ranker, n, wanted);
     *count = wanted;
-    return HS_OK;
+    return ranker->pace.status;
 }

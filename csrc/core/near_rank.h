@@ -18,6 +18,7 @@ typedef struct hs_near_ranker {
     hs_near_key         *spare;
     int64_t              capacity;
     int32_t              si;    /* the point that asks */
+    hs_near_pace         pace;
     hs_stages            stages;
     int64_t              n_compared;
 } hs_near_ranker;
@@ -27,6 +28,7 @@ void hs_near_ranker_free(hs_near_ranker *ranker);
 /*
  * Ranks the nearest of n hits of point si: ranker->keys[0 ... *count - 1], at most k, in order of
  * distance, then (j, S). *count is -1 when there may be nearer ones beyond the group's radius.
+ * HS_ERR_MEMORY, HS_ERR_INTERRUPTED.
  */
 hs_status hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si,
                        const int32_t *hits, int64_t n, int64_t *count);

@@ -189,7 +189,8 @@ open_worker(near_crew *crew, near_worker *worker)
     worker->crew = crew;
     worker->options = near->search->options;
     worker->failure = HS_NO_FAILURE;
-    worker->ranker = (hs_near_ranker){.near = near, .block = &worker->block};
+    worker->ranker = (hs_near_ranker){
+        .near = near, .block = &worker->block, .pace = {.options = &worker->options}};
     hs_near_writer_init(near, &worker->writer);
     const hs_status status = hs_near_bounder_init(near, &worker->bounder);
     return status == HS_OK ? hs_near_block_init(near, &worker->block) : status;

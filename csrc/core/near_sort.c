@@ -42,12 +42,13 @@ sort_by_counting(hs_near_key **keys, hs_near_key **spare, int64_t n, double larg
 }
 
 void
-hs_near_sort(hs_near_key **keys, hs_near_key **spare, int64_t n, double largest)
+hs_near_sort(hs_near_pace *pace, hs_near_key **keys, hs_near_key **spare, int64_t n,
+             double largest)
 {
     if (n <= HS_NEAR_COUNTED) {
         sort_by_counting(keys, spare, n, largest);
     } else {
-        hs_near_merge(NULL, *keys, *spare, n, is_smaller);
+        hs_near_merge(pace, NULL, *keys, *spare, n, is_smaller);
     }
 }
 

@@ -315,9 +315,87 @@ it_can_be_stopped(void)
     CHECK(hs_nearest_find(&points, NULL, NULL, 3, &options, &rows, NULL) == HS_ERR_CUTOFF);
 }
 
+/* ---- as many as you like, all equally far ---- */
+
+#define ORDERS 5040 /* of 7 numbers */
+
+/* All orders of the numbers from 1 to 7: each is as far from the origin as any other. */
+static void
+list_orders(double (*to)[7])
+{
+    for (int n = 0; n < ORDERS; n++) {
+        int left[7] = {1, 2, 3, 4, 5, 6, 7}, rest = n;
+        for (int k = 0; k < 7; k++) {
+            const int at = rest % (7 - k);
+            rest /= 7 - k;
+            to[n][k] = left[at];
+            memmove(left + at, left + at + 1, (size_t)(6 - k - at) * sizeof *left);
+        }
+    }
+}
+
+/* How many polls there may still be. */
+static bool
+stop_after(void *context, double fraction)
+{
+    int *left = context;
+    (void)fraction;
+    return --*left >= 0;
+}
+
+static hs_status
+find_ties(int64_t k, int polls, hs_counters *counters, int64_t *wrong)
+{
+    static double   orders[ORDERS][7];
+    const double    origin_of_all[7] = {0.0};
+    const hs_points points = {&orders[0][0], ORDERS, 7, HS_FLOAT64, sizeof orders[0], 8};
+    const hs_points query = {origin_of_all, 1, 7, HS_FLOAT64, sizeof origin_of_all, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    list_orders(orders);
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J;
+    options.poll = stop_after;
+    options.poll_context = &polls;
+    options.counters = counters;
+    const hs_status status = hs_nearest_find(&points, &query, NULL, k, &options, &rows, NULL);
+    *wrong = status != HS_OK && rows != NULL;
+    for (int64_t e = 0; status == HS_OK && e < k; e++)
+        *wrong += ((const int64_t *)hs_pairs_array(rows, HS_WANT_J))[e] != e;
+    hs_pairs_free(rows);
+    return status;
+}
+
+static void
+ties_take_no_more_than_sorting(void)
+{
+    hs_counters   counters;
+    int64_t       wrong;
+    const int64_t numbers[] = {1, 64, 65, 1000, ORDERS / 4 - 1, ORDERS};
+    for (int t = 0; t < 6; t++) {
+        CHECK(find_ties(numbers[t], INT32_MAX, &counters, &wrong) == HS_OK && wrong == 0);
+        CHECK(counters.ambiguous < 65 * (int64_t)ORDERS);
+        CHECK(numbers[t] <= 64 || counters.ambiguous < 14 * (int64_t)ORDERS);
+    }
+}
+
+static void
+one_row_can_be_stopped_anywhere(void)
+{
+    hs_counters counters;
+    int64_t     wrong;
+    CHECK(find_ties(ORDERS, INT32_MAX, &counters, &wrong) == HS_OK);
+    const int polls = (int)counters.polls;
+    CHECK(polls > 1); /* more than there are groups */
+    for (int n = 0; n < polls; n++)
+        CHECK(find_ties(ORDERS, n, &counters, &wrong) == HS_ERR_INTERRUPTED && wrong == 0);
+}
+
 void
 test_nearest(void)
 {
+    RUN(ties_take_no_more_than_sorting);
+    RUN(one_row_can_be_stopped_anywhere);
     RUN(order_is_that_of_real_numbers);
     RUN(order_at_the_ends_of_the_range);
     RUN(rows_are_the_neighbours_in_order);

@@ -15,6 +15,10 @@ SEARCHES = {
     "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
     "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
     "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
+    "nearest": "hs.nearest(points, 100, memory_limit=1e13)",
+    "nearest, all equally far": """hs.nearest(
+        np.concatenate([points > 0.5] * 5), 1_000_000, queries=points[:9] * 0 + 0.5
+    )""",
     "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
     "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
     "count of exact ties": "hs.count_pairs(grid, 40.0, box=[60.0] * 3)",
