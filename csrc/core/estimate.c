@@ -114,7 +114,7 @@ hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndi
     if (failure->expected_bytes == 0.0) {
         failure->expected_pairs = hs_larger(shortage->pairs, failure->expected_pairs);
         failure->expected_bytes = failure->expected_pairs * bytes_per_pair_of(options, ndim);
-        failure->search_bytes = shortage->bytes + BYTES_OF_WALK;
+        failure->search_bytes = hs_larger(shortage->bytes + BYTES_OF_WALK, failure->search_bytes);
     }
 }
 

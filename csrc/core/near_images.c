@@ -12,10 +12,12 @@
 /* Products of unit vectors at right angles, and the room that this takes beside squares. */
 #define UPRIGHT 0x1p-40
 #define LAYER_ROOM 0x1p-36
-/* Shifts are int32, with room for sums of two; and so many images are more than any memory holds
- * points. */
-#define MOST_SHIFTS 0x1p30
-#define MOST_IMAGES 0x1p40
+#define MOST_SHIFTS 0x1p30 /* they are int32, with room for sums of two */
+/* More images than these take minutes: they are refused, but where so many neighbours are asked
+ * for that all of them may be images of one point. A box around a ball in 8 dimensions is 63 times
+ * as large. */
+#define MOST_IMAGES 0x1p24
+#define IMAGES_A_NEIGHBOUR 1024.0
 
 void
 hs_near_measure_drift(hs_near *near)
@@ -162,7 +164,9 @@ hs_near_images_start(const hs_near *near, const hs_near_group *group, hs_near_im
         images->count *= hs_larger((double)(images->high[r] - images->low[r] + 1), 0.0);
     }
     images->error = bound_error(&near->search->scene, most);
-    return images->count < MOST_IMAGES ? HS_OK : HS_ERR_MEMORY;
+    return images->count < fmax(MOST_IMAGES, IMAGES_A_NEIGHBOUR * (double)near->k)
+               ? HS_OK
+               : HS_ERR_MEMORY;
 }
 
 bool

@@ -43,6 +43,9 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
     if (status == HS_OK) {
         status = hs_near_search(near, failure);
     }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
     hs_near_release(near);
     hs_search_report(search, near->rows->n_pairs);
     hs_search_close(search);

@@ -81,6 +81,9 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
     if (status == HS_OK) {
         status = hs_stencil_build(&search->account, &search->options, scene, &search->grid,
                                   search->is_full, &search->stencil);
+        if (status == HS_ERR_MEMORY) {
+            failure->search_bytes = hs_stencil_bytes(&search->grid, search->is_full);
+        }
     }
     if (status == HS_OK) {
         status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);

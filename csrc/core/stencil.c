@@ -213,6 +213,22 @@ hs_stencil_bound(const hs_grid *grid)
     return 0.5 * (rows + 1.0);
 }
 
+double
+hs_stencil_bytes(const hs_grid *grid, bool is_full)
+{
+    /* Along axes on which only the next cells are in reach these always are; in the space of the
+     * others rows in reach fill a ball, or an ellipsoid, of which this is the share of the box. */
+    static const double share[HS_MAX_DIM] = {1.0, 1.0, 0.785, 0.523, 0.308, 0.164, 0.080, 0.036};
+    double              rows = is_full ? 1.0 : 0.5;
+    int                 m = 0;
+    for (int k = 1; k < grid->ndim; k++) {
+        const double reach = (double)grid->reach[k];
+        rows *= reach > 1.0 ? 2.0 * reach : 2.0 * reach + 1.0;
+        m += reach > 1.0;
+    }
+    return 0.9 * share[m] * rows * (double)sizeof(hs_stencil_row); /* balls of cells are uneven */
+}
+
 /* Twice the room; on failure the stencil is freed. */
 static bool
 grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
@@ -266,6 +282,10 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
     }
     if (bound > (of.axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
         return hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
+    }
+    if (scene->lattice.aligned && bound > FIRST_CAPACITY &&
+        !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {
+        return HS_ERR_MEMORY; /* rather than after as much has been written */
     }
     const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
     stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
