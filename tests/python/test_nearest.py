@@ -420,6 +420,12 @@ def test_shifts_that_do_not_fit_are_refused():
 def test_more_images_than_memory_are_refused():
     with pytest.raises(MemoryError, match="images"):
         hs.nearest([[0.0, 0.0]], 1, queries=[[0.0, 1e300]], box=[1.0, 1.0], periodic=[True, False])
+    # Memory would do, but not the time: some 1e8 images are about as near.
+    with pytest.raises(MemoryError, match="images"):
+        hs.nearest(
+            np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1e10]], box=np.ones(3),
+            periodic=[True, True, False],
+        )  # fmt: skip
 
 
 def test_inputs_are_left_alone(rng):

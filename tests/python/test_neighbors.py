@@ -339,6 +339,21 @@ def test_what_would_not_fit_is_refused(rng):
     assert (hs.coordination(points[:5000], 2.0, memory_limit=1e8) == 4999).all()
 
 
+@pytest.mark.parametrize("quantities", ["j", "jdD"])
+def test_far_more_rows_than_the_density_foretells(rng, quantities):
+    # A small table is held until its rows have places. This one is expected to be small, and is
+    # not: it is begun again. Two threads count first.
+    points = np.concatenate([rng.random((1000, 3)) * 1e-3, rng.random((1000, 3)) * 100.0])
+    one, two = (hs.neighbors(points, 0.5, quantities=quantities, threads=n) for n in (1, 2))
+    i, j = np.nonzero(np.linalg.norm(points[:, None] - points, axis=2) <= 0.5)
+    assert len(one.indices) == 999_000 + np.count_nonzero((i >= 1000) & (i != j))
+    assert one.offsets.tobytes() == two.offsets.tobytes()
+    assert one.indices.tobytes() == two.indices.tobytes() == j[i != j].tobytes()
+    if "d" in quantities:
+        assert one.distances.tobytes() == two.distances.tobytes()
+        assert one.vectors.tobytes() == two.vectors.tobytes()
+
+
 def test_shifts_that_do_not_fit(rng):
     points = rng.random((5, 1))
     points[3] = 1e12
