@@ -107,6 +107,8 @@ def compare(scene: Scene, ours: Keys, theirs: Keys, inclusive: bool, band: float
     shifts : bool
         Whether the keys were made with shifts.
     """
+    if np.array_equal(ours, theirs) and bool((theirs[1:] > theirs[:-1]).all()):
+        return Verdict()  # nearly always, and sets of millions of keys take half a minute
     unique = np.unique(theirs)
     missed = np.setdiff1d(ours, unique, assume_unique=True)
     spurious = np.setdiff1d(unique, ours, assume_unique=True)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import platform
 import subprocess
@@ -43,11 +44,16 @@ def touch_memory(n_bytes: int) -> None:
     """Write to `n_bytes` of memory once and give them back.
 
     On a virtual machine the first use of a page may be many times slower than any later one,
-    which would be charged to whoever comes first.
+    which would be charged to whoever comes first. Mapped here, because an allocator would hand out
+    memory that it has kept, and keep what it is given back.
     """
-    block = 8 << 20  # large enough for huge pages, small enough to come from free memory first
-    held = [np.ones(block, dtype=np.uint8) for _ in range(n_bytes // block)]
-    del held
+    least = 16 << 20  # some more than a huge page, which is all that small results need
+    own = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
+    with mmap.mmap(-1, max(n_bytes, least), **own) as block:
+        if hasattr(mmap, "MADV_HUGEPAGE"):
+            block.madvise(mmap.MADV_HUGEPAGE)
+        for at in range(0, len(block), mmap.PAGESIZE):
+            block[at] = 1
 
 
 def facts(label: str | None = None, simd: str = "", compiler: str = "") -> dict[str, Any]:
