@@ -63,7 +63,7 @@ class Contestant(Library):
 
     def nearest(self, scene: Scene, result: Any) -> tuple[Any, Any]:
         """Return distances and numbers of the nearest, shape (n, k), where it finds these."""
-        raise NotImplementedError
+        raise ValueError(f"{self.name} finds no nearest points")
 
     def for_batch(self) -> Contestant:
         """Return the contestant for scenes of many systems. Default: a loop over them."""

@@ -92,7 +92,7 @@ typedef struct hs_points {
     ptrdiff_t   column_stride;
 } hs_points;
 
-/* The box. Rows of axes that do not repeat are ignored. */
+/* The box. Rows of axes that do not repeat must be finite, and are otherwise ignored. */
 typedef struct hs_box {
     int    ndim;
     bool   periodic[HS_MAX_DIM];

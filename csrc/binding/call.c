@@ -101,6 +101,15 @@ count_points(const hs_call *call)
 }
 
 bool
+hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
+{
+    if (n_arguments != expected) {
+        PyErr_Format(PyExc_TypeError, "%s takes %d arguments", name, expected);
+    }
+    return n_arguments == expected;
+}
+
+bool
 hs_call_init(hs_call *call, PyObject *const *arguments)
 {
     return hs_call_init_sets(call, arguments, Py_None);

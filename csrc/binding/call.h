@@ -21,6 +21,9 @@ typedef struct hs_call {
     PyThreadState  *thread;   /* saved while the GIL is released, else NULL */
 } hs_call;
 
+/* Whether a function got as many arguments as it takes; false with an exception set. */
+bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected);
+
 /*
  * Positional arguments of every search, in this order: points (or cells of cells_build, with None
  * as box and 0 as periodic), cutoff, box, periodic, inclusive,

@@ -145,9 +145,8 @@ call_plain(const plain_form *form, PyObject *module, PyObject *const *arguments,
            Py_ssize_t n_arguments)
 {
     PyObject *taken[MOST_ARGUMENTS], *index_bytes = NULL, *result = NULL;
-    if (n_arguments != form->n_arguments) {
-        return PyErr_Format(PyExc_TypeError, "%s takes %d arguments", form->name,
-                            form->n_arguments);
+    if (!hs_expect_arguments(form->name, n_arguments, form->n_arguments)) {
+        return NULL;
     }
     memcpy(taken, arguments, (size_t)n_arguments * sizeof *taken);
     const int bytes = form->index_dtype > 0 ? index_bytes_of(arguments[form->index_dtype]) : 0;

@@ -198,8 +198,7 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_pairs  *pairs = NULL;
     batch      given;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 7) {
-        PyErr_Format(PyExc_TypeError, "batch_pairs takes %d arguments", HS_CALL_ARGUMENTS + 7);
+    if (!hs_expect_arguments("batch_pairs", n_arguments, HS_CALL_ARGUMENTS + 7)) {
         return NULL;
     }
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
@@ -230,8 +229,7 @@ hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_failure failure;
     batch      given;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 3) {
-        PyErr_Format(PyExc_TypeError, "batch_count takes %d arguments", HS_CALL_ARGUMENTS + 3);
+    if (!hs_expect_arguments("batch_count", n_arguments, HS_CALL_ARGUMENTS + 3)) {
         return NULL;
     }
     if (!hs_call_init(&call, arguments) ||

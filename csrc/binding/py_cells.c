@@ -22,8 +22,7 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_failure failure;
     hs_cells  *cells = NULL;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 1) {
-        PyErr_Format(PyExc_TypeError, "cells_build takes %d arguments", HS_CALL_ARGUMENTS + 1);
+    if (!hs_expect_arguments("cells_build", n_arguments, HS_CALL_ARGUMENTS + 1)) {
         return NULL;
     }
     const double cell_size = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS]);
@@ -145,9 +144,7 @@ hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t 
     hs_failure failure;
     hs_pairs  *ranges = NULL;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 1) {
-        PyErr_Format(PyExc_TypeError, "cells_candidates takes %d arguments",
-                     HS_CALL_ARGUMENTS + 1);
+    if (!hs_expect_arguments("cells_candidates", n_arguments, HS_CALL_ARGUMENTS + 1)) {
         return NULL;
     }
     if (!hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS]) ||

@@ -103,8 +103,7 @@ hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     hs_pairs   *pairs = NULL;
     bool        measures;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 4) {
-        PyErr_Format(PyExc_TypeError, "explain takes %d arguments", HS_CALL_ARGUMENTS + 4);
+    if (!hs_expect_arguments("explain", n_arguments, HS_CALL_ARGUMENTS + 4)) {
         return NULL;
     }
     if (!hs_call_init(&call, arguments) ||

@@ -83,8 +83,7 @@ hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     hs_failure       failure;
     hs_histogram     wanted;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 8) {
-        PyErr_Format(PyExc_TypeError, "histogram takes %d arguments", HS_CALL_ARGUMENTS + 8);
+    if (!hs_expect_arguments("histogram", n_arguments, HS_CALL_ARGUMENTS + 8)) {
         return NULL;
     }
     if (!hs_call_init_sets(&call, arguments, more[2]) || !take_histogram(more, &call, &wanted)) {

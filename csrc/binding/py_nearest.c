@@ -41,8 +41,7 @@ hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     hs_pairs   *rows = NULL;
     const char *letters;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 4) {
-        PyErr_Format(PyExc_TypeError, "nearest takes %d arguments", HS_CALL_ARGUMENTS + 4);
+    if (!hs_expect_arguments("nearest", n_arguments, HS_CALL_ARGUMENTS + 4)) {
         return NULL;
     }
     PyObject *const *own = arguments + HS_CALL_ARGUMENTS;

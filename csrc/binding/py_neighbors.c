@@ -9,15 +9,6 @@
 #include "outputs.h"
 #include "result.h"
 
-static bool
-expect_arguments(const char *name, Py_ssize_t n, int expected)
-{
-    if (n != expected) {
-        PyErr_Format(PyExc_TypeError, "%s takes %d arguments", name, expected);
-    }
-    return n == expected;
-}
-
 /* Where two sets are asked for, None is none of them. */
 static bool
 expect_queries(PyObject *queries)
@@ -50,7 +41,7 @@ hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_call          call;
     hs_result        result;
     (void)module;
-    if (!expect_arguments("pairs_between", n_arguments, HS_CALL_ARGUMENTS + 5) ||
+    if (!hs_expect_arguments("pairs_between", n_arguments, HS_CALL_ARGUMENTS + 5) ||
         !expect_queries(more[4]) ||
         !hs_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call) ||
         !hs_result_is_apart(&result, more[4], "queries") ||
@@ -71,7 +62,7 @@ hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_failure failure;
     int64_t    count = 0;
     (void)module;
-    if (!expect_arguments("count_between", n_arguments, HS_CALL_ARGUMENTS + 1) ||
+    if (!hs_expect_arguments("count_between", n_arguments, HS_CALL_ARGUMENTS + 1) ||
         !expect_queries(arguments[HS_CALL_ARGUMENTS]) ||
         !hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
         return NULL;
@@ -90,7 +81,7 @@ hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     hs_call          call;
     const char      *letters;
     (void)module;
-    if (!expect_arguments("neighbors", n_arguments, HS_CALL_ARGUMENTS + 3) ||
+    if (!hs_expect_arguments("neighbors", n_arguments, HS_CALL_ARGUMENTS + 3) ||
         !hs_call_init_sets(&call, arguments, more[2]) ||
         !hs_quantities_of(more[0], HS_ROW_LETTERS, &letters, &call.options.want)) {
         return NULL;
@@ -113,7 +104,7 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
     hs_call    call;
     hs_failure failure;
     (void)module;
-    if (!expect_arguments("coordination", n_arguments, HS_CALL_ARGUMENTS + 1) ||
+    if (!hs_expect_arguments("coordination", n_arguments, HS_CALL_ARGUMENTS + 1) ||
         !hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
         return NULL;
     }

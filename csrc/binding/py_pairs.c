@@ -14,8 +14,7 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
     hs_failure failure;
     hs_pairs  *pairs = NULL;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 4) {
-        PyErr_Format(PyExc_TypeError, "pairs takes %d arguments", HS_CALL_ARGUMENTS + 4);
+    if (!hs_expect_arguments("pairs", n_arguments, HS_CALL_ARGUMENTS + 4)) {
         return NULL;
     }
     if (!hs_call_init(&call, arguments) ||
@@ -42,8 +41,7 @@ hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_failure failure;
     int64_t    count = 0;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS) {
-        PyErr_Format(PyExc_TypeError, "count_pairs takes %d arguments", HS_CALL_ARGUMENTS);
+    if (!hs_expect_arguments("count_pairs", n_arguments, HS_CALL_ARGUMENTS)) {
         return NULL;
     }
     if (!hs_call_init(&call, arguments)) {

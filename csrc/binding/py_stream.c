@@ -205,8 +205,7 @@ PyObject *
 hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_failure failure;
-    if (n_arguments != HS_CALL_ARGUMENTS + 3) {
-        PyErr_Format(PyExc_TypeError, "iter_pairs takes %d arguments", HS_CALL_ARGUMENTS + 3);
+    if (!hs_expect_arguments("iter_pairs", n_arguments, HS_CALL_ARGUMENTS + 3)) {
         return NULL;
     }
     PyTypeObject *type = *(PyTypeObject **)PyModule_GetState(module);

@@ -33,13 +33,10 @@ hs_py_verlet_new(PyObject *module, PyObject *ignored)
 
 /* The list of the first argument, of which there must be n in all; NULL with an exception set. */
 static hs_verlet *
-list_of(PyObject *const *arguments, Py_ssize_t n_arguments, Py_ssize_t n, const char *name)
+list_of(PyObject *const *arguments, Py_ssize_t n_arguments, int n, const char *name)
 {
-    if (n_arguments != n) {
-        PyErr_Format(PyExc_TypeError, "%s takes %zd arguments", name, n);
-        return NULL;
-    }
-    return PyCapsule_GetPointer(arguments[0], CAPSULE);
+    return hs_expect_arguments(name, n_arguments, n) ? PyCapsule_GetPointer(arguments[0], CAPSULE)
+                                                     : NULL;
 }
 
 PyObject *

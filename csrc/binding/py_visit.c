@@ -125,8 +125,7 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_visit   visit = {0};
     int64_t    n = 0;
     (void)module;
-    if (n_arguments != HS_CALL_ARGUMENTS + 3) {
-        PyErr_Format(PyExc_TypeError, "for_each_pair takes %d arguments", HS_CALL_ARGUMENTS + 3);
+    if (!hs_expect_arguments("for_each_pair", n_arguments, HS_CALL_ARGUMENTS + 3)) {
         return NULL;
     }
     if (!hs_call_init(&call, arguments) ||

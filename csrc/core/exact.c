@@ -86,23 +86,11 @@ judge_in_floats(const hs_metric *metric, const double *p, const double *q, const
     return verdict;
 }
 
-static bool
-is_shifted(const hs_metric *metric, const int64_t *shift)
-{
-    uint64_t any = 0;
-    if (shift != NULL) {
-        for (int l = 0; l < metric->n_rows; l++) {
-            any |= (uint64_t)shift[l];
-        }
-    }
-    return any != 0;
-}
-
 bool
 hs_metric_within(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
                  hs_stages *stages)
 {
-    if (!is_shifted(metric, shift)) {
+    if (!hs_is_shifted(metric, shift)) {
         shift = NULL;
     }
     if (metric->floats_usable) {
@@ -129,12 +117,9 @@ static hs_verdict
 judge_by_a_hair(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
 {
     hs_difference difference;
-    if (!is_shifted(metric, shift)) {
-        hs_difference_plain(&difference, p, q, metric->ndim);
-    } else if (!hs_difference_shifted(&difference, metric, p, q, shift, metric->ndim, true)) {
-        return HS_UNDECIDED;
-    }
-    return hs_hair_verdict(metric, &difference, metric->ndim);
+    return hs_difference_watched(&difference, metric, p, q, shift)
+               ? hs_hair_verdict(metric, &difference, metric->ndim)
+               : HS_UNDECIDED;
 }
 
 bool

@@ -75,6 +75,29 @@ hs_difference_shifted(hs_difference *difference, const hs_metric *metric, const 
     return magnitude <= ldexp(1.0, HS_SAFE_EXPONENT); /* also false for NaN */
 }
 
+/* Whether q is an image of itself that lies elsewhere; shift may be NULL. */
+HS_ALWAYS_INLINE bool
+hs_is_shifted(const hs_metric *metric, const int64_t *shift)
+{
+    uint64_t any = 0;
+    for (int l = 0; shift != NULL && l < metric->n_rows; l++) {
+        any |= (uint64_t)shift[l];
+    }
+    return any != 0;
+}
+
+/* D, watched, whatever the shift. False as for hs_difference_shifted. */
+HS_ALWAYS_INLINE bool
+hs_difference_watched(hs_difference *difference, const hs_metric *metric, const double *p,
+                      const double *q, const int64_t *shift)
+{
+    if (!hs_is_shifted(metric, shift)) {
+        hs_difference_plain(difference, p, q, metric->ndim);
+        return true;
+    }
+    return hs_difference_shifted(difference, metric, p, q, shift, metric->ndim, true);
+}
+
 /* |D|^2 of the computed D in float64. */
 HS_ALWAYS_INLINE double
 hs_float64_square(const hs_difference *difference, int ndim)

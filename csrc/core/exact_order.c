@@ -10,26 +10,12 @@
 #define LEAST_SQUARE 0x1p-800
 #define MOST_SQUARE 0x1p800
 
-static bool
-is_unshifted(const hs_metric *metric, const int64_t *shift)
-{
-    uint64_t any = 0;
-    for (int l = 0; shift != NULL && l < metric->n_rows; l++) {
-        any |= (uint64_t)shift[l];
-    }
-    return any == 0;
-}
-
 /* D in double-words, watched. False where floats cannot hold it. */
 static bool
 subtract(const hs_metric *metric, const hs_span *span, hs_difference *difference)
 {
-    if (is_unshifted(metric, span->shift)) {
-        hs_difference_plain(difference, span->p, span->q, metric->ndim);
-        return true;
-    }
-    return metric->floats_usable && hs_difference_shifted(difference, metric, span->p, span->q,
-                                                          span->shift, metric->ndim, true);
+    return (metric->floats_usable || !hs_is_shifted(metric, span->shift)) &&
+           hs_difference_watched(difference, metric, span->p, span->q, span->shift);
 }
 
 /* How far hs_float64_square may be from |D|^2. */

@@ -244,13 +244,6 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
-/* More than any memory holds: the cutoff spans them, or the box could not be reduced. */
-static hs_status
-too_many_images(const hs_scene *scene)
-{
-    return hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
-}
-
 /* One cell, or a grid of cells where that is cheaper. */
 static hs_status
 choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid)
@@ -284,7 +277,7 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
         *grid = single;
         status = HS_OK;
     }
-    return status == HS_OK ? HS_OK : too_many_images(scene);
+    return status == HS_OK ? HS_OK : hs_skew_or_memory(&scene->lattice);
 }
 
 /* How far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more images
@@ -301,7 +294,7 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
         const int r = scene->lattice.row_of_axis[k];
         grid->range[k] = (scene->radius + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
         if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
-            return too_many_images(scene);
+            return hs_skew_or_memory(&scene->lattice);
         }
     }
     grid->shift_error = bound_shift_error(scene, images);

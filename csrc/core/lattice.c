@@ -68,17 +68,17 @@ hs_box_check(const hs_box *box, hs_failure *failure)
     if (box == NULL) {
         return HS_OK;
     }
-    const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
-    for (int r = 0; r < n_periodic; r++) {
+    for (int l = 0; l < box->ndim; l++) {
         for (int k = 0; k < box->ndim; k++) {
-            if (!isfinite(rows[r][k])) {
-                failure->row = vector_of_row[r];
+            if (!isfinite(box->rows[l][k])) {
+                failure->row = l;
                 failure->column = k;
-                failure->value = rows[r][k];
+                failure->value = box->rows[l][k];
                 return HS_ERR_BOX_FINITE;
             }
         }
     }
+    const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
     return rows_are_aligned(box->ndim, n_periodic, rows, column) ||
                    hs_rows_independent(box->ndim, n_periodic, rows)
                ? HS_OK

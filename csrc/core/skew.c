@@ -30,6 +30,12 @@ hs_skew_is_left(const hs_lattice *lattice)
     return false;
 }
 
+hs_status
+hs_skew_or_memory(const hs_lattice *lattice)
+{
+    return hs_skew_is_left(lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
+}
+
 bool
 hs_skew_blurs(const hs_scene *scene, const double *drift)
 {

@@ -9,6 +9,10 @@
  * given than a shift may have. */
 bool hs_skew_is_left(const hs_lattice *lattice);
 
+/* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or
+ * HS_ERR_MEMORY, because the cutoff spans them. */
+hs_status hs_skew_or_memory(const hs_lattice *lattice);
+
 /*
  * Whether rounding moves points across half a period and more than the cutoff: a box vector is so
  * long that along the short ones every point would meet many images of every other. drift: how far

@@ -281,7 +281,7 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
         set_triangular_frame(&scene->lattice, &of.axes);
     }
     if (bound > (of.axes.usable ? (double)INT32_MAX : MOST_UNPRUNED)) {
-        return hs_skew_is_left(&scene->lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
+        return hs_skew_or_memory(&scene->lattice);
     }
     if (scene->lattice.aligned && bound > FIRST_CAPACITY &&
         !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {

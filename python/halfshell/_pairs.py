@@ -66,8 +66,8 @@ def pairs(
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box.
     box : array_like of float, shape (d,) or (d, d), or Box, optional
-        Edge lengths, or edge vectors as rows, in the unit of `points`. None: open space. Rows of
-        axes that are not periodic are ignored and may be zero.
+        Edge lengths, or edge vectors as rows, in the unit of `points`; finite. None: open
+        space. Rows of axes that are not periodic may be anything finite, such as zero.
     periodic : bool or sequence of bool, shape (d,), optional
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"

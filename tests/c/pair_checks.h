@@ -40,6 +40,15 @@ options_of(const brute_scene *scene)
     return options;
 }
 
+/* Whether two searches wrote the same bits. */
+static inline bool
+same_array(const hs_pairs *a, const hs_pairs *b, unsigned which, size_t width)
+{
+    const int64_t n = hs_pairs_length(a);
+    return n == hs_pairs_length(b) &&
+           memcmp(hs_pairs_array(a, which), hs_pairs_array(b, which), (size_t)n * width) == 0;
+}
+
 static inline void *
 array_of(int64_t count, size_t size)
 {

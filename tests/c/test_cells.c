@@ -12,14 +12,6 @@
 void test_cells(void);
 
 static bool
-same_array(const hs_pairs *a, const hs_pairs *b, unsigned which, size_t width)
-{
-    const int64_t n = hs_pairs_length(a);
-    return n == hs_pairs_length(b) &&
-           memcmp(hs_pairs_array(a, which), hs_pairs_array(b, which), (size_t)n * width) == 0;
-}
-
-static bool
 same_pairs(const hs_pairs *a, const hs_pairs *b, int ndim)
 {
     const size_t d = (size_t)ndim;

@@ -13,14 +13,6 @@
 
 void test_nearest_cells(void);
 
-static bool
-same_array(const hs_pairs *a, const hs_pairs *b, unsigned which, size_t width)
-{
-    const int64_t n = hs_pairs_length(a);
-    return n == hs_pairs_length(b) &&
-           memcmp(hs_pairs_array(a, which), hs_pairs_array(b, which), (size_t)n * width) == 0;
-}
-
 /* NaN and all: what is missing has the same bits too. */
 static bool
 same_rows(const hs_pairs *a, const hs_pairs *b, int ndim)

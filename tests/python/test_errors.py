@@ -224,6 +224,9 @@ def test_box_entries_that_are_not_finite(value, word):
     assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", word, row_and_column)
     lengths = [1.0, value, 1.0]
     assert_refused(lambda: hs.pairs(POINTS, 1.0, box=lengths), ValueError, "box", word)
+    for periodic in (False, [True, False, True]):  # also where the axis does not repeat
+        given = {"box": lengths, "periodic": periodic}
+        assert_refused(lambda given=given: hs.pairs(POINTS, 1.0, **given), ValueError, "box", word)
 
 
 DEPENDENT = {

@@ -152,8 +152,7 @@ status_of(const fuzz_scene *f)
     if (!(f->scene.cutoff >= 0.0) || !isfinite(f->scene.cutoff))
         return HS_ERR_CUTOFF;
     for (int e = 0; f->scene.box != NULL && e < f->scene.ndim * f->scene.ndim; e++) {
-        const int l = e / f->scene.ndim;
-        if (f->box.periodic[l] && !isfinite(f->box.rows[l][e % f->scene.ndim]))
+        if (!isfinite(f->box.rows[e / f->scene.ndim][e % f->scene.ndim]))
             return HS_ERR_BOX_FINITE;
     }
     for (int e = 0; e < f->scene.n * f->scene.ndim; e++)
