@@ -51,6 +51,9 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
         hs_block_free(account, block);
         return HS_ERR_MEMORY;
     }
+    /* Lanes behind the last candidate do not count, but take a hundred times as long where what
+     * was left there reads as subnormal numbers. */
+    memset(block->y[0], 0, (size_t)(room * (ndim + 1)) * sizeof(float));
     for (int32_t c = 0; block->place != NULL && c < capacity; c++) {
         block->place[c] = c;
     }
