@@ -119,15 +119,10 @@ trace_unsure(hs_walker *walker, const hs_scan *scan, int32_t u, int32_t *next)
             const int32_t place = scan->unsure[u + n].place;
             places[n] = walker->is_ordered ? walker->block.origin[place] : place;
         }
-        const int32_t taken = hs_trace_add(trace, si, places, n);
-        if (taken < 0) {
-            walker->failed_point = hs_search_asking(walker->search)->order[si];
-            return HS_ERR_SHIFT_RANGE;
-        }
-        u += taken;
+        u += hs_trace_add(trace, si, places, n);
     }
     *next = u;
-    return HS_OK;
+    return hs_trace_look_up(trace, true, &walker->failed_point);
 }
 
 hs_status

@@ -123,6 +123,15 @@ put_narrow(const hs_trace *trace, const double *sign, int32_t *to)
     for (int32_t e = 0; e < trace->n; e++) {
         flip[e] = -(sign[e] < 0.0);
     }
+    if (d == 3 && lattice->n_periodic == 3) { /* most scenes: row by row, not column by column */
+        const int32_t *x = trace->shift[0], *y = trace->shift[1], *z = trace->shift[2];
+        for (int32_t e = 0; e < trace->n; e++, to += 3) {
+            to[lattice->vector_of_row[0]] = (x[e] ^ flip[e]) - flip[e];
+            to[lattice->vector_of_row[1]] = (y[e] ^ flip[e]) - flip[e];
+            to[lattice->vector_of_row[2]] = (z[e] ^ flip[e]) - flip[e];
+        }
+        return;
+    }
     for (int l = 0; l < lattice->n_periodic; l++) {
         const int32_t *shift = trace->shift[l];
         int32_t       *column = to + lattice->vector_of_row[l];
@@ -173,7 +182,12 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
 {
     const hs_trace  *trace = &walker->trace;
     const hs_search *search = walker->search;
+    const bool       measured = recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
     double           sign[HS_BATCH];
+    const hs_status  status = hs_trace_look_up(&walker->trace, measured, &walker->failed_point);
+    if (status != HS_OK) {
+        return status;
+    }
     if (search->is_full) {
         for (int32_t e = 0; e < trace->n; e++) {
             sign[e] = 1.0;
@@ -181,7 +195,7 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
     } else if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
         find_signs(trace, part->point, recorder->ids + part->first, sign);
     }
-    if (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) {
+    if (measured) {
         measure(recorder, trace);
     }
     if (recorder->columns & HS_WANT_DISTANCE) {
@@ -210,10 +224,6 @@ hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first, const h
         while (h < hits->end[t]) {
             const int32_t taken =
                 hs_trace_add(trace, first + t, hits->label + h, hits->end[t] - h);
-            if (taken < 0) {
-                walker->failed_point = hits->point[t];
-                return HS_ERR_SHIFT_RANGE;
-            }
             for (int32_t e = trace->n - taken; e < trace->n; e++) {
                 part.point[e] = hits->point[t];
             }

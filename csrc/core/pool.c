@@ -188,16 +188,14 @@ suits(const hs_chunk *chunk, size_t expected)
             (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected));
 }
 
-/* The chunk with the least touched memory that holds all that is expected, or else the one with
- * the most. */
-static bool
-is_better(const hs_chunk *chunk, const hs_chunk *best, size_t expected)
+/* Bytes that a request would waste, or twice those that it would lack. Lists are expected to be a
+ * little longer than they are: the chunk that the same list had before is the one for it, and not
+ * the next larger one, which another column had. */
+static uint64_t
+misfit(const hs_chunk *chunk, size_t expected)
 {
-    if ((chunk->touched >= expected) != (best->touched >= expected)) {
-        return chunk->touched >= expected;
-    }
-    return chunk->touched >= expected ? chunk->touched < best->touched
-                                      : chunk->touched > best->touched;
+    return chunk->touched >= expected ? chunk->touched - expected
+                                      : (uint64_t)2 * (expected - chunk->touched);
 }
 
 void *
@@ -210,7 +208,7 @@ hs_pool_take(size_t expected)
     for (int k = 0; k < pool.n; k++) {
         const hs_chunk *chunk = hs_chunk_of(pool.data[k]);
         if (suits(chunk, expected) &&
-            (best < 0 || is_better(chunk, hs_chunk_of(pool.data[best]), expected))) {
+            (best < 0 || misfit(chunk, expected) < misfit(hs_chunk_of(pool.data[best]), expected))) {
             best = k;
         }
     }

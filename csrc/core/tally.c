@@ -256,13 +256,10 @@ trace_waiting(hs_tally *tally, hs_walker *walker, int32_t u, int32_t *next)
              u = tally->open[u].next) {
             places[n++] = tally->open[u].place;
         }
-        if (hs_trace_add(trace, si, places, n) < 0) {
-            walker->failed_point = hs_search_asking(walker->search)->order[si];
-            return HS_ERR_SHIFT_RANGE;
-        }
+        (void)hs_trace_add(trace, si, places, n); /* there is room for them */
     }
     *next = u;
-    return HS_OK;
+    return hs_trace_look_up(trace, true, &walker->failed_point);
 }
 
 /* Decides all pairs that wait for one edge. */

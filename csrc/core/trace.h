@@ -17,18 +17,19 @@ typedef struct hs_trace_block {
     int32_t *few[HS_MAX_DIM];    /* the same as int32, when is_narrow */
 } hs_trace_block;
 
-/* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more; those of
- * shifts have one for each row of B. */
+/* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more of doubles;
+ * those of shifts are one for each row of B. */
 typedef struct hs_trace {
     const hs_search *search; /* borrowed */
     const hs_block  *block;  /* borrowed */
-    hs_trace_block   of;     /* the block's, when is_loaded */
-    bool     is_loaded;
+    hs_trace_block   of;
+    bool     has_metric, has_given; /* `of` is the block's: q and image; turned or few */
     bool     is_plain;       /* shifts over B are those over the rows as given */
     bool     needs_given;
     bool     is_narrow;      /* all S of the scene are few: `shift` has them, `given` is not set */
     bool     has_images;     /* some candidate of the block is in another image */
     int32_t  n;
+    int32_t *place, *si;     /* of the candidate, and of the point that asks */
     double  *p[HS_MAX_DIM], *q[HS_MAX_DIM]; /* what the metric measures between */
     double  *times[HS_MAX_DIM];   /* its shift */
     int64_t *image[HS_MAX_DIM];   /* shift over B, of X */
@@ -56,14 +57,19 @@ hs_trace_clear(hs_trace *trace)
 HS_ALWAYS_INLINE void
 hs_trace_reset(hs_trace *trace)
 {
-    trace->is_loaded = false;
+    trace->has_metric = trace->has_given = false;
 }
 
-/*
- * Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
- * many, or -1 when a shift passes its range.
- */
+/* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
+ * many. They are looked up together, because the rows of one point are short. */
 int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n);
+
+/*
+ * Fills the arrays of the batch: S, when needs_given, and unless `metric` is false and S needs
+ * nothing else, what the metric measures between. HS_OK; HS_ERR_SHIFT_RANGE when a shift passes its
+ * range, with the number of the point.
+ */
+hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
 
 /* As the batch kernels take it. */
 hs_batch hs_trace_batch(const hs_trace *trace);
