@@ -60,9 +60,14 @@ def machine(rows: Sequence[Row]) -> Lines:
     ]
 
 
+def _is_main(row: Row) -> bool:
+    """Whether a row is of a scene with a wanted ratio, or of the main ones."""
+    return row.one.scene in GROUPS["main"] or bool(row.facts["want"])
+
+
 def ratios(rows: Sequence[Row]) -> Lines:
     """Compare us with the fastest library on each scene with a wanted ratio."""
-    mine = [row.one for row in rows if row.one.scene in GROUPS["main"]]
+    mine = [row.one for row in rows if _is_main(row)]
     wanted = {
         row.one.scene: float(row.facts["want"]) if row.facts["want"] else None for row in rows
     }
@@ -87,8 +92,8 @@ def _star(all_held: bool) -> str:
 def families(rows: Sequence[Row]) -> Lines:
     """Compare us with the fastest library on the families of scenes."""
     names = {name for group, scenes in GROUPS.items() if group not in ("main", "S1")
-             for name in scenes} - set(GROUPS["main"])  # fmt: skip
-    mine = [row.one for row in rows if row.one.scene in names]
+             for name in scenes}  # fmt: skip
+    mine = [row.one for row in rows if row.one.scene in names and not _is_main(row)]
     body = [
         [
             f"`{one.scene}`", duration(one.ours.fresh_median), f"{one.ours.ns_per_pair:.2f}",

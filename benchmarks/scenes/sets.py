@@ -6,7 +6,10 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from scenes.main import pairs_1e4_k52, pairs_1e5_k52
+from scenes.make import uniform
 from scenes.registry import add
 from scenes.scene import Scene
 
@@ -28,7 +31,7 @@ def rows_1e5_k52(name: str) -> Scene:
     """Make the large box, of which all rows are wanted."""
     return replace(
         pairs_1e5_k52(name), stresses="rows of all neighbours, sorted; a large box",
-        task="rows", quantities="j", want=None, limits=(), peers=_ROW_PEERS,
+        task="rows", quantities="j", want=20.0, limits=(), peers=_ROW_PEERS,
     )  # fmt: skip
 
 
@@ -36,6 +39,16 @@ def _between(n_queries: int, what: str, name: str) -> Scene:
     return replace(
         pairs_1e5_k52(name), stresses=f"two sets, {what}", task="between", n_queries=n_queries,
         want=None, limits=(), peers=_BETWEEN_PEERS,
+    )  # fmt: skip
+
+
+@add("S11")
+def between_1e5(name: str) -> Scene:
+    """Make two large sets in one box."""
+    return Scene(
+        name, "two sets of 100 000 points", uniform(20260103, 200_000, 3) * 100.0, 5.0,
+        np.full(3, 100.0), (True,) * 3, task="between", n_queries=100_000, want=20.0,
+        peers=_BETWEEN_PEERS,
     )  # fmt: skip
 
 

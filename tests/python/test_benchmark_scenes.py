@@ -121,7 +121,7 @@ def test_pair_numbers_of_small_scenes_are_those_of_brute_force(
      "clusters-1e5", "narrow-1e4", "plane-1e5-k8", "plane-1e5-k30", "packing-131k", "slab-1e5",
      "droplet-1e5", "two-clusters-open", "two-clusters-periodic", "lognormal-1e5", "plummer-1e5",
      "equal-2000", "one-cell-2000", "outlier-1e5", "batch-30", "growth-1e4-sorted", "rows-1e4-k52",
-     "between-few", "between-halves"],
+     "between-1e5", "between-few", "between-halves"],
 )  # fmt: skip
 def test_pair_numbers_of_larger_scenes_are_those_of_a_tree(
     bench: SimpleNamespace, name: str
