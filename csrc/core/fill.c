@@ -215,6 +215,31 @@ hs_fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hit
     return status;
 }
 
+/* The rows of a visit, behind those that `fill->to` has already. */
+HS_ALWAYS_INLINE void
+keep_visit(hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t own,
+           int64_t *where)
+{
+    hs_output *kept = fill->to;
+    for (int32_t t = 0, hit = 0; t < hits->n; t++) {
+        table_row of = {.at = kept->n_pairs, .point = hits->point[t]};
+        put_row(fill, walker, hits, hit, hits->end[t] - hit, own + t, &of);
+        fill->table->offsets[of.point] = of.n;
+        if (where != NULL) {
+            where[of.point] = of.at;
+        }
+        kept->n_pairs += of.n;
+        hit = hits->end[t];
+    }
+}
+
+void
+hs_keep_numbers(hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int64_t *where)
+{
+    HS_ASSERT(walker->use == HS_BLOCK_LISTS_IDS);
+    keep_visit(fill, walker, hits, 0, where);
+}
+
 hs_status
 hs_keep_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
 {
@@ -226,15 +251,12 @@ hs_keep_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hit
     if (status == HS_OK) {
         status = begin_visit(fill, walker, first, hits, &own);
     }
-    for (int32_t t = 0, hit = 0; t < hits->n && status == HS_OK; t++) {
-        table_row of = {.at = kept->n_pairs, .point = hits->point[t]};
-        put_row(fill, walker, hits, hit, hits->end[t] - hit, own + t, &of);
-        fill->table->offsets[of.point] = of.n;
-        kept->n_pairs += of.n;
-        hit = hits->end[t];
+    if (status != HS_OK) {
+        return status;
     }
+    keep_visit(fill, walker, hits, own, NULL);
     const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > HS_MOST_KEPT;
-    return status == HS_OK && is_much ? HS_STATUS_END : status;
+    return is_much ? HS_STATUS_END : HS_OK;
 }
 
 hs_status

@@ -35,6 +35,11 @@ hs_status hs_fill_rows(void *filler, hs_walker *walker, int32_t first, const hs_
  * are more than HS_MOST_KEPT. */
 hs_status hs_keep_rows(void *filler, hs_walker *walker, int32_t first, const hs_hits *hits);
 
+/* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
+ * them: to table->offsets the lengths, and to `where` the entry that each begins with. */
+void hs_keep_numbers(hs_filler *fill, const hs_walker *walker, const hs_hits *hits,
+                     int64_t *where);
+
 /* The rows that were kept, to their places. */
 void hs_move_rows(hs_table *table);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* neighbors.c: the public searches for all neighbours of each point, or of each query. */
 #include "estimate.h"
+#include "once.h"
 #include "request.h"
 #include "table.h"
 #include "touch.h"
@@ -33,6 +34,25 @@ make_room(hs_pairs *rows, int64_t n_entries, hs_failure *failure)
     return HS_OK;
 }
 
+/* Offsets and entries of a table that is prepared. */
+static hs_status
+find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
+{
+    hs_search *search = table->search;
+    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_STATUS_END;
+    if (status != HS_STATUS_END) {
+        return status;
+    }
+    status = hs_table_measure(table, failure);
+    if (status == HS_OK) {
+        status = make_room(rows, table->offsets[hs_search_asking(search)->n], failure);
+    }
+    if (status == HS_OK) {
+        status = hs_touch_output(search->team, &search->options, &rows->output);
+    }
+    return status == HS_OK ? hs_table_fill(table, failure) : status;
+}
+
 /* A hs_fill_fn. */
 static hs_status
 find_rows(hs_pairs *rows, hs_failure *failure)
@@ -51,16 +71,7 @@ find_rows(hs_pairs *rows, hs_failure *failure)
         status = hs_table_prepare(&table, failure);
     }
     if (status == HS_OK) {
-        status = hs_table_measure(&table, failure);
-    }
-    if (status == HS_OK) {
-        status = make_room(rows, table.offsets[n], failure);
-    }
-    if (status == HS_OK) {
-        status = hs_touch_output(search->team, &search->options, &rows->output);
-    }
-    if (status == HS_OK) {
-        status = hs_table_fill(&table, failure);
+        status = find_entries(rows, &table, failure);
     }
     hs_table_free(&table);
     return status;

@@ -56,31 +56,65 @@ sort_few(uint64_t *entries, int32_t n)
     }
 }
 
-/* By one digit of the key, into the spare entries, which become the entries. Returns the largest
- * number of entries that agree in it. */
-static uint32_t
-sort_digit(hs_order *order, int32_t n, int shift, int bits)
+/* From how many entries have each digit to where the first of them goes. Returns the most. */
+HS_ALWAYS_INLINE uint32_t
+sum_digits(uint32_t *start, uint32_t mask)
 {
-    uint32_t       start[1 << DIGIT_BITS];
-    const uint32_t mask = (UINT32_C(1) << bits) - 1;
-    uint64_t      *from = order->entries, *to = order->spare;
-    uint32_t       most = 0;
-    memset(start, 0, ((size_t)mask + 1) * sizeof *start);
-    for (int32_t c = 0; c < n; c++) {
-        start[(uint32_t)(from[c] >> shift) & mask]++;
-    }
+    uint32_t most = 0;
     for (uint32_t digit = 0, sum = 0; digit <= mask; digit++) {
         const uint32_t count = start[digit];
         start[digit] = sum;
         sum += count;
         most = count > most ? count : most;
     }
+    return most;
+}
+
+/* Into the spare entries, which become the entries. */
+HS_ALWAYS_INLINE void
+deal_out(hs_order *order, int32_t n, int shift, uint32_t mask, uint32_t *start)
+{
+    const uint64_t *from = order->entries;
+    uint64_t       *to = order->spare;
     for (int32_t c = 0; c < n; c++) {
         to[start[(uint32_t)(from[c] >> shift) & mask]++] = from[c];
     }
+    order->spare = order->entries;
     order->entries = to;
-    order->spare = from;
+}
+
+/* By one digit of the key. Returns the largest number of entries that agree in it. */
+static uint32_t
+sort_digit(hs_order *order, int32_t n, int shift, int bits)
+{
+    uint32_t       start[1 << DIGIT_BITS];
+    const uint32_t mask = (UINT32_C(1) << bits) - 1;
+    memset(start, 0, ((size_t)mask + 1) * sizeof *start);
+    for (int32_t c = 0; c < n; c++) {
+        start[(uint32_t)(order->entries[c] >> shift) & mask]++;
+    }
+    const uint32_t most = sum_digits(start, mask);
+    deal_out(order, n, shift, mask, start);
     return most;
+}
+
+/* By two digits of `low` and `high` bits, which are the key: one look counts both. */
+static void
+sort_two_digits(hs_order *order, int32_t n, int low, int high)
+{
+    uint32_t       start[1 << DIGIT_BITS], start_high[1 << DIGIT_BITS];
+    const uint32_t mask = (UINT32_C(1) << low) - 1, mask_high = (UINT32_C(1) << high) - 1;
+    memset(start, 0, ((size_t)mask + 1) * sizeof *start);
+    memset(start_high, 0, ((size_t)mask_high + 1) * sizeof *start_high);
+    for (int32_t c = 0; c < n; c++) {
+        const uint32_t key = (uint32_t)(order->entries[c] >> 32);
+        start[key & mask]++;
+        start_high[key >> low & mask_high]++;
+    }
+    (void)sum_digits(start, mask);
+    (void)sum_digits(start_high, mask_high);
+    deal_out(order, n, 32, mask, start);
+    deal_out(order, n, 32 + low, mask_high, start_high);
 }
 
 /* Stable, by the keys, none of which has a bit that `any` has not. */
@@ -106,6 +140,10 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
             return;
         }
     }
+    if (digits == 2) {
+        sort_two_digits(order, n, (bits + 1) / 2, bits / 2);
+        return;
+    }
     for (int digit = 0, from = 0; digit < digits; digit++) {
         const int width = (bits - from + digits - digit - 1) / (digits - digit);
         (void)sort_digit(order, n, 32 + from, width);
@@ -113,23 +151,45 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
     }
 }
 
-/* Stable, by the candidates' numbers. Returns whether one occurs twice. */
+/* Whether a key occurs twice in a row. */
+static bool
+has_twice(const hs_order *order, int32_t n)
+{
+    uint32_t twice = 0;
+    for (int32_t c = 1; c < n; c++) {
+        twice |= (order->entries[c] >> 32) == (order->entries[c - 1] >> 32);
+    }
+    return twice != 0;
+}
+
+/* By the candidates' numbers, those of the same number as they lie. Returns whether one occurs
+ * twice. */
 static bool
 sort_by_number(const hs_block *block, hs_order *order)
 {
     const int32_t n = block->n;
-    uint32_t      any = 0, twice = 0;
+    uint32_t      any = 0;
     for (int32_t c = 0; c < n; c++) {
+        const uint32_t key = (uint32_t)block->id[c];
+        order->entries[c] = (uint64_t)key << 32 | (uint32_t)c;
+        any |= key;
+    }
+    sort_entries(order, n, any);
+    return has_twice(order, n);
+}
+
+/* The same, stable, of entries that are in another order. */
+static void
+sort_again_by_number(const hs_block *block, hs_order *order)
+{
+    uint32_t any = 0;
+    for (int32_t c = 0; c < block->n; c++) {
         const uint32_t place = (uint32_t)(order->entries[c] & UINT32_MAX);
         const uint32_t key = (uint32_t)block->id[place];
         order->entries[c] = (uint64_t)key << 32 | place;
         any |= key;
     }
-    sort_entries(order, n, any);
-    for (int32_t c = 1; c < n; c++) {
-        twice |= (order->entries[c] >> 32) == (order->entries[c - 1] >> 32);
-    }
-    return twice != 0;
+    sort_entries(order, block->n, any);
 }
 
 /* S of each run's image, over the rows as given. */
@@ -212,9 +272,6 @@ is_ascending(const int32_t *numbers, int32_t n)
 hs_status
 hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_order *order)
 {
-    for (int32_t c = 0; c < block->n; c++) {
-        order->entries[c] = (uint64_t)c;
-    }
     if (is_ascending(block->id, block->n)) {
         for (int32_t c = 0; c < block->n; c++) {
             block->origin[c] = c;
@@ -230,7 +287,7 @@ hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_
             sort_by_shift(block, order->shifts + l, false, order);
             sort_by_shift(block, order->shifts + l, true, order);
         }
-        (void)sort_by_number(block, order);
+        sort_again_by_number(block, order);
     }
     arrange(lattice->ndim, use, block, order);
     return HS_OK;

@@ -47,11 +47,11 @@ hs_table_prepare(hs_table *table, hs_failure *failure)
                : hs_parallel_visit(table->search, &sizes, &table->most, failure);
 }
 
-/* From the number of each row's entries to where it begins. */
-static void
-sum_counts(int64_t *offsets, int64_t n)
+void
+hs_table_sum(hs_table *table)
 {
-    int64_t sum = 0;
+    const int64_t n = hs_search_asking(table->search)->n;
+    int64_t      *offsets = table->offsets, sum = 0;
     for (int64_t i = 0; i < n; i++) {
         const int64_t count = offsets[i];
         offsets[i] = sum;
@@ -108,7 +108,7 @@ hs_table_measure(hs_table *table, hs_failure *failure)
         hs_table_free(table);
         status = hs_table_count(table->search, table->offsets, failure);
     }
-    sum_counts(table->offsets, hs_search_asking(table->search)->n);
+    hs_table_sum(table);
     return status;
 }
 

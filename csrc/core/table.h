@@ -30,6 +30,9 @@ hs_status hs_table_prepare(hs_table *table, hs_failure *failure);
 /* Fills offsets. Where few entries are expected, one walk finds them, and keeps them. */
 hs_status hs_table_measure(hs_table *table, hs_failure *failure);
 
+/* Offsets that hold the number of each row's entries: where it begins. */
+void hs_table_sum(hs_table *table);
+
 /* Then the entries, which have room for offsets[rows]. */
 hs_status hs_table_fill(hs_table *table, hs_failure *failure);
 

@@ -247,6 +247,79 @@ crowds_and_distant_clusters(void)
     }
 }
 
+/* So many that one walk finds them all, in memory of i, and two walks with a second thread. */
+enum { MANY = 24000, ASKING = 9000 };
+
+static hs_status
+find_many(int index_bytes, int threads, bool asks, double limit, hs_pairs **rows)
+{
+    static double  x[3 * MANY];
+    harness_random random = {88};
+    hs_box         box = {.ndim = 3, .periodic = {true, false, true}};
+    const hs_points points = {.data = x, .n = MANY, .ndim = 3, .real = HS_FLOAT64,
+                              .row_stride = 24, .column_stride = 8};
+    hs_points      queries = points;
+    hs_options     options = hs_options_default();
+    for (int e = 0; e < 3 * MANY; e++)
+        x[e] = random_unit(&random);
+    for (int k = 0; k < 3; k++)
+        box.rows[k][k] = 1.0;
+    queries.n = ASKING;
+    options.cutoff = asks ? 0.12 : 0.09;
+    options.index_bytes = index_bytes;
+    options.threads = threads;
+    options.memory_limit = limit;
+    return hs_neighbors_find(&points, asks ? &queries : NULL, &box, &options, rows, NULL);
+}
+
+static bool
+same_numbers(const hs_pairs *one, const hs_pairs *two, int index_bytes)
+{
+    const size_t bytes = (size_t)hs_pairs_length(one) * (size_t)index_bytes;
+    return hs_pairs_length(one) == hs_pairs_length(two) &&
+           memcmp(hs_pairs_array(one, HS_WANT_I), hs_pairs_array(two, HS_WANT_I), bytes) == 0 &&
+           memcmp(hs_pairs_array(one, HS_WANT_J), hs_pairs_array(two, HS_WANT_J), bytes) == 0 &&
+           memcmp(hs_pairs_offsets(one), hs_pairs_offsets(two),
+                  (size_t)(hs_pairs_rows(one) + 1) * sizeof(int64_t)) == 0;
+}
+
+static void
+one_walk_finds_what_two_find(void)
+{
+    for (int form = 0; form < 4; form++) {
+        const int  index_bytes = form % 2 ? 4 : 8;
+        const bool asks = form / 2;
+        hs_pairs  *one = NULL, *two = NULL;
+        CHECK(find_many(index_bytes, 1, asks, INFINITY, &one) == HS_OK);
+        CHECK(find_many(index_bytes, 2, asks, INFINITY, &two) == HS_OK);
+        CHECK(hs_pairs_length(one) > 1 << 20);
+        CHECK(same_numbers(one, two, index_bytes));
+        hs_pairs_free(one);
+        hs_pairs_free(two);
+    }
+}
+
+static void
+one_walk_gives_way_where_memory_is_short(void)
+{
+    hs_pairs *all = NULL;
+    int       n_found = 0, n_refused = 0;
+    CHECK(find_many(8, 1, true, INFINITY, &all) == HS_OK);
+    const double bytes = 16.0 * (double)hs_pairs_length(all);
+    for (double beyond = 16.0; beyond > -1.0; beyond -= 1.0) { /* hundredths of the result */
+        hs_pairs       *rows = NULL;
+        const hs_status status = find_many(8, 1, true, bytes * (1.0 + 0.01 * beyond), &rows);
+        CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+        CHECK((status == HS_OK) == (rows != NULL));
+        CHECK(rows == NULL || same_numbers(all, rows, 8));
+        n_found += status == HS_OK;
+        n_refused += status != HS_OK;
+        hs_pairs_free(rows);
+    }
+    CHECK(n_found > 0 && n_refused > 0);
+    hs_pairs_free(all);
+}
+
 static void
 a_capacity_that_is_too_small_is_named(void)
 {
@@ -292,6 +365,8 @@ test_neighbors(void)
     RUN(rows_are_the_half_list_both_ways);
     RUN(queries_meet_the_points_alone);
     RUN(crowds_and_distant_clusters);
+    RUN(one_walk_finds_what_two_find);
+    RUN(one_walk_gives_way_where_memory_is_short);
     RUN(a_capacity_that_is_too_small_is_named);
     RUN(a_bad_query_is_named);
 }
