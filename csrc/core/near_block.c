@@ -2,6 +2,7 @@
 /* near_block.c: see near_block.h. */
 #include "near_block.h"
 
+#include "bounds.h"
 #include "poll.h"
 
 #include <math.h>
@@ -15,6 +16,9 @@
 #define LEAST_IN_ERRORS 1024.0
 /* Candidates for which there is room at first. */
 #define FIRST_CAPACITY 1024
+/* With more to be found there are more hits than a kernel puts in order. */
+#define MOST_BY_SQUARES (HS_ORDER_MOST / 2)
+#define LARGEST_SQUARE 0x1p60 /* far from where float32 ends */
 /* Images between two polls. */
 #define POLL_IMAGES 4096
 
@@ -37,15 +41,17 @@ reserve(const hs_near *near, hs_near_block *block, int64_t n)
     }
     block->capacity = 0;
     for (int k = 0; done && k < near->tree.ndim; k++) {
-        done = hs_shared_resize(shared, (void **)&block->z[k], 0, room, sizeof(double)) &&
-               hs_shared_resize(shared, (void **)&block->y[k], 0, room, sizeof(float));
+        done = hs_shared_resize(shared, (void **)&block->y[k], 0, room, sizeof(float));
     }
     done = done && hs_shared_resize(shared, (void **)&block->norm, 0, room, sizeof(float)) &&
-           hs_shared_resize(shared, (void **)&block->run_of, 0, room, sizeof(int32_t)) &&
+           hs_shared_resize(shared, (void **)&block->number, 0, room, sizeof(int32_t)) &&
+           hs_shared_resize(shared, (void **)&block->image_of, 0, room, sizeof(int32_t)) &&
            hs_shared_resize(shared, (void **)&block->place, 0, room, sizeof(int32_t)) &&
            hs_shared_resize(shared, (void **)&block->unsure, 0, room, sizeof(hs_unsure)) &&
            hs_shared_resize(shared, (void **)&block->hits, 0, 2 * capacity + HS_PADDING,
-                            sizeof(int32_t));
+                            sizeof(int32_t)) &&
+           hs_shared_resize(shared, (void **)&block->squares, 0, 2 * capacity + HS_PADDING,
+                            sizeof(float));
     for (int64_t c = 0; done && c < room; c++) {
         block->place[c] = (int32_t)c;
     }
@@ -68,13 +74,14 @@ void
 hs_near_block_free(const hs_near *near, hs_near_block *block)
 {
     for (int k = 0; k < HS_MAX_DIM; k++) {
-        hs_shared_release(near->shared, (void **)&block->z[k]);
         hs_shared_release(near->shared, (void **)&block->y[k]);
     }
     hs_shared_release(near->shared, (void **)&block->norm);
-    hs_shared_release(near->shared, (void **)&block->run_of);
+    hs_shared_release(near->shared, (void **)&block->number);
+    hs_shared_release(near->shared, (void **)&block->image_of);
     hs_shared_release(near->shared, (void **)&block->place);
     hs_shared_release(near->shared, (void **)&block->hits);
+    hs_shared_release(near->shared, (void **)&block->squares);
     hs_shared_release(near->shared, (void **)&block->unsure);
     hs_shared_release(near->shared, (void **)&block->runs);
     hs_shared_release(near->shared, (void **)&block->images);
@@ -245,24 +252,25 @@ relative(double x, double centre, double unit, double extent)
 }
 
 static void
-gather_axis(const hs_near *near, int k, double centre, hs_near_block *block)
+relate(const hs_near *near, const double *centre, hs_near_block *block)
 {
-    const double         unit = block->unit, extent = block->extent;
-    double *HS_RESTRICT  z = block->z[k];
-    float *HS_RESTRICT   y = block->y[k];
-    float *HS_RESTRICT   norm = block->norm;
-    for (const hs_near_run *run = block->runs; run < block->runs + block->n_runs; run++) {
-        const double *x = near->search->bins.x[k] + run->si;
-        const double  moved = block->images[run->image].moved[k];
-        for (int32_t c = 0; c < run->n; c++) {
-            z[run->at + c] = x[c] + moved;
+    hs_relate relate = {.ndim = near->tree.ndim,
+                        .images = block->images,
+                        .unit = block->unit,
+                        .extent = block->extent,
+                        .norm = block->norm,
+                        .number = block->number};
+    for (int k = 0; k < near->tree.ndim; k++) {
+        relate.x[k] = near->search->bins.x[k];
+        relate.y[k] = block->y[k];
+        relate.centre[k] = centre[k];
+    }
+    near->search->kernel->relate(&relate, block->runs, block->n_runs);
+    for (int32_t r = 0; block->n_images > 1 && r < block->n_runs; r++) {
+        int32_t *image_of = block->image_of + block->runs[r].at;
+        for (int32_t c = 0; c < block->runs[r].n; c++) {
+            image_of[c] = block->runs[r].image;
         }
-    }
-    for (int32_t c = 0; c < block->n; c++) {
-        y[c] = relative(z[c], centre, unit, extent);
-    }
-    for (int32_t c = 0; c < block->n; c++) {
-        norm[c] = (k > 0 ? norm[c] : 0.0f) + y[c] * y[c];
     }
 }
 
@@ -271,23 +279,41 @@ gather(const hs_near *near, const hs_options *options, const hs_near_group *grou
        hs_near_block *block)
 {
     const hs_bins *asking = hs_search_asking(near->search);
-    hs_status      status = poll_if_large(options, block);
-    for (int k = 0; k < near->tree.ndim && status == HS_OK; k++) {
-        const double centre = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
-        gather_axis(near, k, centre, block);
+    double         centre[HS_MAX_DIM];
+    for (int k = 0; k < near->tree.ndim; k++) {
+        centre[k] = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
         for (int32_t t = 0; t < group->last - group->first; t++) {
             block->q[k][t] =
-                relative(asking->x[k][group->first + t], centre, block->unit, block->extent);
-        }
-        status = poll_if_large(options, block);
-    }
-    for (int32_t r = 0; r < block->n_runs; r++) {
-        int32_t *run_of = block->run_of + block->runs[r].at;
-        for (int32_t c = 0; c < block->runs[r].n; c++) {
-            run_of[c] = r;
+                relative(asking->x[k][group->first + t], centre[k], block->unit, block->extent);
         }
     }
-    return status;
+    relate(near, centre, block);
+    return poll_if_large(options, block);
+}
+
+/* Largest |y| and |q| together, as floats, which round up. */
+static double
+scan_extent(const hs_near_block *block)
+{
+    return 2.0 * block->extent * (1.0 + 0x1p-20);
+}
+
+/* Whether squares in float32 may do: where there are hits enough for all that are wanted, but not
+ * more than a kernel puts in order. */
+static void
+choose_squares(const hs_near *near, const hs_near_group *group, hs_near_block *block)
+{
+    const double extent = scan_extent(block), limit = near->limit * block->unit;
+    double       in, out;
+    block->has_squares = false;
+    if (group->is_complete || near->k > MOST_BY_SQUARES || limit < block->reach) {
+        return;
+    }
+    hs_threshold_bounds(near->tree.ndim, block->reach, extent, block->error, HS_FILTER_UNIT,
+                        HS_FILTER_TINY, &in, &out);
+    const double square = block->reach * block->reach;
+    block->has_squares = in > 0.0 && out < LARGEST_SQUARE;
+    block->square_error = hs_larger(square - in, out - square) * (1.0 + ROOM);
 }
 
 hs_status
@@ -309,6 +335,7 @@ hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group
     }
     /* Beyond the group and the radius, by more than roundings take. */
     block->extent = 0.5 * widest + 4.0;
+    choose_squares(near, group, block);
     status = find_candidates(near, options, group, most, &images, block);
     if (status == HS_OK) {
         status = poll_if_large(options, block);
@@ -325,7 +352,7 @@ hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_bloc
 {
     const hs_kernel *kernel = near->search->kernel;
     const int        d = near->tree.ndim;
-    const double     extent = 2.0 * block->extent * (1.0 + 0x1p-20); /* floats round up */
+    const double     extent = scan_extent(block);
     hs_scan          scan = {.ndim = d,
                              .norm = block->norm,
                              .label = block->place,
@@ -342,6 +369,10 @@ hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_bloc
     }
     /* Nothing is decided here: no hit is unsure. */
     scan.direct = hs_thresholds_of(d, block->reach, extent, block->error);
+    if (block->has_squares) {
+        scan.squares = block->squares;
+        return kernel->squares(&scan, first);
+    }
     scan.expanded = hs_expanded_of(d, block->reach, extent, block->error);
     scan.direct.in = INFINITY;
     scan.expanded.in = INFINITY;

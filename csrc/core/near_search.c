@@ -65,11 +65,17 @@ fail_shift(near_worker *worker)
 
 /* Ranks and writes one point's hits; *done: whether the group's radius sufficed. */
 static hs_status
-finish_point(near_worker *worker, const hs_near_group *group, int32_t si, const int32_t *hits,
-             int64_t n, bool *done)
+finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_t begin,
+             int32_t end, bool *done)
 {
-    int64_t   count;
-    hs_status status = hs_near_rank(&worker->ranker, group, si, hits, n, &count);
+    const hs_near_block *block = &worker->block;
+    const int32_t       *hits = block->hits + begin;
+    int64_t              count;
+    hs_status            status = HS_OK;
+    if (!block->has_squares || !hs_near_rank_fast(&worker->ranker, si, hits,
+                                                  block->squares + begin, end - begin, &count)) {
+        status = hs_near_rank(&worker->ranker, group, si, hits, end - begin, &count);
+    }
     *done = count >= 0;
     if (status == HS_OK && *done) {
         status = hs_near_write(&worker->writer, &worker->ranker, count);
@@ -97,8 +103,7 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
                 hs_near_expect(&worker->writer, group->first + t + AHEAD);
             }
             bool          done = false;
-            status = finish_point(worker, group, group->first + t, worker->block.hits + begin,
-                                  end[t] - begin, &done);
+            status = finish_point(worker, group, group->first + t, begin, end[t], &done);
             *left |= (uint64_t)!done << t;
         }
     }
