@@ -89,7 +89,7 @@ hs_near_block_free(const hs_near *near, hs_near_block *block)
 }
 
 static bool
-add_image(const hs_near *near, const hs_near_images *images, hs_near_block *block)
+add_image(const hs_near *near, const hs_near_image *image, hs_near_block *block)
 {
     if (block->n_images == block->image_capacity) {
         const int32_t capacity = 2 * block->image_capacity + 32;
@@ -99,25 +99,16 @@ add_image(const hs_near *near, const hs_near_images *images, hs_near_block *bloc
         }
         block->image_capacity = capacity;
     }
-    hs_near_image *image = &block->images[block->n_images++];
-    memcpy(image->shift, images->shift, sizeof image->shift);
-    memcpy(image->moved, images->moved, sizeof image->moved);
-    image->is_home = true;
-    for (int r = 0; r < near->search->bins.n_periodic; r++) {
-        image->is_home = image->is_home && image->shift[r] == 0;
-    }
+    block->images[block->n_images++] = *image;
     return true;
 }
 
-/* Points of a leaf, in the last image. */
+/* Points si, ..., si + n - 1 in that image. */
 static bool
-add_points(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
+add_points(const hs_near *near, int32_t si, int32_t n, int32_t image, hs_near_block *block)
 {
-    const int32_t image = block->n_images - 1;
-    int32_t       n = node->end - node->first;
-    n = node->is_spot && n > near->of_spot ? near->of_spot : n;
     hs_near_run *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
-    if (last != NULL && last->image == image && last->si + last->n == node->first) {
+    if (last != NULL && last->image == image && last->si + last->n == si) {
         last->n += n;
         block->n += n;
         return true;
@@ -130,9 +121,18 @@ add_points(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
         }
         block->run_capacity = capacity;
     }
-    block->runs[block->n_runs++] = (hs_near_run){block->n, n, node->first, image};
+    block->runs[block->n_runs++] = (hs_near_run){block->n, n, si, image};
     block->n += n;
     return true;
+}
+
+/* Points of a leaf, in the last image. */
+static bool
+add_leaf(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
+{
+    const int32_t n = node->end - node->first;
+    return add_points(near, node->first, node->is_spot && n > near->of_spot ? near->of_spot : n,
+                      block->n_images - 1, block);
 }
 
 /* Leaves of the last image that are in reach: runs in ascending order. low, high: the group, less
@@ -157,7 +157,7 @@ find_runs(const hs_near *near, const double *low, const double *high, double mos
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, block->unit, ndim, gap);
             is_near[0] = gap[0] <= limit;
             is_near[1] = gap[1] <= limit;
-        } else if (!add_points(near, node, block) || block->n >= INT32_MAX / 8) {
+        } else if (!add_leaf(near, node, block) || block->n >= INT32_MAX / 8) {
             return HS_ERR_MEMORY;
         } else if (block->n > most) {
             return HS_STATUS_END;
@@ -230,7 +230,9 @@ find_candidates(const hs_near *near, const hs_options *options, const hs_near_gr
     block->n = block->n_runs = block->n_images = 0;
     while (status == HS_OK && hs_near_images_next(images)) {
         const int32_t n = block->n;
-        if (!add_image(near, images, block)) {
+        hs_near_image image;
+        hs_near_image_set(near, images, &image);
+        if (!add_image(near, &image, block)) {
             return HS_ERR_MEMORY;
         }
         status = find_in_image(near, group, images->moved, most, reach, block);
@@ -316,28 +318,73 @@ choose_squares(const hs_near *near, const hs_near_group *group, hs_near_block *b
     block->square_error = hs_larger(square - in, out - square) * (1.0 + ROOM);
 }
 
-hs_status
-hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group *group,
-                   double most, hs_near_block *block)
+/* Points of the leaves that some groups have in common. */
+static hs_status
+take_leaves(const hs_near *near, const hs_near_group *group, double most, hs_near_leaves *leaves,
+            hs_near_block *block)
 {
-    hs_near_images images;
-    double         widest = 0.0;
-    hs_status      status = start_images(near, group, &images);
-    if (status != HS_OK || images.count > most) {
-        return most < INFINITY ? HS_STATUS_END : HS_ERR_MEMORY;
+    const int32_t n = hs_near_leaves_list(near, group, group->radius, leaves);
+    int32_t       first = 0;
+    bool          is_one = true;
+    block->n = block->n_runs = block->n_images = 0;
+    for (int32_t l = 0; l < n; l++) {
+        const hs_near_run *leaf = &leaves->runs[leaves->hits[l]];
+        first = l == 0 ? leaf->image : first;
+        is_one = is_one && leaf->image == first;
+        if (!add_points(near, leaf->si, leaf->n, leaf->image, block)) {
+            return HS_ERR_MEMORY;
+        }
     }
-    settle_unit(near, group, images.error, block);
+    for (int32_t i = is_one ? first : 0; i < (is_one ? first + 1 : leaves->n_images); i++) {
+        if (i < leaves->n_images && !add_image(near, &leaves->images[i], block)) {
+            return HS_ERR_MEMORY;
+        }
+    }
+    for (int32_t r = 0; is_one && r < block->n_runs; r++) {
+        block->runs[r].image = 0;
+    }
+    return block->n > most ? HS_STATUS_END : HS_OK;
+}
+
+/* Unit, errors and extent; HS_STATUS_END: the group is too wide. */
+static hs_status
+settle_frame(const hs_near *near, const hs_near_group *group, double error, hs_near_block *block)
+{
+    double widest = 0.0;
+    settle_unit(near, group, error, block);
     for (int k = 0; k < near->tree.ndim; k++) {
         widest = hs_larger((group->upper[k] - group->lower[k]) * block->unit, widest);
     }
-    if (widest > WIDEST) {
-        return HS_STATUS_END;
-    }
     /* Beyond the group and the radius, by more than roundings take. */
     block->extent = 0.5 * widest + 4.0;
-    choose_squares(near, group, block);
-    status = find_candidates(near, options, group, most, &images, block);
+    return widest > WIDEST ? HS_STATUS_END : HS_OK;
+}
+
+/* Runs and images. */
+static hs_status
+find(const hs_near *near, const hs_options *options, hs_near_group *group, double most,
+     hs_near_leaves *leaves, hs_near_block *block)
+{
+    hs_near_images images;
+    if (leaves != NULL && group->radius <= leaves->radius &&
+        group->radius >= LEAST_IN_ERRORS * leaves->error) {
+        const hs_status status = settle_frame(near, group, leaves->error, block);
+        return status == HS_OK ? take_leaves(near, group, most, leaves, block) : status;
+    }
+    if (start_images(near, group, &images) != HS_OK || images.count > most) {
+        return most < INFINITY ? HS_STATUS_END : HS_ERR_MEMORY;
+    }
+    const hs_status status = settle_frame(near, group, images.error, block);
+    return status == HS_OK ? find_candidates(near, options, group, most, &images, block) : status;
+}
+
+hs_status
+hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group *group,
+                   double most, hs_near_leaves *leaves, hs_near_block *block)
+{
+    hs_status status = find(near, options, group, most, leaves, block);
     if (status == HS_OK) {
+        choose_squares(near, group, block);
         status = poll_if_large(options, block);
     }
     if (status == HS_OK && !reserve(near, block, block->n)) {

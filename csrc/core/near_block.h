@@ -6,7 +6,7 @@
 #ifndef HS_NEAR_BLOCK_H
 #define HS_NEAR_BLOCK_H
 
-#include "near.h"
+#include "near_leaves.h"
 
 /* Owned by a thread; arrays grow as needed. Places count candidates. */
 typedef struct hs_near_block {
@@ -37,10 +37,12 @@ typedef struct hs_near_block {
 hs_status hs_near_block_init(const hs_near *near, hs_near_block *block);
 void      hs_near_block_free(const hs_near *near, hs_near_block *block);
 
-/* Fills the block for a group with its radius, which may be raised a little. HS_STATUS_END: there
- * are more than `most` candidates or images, or the group is far wider than its radius. */
+/* Fills the block for a group with its radius, which may be raised a little. leaves: for some
+ * groups, this among them, or NULL. HS_STATUS_END: there are more than `most` candidates or images,
+ * or the group is far wider than its radius. */
 hs_status hs_near_block_fill(const hs_near *near, const hs_options *options,
-                             hs_near_group *group, double most, hs_near_block *block);
+                             hs_near_group *group, double most, hs_near_leaves *leaves,
+                             hs_near_block *block);
 
 /* The image of the candidate at a place. */
 HS_ALWAYS_INLINE const hs_near_image *

@@ -286,7 +286,6 @@ hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits, const
         const int32_t first = hits[keys[0] & (HS_ORDER_MOST - 1)];
         is_sure = block->number[first] == si && hs_near_image_of(block, first)->is_home;
     }
-    ranker->n_doubtful += !is_sure;
     if (!is_sure || !reserve(ranker, n)) {
         return false;
     }

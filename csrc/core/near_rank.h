@@ -21,12 +21,12 @@ typedef struct hs_near_ranker {
     hs_near_pace         pace;
     hs_stages            stages;
     int64_t              n_compared;
-    int32_t              n_doubtful; /* rows that float32 could not tell */
 } hs_near_ranker;
 
 void hs_near_ranker_free(hs_near_ranker *ranker);
 
-/* The same as hs_near_rank from squares in float32, for a block that has them: false when these cannot tell. */
+/* The same as hs_near_rank, from squares in float32, for a block that has them: false when these
+ * cannot tell. */
 bool hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits,
                        const float *squares, int64_t n, int64_t *count);
 

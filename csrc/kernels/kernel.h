@@ -10,6 +10,7 @@
  *   emit     writes listed hits as pairs, i < j, int32 or int64
  *   relate   gathers candidates of a search for the nearest
  *   order    puts the squares of a few hits in order
+ *   near_boxes  lists boxes within a distance of another one
  *
  * All kernels list the same candidates in the same order, except that they may differ on those
  * between the two thresholds of filter.h; every such hit is decided again by the caller, so results
@@ -143,6 +144,22 @@ typedef struct hs_relate {
  * number = that in tree order. Entries past the last may be overwritten. */
 typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_near_run *runs, int32_t n);
 
+/* Boxes, and the one that they are near to; all arrays borrowed. */
+typedef struct hs_boxes {
+    int            ndim;
+    const float   *low[HS_MAX_DIM];  /* n + HS_PADDING each */
+    const float   *high[HS_MAX_DIM]; /* the same */
+    float          from[HS_MAX_DIM], to[HS_MAX_DIM];
+    float          out;              /* largest square of the distance */
+    const int32_t *label;            /* n + HS_PADDING */
+    int32_t        n;
+    int32_t       *hits;             /* receives labels; n + HS_PADDING */
+} hs_boxes;
+
+/* Lists label[c] for every box c with !(s > out), ascending, and returns their number:
+ * s = sum of max(low_k - to_k, from_k - high_k, 0)^2, fused or not. */
+typedef int32_t (*hs_boxes_fn)(const hs_boxes *boxes);
+
 #define HS_ORDER_MOST 64 /* squares that are put in order together, at most; a power of two */
 
 /* Keys, ascending, of n squares >= 0 below 2^126, at most HS_ORDER_MOST: the bits of the float32,
@@ -178,6 +195,7 @@ typedef struct hs_kernel {
     hs_emit_fn    emit_int64;
     hs_relate_fn  relate;
     hs_order_fn   order;
+    hs_boxes_fn   near_boxes;
     hs_judge_fn   judge; /* batch.h */
     hs_measure_fn measure;
 } hs_kernel;
@@ -186,7 +204,8 @@ typedef struct hs_kernel {
 #define HS_KERNEL_LOOPS                                                                          \
     .gather = gather, .list = list, .count = count, .list_direct = list_direct,                  \
     .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32,                  \
-    .emit_int64 = emit_int64, .relate = relate, .order = order
+    .emit_int64 = emit_int64, .relate = relate, .order = order,     \
+    .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

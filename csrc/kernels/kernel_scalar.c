@@ -283,6 +283,25 @@ order(const float *squares, int32_t n, int32_t *keys)
     }
 }
 
+static int32_t
+near_boxes(const hs_boxes *boxes)
+{
+    int32_t at = 0;
+    for (int32_t c = 0; c < boxes->n; c++) {
+        float s = 0.0f;
+        for (int k = 0; k < boxes->ndim; k++) {
+            const float below = boxes->low[k][c] - boxes->to[k];
+            const float above = boxes->from[k] - boxes->high[k][c];
+            const float most = below > above ? below : above;
+            const float gap = most > 0.0f ? most : 0.0f;
+            s = s + gap * gap;
+        }
+        boxes->hits[at] = boxes->label[c];
+        at += !(s > boxes->out);
+    }
+    return at;
+}
+
 static bool
 supported(void)
 {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * near_template.h: the vector loops of a search for the nearest, once for each instruction set.
- * Include it as scan_template.h. Defines relate (hs_relate_fn) and order (hs_order_fn).
+ * Include it as scan_template.h. Defines relate (hs_relate_fn), order
+ * (hs_order_fn) and near_boxes (hs_boxes_fn).
  */
 
 HS_ALWAYS_INLINE void
@@ -63,5 +64,42 @@ order(const float *squares, int32_t n, int32_t *keys)
     }
     for (int32_t e = 0; e < n; e++) {
         keys[place[e]] = own[e];
+    }
+}
+
+HS_ALWAYS_INLINE int32_t
+list_boxes(const hs_boxes *boxes, const int ndim)
+{
+    const floats zero = broadcast(0.0f), out = broadcast(boxes->out);
+    floats       from[HS_MAX_DIM], to[HS_MAX_DIM];
+    int32_t      at = 0;
+    for (int k = 0; k < ndim; k++) {
+        from[k] = broadcast(boxes->from[k]);
+        to[k] = broadcast(boxes->to[k]);
+    }
+    for (int32_t c = 0; c < boxes->n; c += LANES) {
+        floats s = zero;
+        for (int k = 0; k < ndim; k++) {
+            const floats below = subtract(load(boxes->low[k] + c), to[k]);
+            const floats above = subtract(from[k], load(boxes->high[k] + c));
+            const floats gap = larger_of(larger_of(below, above), zero);
+            s = multiply_add(gap, gap, s);
+        }
+        mask near = not_greater(s, out);
+        if (HS_UNLIKELY(boxes->n - c < LANES)) {
+            near = (mask)(near & first_lanes(boxes->n - c));
+        }
+        at += append(boxes->hits + at, boxes->label + c, near);
+    }
+    return at;
+}
+
+static int32_t
+near_boxes(const hs_boxes *boxes)
+{
+    switch (boxes->ndim) {
+    case 2: return list_boxes(boxes, 2);
+    case 3: return list_boxes(boxes, 3);
+    default: return list_boxes(boxes, boxes->ndim);
     }
 }

@@ -143,6 +143,7 @@ within(floats a, float most)
 {
     return _mm256_max_ps(_mm256_min_ps(a, broadcast(most)), broadcast(-most));
 }
+HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm256_max_ps(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)
 {

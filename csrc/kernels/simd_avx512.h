@@ -112,6 +112,7 @@ within(floats a, float most)
 {
     return _mm512_max_ps(_mm512_min_ps(a, broadcast(most)), broadcast(-most));
 }
+HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm512_max_ps(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)
 {

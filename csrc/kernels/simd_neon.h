@@ -135,6 +135,7 @@ within(floats a, float most)
 {
     return vmaxq_f32(vminq_f32(a, broadcast(most)), broadcast(-most));
 }
+HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return vmaxq_f32(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)
 {
