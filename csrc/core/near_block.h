@@ -34,6 +34,16 @@ typedef struct hs_near_block {
     double         square_error;  /* of these, up to the radius */
 } hs_near_block;
 
+/* Sets runs and images, by walking down the tree: what is within the radius of the group and a
+ * little more. HS_STATUS_END: more than `most` candidates. */
+hs_status hs_near_runs_find(const hs_near *near, const hs_options *options,
+                            const hs_near_group *group, double most, hs_near_images *images,
+                            hs_near_block *block);
+
+/* The same from leaves that are for this group and others. */
+hs_status hs_near_runs_take(const hs_near *near, const hs_near_group *group, double most,
+                            hs_near_leaves *leaves, hs_near_block *block);
+
 hs_status hs_near_block_init(const hs_near *near, hs_near_block *block);
 void      hs_near_block_free(const hs_near *near, hs_near_block *block);
 
@@ -51,8 +61,8 @@ hs_near_image_of(const hs_near_block *block, int32_t place)
     return &block->images[block->n_images > 1 ? block->image_of[place] : 0];
 }
 
-/* How far |D|^2 in units, as it comes from float64, may be from the true one, for any that is not beyond
- * the radius. */
+/* How far |D|^2 in units, as it comes from float64, may be from the true one, for any that is not
+ * beyond the radius. */
 HS_ALWAYS_INLINE double
 hs_near_error(const hs_near_block *block, int ndim, double square)
 {

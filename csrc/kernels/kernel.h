@@ -139,9 +139,9 @@ typedef struct hs_relate {
     int32_t             *number;        /* the same */
 } hs_relate;
 
-/* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit), but
- * no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or not;
- * number = that in tree order. Entries past the last may be overwritten. */
+/* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
+ * but no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or
+ * not; number = that in tree order. Entries past the last may be overwritten. */
 typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_near_run *runs, int32_t n);
 
 /* Boxes, and the one that they are near to; all arrays borrowed. */

@@ -8,9 +8,9 @@
 HS_ALWAYS_INLINE void
 relate_runs(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs, const int ndim)
 {
-    const float     extent = (float)relate->extent;
-    const integers  lanes = lane_numbers();
-    const double    unit = relate->unit;
+    const float    extent = (float)relate->extent;
+    const integers lanes = lane_numbers();
+    const double   unit = relate->unit;
     for (int32_t r = 0; r < n_runs; r++) {
         const hs_near_run *run = &runs[r];
         const double      *moved = relate->images[run->image].moved;
@@ -18,8 +18,9 @@ relate_runs(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs, co
             const int32_t to = run->at + c, si = run->si + c;
             floats        sum = broadcast(0.0f);
             for (int k = 0; k < ndim; k++) {
-                const floats y = load_relative(relate->x[k] + si, moved[k], relate->centre[k], unit);
-                const floats place = within(y, extent);
+                const double *x = relate->x[k] + si;
+                const floats  y = load_relative(x, moved[k], relate->centre[k], unit);
+                const floats  place = within(y, extent);
                 store(relate->y[k] + to, place);
                 sum = multiply_add(place, place, sum);
             }
