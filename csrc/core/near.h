@@ -78,6 +78,9 @@ void hs_near_guess(const hs_near *near, hs_near_group *group);
  * unless there is a largest distance. */
 double hs_near_farthest(const hs_near *near, const hs_near_group *group);
 
+/* The present one, as it is kept. */
+void hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_near_image *image);
+
 /* Owned by a thread: the least squares found so far, and what is left to look at. */
 typedef struct hs_near_bounder {
     double  *least;    /* a heap, the largest first */

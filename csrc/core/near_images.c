@@ -3,6 +3,7 @@
 #include "near.h"
 
 #include <math.h>
+#include <string.h>
 
 #define UNIT 0x1p-53
 /* In periods: far more than the rounding of a quotient of ordinary size, ... */
@@ -198,4 +199,15 @@ hs_near_images_next(hs_near_images *images)
         images->moved[c] = moved;
     }
     return true;
+}
+
+void
+hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_near_image *image)
+{
+    memcpy(image->shift, images->shift, sizeof image->shift);
+    memcpy(image->moved, images->moved, sizeof image->moved);
+    image->is_home = true;
+    for (int r = 0; r < near->search->bins.n_periodic; r++) {
+        image->is_home = image->is_home && image->shift[r] == 0;
+    }
 }

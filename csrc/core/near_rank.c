@@ -2,6 +2,8 @@
 /* near_rank.c: see near_rank.h. */
 #include "near_rank.h"
 
+/* Of the largest square: what two keys lose where their numbers are, twice. */
+#define KEY_ERROR 0x1p-15
 /* Of so many times the keys that are wanted, the others are first set aside. */
 #define MANY 3
 /* Of keys that float64 cannot tell, up to so many of very many are found by insertion. */
@@ -45,8 +47,8 @@ hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_
              int64_t *shift, int64_t *given)
 {
     const hs_bins       *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    const hs_near_image *image = &block->images[block->runs[block->run_of[place]].image];
-    const int32_t        sj = hs_near_number(block, place);
+    const hs_near_image *image = hs_near_image_of(block, place);
+    const int32_t        sj = block->number[place];
     const int            m = bins->n_periodic;
     int64_t              turned[HS_MAX_DIM] = {0}, as_given[HS_MAX_DIM];
     for (int k = 0; k < bins->ndim; k++) {
@@ -117,16 +119,16 @@ is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
     const hs_near_ranker *ranker = context;
     const hs_search     *search = ranker->near->search;
     const hs_near_block *block = ranker->block;
-    const int32_t        j = search->bins.order[hs_near_number(block, b->place)];
-    const int32_t        other = search->bins.order[hs_near_number(block, a->place)];
+    const int32_t        j = search->bins.order[block->number[b->place]];
+    const int32_t        other = search->bins.order[block->number[a->place]];
     int64_t              difference[HS_MAX_DIM] = {0}, given[HS_MAX_DIM];
     if (j != other) {
         return j < other;
     }
     for (int r = 0; r < search->bins.n_periodic; r++) {
         difference[r] =
-            (int64_t)block->images[block->runs[block->run_of[b->place]].image].shift[r] -
-            block->images[block->runs[block->run_of[a->place]].image].shift[r];
+            (int64_t)hs_near_image_of(block, b->place)->shift[r] -
+            hs_near_image_of(block, a->place)->shift[r];
     }
     if (!hs_lattice_shift(&search->scene.lattice, difference, given)) {
         return false;
@@ -189,18 +191,19 @@ fill_keys(hs_near_ranker *ranker, const int32_t *hits, int64_t n, double limit, 
     const hs_near_block *block = ranker->block;
     const hs_bins       *asking = hs_search_asking(ranker->near->search);
     hs_near_key *HS_RESTRICT keys = ranker->keys;
-    const double            *z[HS_MAX_DIM], unit = block->unit;
+    const double            *x[HS_MAX_DIM], unit = block->unit;
     double                   at[HS_MAX_DIM];
     int64_t                  n_keys = 0;
     for (int k = 0; k < ndim; k++) {
         at[k] = asking->x[k][ranker->si];
-        z[k] = block->z[k];
+        x[k] = ranker->near->search->bins.x[k];
     }
     for (int64_t h = 0; h < n; h++) {
-        const int32_t place = hits[h];
+        const int32_t place = hits[h], sj = block->number[place];
+        const double *moved = hs_near_image_of(block, place)->moved;
         double        square = 0.0;
         for (int k = 0; k < ndim; k++) {
-            const double along = (z[k][place] - at[k]) * unit;
+            const double along = (x[k][sj] + moved[k] - at[k]) * unit;
             square += along * along;
         }
         keys[n_keys].square = square;
@@ -218,8 +221,8 @@ drop_self(hs_near_ranker *ranker, int64_t n)
     for (int64_t e = 0; e < n; e++) {
         const int32_t place = ranker->keys[e].place;
         if (ranker->keys[e].square <= block->flat_error &&
-            hs_near_number(block, place) == ranker->si &&
-            block->images[block->runs[block->run_of[place]].image].is_home) {
+            block->number[place] == ranker->si &&
+            hs_near_image_of(block, place)->is_home) {
             ranker->keys[e] = ranker->keys[n - 1];
             return n - 1;
         }
@@ -247,6 +250,52 @@ keep_nearest(hs_near_ranker *ranker, int64_t n, int64_t wanted)
         }
     }
     return kept;
+}
+
+HS_ALWAYS_INLINE float
+square_of(int32_t key)
+{
+    float square;
+    memcpy(&square, &key, sizeof square);
+    return square;
+}
+
+bool
+hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits, const float *squares,
+                  int64_t n, int64_t *count)
+{
+    const hs_near_block *block = ranker->block;
+    const bool           omits_self = ranker->near->omits_self;
+    const int64_t        wanted = ranker->near->k + omits_self;
+    const double         reach = block->reach * block->reach;
+    /* Of two squares, and of two keys. */
+    const double         least = 2.0 * block->square_error + KEY_ERROR * reach;
+    int32_t              keys[HS_ORDER_MOST + 1];
+    *count = -1;
+    if (n < wanted || n > HS_ORDER_MOST) {
+        return n < wanted;
+    }
+    ranker->si = si;
+    ranker->near->search->kernel->order(squares, (int32_t)n, keys);
+    keys[n] = HS_ORDER_LAST;
+    bool is_sure = square_of(keys[wanted - 1]) + least < reach;
+    for (int64_t e = 0; e < wanted; e++) {
+        is_sure = is_sure & (square_of(keys[e + 1]) - square_of(keys[e]) > (float)least);
+    }
+    if (is_sure && omits_self) {
+        const int32_t first = hits[keys[0] & (HS_ORDER_MOST - 1)];
+        is_sure = block->number[first] == si && hs_near_image_of(block, first)->is_home;
+    }
+    if (!is_sure || !reserve(ranker, n)) {
+        return false;
+    }
+    for (int64_t e = omits_self; e < wanted; e++) {
+        const int32_t key = keys[e];
+        ranker->keys[e - omits_self] =
+            (hs_near_key){square_of(key), hits[key & (HS_ORDER_MOST - 1)]};
+    }
+    *count = ranker->near->k;
+    return true;
 }
 
 hs_status

@@ -25,6 +25,11 @@ typedef struct hs_near_ranker {
 
 void hs_near_ranker_free(hs_near_ranker *ranker);
 
+/* The same as hs_near_rank, from squares in float32, for a block that has them: false when these
+ * cannot tell. */
+bool hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits,
+                       const float *squares, int64_t n, int64_t *count);
+
 /*
  * Ranks the nearest of n hits of point si: ranker->keys[0 ... *count - 1], at most k, in order of
  * distance, then (j, S). *count is -1 when there may be nearer ones beyond the group's radius.
@@ -37,13 +42,5 @@ hs_status hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32
  * is not NULL. False when a shift passes its range. */
 bool hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_t place,
                   double *q, int64_t *shift, int64_t *given);
-
-/* Number in tree order of the candidate at a place. */
-HS_ALWAYS_INLINE int32_t
-hs_near_number(const hs_near_block *block, int32_t place)
-{
-    const hs_near_run *run = &block->runs[block->run_of[place]];
-    return run->si + (place - run->at);
-}
 
 #endif

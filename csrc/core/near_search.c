@@ -20,8 +20,13 @@
  * where vectors are wide. */
 #define GROUP_POINTS 48
 #define AHEAD 8 /* points between asking for a row's memory and writing to it */
-/* Groups that a thread takes at a time. */
-#define RANGE_GROUPS 8
+/* A thread takes subtrees at a time whose groups share a walk down the tree: at most a so many-th
+ * part of all points, so that there is enough for all threads, within these bounds. Measured: with
+ * more points the walk is a smaller part of the work. */
+#define RANGES 32
+#define LEAST_RANGE 640
+#define MOST_RANGE 2560
+#define RANGE_GROUPS 160 /* groups of one, at most; three times as many as there usually are */
 /* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
  * some three times as many as there are where points are evenly spread, ... */
 #define MOST_CANDIDATES 24.0
@@ -37,6 +42,8 @@ typedef struct near_crew {
     hs_near   *near;
     near_part *parts;
     int64_t    n_parts;
+    int64_t   *ranges; /* the first part of each, and behind the last one n_parts */
+    int64_t    n_ranges;
     hs_commits *commits;
     struct near_worker *workers;
 } near_crew;
@@ -47,6 +54,8 @@ typedef struct near_worker {
     hs_options      options;
     hs_committer    committer;
     hs_output       nothing; /* rows are written where they belong, not committed */
+    hs_near_group   groups[RANGE_GROUPS];
+    hs_near_leaves  leaves;
     hs_near_block   block;
     hs_near_bounder bounder;
     hs_near_ranker  ranker;
@@ -65,11 +74,17 @@ fail_shift(near_worker *worker)
 
 /* Ranks and writes one point's hits; *done: whether the group's radius sufficed. */
 static hs_status
-finish_point(near_worker *worker, const hs_near_group *group, int32_t si, const int32_t *hits,
-             int64_t n, bool *done)
+finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_t begin,
+             int32_t end, bool *done)
 {
-    int64_t   count;
-    hs_status status = hs_near_rank(&worker->ranker, group, si, hits, n, &count);
+    const hs_near_block *block = &worker->block;
+    const int32_t       *hits = block->hits + begin;
+    int64_t              count;
+    hs_status            status = HS_OK;
+    if (!block->has_squares || !hs_near_rank_fast(&worker->ranker, si, hits,
+                                                  block->squares + begin, end - begin, &count)) {
+        status = hs_near_rank(&worker->ranker, group, si, hits, end - begin, &count);
+    }
     *done = count >= 0;
     if (status == HS_OK && *done) {
         status = hs_near_write(&worker->writer, &worker->ranker, count);
@@ -97,8 +112,7 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
                 hs_near_expect(&worker->writer, group->first + t + AHEAD);
             }
             bool          done = false;
-            status = finish_point(worker, group, group->first + t, worker->block.hits + begin,
-                                  end[t] - begin, &done);
+            status = finish_point(worker, group, group->first + t, begin, end[t], &done);
             *left |= (uint64_t)!done << t;
         }
     }
@@ -116,7 +130,8 @@ search_point(near_worker *worker, int32_t si, double guess)
     alone.radius = guess;
     hs_status status = hs_near_bound(near, &worker->options, &worker->bounder, &alone);
     while (status == HS_OK && left != 0) {
-        status = hs_near_block_fill(near, &worker->options, &alone, INFINITY, &worker->block);
+        status = hs_near_block_fill(near, &worker->options, &alone, INFINITY, NULL,
+                                    &worker->block);
         if (status == HS_OK) {
             status = finish_block(worker, &alone, &left);
         }
@@ -126,27 +141,24 @@ search_point(near_worker *worker, int32_t si, double guess)
 }
 
 static hs_status
-search_part(near_worker *worker, const near_part *part)
+search_group(near_worker *worker, hs_near_group *group)
 {
     const hs_near *near = worker->crew->near;
-    const int32_t  n_points = part->last - part->first;
+    const int32_t  n_points = group->last - group->first;
     const double   more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
     const double   most = more * MOST_CANDIDATES * ((double)near->k + n_points) + 64.0;
-    hs_near_group  group;
     uint64_t       left = UINT64_MAX;
-    hs_near_group_set(near, part->first, part->last, &group);
-    hs_near_guess(near, &group);
-    hs_status status = hs_near_block_fill(near, &worker->options, &group,
-                                          n_points == 1 && group.is_complete ? INFINITY : most,
-                                          &worker->block);
+    hs_status status = hs_near_block_fill(near, &worker->options, group,
+                                          n_points == 1 && group->is_complete ? INFINITY : most,
+                                          &worker->leaves, &worker->block);
     if (status == HS_OK) {
-        status = finish_block(worker, &group, &left);
+        status = finish_block(worker, group, &left);
     } else if (status == HS_STATUS_END) {
         status = HS_OK;
     }
     for (int32_t t = 0; t < n_points && status == HS_OK && left != 0; t++) {
         if (left >> t & 1) {
-            status = search_point(worker, part->first + t, group.radius);
+            status = search_point(worker, group->first + t, group->radius);
         }
     }
     return status;
@@ -158,11 +170,17 @@ search_range(void *context, int64_t range)
 {
     near_worker     *worker = context;
     const near_crew *crew = worker->crew;
-    const int64_t    first = range * RANGE_GROUPS;
-    const int64_t    left = crew->n_parts - first;
+    const int64_t    first = crew->ranges[range];
+    const int32_t    n = (int32_t)(crew->ranges[range + 1] - first);
     hs_status        status = HS_OK;
-    for (int64_t g = 0; g < (left < RANGE_GROUPS ? left : RANGE_GROUPS) && status == HS_OK; g++) {
-        status = search_part(worker, &crew->parts[first + g]);
+    for (int32_t g = 0; g < n; g++) {
+        const near_part *part = &crew->parts[first + g];
+        hs_near_group_set(crew->near, part->first, part->last, &worker->groups[g]);
+        hs_near_guess(crew->near, &worker->groups[g]);
+    }
+    hs_near_leaves_find(crew->near, worker->groups, n, &worker->leaves);
+    for (int32_t g = 0; g < n && status == HS_OK; g++) {
+        status = search_group(worker, &worker->groups[g]);
     }
     if (status == HS_OK) {
         status = hs_poll(&worker->options, (double)first / (double)crew->n_parts);
@@ -192,7 +210,10 @@ open_worker(near_crew *crew, near_worker *worker)
     worker->ranker = (hs_near_ranker){
         .near = near, .block = &worker->block, .pace = {.options = &worker->options}};
     hs_near_writer_init(near, &worker->writer);
-    const hs_status status = hs_near_bounder_init(near, &worker->bounder);
+    hs_status status = hs_near_bounder_init(near, &worker->bounder);
+    if (status == HS_OK) {
+        status = hs_near_leaves_init(near, &worker->leaves);
+    }
     return status == HS_OK ? hs_near_block_init(near, &worker->block) : status;
 }
 
@@ -209,33 +230,51 @@ close_worker(const near_crew *crew, near_worker *worker)
     hs_search_note(crew->near->search, &walked);
     hs_near_ranker_free(&worker->ranker);
     hs_near_bounder_free(crew->near, &worker->bounder);
+    hs_near_leaves_free(crew->near, &worker->leaves);
     hs_near_block_free(crew->near, &worker->block);
 }
 
-/* Largest subtrees of at most GROUP_POINTS; leaves that are larger in parts. */
-static int64_t
-list_parts(const hs_tree *tree, near_part *parts)
+/* Points of a node, as one group or several, in the present range or from it on in new ones. */
+static void
+add_parts(near_crew *crew, const hs_tree_node *node)
 {
-    int64_t n = 0;
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
+    for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
+        const int32_t last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
+        if (crew->n_parts - crew->ranges[crew->n_ranges - 1] == RANGE_GROUPS) {
+            crew->ranges[crew->n_ranges++] = crew->n_parts;
+        }
+        crew->parts[crew->n_parts++] = (near_part){first, last};
+    }
+}
+
+/* Largest subtrees of at most GROUP_POINTS, in ranges that are larger ones; leaves that are larger
+ * in parts. */
+static void
+list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
+{
+    const int32_t n = tree->nodes[0].end;
+    const int32_t part = n / RANGES < MOST_RANGE ? n / RANGES : MOST_RANGE;
+    const int32_t range_points = part > LEAST_RANGE ? part : LEAST_RANGE;
+    int32_t number = 0, range_end = 0;
+    int64_t n_waiting = 1; /* a node that is not looked at, for the end */
+    stack[0] = 0;
+    while (n_waiting > 0) {
         const hs_tree_node *node = &tree->nodes[number];
         const int32_t       points = node->end - node->first;
-        if (points > GROUP_POINTS && node->left != 0) {
-            for (int side = 0; side < 2; side++) {
-                const hs_tree_node *child = &tree->nodes[node->left + side];
-                if (child->end - child->first <= GROUP_POINTS) {
-                    parts[n++] = (near_part){child->first, child->end};
-                }
-            }
-        } else if (points > GROUP_POINTS || number == 0) {
-            for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
-                const int32_t last =
-                    node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
-                parts[n++] = (near_part){first, last};
-            }
+        const bool          is_leaf = node->left == 0;
+        if (node->first >= range_end && (points <= range_points || is_leaf)) {
+            crew->ranges[crew->n_ranges++] = crew->n_parts;
+            range_end = node->end;
+        }
+        if (points <= GROUP_POINTS || is_leaf) {
+            add_parts(crew, node);
+            number = stack[--n_waiting];
+        } else {
+            stack[n_waiting++] = node->left + 1;
+            number = node->left;
         }
     }
-    return n;
+    crew->ranges[crew->n_ranges] = crew->n_parts;
 }
 
 /* Everybody searches. */
@@ -247,8 +286,7 @@ run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
     int        opened = 0;
     hs_status  status = HS_OK;
     crew->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof(near_worker));
-    crew->commits = hs_commits_new(account, NULL,
-                                   (crew->n_parts + RANGE_GROUPS - 1) / RANGE_GROUPS);
+    crew->commits = hs_commits_new(account, NULL, crew->n_ranges);
     if (crew->workers == NULL || crew->commits == NULL) {
         status = HS_ERR_MEMORY;
     }
@@ -282,15 +320,20 @@ hs_near_search(hs_near *near, hs_failure *failure)
     if (near->tree.n_nodes == 0 || near->asking->n_nodes == 0) {
         return HS_OK;
     }
-    crew.parts = hs_alloc(account, HS_FOR_STENCIL,
-                          near->asking->n_nodes + n / GROUP_POINTS + 1, sizeof *crew.parts);
+    const int64_t most_parts = near->asking->n_nodes + n / GROUP_POINTS + 1;
+    int32_t      *stack =
+        hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
+    crew.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *crew.parts);
+    crew.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *crew.ranges);
     near->shared = hs_shared_new(account);
     hs_status status = HS_ERR_MEMORY;
-    if (crew.parts != NULL && near->shared != NULL) {
-        crew.n_parts = list_parts(near->asking, crew.parts);
+    if (stack != NULL && crew.parts != NULL && crew.ranges != NULL && near->shared != NULL) {
+        list_parts(&crew, near->asking, stack);
         status = run_crew(&crew, account, failure);
     }
     hs_shared_free(near->shared);
+    hs_free(account, crew.ranges);
     hs_free(account, crew.parts);
+    hs_free(account, stack);
     return status;
 }

@@ -218,8 +218,7 @@ put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_k
         return;
     }
     for (int32_t e = 0; e < n; e++) {
-        const hs_near_run   *run = &block->runs[block->run_of[keys[e].place]];
-        const hs_near_image *image = &block->images[run->image];
+        const hs_near_image *image = hs_near_image_of(block, keys[e].place);
         for (int r = 0; !image->is_home && r < writer->near->order.n_rows; r++) {
             writer->times[r][writer->n + e] = image->shift[r];
             writer->shift[writer->n + e][r] = image->shift[r];
@@ -239,7 +238,7 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
     const int      index_bytes = near->rows->index_bytes;
     int32_t        number[HS_BATCH];
     for (int32_t e = 0; e < n; e++) {
-        number[e] = hs_near_number(ranker->block, keys[e].place);
+        number[e] = ranker->block->number[keys[e].place];
         put_number(writer->j, index_bytes, at + e, bins->order[number[e]]);
     }
     for (int k = 0; k < bins->ndim; k++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * kernel.h: the contract of the kernels, the five inner loops of a search, and the table of them.
+ * kernel.h: the contract of the kernels, the inner loops of a search, and the table of them.
  *
  *   gather   copies a run of points to float32, relative to a centre
  *   list     compares the points of a group with gathered candidates in float32 and lists those
@@ -8,6 +8,9 @@
  *   count    the same, but only counts them
  *   squares  the same as list, but gives the float32 square of each in place of the unsure ones
  *   emit     writes listed hits as pairs, i < j, int32 or int64
+ *   relate   gathers candidates of a search for the nearest
+ *   order    puts the squares of a few hits in order
+ *   near_boxes  lists boxes within a distance of another one
  *
  * All kernels list the same candidates in the same order, except that they may differ on those
  * between the two thresholds of filter.h; every such hit is decided again by the caller, so results
@@ -110,6 +113,62 @@ typedef struct hs_gather {
  * overwritten. */
 typedef void (*hs_gather_fn)(hs_gather *gather, const hs_run *runs, int32_t n);
 
+/* Candidates that are consecutive points in tree order, in one image. */
+typedef struct hs_near_run {
+    int32_t at, n; /* place of the first, and how many */
+    int32_t si;    /* its number in tree order */
+    int32_t image;
+} hs_near_run;
+
+typedef struct hs_near_image {
+    int32_t shift[HS_MAX_DIM]; /* over the rows of B */
+    double  moved[HS_MAX_DIM]; /* what it adds to X */
+    bool    is_home;           /* no shift */
+} hs_near_image;
+
+/* Where candidates for the nearest come from and go to; all arrays borrowed. */
+typedef struct hs_relate {
+    int                  ndim;
+    const double        *x[HS_MAX_DIM]; /* points in tree order; HS_PADDING more may be read */
+    const hs_near_image *images;
+    double               centre[HS_MAX_DIM];
+    double               unit;          /* a power of two: lengths times this */
+    double               extent;
+    float               *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
+    float               *norm;          /* the same */
+    int32_t             *number;        /* the same */
+} hs_relate;
+
+/* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
+ * but no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or
+ * not; number = that in tree order. Entries past the last may be overwritten. */
+typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_near_run *runs, int32_t n);
+
+/* Boxes, and the one that they are near to; all arrays borrowed. */
+typedef struct hs_boxes {
+    int            ndim;
+    const float   *low[HS_MAX_DIM];  /* n + HS_PADDING each */
+    const float   *high[HS_MAX_DIM]; /* the same */
+    float          from[HS_MAX_DIM], to[HS_MAX_DIM];
+    float          out;              /* largest square of the distance */
+    const int32_t *label;            /* n + HS_PADDING */
+    int32_t        n;
+    int32_t       *hits;             /* receives labels; n + HS_PADDING */
+} hs_boxes;
+
+/* Lists label[c] for every box c with !(s > out), ascending, and returns their number:
+ * s = sum of max(low_k - to_k, from_k - high_k, 0)^2, fused or not. */
+typedef int32_t (*hs_boxes_fn)(const hs_boxes *boxes);
+
+#define HS_ORDER_MOST 64 /* squares that are put in order together, at most; a power of two */
+
+/* Keys, ascending, of n squares >= 0 below 2^126, at most HS_ORDER_MOST: the bits of the float32,
+ * but for the last ones, which are the square's number. squares: HS_PADDING more may be read. */
+typedef void (*hs_order_fn)(const float *squares, int32_t n, int32_t *keys);
+
+/* Beyond all squares. */
+#define HS_ORDER_LAST INT32_C(0x7f000000)
+
 /* The hits of some points; all arrays borrowed. */
 typedef struct hs_hits {
     int32_t        n;     /* points */
@@ -134,6 +193,9 @@ typedef struct hs_kernel {
     hs_scan_fn    squares;
     hs_emit_fn    emit_int32;
     hs_emit_fn    emit_int64;
+    hs_relate_fn  relate;
+    hs_order_fn   order;
+    hs_boxes_fn   near_boxes;
     hs_judge_fn   judge; /* batch.h */
     hs_measure_fn measure;
 } hs_kernel;
@@ -142,7 +204,8 @@ typedef struct hs_kernel {
 #define HS_KERNEL_LOOPS                                                                          \
     .gather = gather, .list = list, .count = count, .list_direct = list_direct,                  \
     .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32,                  \
-    .emit_int64 = emit_int64
+    .emit_int64 = emit_int64, .relate = relate, .order = order,     \
+    .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

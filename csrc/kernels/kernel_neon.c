@@ -9,6 +9,7 @@
 #include "simd_neon.h"
 
 #include "copy_template.h"
+#include "near_template.h"
 #include "scan_template.h"
 
 static bool

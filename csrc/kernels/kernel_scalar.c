@@ -243,6 +243,65 @@ emit_int64(const hs_hits *hits, void *i, void *j)
     emit(hits, i, j, true);
 }
 
+static void
+relate(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs)
+{
+    const float extent = (float)relate->extent;
+    for (const hs_near_run *run = runs; run < runs + n_runs; run++) {
+        float *HS_RESTRICT   norm = relate->norm + run->at;
+        int32_t *HS_RESTRICT number = relate->number + run->at;
+        for (int k = 0; k < relate->ndim; k++) {
+            const double *HS_RESTRICT x = relate->x[k] + run->si;
+            float *HS_RESTRICT        y = relate->y[k] + run->at;
+            const double              moved = relate->images[run->image].moved[k];
+            for (int32_t c = 0; c < run->n; c++) {
+                const float place = (float)((x[c] + moved - relate->centre[k]) * relate->unit);
+                y[c] = place > extent ? extent : place < -extent ? -extent : place;
+                norm[c] = (k > 0 ? norm[c] : 0.0f) + y[c] * y[c];
+            }
+        }
+        for (int32_t c = 0; c < run->n; c++) {
+            number[c] = run->si + c;
+        }
+    }
+}
+
+static void
+order(const float *squares, int32_t n, int32_t *keys)
+{
+    int32_t own[HS_ORDER_MOST];
+    memcpy(own, squares, (size_t)n * sizeof *own);
+    for (int32_t e = 0; e < n; e++) {
+        own[e] = (own[e] & ~(HS_ORDER_MOST - 1)) | e;
+    }
+    for (int32_t e = 0; e < n; e++) {
+        int32_t smaller = 0;
+        for (int32_t f = 0; f < n; f++) {
+            smaller += own[f] < own[e];
+        }
+        keys[smaller] = own[e];
+    }
+}
+
+static int32_t
+near_boxes(const hs_boxes *boxes)
+{
+    int32_t at = 0;
+    for (int32_t c = 0; c < boxes->n; c++) {
+        float s = 0.0f;
+        for (int k = 0; k < boxes->ndim; k++) {
+            const float below = boxes->low[k][c] - boxes->to[k];
+            const float above = boxes->from[k] - boxes->high[k][c];
+            const float most = below > above ? below : above;
+            const float gap = most > 0.0f ? most : 0.0f;
+            s = s + gap * gap;
+        }
+        boxes->hits[at] = boxes->label[c];
+        at += !(s > boxes->out);
+    }
+    return at;
+}
+
 static bool
 supported(void)
 {

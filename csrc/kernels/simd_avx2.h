@@ -122,6 +122,47 @@ keep_lanes(integers a, int32_t n)
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     return _mm256_and_si256(a, _mm256_cmpgt_epi32(_mm256_set1_epi32(n), lane));
 }
+/* (float)((p[lane] + moved - centre) * unit), rounded after each step. */
+HS_ALWAYS_INLINE __m128
+load_relative_half(const double *p, double moved, double centre, double unit)
+{
+    const __m256d z = _mm256_add_pd(_mm256_loadu_pd(p), _mm256_set1_pd(moved));
+    const __m256d y = _mm256_sub_pd(z, _mm256_set1_pd(centre));
+    return _mm256_cvtpd_ps(_mm256_mul_pd(y, _mm256_set1_pd(unit)));
+}
+HS_ALWAYS_INLINE floats
+load_relative(const double *p, double moved, double centre, double unit)
+{
+    const __m128 low = load_relative_half(p, moved, centre, unit);
+    const __m128 high = load_relative_half(p + 4, moved, centre, unit);
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
+}
+/* The nearest numbers of [-most, most]. */
+HS_ALWAYS_INLINE floats
+within(floats a, float most)
+{
+    return _mm256_max_ps(_mm256_min_ps(a, broadcast(most)), broadcast(-most));
+}
+HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm256_max_ps(a, b); }
+HS_ALWAYS_INLINE integers
+lane_numbers(void)
+{
+    return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+}
+HS_ALWAYS_INLINE integers add_integers(integers a, integers b) { return _mm256_add_epi32(a, b); }
+HS_ALWAYS_INLINE integers bits_of(floats a) { return _mm256_castps_si256(a); }
+/* b where bits are set, elsewhere a; b has no others. */
+HS_ALWAYS_INLINE integers
+merge_bits(integers a, integers b, integers bits)
+{
+    return _mm256_or_si256(_mm256_andnot_si256(bits, a), b);
+}
+/* One more in lanes with a > b. */
+HS_ALWAYS_INLINE integers
+count_greater(integers counts, integers a, integers b)
+{
+    return _mm256_sub_epi32(counts, _mm256_cmpgt_epi32(a, b));
+}
 HS_ALWAYS_INLINE int32_t
 largest_lane(integers a)
 {

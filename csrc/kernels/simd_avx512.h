@@ -91,6 +91,48 @@ keep_lanes(integers a, int32_t n)
 {
     return _mm512_maskz_mov_epi32(first_lanes(n), a);
 }
+/* (float)((p[lane] + moved - centre) * unit), rounded after each step. */
+HS_ALWAYS_INLINE __m256
+load_relative_half(const double *p, double moved, double centre, double unit)
+{
+    const __m512d z = _mm512_add_pd(_mm512_loadu_pd(p), _mm512_set1_pd(moved));
+    const __m512d y = _mm512_sub_pd(z, _mm512_set1_pd(centre));
+    return _mm512_cvtpd_ps(_mm512_mul_pd(y, _mm512_set1_pd(unit)));
+}
+HS_ALWAYS_INLINE floats
+load_relative(const double *p, double moved, double centre, double unit)
+{
+    const __m256 low = load_relative_half(p, moved, centre, unit);
+    const __m256 high = load_relative_half(p + 8, moved, centre, unit);
+    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+}
+/* The nearest numbers of [-most, most]. */
+HS_ALWAYS_INLINE floats
+within(floats a, float most)
+{
+    return _mm512_max_ps(_mm512_min_ps(a, broadcast(most)), broadcast(-most));
+}
+HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm512_max_ps(a, b); }
+HS_ALWAYS_INLINE integers
+lane_numbers(void)
+{
+    return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+}
+HS_ALWAYS_INLINE integers add_integers(integers a, integers b) { return _mm512_add_epi32(a, b); }
+HS_ALWAYS_INLINE integers bits_of(floats a) { return _mm512_castps_si512(a); }
+/* b where bits are set, elsewhere a; b has no others. */
+HS_ALWAYS_INLINE integers
+merge_bits(integers a, integers b, integers bits)
+{
+    return _mm512_or_si512(_mm512_andnot_si512(bits, a), b);
+}
+/* One more in lanes with a > b. */
+HS_ALWAYS_INLINE integers
+count_greater(integers counts, integers a, integers b)
+{
+    const mask greater = _mm512_cmpgt_epi32_mask(a, b);
+    return _mm512_mask_add_epi32(counts, greater, counts, broadcast_integer(1));
+}
 HS_ALWAYS_INLINE int32_t largest_lane(integers a) { return _mm512_reduce_max_epi32(a); }
 
 #endif

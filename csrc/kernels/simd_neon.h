@@ -116,6 +116,46 @@ keep_lanes(integers a, int32_t n)
     const uint32x4_t     kept = vcgtq_s32(vdupq_n_s32(n), vld1q_s32(lane));
     return vandq_s32(a, vreinterpretq_s32_u32(kept));
 }
+/* (float)((p[lane] + moved - centre) * unit), rounded after each step. */
+HS_ALWAYS_INLINE float64x2_t
+load_relative_half(const double *p, double moved, double centre, double unit)
+{
+    const float64x2_t z = vaddq_f64(vld1q_f64(p), vdupq_n_f64(moved));
+    return vmulq_f64(vsubq_f64(z, vdupq_n_f64(centre)), vdupq_n_f64(unit));
+}
+HS_ALWAYS_INLINE floats
+load_relative(const double *p, double moved, double centre, double unit)
+{
+    const float32x2_t low = vcvt_f32_f64(load_relative_half(p, moved, centre, unit));
+    return vcvt_high_f32_f64(low, load_relative_half(p + 2, moved, centre, unit));
+}
+/* The nearest numbers of [-most, most]. */
+HS_ALWAYS_INLINE floats
+within(floats a, float most)
+{
+    return vmaxq_f32(vminq_f32(a, broadcast(most)), broadcast(-most));
+}
+HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return vmaxq_f32(a, b); }
+HS_ALWAYS_INLINE integers
+lane_numbers(void)
+{
+    static const int32_t lane[LANES] = {0, 1, 2, 3};
+    return vld1q_s32(lane);
+}
+HS_ALWAYS_INLINE integers add_integers(integers a, integers b) { return vaddq_s32(a, b); }
+HS_ALWAYS_INLINE integers bits_of(floats a) { return vreinterpretq_s32_f32(a); }
+/* b where bits are set, elsewhere a; b has no others. */
+HS_ALWAYS_INLINE integers
+merge_bits(integers a, integers b, integers bits)
+{
+    return vorrq_s32(vbicq_s32(a, bits), b);
+}
+/* One more in lanes with a > b. */
+HS_ALWAYS_INLINE integers
+count_greater(integers counts, integers a, integers b)
+{
+    return vsubq_s32(counts, vreinterpretq_s32_u32(vcgtq_s32(a, b)));
+}
 HS_ALWAYS_INLINE int32_t largest_lane(integers a) { return vmaxvq_s32(a); }
 
 #endif

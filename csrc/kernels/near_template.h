@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * near_template.h: the vector loops of a search for the nearest, once for each instruction set.
+ * Include it as scan_template.h. Defines relate (hs_relate_fn), order
+ * (hs_order_fn) and near_boxes (hs_boxes_fn).
+ */
+
+HS_ALWAYS_INLINE void
+relate_runs(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs, const int ndim)
+{
+    const float    extent = (float)relate->extent;
+    const integers lanes = lane_numbers();
+    const double   unit = relate->unit;
+    for (int32_t r = 0; r < n_runs; r++) {
+        const hs_near_run *run = &runs[r];
+        const double      *moved = relate->images[run->image].moved;
+        for (int32_t c = 0; c < run->n; c += LANES) {
+            const int32_t to = run->at + c, si = run->si + c;
+            floats        sum = broadcast(0.0f);
+            for (int k = 0; k < ndim; k++) {
+                const double *x = relate->x[k] + si;
+                const floats  y = load_relative(x, moved[k], relate->centre[k], unit);
+                const floats  place = within(y, extent);
+                store(relate->y[k] + to, place);
+                sum = multiply_add(place, place, sum);
+            }
+            store(relate->norm + to, sum);
+            store_integers(relate->number + to, add_integers(lanes, broadcast_integer(si)));
+        }
+    }
+}
+
+static void
+relate(const hs_relate *relate, const hs_near_run *runs, int32_t n)
+{
+    switch (relate->ndim) {
+    case 2: relate_runs(relate, runs, n, 2); break;
+    case 3: relate_runs(relate, runs, n, 3); break;
+    default: relate_runs(relate, runs, n, relate->ndim); break;
+    }
+}
+
+/* Each key goes to the place that is the number of smaller ones. */
+static void
+order(const float *squares, int32_t n, int32_t *keys)
+{
+    const integers number_bits = broadcast_integer(HS_ORDER_MOST - 1);
+    const integers lanes = lane_numbers();
+    int32_t        own[HS_ORDER_MOST], place[HS_ORDER_MOST];
+    for (int32_t e = 0; e < n; e += LANES) {
+        const integers number = add_integers(lanes, broadcast_integer(e));
+        const integers key = merge_bits(bits_of(load(squares + e)), number, number_bits);
+        store_integers(own + e, key);
+    }
+    for (int32_t e = n; e % LANES != 0; e++) {
+        own[e] = HS_ORDER_LAST;
+    }
+    for (int32_t e = 0; e < n; e += LANES) {
+        const integers key = load_integers(own + e);
+        integers       smaller_ones = broadcast_integer(0);
+        for (int32_t f = 0; f < n; f++) {
+            smaller_ones = count_greater(smaller_ones, key, broadcast_integer(own[f]));
+        }
+        store_integers(place + e, smaller_ones);
+    }
+    for (int32_t e = 0; e < n; e++) {
+        keys[place[e]] = own[e];
+    }
+}
+
+HS_ALWAYS_INLINE int32_t
+list_boxes(const hs_boxes *boxes, const int ndim)
+{
+    const floats zero = broadcast(0.0f), out = broadcast(boxes->out);
+    floats       from[HS_MAX_DIM], to[HS_MAX_DIM];
+    int32_t      at = 0;
+    for (int k = 0; k < ndim; k++) {
+        from[k] = broadcast(boxes->from[k]);
+        to[k] = broadcast(boxes->to[k]);
+    }
+    for (int32_t c = 0; c < boxes->n; c += LANES) {
+        floats s = zero;
+        for (int k = 0; k < ndim; k++) {
+            const floats below = subtract(load(boxes->low[k] + c), to[k]);
+            const floats above = subtract(from[k], load(boxes->high[k] + c));
+            const floats gap = larger_of(larger_of(below, above), zero);
+            s = multiply_add(gap, gap, s);
+        }
+        mask near = not_greater(s, out);
+        if (HS_UNLIKELY(boxes->n - c < LANES)) {
+            near = (mask)(near & first_lanes(boxes->n - c));
+        }
+        at += append(boxes->hits + at, boxes->label + c, near);
+    }
+    return at;
+}
+
+static int32_t
+near_boxes(const hs_boxes *boxes)
+{
+    switch (boxes->ndim) {
+    case 2: return list_boxes(boxes, 2);
+    case 3: return list_boxes(boxes, 3);
+    default: return list_boxes(boxes, boxes->ndim);
+    }
+}
