@@ -55,6 +55,7 @@ harness_took(const char *test, clock_t begun)
 {
     if (harness_times) {
         printf("%8.3f s  %s\n", (double)(clock() - begun) / CLOCKS_PER_SEC, test);
+        fflush(stdout);
     }
 }
 
