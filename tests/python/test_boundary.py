@@ -6,6 +6,7 @@ HALFSHELL_FUZZ_SEED (1 without it), the next number, and so on; a failure says w
 """
 
 import faulthandler
+import functools
 import itertools
 import os
 import time
@@ -33,22 +34,25 @@ SHARES = len(ARGUMENTS) + 3 * 20  # of the seconds: one for each argument, 20 fo
 def fuzz(strategy, check, examples, shares=20):
     """Check examples, then, if that is wanted, rounds of as many others."""
     settled = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
-
     end = time.monotonic() + FUZZ_SECONDS * shares / SHARES
 
-    def run(test, **how):
+    @functools.wraps(check)
+    def watched(**drawn):
         faulthandler.dump_traceback_later(STUCK, exit=True)
         try:
-            settings(max_examples=examples, **settled, **how)(given(strategy)(test))()
+            check(**drawn)
         finally:
             faulthandler.cancel_dump_traceback_later()
 
-    run(check, derandomize=True)
+    def run(test, **how):
+        settings(max_examples=examples, **settled, **how)(given(strategy)(test))()
+
+    run(watched, derandomize=True)
     for number in itertools.count(FUZZ_SEED):
         if number >= FUZZ_SEED + FUZZ_ROUNDS and time.monotonic() >= end:
             break
         try:
-            run(seed(number)(check), derandomize=False)
+            run(seed(number)(watched), derandomize=False)
         except BaseException as error:
             error.add_note(f"drawn with HALFSHELL_FUZZ_SEED={number}")
             raise
