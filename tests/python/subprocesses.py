@@ -34,7 +34,7 @@ HEARS_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_i
 def run(script, timeout=600):
     """Run a script that prints one line of JSON at its end; return what it printed.
 
-    The limit is for what hangs: memory is measured for half a minute, on a busy machine for minutes.
+    The limit is for what hangs: tests of memory take minutes on a busy machine.
     """
     command = [sys.executable, "-c", HEARS_INTERRUPTS + script]
     done = subprocess.run(command, capture_output=True, text=True, timeout=timeout)
