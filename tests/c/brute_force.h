@@ -44,7 +44,7 @@ typedef struct brute_rows {
     long double uncertainty; /* relative, of the dual vectors */
 } brute_rows;
 
-static inline long double
+TRUTH long double
 brute_dot(int ndim, const long double *a, const long double *b)
 {
     long double sum = 0.0L;
@@ -54,7 +54,7 @@ brute_dot(int ndim, const long double *a, const long double *b)
 }
 
 /* Remove the directions of n orthonormal vectors from v; returns what is left of its length. */
-static inline long double
+TRUTH long double
 brute_project(int ndim, int n, long double basis[][HS_MAX_DIM], long double *v)
 {
     for (int pass = 0; pass < 2; pass++) {
@@ -68,7 +68,7 @@ brute_project(int ndim, int n, long double basis[][HS_MAX_DIM], long double *v)
 }
 
 /* v = row * 2^-exponent, with a largest entry of about 1. */
-static inline int
+TRUTH int
 brute_unit_row(int ndim, const double *row, long double *v)
 {
     double largest = 0.0;
@@ -82,7 +82,7 @@ brute_unit_row(int ndim, const double *row, long double *v)
 }
 
 /* False where plain numbers cannot tell the duals: rows that are dependent or nearly so. */
-static inline bool
+TRUTH bool
 brute_prepare(const brute_scene *scene, brute_rows *r)
 {
     const int   d = scene->ndim;
@@ -120,7 +120,7 @@ brute_prepare(const brute_scene *scene, brute_rows *r)
 }
 
 /* Sign of |D|^2 - cutoff^2. */
-static inline int
+TRUTH int
 brute_sign_exact(const brute_scene *scene, const brute_rows *r, const double *p, const double *q,
                  const int64_t *shift)
 {
@@ -130,7 +130,7 @@ brute_sign_exact(const brute_scene *scene, const brute_rows *r, const double *p,
 }
 
 /* The same, where it can in plain numbers: then D is not within 2^-40 of a tie. */
-static inline int
+TRUTH int
 brute_sign(const brute_scene *scene, const brute_rows *r, const double *p, const double *q,
            const int64_t *shift)
 {
@@ -156,7 +156,7 @@ brute_sign(const brute_scene *scene, const brute_rows *r, const double *p, const
     return brute_sign_exact(scene, r, p, q, shift);
 }
 
-static inline void
+TRUTH void
 brute_add(brute_list *list, const brute_rows *r, int32_t i, int32_t j, const int64_t *shift)
 {
     if (list->n == list->capacity) {
@@ -174,7 +174,7 @@ brute_add(brute_list *list, const brute_rows *r, int32_t i, int32_t j, const int
 }
 
 /* Images of j that can be near i. False when plain numbers cannot count them within the budget. */
-static inline bool
+TRUTH bool
 brute_range(const brute_scene *scene, const brute_rows *r, const double *p, const double *q,
             int64_t *low, int64_t *high, double *images)
 {
@@ -197,7 +197,7 @@ brute_range(const brute_scene *scene, const brute_rows *r, const double *p, cons
 }
 
 /* The half list: (i, j, S) and not also (j, i, -S). */
-static inline bool
+TRUTH bool
 brute_is_forward(int32_t i, int32_t j, int m, const int64_t *shift)
 {
     for (int l = 0; i == j && l < m; l++) {
@@ -207,7 +207,7 @@ brute_is_forward(int32_t i, int32_t j, int m, const int64_t *shift)
     return i < j;
 }
 
-static inline void
+TRUTH void
 brute_images(const brute_scene *scene, const brute_rows *r, int32_t i, int32_t j,
              const int64_t *low, const int64_t *high, brute_list *list)
 {
@@ -233,7 +233,7 @@ brute_images(const brute_scene *scene, const brute_rows *r, int32_t i, int32_t j
     }
 }
 
-static inline int
+TRUTH int
 brute_order(const void *a, const void *b)
 {
     const brute_pair *p = a, *q = b;
@@ -248,7 +248,7 @@ brute_order(const void *a, const void *b)
     return 0;
 }
 
-static inline void
+TRUTH void
 brute_free(brute_list *list)
 {
     free(list->pairs);
@@ -259,7 +259,7 @@ brute_free(brute_list *list)
  * All pairs, ascending. False, with an empty list, when that would take more than `budget` tests, or
  * when plain numbers cannot tell which images to test.
  */
-static inline bool
+TRUTH bool
 brute_find(const brute_scene *scene, double budget, brute_list *list)
 {
     brute_rows r;

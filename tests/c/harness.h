@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 /* Under the thread sanitizer or in an emulator, which make programs some thirty times slower. */
 #if defined(__SANITIZE_THREAD__) || defined(HS_EMULATED)
@@ -28,6 +29,7 @@
 extern int         harness_failures; /* failed checks so far */
 extern int         harness_tests;    /* tests run so far */
 extern const char *harness_filter;   /* run only tests whose name contains this, or NULL */
+extern bool        harness_times;    /* whether to print what each test took */
 
 #define CHECK(condition)                                                                  \
     do {                                                                                  \
@@ -40,10 +42,22 @@ extern const char *harness_filter;   /* run only tests whose name contains this,
 #define RUN(test)                                                        \
     do {                                                                 \
         if (harness_filter == NULL || strstr(#test, harness_filter)) {   \
+            const clock_t begun_ = clock();                              \
             harness_tests++;                                             \
             test();                                                      \
+            harness_took(#test, begun_);                                 \
         }                                                                \
     } while (0)
+
+/* Seconds of processor time, of all threads: other programs do not change them much. */
+static inline void
+harness_took(const char *test, clock_t begun)
+{
+    if (harness_times) {
+        printf("%8.3f s  %s\n", (double)(clock() - begun) / CLOCKS_PER_SEC, test);
+        fflush(stdout);
+    }
+}
 
 /* A reproducible stream: xorshift64*, seeded per test. */
 typedef struct harness_random {

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* main.c: runs the C tests. Usage: core_tests [part of a test's name] */
+/* main.c: runs the C tests. Usage: core_tests [-t] [part of a test's name]; -t: times */
 #include "harness.h"
 
 int         harness_failures;
 int         harness_tests;
 const char *harness_filter;
+bool        harness_times;
 
 #define MODULE(name) void test_##name(void);
 #include "modules.h"
@@ -13,7 +14,8 @@ const char *harness_filter;
 int
 main(int argc, char **argv)
 {
-    harness_filter = argc > 1 ? argv[1] : NULL;
+    harness_times = argc > 1 && strcmp(argv[1], "-t") == 0;
+    harness_filter = argc > 1 + harness_times ? argv[1 + harness_times] : NULL;
 #define MODULE(name) test_##name();
 #include "modules.h"
 #undef MODULE

@@ -31,8 +31,11 @@ def resident():
 HEARS_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 
 
-def run(script, timeout=120):
-    """Run a script that prints one line of JSON at its end; return what it printed."""
+def run(script, timeout=600):
+    """Run a script that prints one line of JSON at its end; return what it printed.
+
+    The limit is for what hangs: tests of memory take minutes on a busy machine.
+    """
     command = [sys.executable, "-c", HEARS_INTERRUPTS + script]
     done = subprocess.run(command, capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-3000:]}"

@@ -1,9 +1,13 @@
 """Any object as any argument: a right answer or a documented error that names it; nothing else.
 
-HALFSHELL_FUZZ_SECONDS=60 goes on for so many seconds, with other examples in each run.
+HALFSHELL_FUZZ_ROUNDS=9 goes on for so many rounds of further examples in each test, the same in
+each run; HALFSHELL_FUZZ_SECONDS=60 for so many seconds in all. Rounds are drawn with the seeds
+HALFSHELL_FUZZ_SEED (1 without it), the next number, and so on; a failure says which.
 """
 
 import faulthandler
+import functools
+import itertools
 import os
 import time
 
@@ -17,7 +21,9 @@ import halfshell as hs
 from boundary import POINTS, anything, calls, dressed, laid_out, outcome
 from halfshell._reference import reference_pairs
 
+FUZZ_ROUNDS = int(os.environ.get("HALFSHELL_FUZZ_ROUNDS", "0"))
 FUZZ_SECONDS = float(os.environ.get("HALFSHELL_FUZZ_SECONDS", "0"))
+FUZZ_SEED = int(os.environ.get("HALFSHELL_FUZZ_SEED", "1"))
 SLOWDOWN = float(os.environ.get("HALFSHELL_SLOWDOWN", "1"))  # more under sanitizers
 STUCK = 60 * SLOWDOWN  # seconds after which a call that hangs is ended, with its traceback
 CALLS = calls()
@@ -26,25 +32,29 @@ SHARES = len(ARGUMENTS) + 3 * 20  # of the seconds: one for each argument, 20 fo
 
 
 def fuzz(strategy, check, examples, shares=20):
-    """Check examples: the same ones in each run, then for some seconds ever new ones."""
+    """Check examples, then, if that is wanted, rounds of as many others."""
     settled = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
-
     end = time.monotonic() + FUZZ_SECONDS * shares / SHARES
 
-    def run(test, **how):
+    @functools.wraps(check)
+    def watched(**drawn):
         faulthandler.dump_traceback_later(STUCK, exit=True)
         try:
-            settings(max_examples=examples, **settled, **how)(given(strategy)(test))()
+            check(**drawn)
         finally:
             faulthandler.cancel_dump_traceback_later()
 
-    run(check, derandomize=True)
-    while time.monotonic() < end:
-        number = time.time_ns() % 2**32
+    def run(test, **how):
+        settings(max_examples=examples, **settled, **how)(given(strategy)(test))()
+
+    run(watched, derandomize=True)
+    for number in itertools.count(FUZZ_SEED):
+        if number >= FUZZ_SEED + FUZZ_ROUNDS and time.monotonic() >= end:
+            break
         try:
-            run(seed(number)(check), derandomize=False)
+            run(seed(number)(watched), derandomize=False)
         except BaseException as error:
-            error.add_note(f"drawn with seed {number}")
+            error.add_note(f"drawn with HALFSHELL_FUZZ_SEED={number}")
             raise
 
 

@@ -78,9 +78,9 @@ def test_many_equal_coordinates(kernel):
     points = np.zeros((50_000, 3))
     points[:, 0] = np.arange(50_000) // 5
     assert hs.count_pairs(points, 0.5, kernel=kernel) == 10_000 * 10
-    start = time.perf_counter()
+    start = time.process_time()
     hs.pairs(points, 0.5, box=[10_000.0, 1.0, 1.0], kernel=kernel)
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2.0
 
 
 def test_one_crowded_cell_among_empty_ones(rng, kernel):
@@ -184,11 +184,11 @@ def test_sharp_angles(rng, kernel):
 def test_sheared_by_a_thousand_cells_in_no_time(rng):
     # ASE, pymatgen: more than 10 s
     points = rng.random((200, 3))
-    start = time.perf_counter()
+    start = time.process_time()
     box = np.array([[1.0, 0, 0], [1000, 1, 0], [-1000, 2000, 1]])
     count = hs.count_pairs(points, 0.3, box=box)
     assert count == hs.count_pairs(points, 0.3, box=[1.0, 1.0, 1.0])
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 def test_a_length_below_the_cutoff(rng, kernel):
