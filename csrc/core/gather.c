@@ -118,17 +118,6 @@ hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double
     return n;
 }
 
-/* They do not count, but slow a scan a hundred times where what was left there reads as subnormal
- * numbers. */
-static void
-clear_lanes_behind(int ndim, hs_block *block)
-{
-    for (int k = 0; k < ndim; k++) {
-        memset(block->y[k] + block->n, 0, HS_PADDING * sizeof(float));
-    }
-    memset(block->norm + block->n, 0, HS_PADDING * sizeof(float));
-}
-
 void
 hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_block *block,
                 hs_group *group)
@@ -146,7 +135,10 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_
     block->runs[block->n_runs].at = block->n;
     kernel->gather(&gather, block->runs, block->n_runs);
     group->largest = gather.largest;
-    clear_lanes_behind(bins->ndim, block);
+    for (int k = 0; k < bins->ndim; k++) {
+        hs_pad_lanes(block->y[k], block->n);
+    }
+    hs_pad_lanes(block->norm, block->n);
     if (is_first) {
         HS_ASSERT(block->runs[0].si == group->first && block->n >= group->last - group->first);
         const size_t bytes = (size_t)(group->last - group->first) * sizeof(float);

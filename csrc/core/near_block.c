@@ -135,6 +135,10 @@ relate(const hs_near *near, const double *centre, hs_near_block *block)
         relate.centre[k] = centre[k];
     }
     near->search->kernel->relate(&relate, block->runs, block->n_runs);
+    for (int k = 0; k < near->tree.ndim; k++) {
+        hs_pad_lanes(block->y[k], block->n);
+    }
+    hs_pad_lanes(block->norm, block->n);
     for (int32_t r = 0; block->n_images > 1 && r < block->n_runs; r++) {
         int32_t *image_of = block->image_of + block->runs[r].at;
         for (int32_t c = 0; c < block->runs[r].n; c++) {
