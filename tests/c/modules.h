@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
 /* One line per test file: MODULE(name) for test_<name>.c. */
 MODULE(exact)
 MODULE(doubleword)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Anything as an argument: hostile objects, odd arrays, and what a call of ours may do with them.
 
 `outcome` makes one call and asserts all that holds for every call: a documented exception or an

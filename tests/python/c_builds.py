@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Compilers, and what the tests of the C interface build with them."""
 
 import shlex

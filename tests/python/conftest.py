@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Shared fixtures: every kernel of this CPU, and a hypothesis profile that never wavers."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Full lists and lists of two sets, as the oracles of half lists say that they must be."""
 
 import math

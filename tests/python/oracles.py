@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Oracles and scenes for the tests: what must come out, and what to put in.
 
 Two oracles, independent of the compiled core and of each other:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Helpers of the report's tests: made-up rows, a page parsed, libraries that misbehave."""
 
 import sys

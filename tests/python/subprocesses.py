@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Run a script in a fresh interpreter, so that a crash or a leak is a test result."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Decisions within a few units in the last place of the cutoff, against Python integers.
 
 Two small clusters of points, a few ulp wide, are placed so that every point of one lies at

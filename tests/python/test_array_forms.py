@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Points and queries in every form of array give the same bytes, from every function."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Many systems in one call: the same as one call for each, one behind the other."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Two sets: every query with every point, and how many pairs that makes."""
 
 import math

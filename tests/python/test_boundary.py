@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Any object as any argument: a right answer or a documented error that names it; nothing else.
 
 HALFSHELL_FUZZ_ROUNDS=9 goes on for so many rounds of further examples in each test, the same in

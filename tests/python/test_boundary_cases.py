@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What fuzzing the arguments found, each by name; objects that change arrays; nothing is kept."""
 
 import decimal

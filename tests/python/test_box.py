@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Boxes: constructors, measures, and wrapping by whole vectors."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """halfshell.h without Python: compiled with a plain command, it finds what the package finds, and
 flags that would change its arithmetic do not."""
 

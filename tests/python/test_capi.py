@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The table of functions for other extension modules: halfshell_capi.h and _core._C_API."""
 
 import ctypes

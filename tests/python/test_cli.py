@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The command line: what it reads, prints, writes, and how it refuses."""
 
 import csv

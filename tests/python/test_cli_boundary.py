@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Any file and any arguments: done, or one line on standard error and exit status 2."""
 
 import contextlib

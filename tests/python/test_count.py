@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Counting: the length of the list, for one cutoff or many, without the list."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One to eight dimensions, open, periodic and mixed."""
 
 import itertools

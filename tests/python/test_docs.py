@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the documentation shows runs, and signatures agree with the stubs."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whatever holds real numbers works as input; the numbers count, not how they are stored."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every bad input: the right exception, a message that names the argument, and no waiting."""
 
 import datetime

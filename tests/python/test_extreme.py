@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Scenes at the ends of float64: the same answers, in time that follows points and pairs."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Points on faces of the box and of cells, and one ulp beside them, near and far from home.
 
 A point at a face belongs to one side by a rounding decision; the pairs must not depend on

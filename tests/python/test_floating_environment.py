@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rounding modes and flushing of subnormals, set by somebody else, change no answer; and the
 caller finds the environment as it was."""
 

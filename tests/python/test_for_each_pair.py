@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`for_each_pair` calls functions of every sort for the pairs of `pairs`, and checks them."""
 
 import ctypes

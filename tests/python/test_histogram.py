@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Pairs by distance: every edge decided exactly, by types, with weights, of one set and of two."""
 
 import math

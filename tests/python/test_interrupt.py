@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Ctrl-C stops a long search at once and leaves nothing behind."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`iter_pairs` gives the arrays of `pairs` in blocks, and holds and leaves behind little."""
 
 import gc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Scenes that have crashed, hung or fooled other neighbour searches, each by its report.
 
 The comment names the project and issue where the scene was first seen to fail.

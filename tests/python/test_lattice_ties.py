@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whole shells of a crystal exactly at the cutoff: every one of these pairs is a tie.
 
 On lattices of integers the right counts follow from number theory, with no oracle at all. On

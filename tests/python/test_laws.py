@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Laws that an exact answer obeys exactly: no tolerance anywhere.
 
 Each law compares two searches that must agree because the geometry is the same, so that no

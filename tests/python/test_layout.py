@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The structure that csrc/README.md promises: who includes whom, and every file on the map."""
 
 import re
@@ -51,3 +52,13 @@ def test_files_stay_readable(path):
     # The public interface is one file, which is mostly words.
     assert len(lines) <= (700 if path.name == "halfshell.h" else 400)
     assert max(map(len, lines)) <= 100
+
+
+def test_every_source_names_its_license():
+    folders = ("csrc", "python", "tests", "benchmarks", "examples")
+    kinds = (".c", ".h", ".py", ".pyi", ".pyx")
+    sources = [p for f in folders for p in (ROOT / f).rglob("*") if p.suffix in kinds]
+    assert sources
+    for path in sources:
+        if "build" not in path.parts:
+            assert "SPDX-License-Identifier" in path.read_text()[:200], path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Memory does not grow over thousands of calls, failing ones included, and stays modest."""
 
 import os

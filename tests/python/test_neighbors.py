@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Full lists: every neighbour of every point, and how many there are."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The oracles agree with each other and with cases that can be worked out by hand."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The order of the pairs: fixed by the scene, and ascending on request."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The headers are where `halfshell.get_include` says, in whatever way the package was installed."""
 
 import shutil

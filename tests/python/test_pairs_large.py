@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Scenes with many cells, crowded cells or many images, against the second oracle."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Small scenes of every sort against the definition, set equality on (i, j, S)."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Equality with the libraries people use today, on generic points; where a peer errs, on
 ties, the test proves by rational numbers that every difference is the peer's."""
 

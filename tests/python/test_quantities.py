@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What is returned: letters, dtypes, shapes; distances and vectors to the last place."""
 
 import itertools

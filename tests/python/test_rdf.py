@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The radial distribution function: the histogram over that of an ideal gas, and its plot."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The report as a whole: right on every scene, rows that say so, CSV, times."""
 
 import csv

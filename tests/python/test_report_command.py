@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``halfshell report``: what it prints and writes, and what it says to wrong arguments."""
 
 import re

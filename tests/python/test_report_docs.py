@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """docs/errors.md and docs/report: made from one committed report, by benchmarks/fill_errors.py."""
 
 import xml.etree.ElementTree as ElementTree

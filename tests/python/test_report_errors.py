@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The error measures of the report, held against lists that are wrong on purpose."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the report says: words, tables, figures, and the page that holds them all."""
 
 import base64

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Other libraries in the report: they may be missing, raise, hang or abort, and nothing happens."""
 
 from dataclasses import replace

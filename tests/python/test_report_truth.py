@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The truth of the report against full rational brute force, where every trick could fail."""
 
 import math

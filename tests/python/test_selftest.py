@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The self-test passes here, is quick, and notices every kind of wrong answer."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The crystal that ships with the package is the published one, and the same as its file."""
 
 import subprocess

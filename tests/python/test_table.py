@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Tables of neighbours: rows, and what they turn into."""
 
 import copy

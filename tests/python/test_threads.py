@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Many Python threads at once; inputs that change during a search."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What type checkers infer: the overloads of the public functions, under mypy --strict."""
 
 import importlib.util

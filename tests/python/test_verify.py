@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The verdict on a list, whoever made it."""
 
 import numpy as np
