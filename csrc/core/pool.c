@@ -201,15 +201,17 @@ misfit(const hs_chunk *chunk, size_t expected)
 void *
 hs_pool_take(size_t expected)
 {
-    int best = -1;
+    int      best = -1;
+    uint64_t least = UINT64_MAX;
     if (!try_lock()) {
         return NULL;
     }
     for (int k = 0; k < pool.n; k++) {
         const hs_chunk *chunk = hs_chunk_of(pool.data[k]);
-        if (suits(chunk, expected) &&
-            (best < 0 || misfit(chunk, expected) < misfit(hs_chunk_of(pool.data[best]), expected))) {
+        const uint64_t  waste = misfit(chunk, expected);
+        if (suits(chunk, expected) && waste < least) {
             best = k;
+            least = waste;
         }
     }
     void *data = best >= 0 ? remove_entry(best) : NULL;

@@ -39,8 +39,8 @@
 #define HS_GROUP_POINTS 64       /* points tested against one neighbourhood, at most */
 #define HS_BLOCK_CANDIDATES 4096 /* candidates held at a time, at most: 80 kB in 3-D */
 
-/* Zeros where scans read behind the last of n candidates. They do not count there, but take a hundred
- * times as long on what reads as subnormal numbers. */
+/* Zeros where scans read behind the last of n candidates. What is there does not count, but takes a
+ * hundred times as long where it reads as subnormal numbers. */
 HS_ALWAYS_INLINE void
 hs_pad_lanes(float *y, int32_t n)
 {
