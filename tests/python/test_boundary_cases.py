@@ -358,12 +358,15 @@ def test_a_call_that_fails_keeps_nothing(name):
 
     for _ in range(20):
         fail()
-    before = kept()
-    for _ in range(300):
-        fail()
-    after = kept()
-    assert after[:2] == before[:2]
-    assert after[2] - before[2] < 100  # an object lost in each call would be 300
+    growth = []
+    for _ in range(3):  # others of the process may grow meanwhile, but not each time
+        before = kept()
+        for _ in range(300):
+            fail()
+        after = kept()
+        assert after[:2] == before[:2]
+        growth.append(after[2] - before[2])
+    assert min(growth) < 100  # an object lost in each call would be 300
 
 
 def test_a_call_that_answers_keeps_nothing():
@@ -381,9 +384,12 @@ def test_a_call_that_answers_keeps_nothing():
 
     for _ in range(20):
         call()
-    before = kept()
-    for _ in range(300):
-        call()
-    after = kept()
-    assert after[0] == before[0]
-    assert after[1] - before[1] < 100
+    growth = []
+    for _ in range(3):
+        before = kept()
+        for _ in range(300):
+            call()
+        after = kept()
+        assert after[0] == before[0]
+        growth.append(after[1] - before[1])
+    assert min(growth) < 100
