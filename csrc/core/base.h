@@ -95,6 +95,23 @@ hs_power_of_two(int exponent)
     return power;
 }
 
+/* The bits of a float; those of numbers that are not negative are in the order of the numbers. */
+HS_ALWAYS_INLINE uint32_t
+hs_bits_of_float(float x)
+{
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+HS_ALWAYS_INLINE float
+hs_float_of_bits(uint32_t bits)
+{
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
 /*
  * Whether a product is rounded before something is added to it, in the code of the function that
  * this is inlined into. Not so where clang was given -ffp-contract=fast, which no pragma takes

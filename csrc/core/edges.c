@@ -15,22 +15,6 @@
 #define ALL_CELLS  8
 #define MOST_CELLS (1 << 16) /* a megabyte; squares below these share cell 0 */
 
-static uint32_t
-bits_of(float x)
-{
-    uint32_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
-}
-
-static float
-float_of(uint32_t bits)
-{
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
-}
-
 hs_status
 hs_edges_init(hs_account *account, const hs_scene *scene, double filter_error,
               const hs_histogram *histogram, hs_edges *edges)
@@ -93,7 +77,7 @@ set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
 static int32_t
 cell_of(const hs_edge_table *table, float square)
 {
-    const int32_t cell = (int32_t)(bits_of(square) >> table->shift) - table->first;
+    const int32_t cell = (int32_t)(hs_bits_of_float(square) >> table->shift) - table->first;
     return square < 0.0f || cell < 0 ? 0 : cell > table->last ? table->last : cell;
 }
 
@@ -109,8 +93,8 @@ set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
     const float lowest = table->out[k] < 0.0f ? 0.0f : table->out[k];
     const float highest = table->out[edges->n - 1] < 0.0f ? 0.0f : table->out[edges->n - 1];
     table->shift = shift;
-    table->first = (int32_t)(bits_of(lowest) >> shift);
-    table->last = (int32_t)(bits_of(highest) >> shift) - table->first;
+    table->first = (int32_t)(hs_bits_of_float(lowest) >> shift);
+    table->last = (int32_t)(hs_bits_of_float(highest) >> shift) - table->first;
     if (table->last >= MOST_CELLS) {
         table->first += table->last - (MOST_CELLS - 1);
         table->last = MOST_CELLS - 1;
@@ -138,8 +122,8 @@ fill_cells(const hs_edges *edges, hs_edge_table *table)
     int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
     for (int32_t c = 0; c <= table->last; c++) {
         const uint32_t at = (uint32_t)(table->first + c);
-        const float    least = c == 0 ? 0.0f : float_of(at << table->shift);
-        const float    most = float_of(((at + 1) << table->shift) - 1);
+        const float    least = c == 0 ? 0.0f : hs_float_of_bits(at << table->shift);
+        const float    most = hs_float_of_bits(((at + 1) << table->shift) - 1);
         while (below < edges->n && table->out[below] < least) {
             below++;
         }
@@ -152,8 +136,9 @@ fill_cells(const hs_edges *edges, hs_edge_table *table)
         cell->in = cell->n_bands == 0 ? INT32_MAX : 0;
         cell->out = INT32_MAX;
         if (cell->n_bands == 1) {
-            cell->in = table->in[below] < 0.0f ? 0 : (int32_t)bits_of(table->in[below]);
-            cell->out = table->out[below] < 0.0f ? -1 : (int32_t)bits_of(table->out[below]);
+            cell->in = table->in[below] < 0.0f ? 0 : (int32_t)hs_bits_of_float(table->in[below]);
+            cell->out =
+                table->out[below] < 0.0f ? -1 : (int32_t)hs_bits_of_float(table->out[below]);
         }
     }
 }
@@ -199,7 +184,7 @@ find_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t 
     const int32_t       first = table->first;
     int32_t             odd = 0;
     for (int32_t h = 0; h < n; h++) {
-        const int32_t       bits = (int32_t)bits_of(squares[h]);
+        const int32_t       bits = (int32_t)hs_bits_of_float(squares[h]);
         const int32_t       at = (bits >> shift) - first;
         const hs_edge_cell *cell = &cells[at < 0 ? 0 : at];
         /* Differences of these do not overflow; their sign bits count. */

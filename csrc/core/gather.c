@@ -90,9 +90,7 @@ hs_group_load(const hs_bins *bins, hs_group *group)
         const double *x = bins->x[k] + group->first;
         for (int32_t t = 0; t < group->last - group->first; t++) {
             const float q = (float)(x[t] - group->centre[k]);
-            uint32_t    bits;
-            memcpy(&bits, &q, sizeof bits);
-            bits &= UINT32_C(0x7fffffff);
+            const uint32_t bits = hs_bits_of_float(q) & UINT32_C(0x7fffffff);
             group->q[k][t] = q;
             group->largest = bits > group->largest ? bits : group->largest;
         }
@@ -155,7 +153,5 @@ hs_group_extent(const hs_group *group)
     const uint32_t low = (UINT32_C(1) << 18) - 1;
     const uint32_t bits = group->largest < UINT32_C(0x7f800000) ? (group->largest + low) & ~low
                                                                  : group->largest;
-    float largest;
-    memcpy(&largest, &bits, sizeof largest);
-    return 2.0 * (double)largest;
+    return 2.0 * (double)hs_float_of_bits(bits);
 }

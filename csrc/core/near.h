@@ -54,6 +54,22 @@ typedef struct hs_near_images {
     bool           is_first;
 } hs_near_images;
 
+/* Number x in units, from the centre, and no further than the extent, which nothing in reach is. */
+HS_ALWAYS_INLINE float
+hs_near_relative(double x, double centre, double unit, double extent)
+{
+    const double y = (x - centre) * unit;
+    return (float)hs_larger(hs_smaller(y, extent), -extent);
+}
+
+/* How many points of a leaf can be of use in one image. */
+HS_ALWAYS_INLINE int32_t
+hs_near_of_leaf(const hs_near *near, const hs_tree_node *node)
+{
+    const int32_t n = node->end - node->first;
+    return node->is_spot && n > near->of_spot ? near->of_spot : n;
+}
+
 /* Of rows of the lattice. */
 void hs_near_measure_drift(hs_near *near);
 

@@ -112,14 +112,6 @@ settle_unit(const hs_near *near, const hs_near_group *group, double error, hs_ne
     block->flat_error = 2.1 * along * (block->reach + along) + 0x1p-1000;
 }
 
-/* Number x in units, from the centre, and no further than the extent, which nothing in reach is. */
-HS_ALWAYS_INLINE float
-relative(double x, double centre, double unit, double extent)
-{
-    const double y = (x - centre) * unit;
-    return (float)hs_larger(hs_smaller(y, extent), -extent);
-}
-
 static void
 relate(const hs_near *near, const double *centre, hs_near_block *block)
 {
@@ -156,8 +148,8 @@ gather(const hs_near *near, const hs_options *options, const hs_near_group *grou
     for (int k = 0; k < near->tree.ndim; k++) {
         centre[k] = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
         for (int32_t t = 0; t < group->last - group->first; t++) {
-            block->q[k][t] =
-                relative(asking->x[k][group->first + t], centre[k], block->unit, block->extent);
+            block->q[k][t] = hs_near_relative(asking->x[k][group->first + t], centre[k],
+                                              block->unit, block->extent);
         }
     }
     relate(near, centre, block);

@@ -82,8 +82,7 @@ static bool
 note_leaf(near_probe *probe, const hs_tree_node *node)
 {
     const hs_bins *bins = &probe->near->search->bins;
-    int32_t        n = node->end - node->first;
-    n = node->is_spot && n > probe->near->of_spot ? probe->near->of_spot : n;
+    const int32_t  n = hs_near_of_leaf(probe->near, node);
     for (int32_t si = node->first; si < node->first + n; si++) {
         double square = 0.0;
         for (int k = 0; k < bins->ndim; k++) {

@@ -87,13 +87,11 @@ unite(const hs_near_group *groups, int32_t n, int ndim)
     return all;
 }
 
-/* A number as it lies in units from the centre, but no further than the extent, which nothing in
- * reach is. */
+/* As it lies in units from the centre of all groups. */
 HS_ALWAYS_INLINE float
 relative(const hs_near_leaves *leaves, int k, double x)
 {
-    const double y = (x - leaves->centre[k]) * leaves->unit;
-    return (float)hs_larger(hs_smaller(y, leaves->extent), -leaves->extent);
+    return hs_near_relative(x, leaves->centre[k], leaves->unit, leaves->extent);
 }
 
 static void
@@ -102,14 +100,14 @@ add_leaf(const hs_near *near, int32_t number, hs_near_leaves *leaves)
     const hs_tree_node *node = &near->tree.nodes[number];
     const int           d = near->tree.ndim, side = (number - 1) % 2;
     const double       *bounds = hs_tree_bounds(&near->tree, number - side, d);
-    const int32_t       image = leaves->n_images - 1, n = node->end - node->first;
+    const int32_t       image = leaves->n_images - 1;
     const double       *moved = leaves->images[image].moved;
     for (int k = 0; k < d; k++) {
         leaves->low[k][leaves->n] = relative(leaves, k, bounds[4 * k + side] + moved[k]);
         leaves->high[k][leaves->n] = relative(leaves, k, bounds[4 * k + 2 + side] + moved[k]);
     }
-    leaves->runs[leaves->n++] = (hs_near_run){
-        0, node->is_spot && n > near->of_spot ? near->of_spot : n, node->first, image};
+    leaves->runs[leaves->n++] =
+        (hs_near_run){0, hs_near_of_leaf(near, node), node->first, image};
 }
 
 /* Leaves of the last image within reach, squared: false when there are too many. */
@@ -139,15 +137,7 @@ find_in_image(const hs_near *near, const hs_near_group *all, double limit, hs_ne
         } else {
             add_leaf(near, number, leaves);
         }
-        if (gap[0] <= limit) {
-            leaves->stack[n_waiting] = left + 1;
-            n_waiting += gap[1] <= limit;
-            number = left;
-        } else if (gap[1] <= limit) {
-            number = left + 1;
-        } else if (n_waiting > 0) {
-            number = leaves->stack[--n_waiting];
-        } else {
+        if (!hs_tree_step(left, gap, limit, leaves->stack, &n_waiting, &number)) {
             return true;
         }
     }

@@ -255,9 +255,7 @@ keep_nearest(hs_near_ranker *ranker, int64_t n, int64_t wanted)
 HS_ALWAYS_INLINE float
 square_of(int32_t key)
 {
-    float square;
-    memcpy(&square, &key, sizeof square);
-    return square;
+    return hs_float_of_bits((uint32_t)key);
 }
 
 bool

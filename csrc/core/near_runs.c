@@ -53,9 +53,7 @@ add_points(const hs_near *near, int32_t si, int32_t n, int32_t image, hs_near_bl
 static bool
 add_leaf(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
 {
-    const int32_t n = node->end - node->first;
-    return add_points(near, node->first, node->is_spot && n > near->of_spot ? near->of_spot : n,
-                      block->n_images - 1, block);
+    return add_points(near, node->first, hs_near_of_leaf(near, node), block->n_images - 1, block);
 }
 
 /* Leaves of the last image that are in reach: runs in ascending order. low, high: the group, less
@@ -74,26 +72,15 @@ find_runs(const hs_near *near, const double *low, const double *high, double mos
     for (;;) {
         const hs_tree_node *node = &tree->nodes[number];
         const int32_t       left = node->left;
-        bool                is_near[2] = {false, false};
+        double              gap[2] = {INFINITY, INFINITY};
         if (left != 0) {
-            double gap[2];
             hs_tree_gaps(hs_tree_bounds(tree, left, ndim), low, high, block->unit, ndim, gap);
-            is_near[0] = gap[0] <= limit;
-            is_near[1] = gap[1] <= limit;
         } else if (!add_leaf(near, node, block) || block->n >= INT32_MAX / 8) {
             return HS_ERR_MEMORY;
         } else if (block->n > most) {
             return HS_STATUS_END;
         }
-        if (is_near[0]) {
-            block->stack[n_waiting] = left + 1;
-            n_waiting += is_near[1];
-            number = left;
-        } else if (is_near[1]) {
-            number = left + 1;
-        } else if (n_waiting > 0) {
-            number = block->stack[--n_waiting];
-        } else {
+        if (!hs_tree_step(left, gap, limit, block->stack, &n_waiting, &number)) {
             return HS_OK;
         }
     }
@@ -157,8 +144,11 @@ hs_near_runs_take(const hs_near *near, const hs_near_group *group, double most,
             return HS_ERR_MEMORY;
         }
     }
-    for (int32_t i = is_one ? first : 0; i < (is_one ? first + 1 : leaves->n_images); i++) {
-        if (i < leaves->n_images && !add_image(near, &leaves->images[i], block)) {
+    /* Where all leaves lie in one image, it becomes the only one. */
+    const int32_t from = is_one ? first : 0;
+    const int32_t to = is_one && first < leaves->n_images ? first + 1 : leaves->n_images;
+    for (int32_t i = from; i < to; i++) {
+        if (!add_image(near, &leaves->images[i], block)) {
             return HS_ERR_MEMORY;
         }
     }

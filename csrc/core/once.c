@@ -61,19 +61,28 @@ walk_once(once *doing, hs_failure *failure)
     hs_status status = hs_walker_init_ordered(search, HS_BLOCK_LISTS_IDS, &table->most, keep_hits,
                                               doing, &walker);
     if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)n);
-        if (status == HS_ERR_SHIFT_RANGE) {
-            failure->row = walker.failed_point;
-            failure->in_queries = search->has_queries;
-        }
+        status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
         hs_walker_close(search, &walker);
     }
     return status;
 }
 
-/* j, row after row. */
+/* Asks for the row that waits some rows ahead. */
+static void
+ask_ahead(const once *doing, const int32_t *kept, int64_t row)
+{
+    const int64_t *offsets = doing->table->offsets;
+    const char    *from = (const char *)(kept + doing->where[row]);
+    int64_t        bytes = 4 * (offsets[row + 1] - offsets[row]);
+    bytes = bytes < MOST_EXPECTED ? bytes : MOST_EXPECTED;
+    for (int64_t at = 0; at < bytes; at += HS_ALIGNMENT) {
+        HS_PREFETCH(from + at);
+    }
+}
+
+/* Column i or j, row after row; j first, because its rows wait in the memory of i. */
 static hs_status
-write_j(const once *doing, const hs_options *options)
+write_column(const once *doing, unsigned bit, const hs_options *options)
 {
     const hs_output *entries = doing->table->entries;
     const int64_t   *offsets = doing->table->offsets;
@@ -81,38 +90,17 @@ write_j(const once *doing, const hs_options *options)
     const int32_t   *kept = hs_output_column(&doing->kept, HS_WANT_J);
     hs_put_column    out;
     hs_status        status = HS_OK;
-    hs_put_open(hs_output_column(entries, HS_WANT_J), entries->index_bytes, &out);
+    hs_put_open(hs_output_column(entries, bit), entries->index_bytes, &out);
     for (int64_t row = 0, next = POLL_ENTRIES; row < n && status == HS_OK; row++) {
-        if (row + AHEAD < n) {
-            const char *from = (const char *)(kept + doing->where[row + AHEAD]);
-            int64_t     bytes = 4 * (offsets[row + AHEAD + 1] - offsets[row + AHEAD]);
-            bytes = bytes < MOST_EXPECTED ? bytes : MOST_EXPECTED;
-            for (int64_t at = 0; at < bytes; at += HS_ALIGNMENT) {
-                HS_PREFETCH(from + at);
+        const int64_t length = offsets[row + 1] - offsets[row];
+        if (bit == HS_WANT_I) {
+            hs_put_repeat(&out, (int32_t)row, length);
+        } else {
+            if (row + AHEAD < n) {
+                ask_ahead(doing, kept, row + AHEAD);
             }
+            hs_put_numbers(&out, kept + doing->where[row], length);
         }
-        hs_put_numbers(&out, kept + doing->where[row], offsets[row + 1] - offsets[row]);
-        if (offsets[row] >= next) {
-            status = hs_poll(options, 1.0);
-            next = offsets[row] + POLL_ENTRIES;
-        }
-    }
-    hs_put_close(&out);
-    return status;
-}
-
-/* i, where the rows have waited. */
-static hs_status
-write_i(const once *doing, const hs_options *options)
-{
-    const hs_output *entries = doing->table->entries;
-    const int64_t   *offsets = doing->table->offsets;
-    const int64_t    n = hs_search_asking(doing->table->search)->n;
-    hs_put_column    out;
-    hs_status        status = HS_OK;
-    hs_put_open(hs_output_column(entries, HS_WANT_I), entries->index_bytes, &out);
-    for (int64_t row = 0, next = POLL_ENTRIES; row < n && status == HS_OK; row++) {
-        hs_put_repeat(&out, (int32_t)row, offsets[row + 1] - offsets[row]);
         if (offsets[row] >= next) {
             status = hs_poll(options, 1.0);
             next = offsets[row] + POLL_ENTRIES;
@@ -151,10 +139,10 @@ hs_once_find(hs_table *table, hs_failure *failure)
     }
     if (status == HS_OK) {
         hs_table_sum(table);
-        status = write_j(&doing, &search->options);
+        status = write_column(&doing, HS_WANT_J, &search->options);
     }
     if (status == HS_OK) {
-        status = write_i(&doing, &search->options);
+        status = write_column(&doing, HS_WANT_I, &search->options);
     }
     hs_filler_close(&doing.fill);
     hs_free(&search->account, doing.where);

@@ -33,10 +33,7 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
         status = hs_recorder_init(&search->account, output, walker.block.most_hits, &recorder);
     }
     if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)search->bins.n);
-    }
-    if (status == HS_ERR_SHIFT_RANGE) {
-        failure->row = walker.failed_point;
+        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);
     }
     hs_recorder_free(&search->account, &recorder);
     hs_walker_close(search, &walker);

@@ -62,11 +62,8 @@ search_range(void *context, int64_t range)
     const int64_t  first = crew->start.point + range * RANGE_POINTS;
     const int64_t  end = first + (n - first < RANGE_POINTS ? n - first : RANGE_POINTS);
     worker->walker.blocks_to_skip = range == 0 ? crew->start.blocks : 0;
-    hs_status status = hs_walk(&worker->walker, (int32_t)first, (int32_t)end);
-    if (status == HS_ERR_SHIFT_RANGE) {
-        worker->failure.row = worker->walker.failed_point;
-        worker->failure.in_queries = crew->search->has_queries;
-    }
+    hs_status status =
+        hs_walk_or_tell(&worker->walker, (int32_t)first, (int32_t)end, &worker->failure);
     if (status == HS_STATUS_END && worker->walker.leaves) {
         return leave_range(worker);
     }

@@ -212,12 +212,8 @@ search_piece(void *context, int64_t piece)
     const int64_t n = all->search->bins.n, n_pieces = all->pieces->n;
     me->piece = &all->pieces->of[piece];
     hs_output_expect(&me->piece->pairs, all->search->grid.expected_pairs / (double)n_pieces);
-    const hs_status status = hs_walk(&me->walker, (int32_t)(n * piece / n_pieces),
-                                     (int32_t)(n * (piece + 1) / n_pieces));
-    if (status == HS_ERR_SHIFT_RANGE) {
-        me->failure.row = me->walker.failed_point;
-    }
-    return status;
+    return hs_walk_or_tell(&me->walker, (int32_t)(n * piece / n_pieces),
+                           (int32_t)(n * (piece + 1) / n_pieces), &me->failure);
 }
 
 /* A hs_task_fn: pieces, as long as there are any. */

@@ -89,11 +89,7 @@ keep_all(hs_table *table, hs_failure *failure)
                                         hs_keep_rows, &fill, &walker);
     }
     if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)n);
-        if (status == HS_ERR_SHIFT_RANGE) {
-            failure->row = walker.failed_point;
-            failure->in_queries = search->has_queries;
-        }
+        status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
         hs_walker_close(search, &walker);
     }
     hs_filler_close(&fill);

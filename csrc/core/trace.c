@@ -320,13 +320,11 @@ hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
     load(trace, metric);
     if (metric) {
         look_up_points(trace);
-    }
-    if (bins->n_periodic > 0 && metric) {
         look_up_images(trace);
     }
-    if (bins->n_periodic > 0 && trace->needs_given && trace->is_narrow) {
+    if (trace->needs_given && trace->is_narrow) {
         look_up_narrow(trace);
-    } else if (bins->n_periodic > 0 && trace->needs_given) {
+    } else if (trace->needs_given) {
         const int32_t fitting = look_up_given(trace);
         if (fitting < trace->n) {
             *failed_point = bins->order[trace->si[fitting]];

@@ -158,6 +158,17 @@ hs_walk(hs_walker *walker, int32_t first, int32_t end)
 }
 
 hs_status
+hs_walk_or_tell(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure)
+{
+    const hs_status status = hs_walk(walker, first, end);
+    if (status == HS_ERR_SHIFT_RANGE) {
+        failure->row = walker->failed_point;
+        failure->in_queries = walker->search->has_queries;
+    }
+    return status;
+}
+
+hs_status
 hs_walk_point(hs_walker *walker, int32_t si)
 {
     hs_row       row;

@@ -102,6 +102,9 @@ hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use,
 /* Visit the groups whose first point is in [first, end), in cell order. */
 hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end);
 
+/* The same; on HS_ERR_SHIFT_RANGE the failure names the point. */
+hs_status hs_walk_or_tell(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure);
+
 /* Visit one point, as a group of its own. */
 hs_status hs_walk_point(hs_walker *walker, int32_t si);
 

@@ -30,8 +30,6 @@
 #include "../halfshell.h"
 #include "batch.h"
 
-#include <string.h>
-
 /* Kernels may read this many entries past the last one of their inputs, and write as many past the
  * last one of their outputs: twice the widest vector. */
 #define HS_PADDING 32

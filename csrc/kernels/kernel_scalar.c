@@ -194,9 +194,7 @@ gather(hs_gather *gather, const hs_run *runs, int32_t n_runs)
     }
     for (int k = 0; k < gather->ndim; k++) {
         for (int32_t c = 0; c < runs[n_runs].at; c++) {
-            uint32_t bits;
-            memcpy(&bits, &gather->y[k][c], sizeof bits);
-            bits &= UINT32_C(0x7fffffff);
+            const uint32_t bits = hs_bits_of_float(gather->y[k][c]) & UINT32_C(0x7fffffff);
             largest = bits > largest ? bits : largest;
         }
     }

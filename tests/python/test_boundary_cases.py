@@ -339,6 +339,21 @@ FAILING = {
 }
 
 
+def assert_keeps_nothing(call, kept):
+    """`kept` counts references of the arguments, and blocks of memory."""
+    for _ in range(20):
+        call()
+    growth = []
+    for _ in range(3):  # others of the process may grow meanwhile, but not each time
+        before = kept()
+        for _ in range(300):
+            call()
+        after = kept()
+        assert after[0] == before[0]
+        growth.append(after[1] - before[1])
+    assert min(growth) < 100  # an object lost in each call would be 300
+
+
 @pytest.mark.parametrize("name", FAILING)
 def test_a_call_that_fails_keeps_nothing(name):
     points, box = POINTS.copy(), CUBE.copy()
@@ -354,19 +369,9 @@ def test_a_call_that_fails_keeps_nothing(name):
     def kept():
         MINE.__traceback__ = None  # it is raised again and again
         gc.collect()
-        return sys.getrefcount(points), sys.getrefcount(box), sys.getallocatedblocks()
+        return [sys.getrefcount(x) for x in (points, box)], sys.getallocatedblocks()
 
-    for _ in range(20):
-        fail()
-    growth = []
-    for _ in range(3):  # others of the process may grow meanwhile, but not each time
-        before = kept()
-        for _ in range(300):
-            fail()
-        after = kept()
-        assert after[:2] == before[:2]
-        growth.append(after[2] - before[2])
-    assert min(growth) < 100  # an object lost in each call would be 300
+    assert_keeps_nothing(fail, kept)
 
 
 def test_a_call_that_answers_keeps_nothing():
@@ -382,14 +387,4 @@ def test_a_call_that_answers_keeps_nothing():
         hs.pairs(points, 1.0, box=box[None], batch=[0] * 4, memory_limit=10**9)
         hs.explain(points, 1.0, box=box, measure=True)
 
-    for _ in range(20):
-        call()
-    growth = []
-    for _ in range(3):
-        before = kept()
-        for _ in range(300):
-            call()
-        after = kept()
-        assert after[0] == before[0]
-        growth.append(after[1] - before[1])
-    assert min(growth) < 100
+    assert_keeps_nothing(call, kept)
