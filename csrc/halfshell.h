@@ -11,8 +11,14 @@
  * Rules: nothing here prints, reads the environment or, but for hs_pool_*, keeps state between
  * calls. Every function may be called from several threads at once. On failure a result is NULL and
  * a number is untouched, but arrays that the caller provides (options->out, counts, wrapped, shift)
- * may hold anything; `hs_failure` says what was wrong. A pointer may be NULL only where it is said.
- * Functions that return hs_status may return any that fits; those that return none cannot fail.
+ * may hold anything; `hs_failure` says what was wrong, in all its fields. Functions that return
+ * hs_status may return any that fits; those that return none cannot fail.
+ *
+ * Arguments: counts, sizes, strides and enums are checked before anything is read. A pointer may be
+ * NULL where it is said, as `failure` may everywhere, and an array where it has no entries. For any
+ * other that is NULL, a function that returns hs_status returns HS_ERR_ARGUMENT; the others return
+ * 0, NULL or a struct of zeros, or write these. What nothing can check is left to the caller: that
+ * objects are alive, and that arrays are as long as is said here.
  *
  * Link the core statically: compile csrc/core/ and csrc/kernels/ into the program, or call it from
  * an extension module through halfshell_capi.h. docs/c-interface.md shows both.
@@ -49,7 +55,7 @@ typedef enum hs_status {
     HS_ERR_BOX_FINITE,    /* a box entry is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent */
     HS_ERR_BOX_SKEWED,    /* independent, but float64 does not tell points along the short ones */
-    HS_ERR_TOO_MANY,      /* 2^31 points or more, or more pairs than int64 counts */
+    HS_ERR_TOO_MANY,      /* 2^31 points or systems or more, or more pairs than int64 counts */
     HS_ERR_SHIFT_RANGE,   /* a shift does not fit: failure.row is the point */
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */
     HS_ERR_KERNEL,        /* no kernel of that name on this CPU, or none compiled as it must be */
@@ -59,7 +65,8 @@ typedef enum hs_status {
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
     HS_ERR_TYPES,         /* a type is none of those that there are: failure.row */
     HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
-    HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or data NULL */
+    HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or a pointer is
+                             NULL; failure.system: where first descends */
     HS_STATUS_END         /* number of codes, not a code; it grows with them */
 } hs_status;
 
@@ -82,7 +89,8 @@ typedef struct hs_failure {
 typedef enum hs_real { HS_FLOAT32, HS_FLOAT64 } hs_real;
 
 /* The caller's coordinates, borrowed for the call. Strides are in bytes and may be zero or
- * negative; entries need not be aligned. Native byte order. */
+ * negative; entries need not be aligned. Native byte order. Strides that lead beyond what addresses
+ * can reach are refused. */
 typedef struct hs_points {
     const void *data;
     int64_t     n;      /* 0 <= n < 2^31 */
@@ -172,6 +180,9 @@ typedef double (*hs_limit_fn)(void *context);
  * start and to end. */
 #define HS_POINTS_FOR_THREADS 20000
 
+/* Of one call; more than these would only wait for each other. */
+#define HS_MOST_THREADS 1024
+
 typedef struct hs_options {
     double       cutoff;       /* finite, not negative; same unit as the points */
     bool         inclusive;    /* whether |D| == cutoff counts */
@@ -182,7 +193,8 @@ typedef struct hs_options {
     double       cell_size;    /* least width of cells, as far as possible; 0: what is quick */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char  *kernel;       /* borrowed; NULL: the best of this CPU */
-    int          threads;      /* so many, 0 as 1; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
+    int          threads;      /* so many, 0 as 1, at most HS_MOST_THREADS; -n: n from
+                                  HS_POINTS_FOR_THREADS on, else 1 */
     double       memory_limit; /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;
@@ -302,7 +314,8 @@ int64_t *hs_pairs_take_offsets(hs_pairs *pairs);
 int64_t hs_pairs_length(const hs_pairs *pairs);
 
 /* The array of one HS_WANT_ bit: borrowed from the result, in the types of hs_pair_arrays; NULL
- * when it was not wanted, has been taken, or the caller's arrays were used. */
+ * when it was not wanted, has been taken, or the caller's arrays were used, and for anything but
+ * one bit. */
 const void *hs_pairs_array(const hs_pairs *pairs, unsigned which);
 
 /* The same, but ownership goes to the caller: hs_array_free. Never NULL for a quantity that was
@@ -453,7 +466,7 @@ hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
  * with another. All arrays are borrowed.
  */
 typedef struct hs_systems {
-    int64_t        n;
+    int64_t        n;       /* 0 <= n < 2^31 */
     const int64_t *first;   /* n + 1; from 0, not descending, to the number of points */
     const hs_box  *box;     /* of all; NULL: open space */
     const double  *rows;    /* n * ndim * ndim, in place of box->rows: of each; or NULL */

@@ -36,7 +36,7 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_check_box(box, box->ndim);
+    hs_status      status = box != NULL ? hs_check_box(box, box->ndim) : HS_ERR_ARGUMENT;
     if (status == HS_OK) {
         status = hs_box_check(box, failure);
     }
@@ -162,7 +162,8 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     *failure = HS_NO_FAILURE;
     const hs_options options = hs_options_default();
     const hs_fpenv   saved = hs_fpenv_enter();
-    hs_status        status = hs_check_arguments(points, NULL, box, &options);
+    hs_status        status =
+        box != NULL ? hs_check_arguments(points, NULL, box, &options, failure) : HS_ERR_ARGUMENT;
     if (status == HS_OK) {
         status = hs_box_check(box, failure);
     }

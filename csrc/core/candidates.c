@@ -14,6 +14,13 @@
 void
 hs_cells_layout(const hs_cells *cells, hs_layout *layout)
 {
+    if (layout == NULL) {
+        return;
+    }
+    if (cells == NULL) {
+        *layout = (hs_layout){.ndim = 0};
+        return;
+    }
     const hs_search *search = &cells->search;
     const hs_grid   *grid = &search->grid;
     *layout = (hs_layout){.ndim = grid->ndim,
@@ -65,16 +72,19 @@ cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t
 hs_status
 hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_failure *failure)
 {
-    hs_failure     ignored;
-    hs_scene       scene;
-    hs_account     account;
-    hs_options     options = hs_options_default();
+    hs_failure ignored;
+    hs_scene   scene;
+    hs_account account;
+    hs_options options = hs_options_default();
+    if (cells == NULL || points == NULL || !hs_has_entries(cell, points)) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
     const hs_fpenv saved = hs_fpenv_enter();
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     options.cutoff = cells->search.options.cutoff;
     hs_account_init(&account, &options);
-    hs_status status = hs_check_arguments(&cells->points, points, NULL, &options);
+    hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
     if (status == HS_OK) {
         status = hs_scene_wrapped_like(&account, &cells->search.scene, points, &options, &scene,
                                        failure);
@@ -94,6 +104,9 @@ hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_
 void
 hs_cells_indices(const hs_cells *cells, int64_t *indices)
 {
+    if (cells == NULL || indices == NULL) {
+        return;
+    }
     const hs_search *search = &cells->search;
     const hs_sparse *sparse = &search->sparse;
     const int        d = search->grid.ndim;
@@ -248,21 +261,24 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
 {
     hs_sets    sets = hs_cells_sets(cells, queries, true);
     hs_failure ignored;
-    *result = NULL;
+    if (!hs_can_return(result, options) || cells == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_pairs *rows = hs_pairs_new();
     if (rows == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     hs_search     *search = &rows->search;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = hs_check_arguments(&cells->points, queries, NULL, options);
+    hs_status status = hs_check_arguments(&cells->points, queries, NULL, options, failure);
     if (status == HS_OK) {
         status = hs_search_reuse(&sets, options, search, failure);
     } else {
         hs_search_begin(options, search); /* for hs_pairs_free */
+        hs_search_report(search, 0);
     }
     if (status == HS_OK) {
         hs_output_init(&search->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8,
@@ -273,11 +289,13 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
         hs_search_close(search);
     } else if (status == HS_STATUS_END) {
         hs_search_begin(options, search); /* for hs_pairs_free */
+        hs_search_report(search, 0);
         status = options->cutoff == cells->search.options.cutoff ? HS_ERR_FAR : HS_ERR_CUTOFF;
+        failure->value = status == HS_ERR_CUTOFF ? options->cutoff : 0.0;
     }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
-        failure->limit_bytes = search->account.limit;
+        failure->limit_bytes = status == HS_ERR_MEMORY ? search->account.limit : 0.0;
         hs_pairs_free(rows);
         return status;
     }

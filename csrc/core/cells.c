@@ -29,13 +29,9 @@ copy_points(const hs_points *points, double *copy)
 
 /* The points in memory of our own: nobody changes them while they are asked. */
 static hs_status
-keep_points(const hs_points *points, hs_cells *cells, hs_failure *failure)
+keep_points(const hs_points *points, hs_cells *cells)
 {
     const int64_t width = points->ndim * (int64_t)sizeof(double);
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
-    }
     cells->copy = hs_alloc(&cells->search.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
     if (cells->copy == NULL) {
         return HS_ERR_MEMORY;
@@ -68,10 +64,10 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     const hs_options of_cells = options_of_cells(options);
     hs_search       *search = &cells->search;
     hs_search_begin(&of_cells, search);
-    hs_status status =
-        hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells);
+    hs_status status = hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL,
+                                          &of_cells, failure);
     if (status == HS_OK) {
-        status = keep_points(points, cells, failure);
+        status = keep_points(points, cells);
     }
     if (status == HS_OK) {
         /* Pairs are for later calls to keep, or only to count. */
@@ -97,12 +93,17 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
                hs_cells **result, hs_failure *failure)
 {
     hs_failure ignored;
-    *result = NULL;
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (result == NULL || options == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
     if (cells == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     cells->copy = NULL;
     cells->trees = hs_near_kept_new();
@@ -140,18 +141,23 @@ hs_cells_free(hs_cells *cells)
 void
 hs_cells_points(const hs_cells *cells, hs_points *points)
 {
-    *points = cells->points;
+    if (points != NULL) {
+        *points = cells != NULL ? cells->points : (hs_points){.data = NULL};
+    }
 }
 
 const hs_box *
 hs_cells_box(const hs_cells *cells)
 {
-    return cells->has_box ? &cells->box : NULL;
+    return cells != NULL && cells->has_box ? &cells->box : NULL;
 }
 
 hs_sets
 hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full)
 {
+    if (cells == NULL) { /* which the search refuses */
+        return (hs_sets){.points = NULL};
+    }
     return (hs_sets){.points = &cells->points,
                      .queries = queries,
                      .is_full = is_full,
@@ -195,7 +201,7 @@ hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
                  const hs_options *options, hs_pairs **rows, hs_failure *failure)
 {
     hs_sets sets = hs_cells_sets(cells, queries, true);
-    sets.trees = cells->trees;
+    sets.trees = cells != NULL ? cells->trees : NULL;
     return hs_nearest_find_in(&sets, hs_cells_box(cells), k, options, rows, failure);
 }
 

@@ -15,7 +15,7 @@ struct hs_cells {
     hs_near_kept *trees; /* owned; for nearest points, which cells are of no use for */
 };
 
-/* Queries, or NULL, among the points of the cells. */
+/* Queries, or NULL, among the points of the cells. cells NULL: there are no points to search. */
 hs_sets hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full);
 
 #endif

@@ -16,14 +16,15 @@ copy_rows(const hs_points *points, int64_t first, int64_t last, char *to)
 {
     const size_t size = points->real == HS_FLOAT32 ? sizeof(float) : sizeof(double);
     const size_t row_size = size * (size_t)points->ndim;
-    const char  *row = (const char *)points->data + first * points->row_stride;
     const bool   packed = points->column_stride == (ptrdiff_t)size || points->ndim == 1;
     to += (size_t)first * row_size;
     if (packed && points->row_stride == (ptrdiff_t)row_size) {
-        memcpy(to, row, (size_t)(last - first) * row_size);
+        memcpy(to, (const char *)points->data + first * points->row_stride,
+               (size_t)(last - first) * row_size);
         return;
     }
-    for (int64_t i = first; i < last; i++, row += points->row_stride) {
+    for (int64_t i = first; i < last; i++) { /* no row behind the last: its address may overflow */
+        const char *row = (const char *)points->data + i * points->row_stride;
         for (int k = 0; k < points->ndim; k++, to += size) {
             memcpy(to, row + k * points->column_stride, size);
         }
@@ -98,10 +99,6 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
 {
     const size_t size = points->real == HS_FLOAT32 ? sizeof(float) : sizeof(double);
     const size_t row_size = size * (size_t)points->ndim;
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
-    }
     frame->rows = hs_store_reserve(&frame->store, HS_FOR_POINTS, points->n, row_size);
     if (frame->rows == NULL) {
         frame->points.n = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* histogram.c: the public histogram of all pairs, which stores none of them. */
+#include "arguments.h"
 #include "cells.h"
 #include "parallel.h"
 #include "poll.h"
@@ -11,8 +12,11 @@
 #define MOST_EDGES (INT64_C(1) << 30) /* slots are int32 */
 
 static hs_status
-check_edges(const hs_histogram *histogram, hs_failure *failure)
+check_histogram(const hs_histogram *histogram, hs_failure *failure)
 {
+    if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
+        return HS_ERR_ARGUMENT;
+    }
     if (histogram->n_edges < 1 || histogram->n_edges >= MOST_EDGES) {
         return HS_ERR_EDGES;
     }
@@ -192,6 +196,7 @@ options_of(const hs_histogram *histogram, const hs_options *options)
     counting.precision = HS_EXACT;
     counting.want = 0;
     counting.sorted = false;
+    counting.out = NULL;
     return counting;
 }
 
@@ -216,14 +221,15 @@ histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
 {
     hs_failure   ignored;
     hs_sets      sets = *among;
-    hs_histogram filled = *histogram;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_status status =
-        histogram->n_types >= 1 ? check_edges(histogram, failure) : HS_ERR_ARGUMENT;
+        options != NULL ? check_histogram(histogram, failure) : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
+        hs_clear_counters(options);
         return status;
     }
+    hs_histogram filled = *histogram;
     sets.is_plain = true;
     sets.keeps_none = true;
     sets.least_cutoff = smallest_edge(histogram);

@@ -28,15 +28,7 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
     hs_search    *search = near->search;
     const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
     const double  limit = search->options.cutoff;
-    hs_status     status = hs_check_arguments(sets->points, sets->queries, box, &search->options);
-    if (status != HS_OK || near->k < 1) {
-        return HS_ERR_ARGUMENT;
-    }
-    if (!(limit >= 0.0)) {
-        failure->value = limit;
-        return HS_ERR_CUTOFF;
-    }
-    status = make_room(near, n_asking, failure);
+    hs_status     status = make_room(near, n_asking, failure);
     if (status == HS_OK) {
         status = hs_near_prepare(near, sets, box, limit, failure);
     }
@@ -47,9 +39,24 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
         failure->limit_bytes = search->account.limit;
     }
     hs_near_release(near);
-    hs_search_report(search, near->rows->n_pairs);
     hs_search_close(search);
     return status;
+}
+
+static hs_status
+check_nearest(const hs_sets *sets, const hs_box *box, int64_t k, const hs_options *options,
+              hs_failure *failure)
+{
+    const hs_status status =
+        hs_check_arguments(sets->points, sets->queries, box, options, failure);
+    if (status != HS_OK || k < 1) {
+        return status != HS_OK ? status : HS_ERR_ARGUMENT;
+    }
+    if (!(options->cutoff >= 0.0)) {
+        failure->value = options->cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    return HS_OK;
 }
 
 hs_status
@@ -58,12 +65,14 @@ hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_
 {
     hs_failure ignored;
     hs_sets    sets = *among;
-    *result = NULL;
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     hs_pairs *rows = hs_pairs_new();
     if (rows == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     sets.is_plain = sets.is_wide = true;
     const hs_fpenv saved = hs_fpenv_enter();
@@ -73,14 +82,18 @@ hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_
     of_rows.precision = HS_EXACT;
     of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
     hs_search_begin(&of_rows, &rows->search);
-    hs_output_init(&rows->search.account, sets.points->ndim, of_rows.want, options->index_bytes,
-                   &rows->output);
     hs_near near = {.search = &rows->search,
                     .k = k,
                     .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
                     .omits_self = sets.queries == NULL,
                     .rows = &rows->output};
-    const hs_status status = find_nearest(&near, &sets, box, failure);
+    hs_status status = check_nearest(&sets, box, k, &of_rows, failure);
+    if (status == HS_OK) {
+        hs_output_init(&rows->search.account, sets.points->ndim, of_rows.want,
+                       options->index_bytes, &rows->output);
+        status = find_nearest(&near, &sets, box, failure);
+    }
+    hs_search_report(&rows->search, rows->output.n_pairs);
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
         hs_pairs_free(rows);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* neighbors.c: the public searches for all neighbours of each point, or of each query. */
+#include "arguments.h"
 #include "estimate.h"
 #include "once.h"
 #include "request.h"
@@ -89,6 +90,9 @@ hs_status
 hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                      hs_pairs **result, hs_failure *failure)
 {
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     const hs_options of_rows = options_of_rows(options);
     const hs_request request = {.sets = sets, .box = box, .options = &of_rows};
     return hs_request_fill(&request, find_rows, result, failure);
@@ -119,9 +123,14 @@ hs_status
 hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                       int64_t *counts, hs_failure *failure)
 {
+    const hs_points *asking = sets->queries != NULL ? sets->queries : sets->points;
+    if (options == NULL || !hs_has_entries(counts, asking)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     hs_options       counting = options_of_rows(options);
     const hs_request request = {.sets = sets, .box = box, .options = &counting};
     counting.want = 0;
+    counting.out = NULL;
     return hs_request_use(&request, count_rows, counts, failure);
 }
 
@@ -130,23 +139,26 @@ hs_between_count(const hs_points *points, const hs_points *queries, const hs_box
                  const hs_options *options, int64_t *count, hs_failure *failure)
 {
     const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
+    if (queries == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     return hs_pairs_count_in(&sets, box, options, count, failure);
 }
 
 int64_t
 hs_pairs_rows(const hs_pairs *pairs)
 {
-    return pairs->offsets.columns != 0 ? pairs->offsets.n_pairs - 1 : 0;
+    return pairs != NULL && pairs->offsets.columns != 0 ? pairs->offsets.n_pairs - 1 : 0;
 }
 
 const int64_t *
 hs_pairs_offsets(const hs_pairs *pairs)
 {
-    return hs_output_column(&pairs->offsets, HS_WANT_I);
+    return pairs != NULL ? hs_output_column(&pairs->offsets, HS_WANT_I) : NULL;
 }
 
 int64_t *
 hs_pairs_take_offsets(hs_pairs *pairs)
 {
-    return hs_output_take(&pairs->offsets, HS_WANT_I);
+    return pairs != NULL ? hs_output_take(&pairs->offsets, HS_WANT_I) : NULL;
 }

@@ -2,6 +2,7 @@
 /* pairs.c: the public searches: find and count. */
 #include "../halfshell.h"
 
+#include "arguments.h"
 #include "estimate.h"
 #include "parallel.h"
 #include "record.h"
@@ -130,6 +131,9 @@ hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *optio
                  hs_pairs **result, hs_failure *failure)
 {
     const hs_request request = {.sets = sets, .box = box, .options = options};
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     return hs_request_fill(&request, fill_pairs, result, failure);
 }
 
@@ -156,29 +160,37 @@ hs_status
 hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   int64_t *count, hs_failure *failure)
 {
+    if (count == NULL || options == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     hs_options       counting = *options;
     const hs_request request = {.sets = sets, .box = box, .options = &counting};
     counting.want = 0;
     counting.sorted = false;
+    counting.out = NULL;
     return hs_request_use(&request, count_pairs, count, failure);
 }
 
 int64_t
 hs_pairs_length(const hs_pairs *pairs)
 {
-    return pairs->output.n_pairs;
+    return pairs != NULL ? pairs->output.n_pairs : 0;
 }
 
 const void *
 hs_pairs_array(const hs_pairs *pairs, unsigned which)
 {
-    return pairs->output.fixed ? NULL : hs_output_column(&pairs->output, which);
+    return pairs == NULL || pairs->output.fixed || !hs_is_quantity(which)
+               ? NULL
+               : hs_output_column(&pairs->output, which);
 }
 
 void *
 hs_pairs_take(hs_pairs *pairs, unsigned which)
 {
-    return pairs->output.fixed ? NULL : hs_output_take(&pairs->output, which);
+    return pairs == NULL || pairs->output.fixed || !hs_is_quantity(which)
+               ? NULL
+               : hs_output_take(&pairs->output, which);
 }
 
 void

@@ -2,7 +2,9 @@
 /* plan.c: what a search of a scene would do, read off the same structures that would do it. */
 #include "../halfshell.h"
 
+#include "arguments.h"
 #include "request.h"
+
 static void
 fill_plan(const hs_search *search, hs_plan *plan)
 {
@@ -45,5 +47,8 @@ hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *optio
 {
     const hs_sets    sets = {.points = points};
     const hs_request request = {.sets = &sets, .box = box, .options = options};
+    if (options == NULL || plan == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     return hs_request_use(&request, use_search, plan, failure);
 }

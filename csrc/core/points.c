@@ -182,11 +182,8 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
     const int n_slabs = points->n < HS_POLL_POINTS
                             ? (int)((points->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
                             : HS_SLABS;
+    HS_ASSERT(points->n <= INT32_MAX); /* hs_check_points */
     *cloud = (hs_cloud){.n = points->n, .ndim = points->ndim};
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
-    }
     if (!allocate(account, cloud)) {
         return HS_ERR_MEMORY;
     }

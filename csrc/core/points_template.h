@@ -16,12 +16,12 @@ HS_ALWAYS_INLINE void
 NAME(copy_rows)(const hs_points *points, int ndim, ptrdiff_t column_stride, int64_t first,
                 int64_t last, double *const *x)
 {
-    const char *row = (const char *)points->data + first * points->row_stride;
-    double     *to[HS_MAX_DIM];
+    double *to[HS_MAX_DIM];
     for (int k = 0; k < ndim; k++) {
         to[k] = x[k];
     }
-    for (int64_t i = first; i < last; i++, row += points->row_stride) {
+    for (int64_t i = first; i < last; i++) { /* no row behind the last: its address may overflow */
+        const char *row = (const char *)points->data + i * points->row_stride;
         for (int k = 0; k < ndim; k++) {
             REAL given;
             memcpy(&given, row + k * column_stride, sizeof given);

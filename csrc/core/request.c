@@ -2,6 +2,7 @@
 /* request.c: see request.h. */
 #include "request.h"
 
+#include "arguments.h"
 #include "estimate.h"
 #include "fpenv.h"
 #include "poll.h"
@@ -45,21 +46,19 @@ hs_status
 hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, hs_failure *failure)
 {
     const hs_options *options = request->options;
-    const int         ndim = request->sets->points->ndim;
     hs_failure        ignored;
-    *result = NULL;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     hs_pairs *pairs = hs_pairs_new();
     if (pairs == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     hs_search     *search = &pairs->search;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_status status = hs_search_open(request->sets, request->box, options, search, failure);
     if (status == HS_OK) {
-        hs_output_init(&search->account, ndim, options->want, options->index_bytes,
-                       &pairs->output);
+        hs_output_init(&search->account, request->sets->points->ndim, options->want,
+                       options->index_bytes, &pairs->output);
         if (options->out != NULL) {
             hs_output_fix(&pairs->output, options->out);
         }

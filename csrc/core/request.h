@@ -19,7 +19,8 @@ typedef struct hs_request {
 typedef hs_status (*hs_use_fn)(void *context, hs_search *search, int64_t *n_pairs,
                                hs_failure *failure);
 
-/* A search that leaves nothing but what `use` writes. failure: NULL, or what was wrong. */
+/* A search that leaves nothing but what `use` writes. failure: NULL, or what was wrong. The caller
+ * has seen that the options are there, and where the result goes; the search checks the rest. */
 hs_status hs_request_use(const hs_request *request, hs_use_fn use, void *context,
                          hs_failure *failure);
 

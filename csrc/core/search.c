@@ -21,7 +21,8 @@ int
 hs_search_threads(int64_t n_points, const hs_options *options)
 {
     const int n = options->threads;
-    return n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
+    const int most = n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
+    return most < HS_MOST_THREADS ? most : HS_MOST_THREADS;
 }
 
 /* The dense grid, with cells as wide as the caller wants them or as is best. Where points crowd in
@@ -182,7 +183,7 @@ hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                hs_search *search, hs_failure *failure)
 {
-    const hs_status sound = hs_check_arguments(sets->points, sets->queries, box, options);
+    const hs_status sound = hs_check_arguments(sets->points, sets->queries, box, options, failure);
     if (sound != HS_OK) {
         hs_search_begin(options, search);
         hs_search_report(search, 0);

@@ -19,7 +19,7 @@ hs_status_text(hs_status status)
     case HS_ERR_BOX_FINITE: return "box must be finite";
     case HS_ERR_BOX_DEPENDENT: return "periodic box vectors must be linearly independent";
     case HS_ERR_BOX_SKEWED: return "the box is too skewed or too long for float64";
-    case HS_ERR_TOO_MANY: return "too many points or pairs";
+    case HS_ERR_TOO_MANY: return "too many points, systems or pairs";
     case HS_ERR_SHIFT_RANGE: return "a shift does not fit its integer type";
     case HS_ERR_ROUNDING: return "too far from the box for precision=\"double\"";
     case HS_ERR_KERNEL: return "no such kernel on this CPU, or not compiled as it must be";

@@ -2,6 +2,7 @@
 /* stream.c: see stream.h. */
 #include "stream.h"
 
+#include "arguments.h"
 #include "fpenv.h"
 #include "pairs.h"
 #include "parallel.h"
@@ -163,7 +164,12 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
                hs_failure *failure)
 {
     hs_failure ignored;
-    *block = NULL;
+    if (block != NULL) {
+        *block = NULL;
+    }
+    if (stream == NULL || block == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
@@ -198,17 +204,19 @@ hs_status
 hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   int64_t max_pairs, hs_stream **result, hs_failure *failure)
 {
-    const hs_options of_stream = options_of_stream(options);
-    hs_sets          of_pairs = *sets;
-    hs_failure       ignored;
-    *result = NULL;
+    hs_sets    of_pairs = *sets;
+    hs_failure ignored;
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (result == NULL || options == NULL || max_pairs < 1) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     of_pairs.keeps_none = true;
-    if (max_pairs < 1) {
-        return HS_ERR_ARGUMENT;
-    }
-    hs_stream *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
+    const hs_options of_stream = options_of_stream(options);
+    hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return HS_ERR_MEMORY;
     }

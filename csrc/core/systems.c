@@ -51,12 +51,13 @@ static hs_status
 check_shared(const hs_points *points, const hs_systems *systems, const hs_options *options,
              hs_failure *failure)
 {
-    if (hs_check_arguments(points, NULL, systems->box, options) != HS_OK || systems->n < 0) {
-        return HS_ERR_ARGUMENT;
+    const hs_box *box = systems != NULL ? systems->box : NULL;
+    hs_status     status = hs_check_arguments(points, NULL, box, options, failure);
+    if (status == HS_OK) {
+        status = hs_check_systems(systems, points->n, failure);
     }
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
+    if (status != HS_OK) {
+        return status;
     }
     if (hs_kernel_select(options->kernel) == NULL) {
         return HS_ERR_KERNEL;
@@ -96,13 +97,13 @@ tell_shortage(const hs_systems_crew *crew, const hs_search *total, hs_failure *f
     hs_shortage_tell(&shortage, &total->options, crew->points->ndim, total->account.limit, failure);
 }
 
-/* The whole of both functions. `total`: where the account and the counts are kept. */
+/* Both functions once all is checked. `total`: where the account and the counts are kept. */
 static hs_status
 search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
 {
     const hs_options *options = &total->options;
-    hs_status         status = check_shared(crew->points, crew->systems, options, failure);
-    if (status == HS_OK && crew->systems->n > 0) {
+    hs_status         status = HS_OK;
+    if (crew->systems->n > 0) {
         const int n_threads = hs_search_threads(crew->points->n, options);
         const int most = crew->systems->n < n_threads ? (int)crew->systems->n : n_threads;
         hs_team  *team = hs_team_create(most);
@@ -123,24 +124,29 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
                 hs_pairs **result, hs_failure *failure)
 {
     hs_failure ignored;
-    *result = NULL;
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     hs_pairs *pairs = hs_pairs_new();
     if (pairs == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     const hs_fpenv saved = hs_fpenv_enter();
     hs_search     *total = &pairs->search;
     hs_output     *output = &pairs->output;
     hs_systems_crew crew = {.points = points, .systems = systems, .output = output};
     hs_search_begin(options, total);
-    hs_output_init(&total->account, points->ndim, options->want, options->index_bytes, output);
-    if (options->out != NULL) {
-        hs_output_fix(output, options->out);
+    hs_status status = check_shared(points, systems, options, failure);
+    if (status == HS_OK) {
+        hs_output_init(&total->account, points->ndim, options->want, options->index_bytes, output);
+        if (options->out != NULL) {
+            hs_output_fix(output, options->out);
+        }
+        status = search_systems(&crew, total, failure);
+        status = hs_pairs_conclude(output, status, failure);
     }
-    hs_status status = search_systems(&crew, total, failure);
-    status = hs_pairs_conclude(output, status, failure);
     hs_search_report(total, output->n_pairs);
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
@@ -156,18 +162,25 @@ hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_op
                  int64_t *counts, hs_failure *failure)
 {
     hs_failure ignored;
-    hs_options counting = *options;
     hs_search  total;
     hs_systems_crew crew = {.points = points, .systems = systems, .counts = counts};
     int64_t    found = 0;
+    if (options == NULL || (counts == NULL && systems != NULL && systems->n > 0)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
+    hs_options counting = *options;
     counting.want = 0;
     counting.sorted = false;
+    counting.out = NULL;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_search_begin(&counting, &total);
-    const hs_status status = search_systems(&crew, &total, failure);
-    for (int64_t s = 0; s < systems->n && status == HS_OK; s++) {
+    hs_status status = check_shared(points, systems, &counting, failure);
+    if (status == HS_OK) {
+        status = search_systems(&crew, &total, failure);
+    }
+    for (int64_t s = 0; status == HS_OK && s < systems->n; s++) {
         found += counts[s];
     }
     hs_search_report(&total, found);

@@ -20,7 +20,9 @@ hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points, hs_bo
     const int         d = crew->points->ndim;
     *points = *crew->points;
     points->n = systems->first[s + 1] - first;
-    points->data = (const char *)points->data + first * points->row_stride;
+    if (points->n > 0) { /* otherwise there is no such row */
+        points->data = (const char *)points->data + first * points->row_stride;
+    }
     if (systems->box == NULL || systems->rows == NULL) {
         return systems->box;
     }

@@ -29,7 +29,9 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
     const int64_t     n = hs_search_asking(search)->n;
     const hs_visitors visitors = {
         .use = HS_BLOCK_COUNTS, .visit = count_hits, .contexts = counts};
-    memset(counts, 0, (size_t)n * sizeof *counts);
+    if (n > 0) { /* otherwise counts may be NULL */
+        memset(counts, 0, (size_t)n * sizeof *counts);
+    }
     const hs_status status = hs_parallel_visit(search, &visitors, NULL, failure);
     for (int64_t i = 0; !search->has_queries && i < n; i++) {
         counts[i] -= counts[i] > 0; /* the point itself; none at all below a cutoff of zero */

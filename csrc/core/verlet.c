@@ -44,6 +44,9 @@ hs_verlet_free(hs_verlet *list)
 hs_verlet_state
 hs_verlet_look(const hs_verlet *list)
 {
+    if (list == NULL) {
+        return (hs_verlet_state){.has_list = false};
+    }
     return (hs_verlet_state){.has_list = list->has_list,
                              .ndim = list->frames[list->now].points.ndim,
                              .n_points = list->frames[list->now].points.n,
@@ -126,7 +129,10 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
                                                                              : options->cutoff;
         return HS_ERR_CUTOFF;
     }
-    hs_status status = hs_check_points(points);
+    hs_status status = hs_check_limits(options);
+    if (status == HS_OK) {
+        status = hs_check_points(points, failure);
+    }
     if (status == HS_OK) {
         status = hs_check_box(box, points->ndim);
     }
@@ -156,6 +162,9 @@ hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
                  hs_failure *failure)
 {
     hs_failure ignored;
+    if (list == NULL || options == NULL || rebuilt == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv  saved = hs_fpenv_enter();

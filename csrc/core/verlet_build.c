@@ -41,6 +41,7 @@ options_of_build(const hs_options *options, double radius, int m)
     searching.inclusive = true;
     searching.precision = HS_EXACT;
     searching.sorted = false;
+    searching.cell_size = 0.0;
     searching.out = NULL;
     searching.counters = NULL;
     searching.want = HS_WANT_I | HS_WANT_J | (m > 0 ? HS_WANT_SHIFT : 0);

@@ -105,12 +105,14 @@ hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **resu
 {
     hs_failure  ignored;
     hs_refilter refilter;
-    *result = NULL;
+    if (!hs_can_return(result, options) || list == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     hs_pairs *pairs = hs_pairs_new();
     if (pairs == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     hs_search     *search = &pairs->search;
     hs_output     *output = &pairs->output;

@@ -2,6 +2,7 @@
 /* visit.c: see visit.h. */
 #include "visit.h"
 
+#include "arguments.h"
 #include "fpenv.h"
 #include "parallel.h"
 #include "poll.h"
@@ -135,21 +136,21 @@ hs_status
 hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
 {
-    visiting   doing = {.visit = visit, .n_visited = n_visited};
+    visiting doing = {.visit = visit, .n_visited = n_visited};
+    hs_sets  of_pairs = *sets;
+    if (n_visited != NULL) {
+        *n_visited = 0;
+    }
+    if (n_visited == NULL || options == NULL || visit == NULL ||
+        (visit->pair == NULL && visit->pairs == NULL)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
     hs_options of_visit = *options;
-    hs_sets    of_pairs = *sets;
-    *n_visited = 0;
     of_visit.want = WANTED;
     of_visit.sorted = false;
     of_visit.index_bytes = 8;
     of_visit.out = NULL;
     of_pairs.keeps_none = true;
-    if (visit->pair == NULL && visit->pairs == NULL) {
-        if (failure != NULL) {
-            *failure = HS_NO_FAILURE;
-        }
-        return HS_ERR_ARGUMENT;
-    }
     const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_visit};
     return hs_request_use(&request, visit_pairs, &doing, failure);
 }

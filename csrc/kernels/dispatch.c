@@ -37,7 +37,7 @@ hs_kernel_names(const char **names, int capacity)
     int n = 0;
     for (int k = 0; k < N_KERNELS; k++) {
         if (kernels[k]->supported()) {
-            if (n < capacity) {
+            if (names != NULL && n < capacity) {
                 names[n] = kernels[k]->name;
             }
             n++;

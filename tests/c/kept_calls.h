@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* kept_calls.h: as calls.h, the functions of objects that are kept: cells and Verlet lists; and the
+ * table of all. */
+#ifndef HS_KEPT_CALLS_H
+#define HS_KEPT_CALLS_H
+
+#include "calls.h"
+
+static inline hs_status
+call_cells_build(call *c, hs_failure *failure)
+{
+    hs_cells       *cells = CALL_NOTHING;
+    const hs_status status =
+        hs_cells_build(c->points, c->box, c->options, RESULT(cells), failure);
+    if (!c->has_result) {
+        CHECK(status != HS_OK && cells == CALL_NOTHING);
+        return status;
+    }
+    CHECK((status == HS_OK) == (cells != NULL) && cells != CALL_NOTHING);
+    if (status == HS_OK) {
+        hs_layout layout;
+        hs_points points;
+        hs_cells_layout(cells, &layout);
+        hs_cells_points(cells, &points);
+        CHECK((hs_cells_box(cells) != NULL) == (c->box != NULL) && points.n == c->points->n);
+        c->answer = call_hash(6, layout.order, (size_t)layout.n_points * sizeof(int32_t));
+        hs_cells_free(cells);
+    }
+    return status;
+}
+
+static inline hs_status
+call_cells_pairs(call *c, hs_failure *failure)
+{
+    hs_pairs       *pairs = CALL_NOTHING;
+    const hs_status status = hs_cells_pairs(c->cells, c->options, RESULT(pairs), failure);
+    return call_take_pairs(c, status, pairs);
+}
+
+static inline hs_status
+call_cells_count(call *c, hs_failure *failure)
+{
+    int64_t         count = -7;
+    const hs_status status =
+        hs_cells_count(c->cells, c->queries, c->options, RESULT(count), failure);
+    return call_take_count(c, status, count);
+}
+
+static inline hs_status
+call_cells_neighbors(call *c, hs_failure *failure)
+{
+    hs_pairs       *rows = CALL_NOTHING;
+    const hs_status status =
+        hs_cells_neighbors(c->cells, c->queries, c->options, RESULT(rows), failure);
+    return call_take_pairs(c, status, rows);
+}
+
+static inline hs_status
+call_cells_neighbors_count(call *c, hs_failure *failure)
+{
+    int64_t         counts[CALL_ROOM];
+    const hs_status status = hs_cells_neighbors_count(c->cells, c->queries, c->options,
+                                                      RESULT(counts[0]), failure);
+    return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
+}
+
+static inline hs_status
+call_cells_histogram(call *c, hs_failure *failure)
+{
+    return call_take_histogram(
+        c, hs_cells_histogram(c->cells, c->queries, c->options, c->histogram, failure));
+}
+
+static inline hs_status
+call_cells_nearest(call *c, hs_failure *failure)
+{
+    hs_pairs       *rows = CALL_NOTHING;
+    const hs_status status =
+        hs_cells_nearest(c->cells, c->queries, c->k, c->options, RESULT(rows), failure);
+    return call_take_pairs(c, status, rows);
+}
+
+static inline hs_status
+call_cells_stream(call *c, hs_failure *failure)
+{
+    hs_stream      *stream = CALL_NOTHING;
+    const hs_status status =
+        hs_cells_stream(c->cells, c->options, c->max_pairs, RESULT(stream), failure);
+    return call_take_stream(c, status, stream, failure);
+}
+
+static inline hs_status
+call_cells_visit(call *c, hs_failure *failure)
+{
+    int64_t n_visited = -7;
+    call_visited = 0;
+    const hs_status status =
+        hs_cells_visit(c->cells, c->options, c->visit, RESULT(n_visited), failure);
+    return call_take_visits(c, status, n_visited);
+}
+
+static inline hs_status
+call_cells_find(call *c, hs_failure *failure)
+{
+    int64_t         cell[CALL_ROOM];
+    const hs_status status = hs_cells_find(c->cells, c->queries, RESULT(cell[0]), failure);
+    return call_take_counts(c, status, cell, status == HS_OK ? c->queries->n : 0);
+}
+
+static inline hs_status
+call_cells_candidates(call *c, hs_failure *failure)
+{
+    hs_pairs       *ranges = CALL_NOTHING;
+    const hs_status status =
+        hs_cells_candidates(c->cells, c->queries, c->options, RESULT(ranges), failure);
+    if (status == HS_OK) {
+        const int64_t n = hs_pairs_length(ranges);
+        CHECK(hs_pairs_rows(ranges) == (c->queries != NULL ? c->queries->n : c->n_points));
+        c->answer = call_hash((uint64_t)n, hs_pairs_array(ranges, HS_WANT_J), (size_t)n * 8);
+        hs_pairs_free(ranges);
+    } else {
+        CHECK(ranges == (c->has_result ? NULL : CALL_NOTHING));
+    }
+    return status;
+}
+
+/* A step that needs a new list, whose pairs the next call finds. */
+static inline hs_status
+call_verlet_update(call *c, hs_failure *failure)
+{
+    bool            rebuilt = false;
+    const hs_status status = hs_verlet_update(c->list, c->points, c->box, c->options, c->skin, true,
+                                              RESULT(rebuilt), failure);
+    CHECK(rebuilt == (status == HS_OK));
+    c->answer = status == HS_OK ? (uint64_t)hs_verlet_look(c->list).n_listed : c->answer;
+    return status;
+}
+
+static inline hs_status
+call_verlet_find(call *c, hs_failure *failure)
+{
+    hs_pairs       *pairs = CALL_NOTHING;
+    const hs_status status = hs_verlet_find(c->list, c->options, RESULT(pairs), failure);
+    return call_take_pairs(c, status, pairs);
+}
+
+#define OF_VERLET \
+    (OF_SCENE | USES_OPTIONS | USES_CUTOFF | NEEDS_FINITE | USES_KERNEL | USES_RESULT | USES_LIST)
+
+static const call_kind call_kinds[] = {
+    {"pairs_find", call_find, OF_SCENE | OF_SEARCH | OF_ARRAYS},
+    {"pairs_count", call_count, OF_SCENE | OF_SEARCH},
+    {"neighbors_find", call_neighbors, OF_SCENE | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
+    {"neighbors_count", call_neighbors_count, OF_SCENE | USES_QUERIES | OF_SEARCH},
+    {"between_count", call_between, OF_SCENE | USES_QUERIES | NEEDS_QUERIES | OF_SEARCH},
+    {"pairs_histogram", call_histogram,
+     OF_SCENE | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL | USES_COUNTERS |
+         USES_HISTOGRAM},
+    {"nearest_find", call_nearest,
+     OF_SCENE | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) | USES_INDEX_BYTES |
+         USES_K},
+    {"stream_open", call_stream,
+     OF_SCENE | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES | USES_MAX_PAIRS},
+    {"stream_next", call_stream_next, USES_STREAM | USES_RESULT},
+    {"pairs_visit", call_visit, OF_SCENE | OF_SEARCH | USES_VISIT},
+    {"cells_build", call_cells_build, OF_SCENE | OF_SEARCH | USES_INDEX_BYTES},
+    {"cells_pairs", call_cells_pairs, USES_CELLS | OF_SEARCH | OF_ARRAYS},
+    {"cells_count", call_cells_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
+    {"cells_neighbors", call_cells_neighbors, USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
+    {"cells_neighbors_count", call_cells_neighbors_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
+    {"cells_histogram", call_cells_histogram,
+     USES_CELLS | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL | USES_COUNTERS |
+         USES_HISTOGRAM},
+    {"cells_nearest", call_cells_nearest,
+     USES_CELLS | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) |
+         USES_INDEX_BYTES | USES_K},
+    {"cells_stream", call_cells_stream,
+     USES_CELLS | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES | USES_MAX_PAIRS},
+    {"cells_visit", call_cells_visit, USES_CELLS | OF_SEARCH | USES_VISIT},
+    {"cells_find", call_cells_find, USES_CELLS | USES_QUERIES | NEEDS_QUERIES | USES_RESULT},
+    {"cells_candidates", call_cells_candidates,
+     USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
+    {"systems_find", call_systems_find, OF_SCENE | USES_SYSTEMS | OF_SEARCH | OF_ARRAYS},
+    {"systems_count", call_systems_count, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
+    {"verlet_update", call_verlet_update, OF_VERLET | USES_SKIN},
+    {"verlet_find", call_verlet_find,
+     USES_LIST | USES_OPTIONS | USES_CELL_SIZE | OF_ARRAYS | USES_KERNEL | USES_COUNTERS |
+         USES_RESULT},
+    {"plan_make", call_plan, OF_SCENE | OF_SEARCH | OF_ARRAYS},
+    {"box_measure", call_measure, USES_BOX | NEEDS_BOX},
+    {"box_wrap", call_wrap, OF_SCENE | NEEDS_BOX},
+};
+
+enum { CALL_KINDS = sizeof call_kinds / sizeof call_kinds[0] };
+
+#endif
