@@ -236,7 +236,8 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
     case HS_ERR_BOX_SKEWED: return raise_skewed(failure);
     case HS_ERR_TOO_MANY:
         return raise_with_number(PyExc_OverflowError,
-                                 "fewer than 2**31 points and 2**62 pairs can be searched, got %R",
+                                 "fewer than 2**31 points and systems and 2**62 pairs can be "
+                                 "searched, got %R",
                                  failure->value);
     case HS_ERR_EDGES:
         return raise_of_row(
@@ -276,8 +277,10 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
             PyErr_SetString(PyExc_SystemError, "interrupted without an exception");
         }
         return NULL;
+    case HS_ERR_ARGUMENT: /* Python's arguments are checked before: these are for whatever passes */
+        PyErr_SetString(PyExc_ValueError, hs_status_text(status));
+        return NULL;
     case HS_OK:
-    case HS_ERR_ARGUMENT: /* all of these are checked before, in Python */
     case HS_STATUS_END: break;
     }
     PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status,

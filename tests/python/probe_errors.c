@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* probe_errors.c: csrc/binding/errors.c alone, for test_statuses.py to raise what no call does. */
+#include "errors.h"
+
+#include "environment.h"
+
+/* What errors.c asks of others. */
+int
+hs_kernel_names(const char **names, int capacity)
+{
+    if (capacity > 0) {
+        names[0] = "scalar";
+    }
+    return 1;
+}
+
+const char *
+hs_environment_kernel(void)
+{
+    return NULL;
+}
+
+/* status, system, in_queries -> raises what calls raise for it */
+static PyObject *
+raise_status(PyObject *module, PyObject *arguments)
+{
+    int        status, system, in_queries;
+    hs_failure failure = {.row = 3, .column = 1, .value = 0.5, .expected_pairs = 7.0};
+    (void)module;
+    if (!PyArg_ParseTuple(arguments, "iip", &status, &system, &in_queries)) {
+        return NULL;
+    }
+    failure.system = system;
+    failure.in_queries = in_queries;
+    return hs_raise((hs_status)status, &failure, NULL);
+}
+
+static PyMethodDef methods[] = {{"raise_status", raise_status, METH_VARARGS, NULL},
+                                {NULL, NULL, 0, NULL}};
+
+static struct PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT, "probe_errors", NULL, -1, methods, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC
+PyInit_probe_errors(void)
+{
+    PyObject *module = PyModule_Create(&definition);
+    if (module != NULL && PyModule_AddIntConstant(module, "STATUS_END", HS_STATUS_END) < 0) {
+        Py_CLEAR(module);
+    }
+    return module;
+}
