@@ -136,6 +136,9 @@ typedef struct fault {
     F(max_pairs_0, USES_MAX_PAIRS, HS_ERR_ARGUMENT, s->c.max_pairs = 0)                           \
     F(max_pairs_below, USES_MAX_PAIRS, HS_ERR_ARGUMENT, s->c.max_pairs = INT64_MIN)               \
     F(max_pairs_highest, USES_MAX_PAIRS, HS_OK, s->c.max_pairs = INT64_MAX)                       \
+    F(cell_size_infinite, USES_CELL_SIZE, HS_OK, s->options.cell_size = INFINITY)                 \
+    F(cell_size_smallest, USES_CELL_SIZE, HS_OK, s->options.cell_size = 5e-324)                   \
+    F(limit_infinite, USES_OPTIONS, HS_OK, s->options.memory_limit = INFINITY)                    \
     F(result_null, USES_RESULT, HS_ERR_ARGUMENT, s->c.has_result = false)
 
 #define SPOIL(name, needs, status, statement) \
