@@ -306,9 +306,51 @@ lists_stay_as_they_were(void)
     hs_test_fail_allocation(0);
 }
 
+/* So many entries that their rows are found by one walk, in memory that is kept for them. */
+static void
+large_tables_fail_cleanly(void)
+{
+    enum { N = 1100 };
+    static double   x[3 * N];
+    harness_random  random = {77};
+    hs_options      options = hs_options_default();
+    const hs_points points = {.data = x,
+                              .n = N,
+                              .ndim = 3,
+                              .real = HS_FLOAT64,
+                              .row_stride = 3 * sizeof(double),
+                              .column_stride = sizeof(double)};
+    bool            disturbed = true;
+    int             n_failed = 0, nth = 0;
+    for (int e = 0; e < 3 * N; e++)
+        x[e] = random_unit(&random);
+    options.cutoff = 2.0;
+    while (disturbed && nth < MOST_ALLOCATIONS) {
+        const int64_t before = hs_test_live_blocks();
+        hs_pairs     *rows = CALL_NOTHING;
+        hs_test_fail_allocation(++nth);
+        const hs_status status = hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL);
+        disturbed = !hs_test_failure_is_due();
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK || (disturbed && status == HS_ERR_MEMORY));
+        CHECK((status == HS_OK) == (rows != NULL));
+        n_failed += status != HS_OK;
+        for (int64_t i = 0; status == HS_OK && i < N; i++) { /* all others, each once */
+            const int32_t last = i < N - 1 ? N - 1 : N - 2;
+            CHECK(hs_pairs_offsets(rows)[i + 1] == (i + 1) * (N - 1));
+            CHECK(((const int64_t *)hs_pairs_array(rows, HS_WANT_J))[(i + 1) * (N - 1) - 1] ==
+                  last);
+        }
+        hs_pairs_free(rows);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(nth < MOST_ALLOCATIONS && n_failed > 2 && nth > 10); /* it can find them twice instead */
+}
+
 void
 test_alloc_calls(void)
 {
+    RUN(large_tables_fail_cleanly);
     RUN(lists_stay_as_they_were);
     RUN(every_function_fails_cleanly);
 }
