@@ -265,6 +265,7 @@ def _with_overrides(
             raise InputError(
                 f"--box has {box.size} numbers; points with {ndim} coordinates need "
                 f"{ndim} (lengths) or {ndim * ndim} (vectors)"
+                + (", not lengths and angles" if box.size == 6 else "")
             )
         box = box if box.size == ndim else box.reshape(ndim, ndim)
         scene = replace(scene, box=box, periodic=(True,) * ndim)
