@@ -290,7 +290,7 @@ def test_six_bare_numbers_make_no_box(kind):
 )
 @pytest.mark.parametrize("ndim", [2, 3])
 def test_six_numbers_are_no_box_of_fewer_dimensions(call, ndim, rng):
-    with pytest.raises(ValueError, match=rf"got \(6,\): .*Box.from_lengths_angles") as caught:
+    with pytest.raises(ValueError, match=r"got \(6,\): .*Box.from_lengths_angles") as caught:
         call(rng.random((4, ndim)), SIX)
     assert f"points in {ndim} dimensions" in str(caught.value)
 
