@@ -8,6 +8,7 @@ from halfshell._cells import CellList
 from halfshell._count import count_pairs
 from halfshell._errors import CapacityError
 from halfshell._explain import Explanation, explain
+from halfshell._graph import Graph
 from halfshell._histogram import pair_histogram
 from halfshell._include import get_include
 from halfshell._nearest import nearest
@@ -29,6 +30,7 @@ __all__ = [
     "CapacityError",
     "CellList",
     "Explanation",
+    "Graph",
     "NeighborTable",
     "RadialDistribution",
     "Verdict",

@@ -21,8 +21,8 @@ class Box:
     vectors : array_like of float, shape (d, d) or (d,), or Box
         Box vectors as rows, or edge lengths along the coordinate axes, in the unit of the points;
         1 <= d <= 8. Six bare numbers are refused, for they may be meant as lengths and angles: use
-        `from_lengths_angles`, or `orthorhombic` for six lengths. Any orientation and handedness; the vectors must be linearly independent,
-        which is decided exactly.
+        `from_lengths_angles`, or `orthorhombic` for six lengths. Any orientation and handedness;
+        the vectors must be linearly independent, which is decided exactly.
 
     Attributes
     ----------

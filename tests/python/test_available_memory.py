@@ -39,8 +39,8 @@ class Tree:
     def v2(self, folder, limit, usage, inactive=0, active=0):
         self.write(f"{folder}/memory.max", f"{limit}\n")
         self.write(f"{folder}/memory.current", f"{usage}\n")
-        self.write(f"{folder}/memory.stat",
-                   f"anon 1\ninactive_anon 5\ninactive_file {inactive}\nactive_file {active}\n")  # fmt: skip
+        files = f"inactive_file {inactive}\nactive_file {active}\n"
+        self.write(f"{folder}/memory.stat", f"anon 1\ninactive_anon 5\n{files}")
 
     def v1(self, folder, limit, usage, inactive=0, active=0):
         self.write(f"{folder}/memory.limit_in_bytes", f"{limit}\n")
