@@ -341,7 +341,8 @@ hs_status hs_stream_open(const hs_points *points, const hs_box *box, const hs_op
                          int64_t max_pairs, hs_stream **stream, hs_failure *failure);
 
 /* The next max_pairs pairs, or those that are left, for hs_pairs_free; *block is NULL after the
- * last ones. poll may be NULL. No thread is left behind. On failure *block is NULL, and the stream
+ * last ones. poll may be NULL; from call to call its fraction never falls, and it is 1 once all
+ * pairs have been found. No thread is left behind. On failure *block is NULL, and the stream
  * as it was before: it may be asked again. */
 hs_status hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                          hs_failure *failure);

@@ -45,6 +45,8 @@ static PyMethodDef methods[] = {
     {"build_info", hs_py_build_info, METH_NOARGS, "How this extension was built."},
     {"available_memory", hs_py_available_memory, METH_NOARGS,
      "Bytes that this process may still take."},
+    {"group_memory", hs_py_group_memory, METH_O,
+     "What control groups leave of them; a folder stands in for the root of all files."},
     {"clear_cache", hs_py_clear_cache, METH_NOARGS, "See halfshell.clear_cache."},
     {"set_cache_limit", hs_py_set_cache_limit, METH_O, "See halfshell.set_cache_limit."},
     {"cache_held", hs_py_cache_held, METH_NOARGS, "Bytes that the cache holds."},

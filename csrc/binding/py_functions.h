@@ -70,6 +70,7 @@ PyObject *hs_py_kernels(PyObject *module, PyObject *ignored);
 PyObject *hs_py_default_kernel(PyObject *module, PyObject *ignored);
 PyObject *hs_py_build_info(PyObject *module, PyObject *ignored);
 PyObject *hs_py_available_memory(PyObject *module, PyObject *ignored);
+PyObject *hs_py_group_memory(PyObject *module, PyObject *root);
 PyObject *hs_py_clear_cache(PyObject *module, PyObject *ignored);
 /* A number of bytes -> the limit before. */
 PyObject *hs_py_set_cache_limit(PyObject *module, PyObject *limit);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_info.c: _core.kernels, default_kernel, build_info, available_memory, and the cache of output
- * memory. */
+/* py_info.c: _core.kernels, default_kernel, build_info, available_memory, group_memory, and the
+ * cache of output memory. */
 #include "py_functions.h"
 
 #include "tuples.h"
@@ -8,6 +8,7 @@
 #include "../halfshell.h"
 #include "available.h"
 #include "environment.h"
+#include "groups.h"
 
 PyObject *
 hs_py_kernels(PyObject *module, PyObject *ignored)
@@ -81,6 +82,14 @@ hs_py_available_memory(PyObject *module, PyObject *ignored)
     (void)module;
     (void)ignored;
     return PyFloat_FromDouble(hs_available_memory(NULL));
+}
+
+PyObject *
+hs_py_group_memory(PyObject *module, PyObject *root)
+{
+    const char *folder = PyUnicode_AsUTF8(root);
+    (void)module;
+    return folder != NULL ? PyFloat_FromDouble(hs_group_memory(folder)) : NULL;
 }
 
 PyObject *

@@ -18,6 +18,7 @@ struct hs_commits {
     hs_mutex         mutex;      /* guards all below, and the output but for what columns hold */
     hs_condition     changed;    /* due, n_copying or status */
     int64_t          due;        /* the range whose pairs are next in the output */
+    double           done;       /* of the whole search, in order: it never falls */
     int              n_copying;  /* threads that write to columns: these must not move then */
     int              n_working;  /* threads that may still have a range */
     hs_status        status;
@@ -83,17 +84,41 @@ goes_on(void *context, double fraction)
     return result;
 }
 
+/* A hs_poll_fn of the caller's thread. What it has done counts once all earlier ranges are written:
+ * it may be far ahead of the others, and what is found beyond a full output is given up. */
+static bool
+ask_caller(void *context, double fraction)
+{
+    hs_committer *committer = context;
+    hs_commits   *commits = committer->commits;
+    hs_mutex_lock(&commits->mutex);
+    if (commits->output == NULL || committer->range == commits->due) {
+        commits->done = hs_larger(commits->done, fraction);
+    }
+    const double done = commits->done;
+    hs_mutex_unlock(&commits->mutex);
+    return committer->poll(committer->poll_context, done);
+}
+
 void
 hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
                 hs_committer *committer)
 {
-    *committer = (hs_committer){.commits = commits, .options = options, .pairs = pairs};
+    *committer = (hs_committer){.commits = commits,
+                                .options = options,
+                                .pairs = pairs,
+                                .poll = options->poll,
+                                .poll_context = options->poll_context,
+                                .range = -1};
     hs_mutex_lock(&commits->mutex);
     commits->n_working++;
     hs_mutex_unlock(&commits->mutex);
     if (!hs_thread_is(commits->caller)) {
         options->poll = goes_on;
         options->poll_context = commits;
+    } else if (options->poll != NULL) {
+        options->poll = ask_caller;
+        options->poll_context = committer;
     }
 }
 
@@ -192,6 +217,7 @@ write_part(hs_committer *committer, const hs_commit_part *part)
         return status;
     }
     heed_limits(committer, part);
+    commits->done = hs_larger(commits->done, part->fraction);
     commits->n_copying++;
     if (part->is_last) {
         commits->due++;

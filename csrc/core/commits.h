@@ -34,6 +34,8 @@ typedef struct hs_commit_part {
 typedef struct hs_committer {
     hs_commits    *commits; /* borrowed */
     hs_options    *options; /* borrowed; its poll tells whether to go on */
+    hs_poll_fn     poll;    /* as it was before; for the caller's thread */
+    void          *poll_context;
     hs_output     *pairs;   /* borrowed: where the thread collects them; NULL when counting */
     int64_t        range;   /* that the thread is working on */
     int64_t        written; /* of the pairs, those that are in the output already */
@@ -60,7 +62,8 @@ int64_t hs_commits_written(const hs_commits *commits);
 hs_status hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure);
 
 /* Called by the thread itself. pairs: NULL when it commits nothing. options: those that it works
- * with; for threads that may not poll they are changed to ask whether anybody has failed. */
+ * with; for threads that may not poll they are changed to ask whether anybody has failed, for the
+ * caller's thread to tell a fraction that never falls. committer must outlive them. */
 void hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
                      hs_committer *committer);
 

@@ -23,6 +23,9 @@ struct hs_stream {
     int64_t     begin;
     int64_t     max_pairs;
     hs_bookmark next;      /* where to go on looking */
+    double      told;      /* the largest fraction that poll has been called with */
+    hs_poll_fn  poll;      /* of the caller, during hs_stream_next */
+    void       *context;
 };
 
 static int64_t
@@ -159,6 +162,16 @@ take_block(hs_stream *stream, hs_pairs **result)
     return HS_OK;
 }
 
+/* A hs_poll_fn: what is looked for a second time, because it did not fit a block or the caller
+ * stopped, does not tell less than the first time. */
+static bool
+tell(void *context, double fraction)
+{
+    hs_stream *stream = context;
+    stream->told = hs_larger(stream->told, fraction);
+    return stream->poll(stream->context, stream->told);
+}
+
 hs_status
 hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                hs_failure *failure)
@@ -174,7 +187,9 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
     hs_status      status = HS_OK;
-    hs_search_set_poll(poll, context, &stream->search);
+    stream->poll = poll;
+    stream->context = context;
+    hs_search_set_poll(poll != NULL ? tell : NULL, stream, &stream->search);
     while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_over(stream)) {
         status = fill(stream, failure);
     }
@@ -237,6 +252,7 @@ hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     stream->begin = 0;
     stream->max_pairs = max_pairs;
     stream->next = (hs_bookmark){.point = 0};
+    stream->told = 0.0;
     *result = stream;
     return HS_OK;
 }

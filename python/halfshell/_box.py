@@ -20,8 +20,9 @@ class Box:
     ----------
     vectors : array_like of float, shape (d, d) or (d,), or Box
         Box vectors as rows, or edge lengths along the coordinate axes, in the unit of the points;
-        1 <= d <= 8. Any orientation and handedness; the vectors must be linearly independent,
-        which is decided exactly.
+        1 <= d <= 8. Six bare numbers are refused, for they may be meant as lengths and angles: use
+        `from_lengths_angles`, or `orthorhombic` for six lengths. Any orientation and handedness;
+        the vectors must be linearly independent, which is decided exactly.
 
     Attributes
     ----------
@@ -34,7 +35,7 @@ class Box:
         If the entries are not real numbers, or are long doubles.
     ValueError
         If an entry is not finite, the vectors are exactly linearly dependent, or the shape does
-        not fit.
+        not fit or is (6,).
 
     Notes
     -----
@@ -63,6 +64,11 @@ class Box:
             raise ValueError(
                 f"box must have shape (d,) or (d, d) with 1 <= d <= {_inputs.MAX_DIM}, "
                 f"got {array.shape}"
+            )
+        if array.shape == (6,):
+            raise ValueError(
+                f"box must not be six bare numbers: {_inputs.LENGTHS_AND_ANGLES}, the lengths of "
+                "a box in six dimensions for Box.orthorhombic"
             )
         own = _inputs.as_box(array, array.shape[0]).copy()
         own.flags.writeable = False
@@ -133,7 +139,7 @@ class Box:
         array = np.atleast_1d(_inputs.as_real_array(only, "lengths"))
         if array.ndim != 1:
             raise ValueError(f"lengths must have shape (d,), got {array.shape}")
-        return cls(array)
+        return cls(np.diag(array) if 1 <= len(array) <= _inputs.MAX_DIM else array)
 
     @classmethod
     def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from halfshell import _core, _inputs
 from halfshell._box import Box
 from halfshell._options import Precision, Progress, Search
+from halfshell._origin import Origin
 
 
 class Candidates(NamedTuple):
@@ -42,7 +43,7 @@ class CellLayout:
     """Points in cells, as `CellList` documents them."""
 
     __slots__ = (
-        "_cells", "_cutoff", "_layout", "_n_points", "_ndim", "_precision", "_threads",
+        "_cells", "_cutoff", "_layout", "_n_points", "_ndim", "_origin", "_precision", "_threads",
     )
 
     def __init__(
@@ -69,6 +70,7 @@ class CellLayout:
         self._n_points: int = array.shape[0]
         self._ndim: int = array.shape[1]
         self._precision = precision
+        self._origin = Origin(array, None, vectors, bits)
         self._threads = threads
 
     def __len__(self) -> int:

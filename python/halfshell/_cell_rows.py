@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Unpack, cast
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from halfshell import _core, _inputs, _radii
 from halfshell._cell_layout import Asking, CellLayout, Running
 from halfshell._nearest import as_k, as_max_distance, in_rows
+from halfshell._origin import Origin
 from halfshell._pairs import Arrays
 from halfshell._table import NeighborTable
 
@@ -99,7 +101,10 @@ class CellRows(CellLayout):
         arrays = _radii.search_each(
             search, asking, radii, quantities, inclusive, self._precision == "exact"
         )
-        return NeighborTable(arrays, quantities, self._n_points, False)
+        origin = self._origin_of(asking, quantities, lambda queries: _radii.search_each(
+            search, queries, radii, "S", inclusive, self._precision == "exact"
+        ))  # fmt: skip
+        return NeighborTable(arrays, quantities, self._n_points, False, origin=origin)
 
     def nearest(
         self,
@@ -174,5 +179,20 @@ class CellRows(CellLayout):
         index_dtype: npt.DTypeLike,
         options: Asking,
     ) -> NeighborTable:
+        cutoff = None if cutoff is None else _inputs.as_cutoff(cutoff)
         arrays = self._arrays(asking, cutoff, quantities, index_dtype, options)
-        return NeighborTable(arrays, quantities, self._n_points, asking is None)
+        origin = self._origin_of(asking, quantities, lambda queries: self._arrays(
+            queries, cutoff, "S", index_dtype, options
+        ))  # fmt: skip
+        return NeighborTable(arrays, quantities, self._n_points, asking is None, origin=origin)
+
+    def _origin_of(
+        self,
+        asking: _inputs.PointArray | None,
+        quantities: str,
+        search: Callable[[Any], _radii.Arrays],
+    ) -> Origin | None:
+        """What a table with distances keeps; `search` returns offsets and S for queries."""
+        if "d" not in quantities:
+            return None
+        return self._origin.asked_by(asking, lambda origin: search(origin.queries)[1])

@@ -28,6 +28,7 @@ from halfshell._cli_scene import (
     unit_suffix,
 )
 from halfshell._files import InputError, Scene, one_line, replacing
+from halfshell._terminal import printable
 
 __all__ = ["run", "write_csv"]
 
@@ -238,7 +239,8 @@ def _text(summary: Summary, scene: Scene, reason: str) -> str:
         lines.append(("pairs written to", summary.output))
     if summary.plot:
         lines.append(("plot written to", summary.plot))
-    return "\n".join([summary.file, *(f"  {name:<18}{value}" for name, value in lines)])
+    text = [summary.file, *(f"  {name:<18}{value}" for name, value in lines)]
+    return "\n".join(map(printable, text))
 
 
 def _duration(seconds: float) -> str:

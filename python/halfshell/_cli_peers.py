@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._extras import how_to_install
 from halfshell._files import InputError, Scene, one_line
 from halfshell._peers import LIBRARIES, Library, Question, wrapped
 
@@ -124,7 +125,7 @@ def find_peer(name: str) -> Peer:
             importlib.import_module(module)
     except ImportError:
         raise InputError(
-            f"--against {name}: is not installed: pip install {peer.package}"
+            f"--against {name}: is not installed: {how_to_install(peer.package)}"
         ) from None
     return peer
 

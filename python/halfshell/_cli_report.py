@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from halfshell._files import InputError, missing_extra, one_line, replacing
+from halfshell._terminal import printable
 
 if TYPE_CHECKING:
     from halfshell._report.rows import ReportRow
@@ -101,12 +102,15 @@ def run(args: Namespace) -> int:
 
 def _require() -> None:
     """Import what the report needs, before any work is done for it."""
+    missing = []
     for module, package in (("scipy.spatial", "scipy"), ("matplotlib.figure", "matplotlib"),
                             ("rich.console", "rich")):  # fmt: skip
         try:
             __import__(module)
         except ImportError:
-            raise missing_extra("report", package) from None
+            missing.append(package)
+    if missing:
+        raise missing_extra("report", *missing)
 
 
 def _list() -> int:
@@ -167,7 +171,8 @@ def _print(rows: Sequence[ReportRow], details: bool, folder: Path) -> None:
     console.print(summary_table(rows))
     for text in findings(rows):
         console.print(f"* {text}", markup=False)
-    console.print(f"written: {folder / 'report.csv'}, {folder / 'report.html'}", markup=False)
+    written = f"written: {folder / 'report.csv'}, {folder / 'report.html'}"
+    console.print(printable(written), markup=False)
 
 
 @contextmanager

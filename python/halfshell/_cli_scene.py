@@ -12,7 +12,9 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._available import refuse_unavailable
 from halfshell._files import InputError, Scene, missing_extra, read_scene
+from halfshell._terminal import printable
 
 __all__ = [
     "choose_cutoff",
@@ -25,6 +27,7 @@ __all__ = [
 ]
 
 NEIGHBORS_WANTED = 50  # what a chosen cutoff aims at: two or three shells of a dense system
+_COPIES = 5  # of the points, while a cutoff is chosen
 BINS = 200  # of g(r): a percent of the cutoff is two bins
 
 
@@ -38,7 +41,7 @@ def load_scene(args: Namespace) -> tuple[Scene, float, str]:
         periodic=args.periodic,
     )
     for remark in scene.remarks:
-        print(f"halfshell: warning: {scene.source}: {remark}", file=sys.stderr)
+        print(printable(f"halfshell: warning: {scene.source}: {remark}"), file=sys.stderr)
     if args.cutoff is not None:
         return scene, args.cutoff, ""
     return scene, *choose_cutoff(scene)
@@ -57,8 +60,9 @@ def choose_cutoff(scene: Scene) -> tuple[float, str]:
         If the scene has no length to choose by: a single point in open space, or points that
         coincide.
     """
+    n, ndim = scene.points.shape
+    refuse_unavailable(_COPIES * 8 * n * ndim, f"choosing a cutoff for {n:,} points")
     points = np.asarray(scene.points, dtype=np.float64)
-    n, ndim = points.shape
     rows = scene.box_rows
     repeating = rows[list(scene.periodic)] if rows is not None else np.empty((0, ndim))
     n_repeating = len(repeating)
@@ -182,6 +186,6 @@ def plot_distribution(
         axes.set_ylabel("g(r)")
     else:
         axes.set_ylabel(f"neighbours of a point per unit of r{unit}\n(raw: no volume to divide by)")
-    title = Path(scene.source).name if scene.source else ""
-    axes.set_title(f"{title}: {len(scene.points):,} points, {len(d):,} pairs", fontsize=10)
+    title = f"{printable(Path(scene.source).name)}: {len(scene.points):,} points, {len(d):,} pairs"
+    axes.set_title(title, fontsize=10, parse_math=False)
     figure.savefig(stream, format=file_format, dpi=150)

@@ -19,6 +19,7 @@ from halfshell._cli_peers import PairList, ask_peer, find_peer
 from halfshell._cli_scene import load_scene, unit_suffix
 from halfshell._files import InputError, Scene, one_line
 from halfshell._reference import exact_square, reference_pairs
+from halfshell._terminal import printable
 
 __all__ = ["Check", "check_by_integers", "check_by_search", "run", "sample_points"]
 
@@ -246,7 +247,7 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: lis
             text.append(f"  {name}: i={i} j={j} S={shift}   distance - cutoff = {excess:+.3e}")
         if len(found) > EXAMPLES:
             text.append(f"  {name}: and {len(found) - EXAMPLES:,} more")
-    return "\n".join(text)
+    return "\n".join(map(printable, text))
 
 
 def _excess(scene: Scene, cutoff: float, i: int, j: int, shift: list[int]) -> Decimal:

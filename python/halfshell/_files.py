@@ -19,9 +19,14 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._extras import needs
+from halfshell._numpy_files import Unreadable, read_arrays
+from halfshell._terminal import printable
+
 __all__ = ["InputError", "Scene", "missing_extra", "one_line", "read_scene", "replacing"]
 
 
+ROWS_CHECKED = 1 << 16  # at a time: some megabytes
 MOST_CHARACTERS = 1000  # of a line that says what is wrong
 
 
@@ -69,20 +74,23 @@ class Scene:
 
 
 def one_line(error: BaseException) -> str:
-    """Return the message of an exception on one line, or its kind if it has none."""
+    """Return the message of an exception on one line, or its kind if it has none.
+
+    What is in it that a terminal would obey is escaped.
+    """
     if isinstance(error, OSError) and error.strerror:
-        return error.strerror
+        return printable(error.strerror)
     if isinstance(error, MemoryError) and not str(error):
         return "not enough memory"
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = printable(" ".join(str(error).split())) or type(error).__name__
     # What was wrong stands at the beginning or at the end; between them may be a very long name.
     half = MOST_CHARACTERS // 2
     return text if len(text) <= MOST_CHARACTERS else f"{text[:half]} ... {text[-half:]}"
 
 
-def missing_extra(what: str, package: str) -> InputError:
-    """Return the error for an optional package that is not installed."""
-    return InputError(f"{what} needs {package}: pip install 'halfshell[cli]'")
+def missing_extra(what: str, *packages: str) -> InputError:
+    """Return the error for optional packages that are not installed."""
+    return InputError(needs(what, *packages))
 
 
 # Reading -----------------------------------------------------------------------------------
@@ -149,19 +157,14 @@ def _read_numpy(file: str, index: int | None) -> Scene:
     if index is not None:
         raise InputError(f"{file}: --index is for files with several frames, not for NumPy's")
     try:
-        with open(file, "rb") as stream, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of headers that Python 2 wrote
-            loaded = np.load(stream, allow_pickle=False)
-            if isinstance(loaded, np.ndarray):
-                content = {"points": loaded}
-            else:
-                content = {name: loaded[name] for name in loaded.files}
-                # Members that are no NumPy files come as bytes.
-                content = {k: v for k, v in content.items() if isinstance(v, np.ndarray)}
+        content, names = read_arrays(file)
+    except Unreadable as error:
+        raise InputError(f"{file}: {error}") from None
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
-    except MemoryError:
-        raise
+    except MemoryError as error:
+        reason = one_line(error) if str(error) else "it does not fit in memory"
+        raise InputError(f"{file}: {reason}") from None
     except Exception as error:  # a broken file may fail in any part of zipfile, zlib and NumPy
         reason = one_line(error)
         if "Object arrays" in reason:
@@ -170,8 +173,8 @@ def _read_numpy(file: str, index: int | None) -> Scene:
             reason = "it is none"
         raise InputError(f"{file}: cannot be read as a NumPy file: {reason}") from None
     if "points" not in content:
-        names = ", ".join(content) or "nothing"
-        raise InputError(f"{file}: has no array 'points' (it holds {names})")
+        held = ", ".join(map(printable, names)) or "nothing"
+        raise InputError(f"{file}: has no array 'points' (it holds {held})")
     points, box = content["points"], content.get("box")
     if points.ndim != 2:
         raise InputError(f"{file}: points have shape {points.shape}; they must be (n, d)")
@@ -238,11 +241,12 @@ def _check(scene: Scene) -> None:
         raise InputError(f"{source}: holds no points")
     if points.shape[1] == 0:
         raise InputError(f"{source}: points have shape {points.shape}; they must be (n, d)")
-    wrong = ~np.isfinite(points)
-    if wrong.any():
-        row, column = (int(k) for k in np.argwhere(wrong)[0])
-        value = points[row, column]
-        raise InputError(f"{source}: point {row}, coordinate {column} is {value}")
+    for first in range(0, len(points), ROWS_CHECKED):
+        block = points[first : first + ROWS_CHECKED]
+        if not np.isfinite(block).all():
+            row, column = (int(k) for k in np.argwhere(~np.isfinite(block))[0])
+            value = block[row, column]
+            raise InputError(f"{source}: point {first + row}, coordinate {column} is {value}")
     if scene.box is None:
         return
     ndim = points.shape[1]
@@ -265,6 +269,7 @@ def _with_overrides(
             raise InputError(
                 f"--box has {box.size} numbers; points with {ndim} coordinates need "
                 f"{ndim} (lengths) or {ndim * ndim} (vectors)"
+                + (", not lengths and angles" if box.size == 6 else "")
             )
         box = box if box.size == ndim else box.reshape(ndim, ndim)
         scene = replace(scene, box=box, periodic=(True,) * ndim)

@@ -25,6 +25,7 @@ from halfshell._foreign import (
 )
 
 MAX_DIM = 8
+LENGTHS_AND_ANGLES = "lengths and angles are for Box.from_lengths_angles((a, b, c), (alpha, ...))"
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
 _MISSING = object()
 
@@ -222,9 +223,10 @@ def as_box(values: Any, ndim: int) -> FloatArray:
     if array.shape == (ndim,):
         return np.diag(array.astype(np.float64))
     if array.shape != (ndim, ndim):
+        hint = f": {LENGTHS_AND_ANGLES}" if array.shape == (6,) else ""
         raise ValueError(
             f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} dimensions, "
-            f"got {array.shape}"
+            f"got {array.shape}{hint}"
         )
     return in_order(array, np.float64)
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from halfshell import _core, _inputs
 from halfshell._box import Box
 from halfshell._options import Precision
+from halfshell._origin import Origin, shifts_of_search
 from halfshell._table import NeighborTable
 
 
@@ -92,17 +93,23 @@ def neighbors(
     """
     if type(box) is Box:
         box = box.vectors
+    vectors, periods, asking = box, periodic, queries
     arrays: Any = _core.plain_neighbors(
         points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
         quantities, index_dtype, queries,
     )
     if arrays is NotImplemented:
         scene, points, asking = _scene(points, cutoff, queries, box, periodic)
+        vectors, periods = scene[2:]
         arrays = _core.neighbors(
             *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
             threads, quantities, _inputs.as_index_bytes(index_dtype), asking,
         )
-    return NeighborTable(arrays, quantities, len(points), queries is None)
+    origin = None
+    if "d" in quantities:
+        find_shifts = shifts_of_search(cutoff, inclusive, precision, threads)
+        origin = Origin(points, asking, vectors, periods, find_shifts)
+    return NeighborTable(arrays, quantities, len(points), queries is None, origin=origin)
 
 
 def coordination(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from halfshell import _core, _histogram, _inputs
 from halfshell._available import refuse_unavailable
+from halfshell._extras import needs
 from halfshell._options import Search
 
 _COLUMNS = 10
@@ -29,9 +30,10 @@ class RadialDistribution:
     r : ndarray of float64, shape (bins,)
         The middle of each bin, in the unit of the points.
     g : ndarray of float64, shape (bins,) or (t, t, bins)
-        g(r): 1 on average where points ignore each other. NaN where there is nothing to divide by:
-        without points, or without points of a type, or where a shell is so small a part of the box
-        that float64 does not hold it (there infinite if it has pairs).
+        g(r): 1 on average where points ignore each other. 0 in each bin without pairs: so also
+        where there are no points, or none of a type, and the density to divide by is 0 as well.
+        Infinite where a bin has pairs, but its shell is so small a part of the box that float64
+        does not hold it.
     counts : ndarray of int64, the shape of `g`
         Pairs in each bin, as `pair_histogram` counts them.
     edges : ndarray of float64, shape (bins + 1,)
@@ -66,14 +68,14 @@ class RadialDistribution:
         Raises
         ------
         ImportError
-            If matplotlib is not installed: ``pip install 'halfshell[cli]'``.
+            If matplotlib is not installed: ``pip install matplotlib``.
         """
         if ax is None:
             ax = _new_axes()
         if self.g.ndim == 1:
             ax.step(self.r, self.g, where="mid")
         else:
-            twice = np.array_equal(self.g, self.g.swapaxes(0, 1), equal_nan=True)
+            twice = np.array_equal(self.g, self.g.swapaxes(0, 1))
             for a, b in np.ndindex(self.g.shape[:2]):
                 if a <= b or not twice:
                     ax.step(self.r, self.g[a, b], where="mid", label=f"{a}-{b}")
@@ -90,7 +92,7 @@ def _new_axes() -> Axes:
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError("plot needs matplotlib: pip install 'halfshell[cli]'") from error
+        raise ImportError(needs("plot", "matplotlib")) from error
     return pyplot.subplots(layout="constrained")[1]
 
 
@@ -140,7 +142,8 @@ def rdf(
         g is the mean number of neighbours in a shell over what the density of all points, n / V,
         would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two different types it
         is ``counts / (n_a * n_b / V * shell)``, for queries ``counts / (q * n / V * shell)``, with
-        types ``counts / (q_a * n_b / V * shell)``. A shell is the length, area, volume, ... between
+        types ``counts / (q_a * n_b / V * shell)``. Without counts it is 0, also where n_a or n_b
+        is 0. A shell is the length, area, volume, ... between
         two spheres, in any number of dimensions.
 
     Raises
@@ -179,8 +182,10 @@ def rdf(
     )
     marks = _histogram.as_marks(len(array), asking, types, query_types)
     counts = _histogram.binned(search, edges, asking, marks)
-    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        g = counts / (_partners(len(array), asking, marks) * shares)
+    g = np.zeros(counts.shape)
+    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+        expected = _partners(len(array), asking, marks) * shares
+        np.divide(counts, expected, out=g, where=counts > 0)
     middle = 0.5 * (edges[1:] + edges[:-1])
     return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
 

@@ -80,8 +80,9 @@ def iter_pairs(
         returned. Default: what the machine and its control group have available.
     progress : callable, optional
         Called now and then, at least once for each time that pairs are looked for, as
-        ``progress(fraction)``: the part of the points that has been dealt with, from 0 to 1. An
-        exception ends the call, and the iterator can go on.
+        ``progress(fraction)``: the part of the points that has been dealt with, from 0 to 1. It
+        never falls, for any number of threads, and is 1 once all pairs have been found; without
+        points it is not called. An exception ends the call, and the iterator can go on.
 
     Returns
     -------

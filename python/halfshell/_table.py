@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _inputs, _table_forms
+from halfshell._graph import Graph, check_letters, turned
 from halfshell._table_rows import Array, Row, TableRows
 
 
@@ -118,7 +119,8 @@ class NeighborTable(TableRows):
         Parameters
         ----------
         by : {"distance"}
-            Ascending by distance; entries at the same distance by (j, S).
+            Ascending by distance, exactly, as `nearest` orders: where rounded distances cannot
+            tell, the true ones are compared. Entries at the same distance by (j, S).
 
         Returns
         -------
@@ -128,9 +130,14 @@ class NeighborTable(TableRows):
         Raises
         ------
         AttributeError
-            If the table has no distances.
+            If the table has no distances or no indices, or was not made by a search.
         ValueError
             If `by` is another word.
+
+        Notes
+        -----
+        A table with distances keeps a copy of points, queries and box for this. In a box that
+        repeats, a table without shifts searches for them once more.
 
         Examples
         --------
@@ -140,8 +147,13 @@ class NeighborTable(TableRows):
         ([0, 1], [1, 0])
         """
         _inputs.as_choice(by, "by", ("distance",))
-        # A stable sort keeps (j, S) ascending where distances are equal.
         order = _table_forms.order_by_distance(self.offsets, self.distances)
+        self._column("j")
+        if self._origin is None:
+            raise AttributeError(
+                "this table does not know its points: sort one that neighbors or CellList has made"
+            )
+        order = self._settled(order, self._origin)
         return self._with(self.offsets, order, self._is_complete, False)
 
     # ---- other forms -----------------------------------------------------------------------
@@ -293,6 +305,15 @@ class NeighborTable(TableRows):
         AttributeError
             If the table has no indices.
 
+        See Also
+        --------
+        graph : with the vectors from source to target, and their shifts.
+
+        Notes
+        -----
+        D and S of the table point from i to j, the other way round, against the edges:
+        ``points[edge_index[0]] - points[edge_index[1]] + S @ box == D``.
+
         Examples
         --------
         >>> import halfshell as hs
@@ -300,6 +321,45 @@ class NeighborTable(TableRows):
         [[1, 0, 2, 1], [0, 1, 1, 2]]
         """
         return np.stack((self.indices, self._row_numbers()))
+
+    def graph(self) -> Graph:
+        """The entries as edges of a graph with their vectors, as graph networks take them.
+
+        Returns
+        -------
+        Graph
+            A named tuple ``(edge_index, shifts, vectors, distances)``: `edge_index` as from the
+            method of that name, shifts and vectors from source to target, with
+            ``points[edge_index[1]] - points[edge_index[0]] + shifts @ box == vectors`` up to
+            rounding. They are -S and -D of the table. `distances` are None if it has none.
+
+        Raises
+        ------
+        AttributeError
+            If the table lacks indices, vectors or shifts: it needs ``quantities="jDS"``.
+        OverflowError
+            If a shift is -2**31, which has no opposite in int32.
+
+        Notes
+        -----
+        In a table of queries the targets are queries: ``queries[edge_index[1]]``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import halfshell as hs
+        >>> points, box = np.array([[0.5], [3.0]]), np.array([[4.0]])
+        >>> edge_index, shifts, vectors, _ = hs.neighbors(
+        ...     points, 2.0, box=box, quantities="jDS"
+        ... ).graph()
+        >>> edge_index.tolist(), shifts.tolist(), vectors.tolist()
+        ([[1, 0], [0, 1]], [[1], [-1]], [[1.5], [-1.5]])
+        >>> np.array_equal(points[edge_index[1]] - points[edge_index[0]] + shifts @ box, vectors)
+        True
+        """
+        check_letters(self._quantities)
+        distances = self.distances if "d" in self._quantities else None
+        return turned(self.edge_index(), self.shifts, self.vectors, distances)
 
     def reverse(self) -> npt.NDArray[np.int64]:
         """Where the other direction of each entry is: (j, i, -S) of (i, j, S).

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from halfshell import _inputs
 from halfshell._available import refuse_unavailable
 from halfshell._errors import CapacityError
+from halfshell._extras import needs
 from halfshell._foreign import kind_of, shown, whole_number
 
 Array = npt.NDArray[Any]
@@ -136,7 +137,7 @@ def sparse_array(
     try:
         sparse = importlib.import_module("scipy.sparse")
     except ImportError as error:
-        raise ImportError("to_scipy needs SciPy: pip install scipy") from error
+        raise ImportError(needs("to_scipy", "scipy")) from error
     shape = (len(offsets) - 1, n_points)
     is_first = np.ones(len(indices), np.bool_)
     is_first[1:] = indices[1:] != indices[:-1]

@@ -11,6 +11,9 @@ from typing import Any, Self, SupportsIndex, overload
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._exact_order import settle
+from halfshell._origin import Origin
+
 Array = npt.NDArray[Any]
 Row = Array | tuple[Array, ...]
 
@@ -19,7 +22,8 @@ class TableRows:
     """What a `NeighborTable` holds, which has the documentation."""
 
     __slots__ = (
-        "_arrays", "_is_complete", "_is_in_order", "_is_of_one_set", "_n_points", "_quantities",
+        "_arrays", "_entries", "_first_row", "_is_complete", "_is_in_order", "_is_of_one_set",
+        "_n_points", "_origin", "_quantities",
     )
 
     _arrays: tuple[Array, ...]  # offsets, then one for each quantity
@@ -28,6 +32,9 @@ class TableRows:
     _is_of_one_set: bool  # rows are those of the points themselves
     _is_complete: bool  # no entry was left out
     _is_in_order: bool  # each row ascends by (j, S)
+    _origin: Origin | None  # None: exact comparisons are not possible
+    _first_row: int  # number of row 0 among those that asked
+    _entries: slice | Array  # which of all entries of the search, if their shifts are not here
 
     def __init__(
         self,
@@ -37,6 +44,9 @@ class TableRows:
         is_of_one_set: bool,
         is_complete: bool = True,
         is_in_order: bool = True,
+        origin: Origin | None = None,
+        first_row: int = 0,
+        entries: slice | Array = slice(None),
     ) -> None:
         self._arrays = arrays
         self._quantities = quantities
@@ -44,6 +54,9 @@ class TableRows:
         self._is_of_one_set = is_of_one_set
         self._is_complete = is_complete
         self._is_in_order = is_in_order
+        self._origin = origin
+        self._first_row = first_row
+        self._entries = entries
 
     # ---- what is there ---------------------------------------------------------------------
 
@@ -155,7 +168,8 @@ class TableRows:
         parts = tuple(column[offsets[0] : offsets[-1]] for column in self._arrays[1:])
         return type(self)(
             (read_only(offsets - offsets[0]), *parts), self._quantities, self._n_points, False,
-            self._is_complete, self._is_in_order,
+            self._is_complete, self._is_in_order, self._origin, self._first_row + first,
+            self._entries_between(int(offsets[0]), int(offsets[-1])),
         )
 
     def __repr__(self) -> str:
@@ -167,7 +181,7 @@ class TableRows:
     def __reduce__(self) -> tuple[Any, ...]:
         state = tuple(getattr(self, name) for name in (
             "_arrays", "_quantities", "_n_points", "_is_of_one_set", "_is_complete",
-            "_is_in_order",
+            "_is_in_order", "_origin", "_first_row", "_entries",
         ))  # fmt: skip
         return _restored, (type(self), *state)
 
@@ -176,8 +190,41 @@ class TableRows:
         columns = (read_only(column[entries]) for column in self._arrays[1:])
         return type(self)(
             (read_only(offsets), *columns), self._quantities, self._n_points,
-            self._is_of_one_set, complete, order,
+            self._is_of_one_set, complete, order, self._origin, self._first_row,
+            self._entries_at(entries),
         )
+
+    # ---- which entries of the search they are ----------------------------------------------
+
+    def _lacks_shifts(self) -> bool:
+        """Whether shifts are not here, and may be other than zero."""
+        return self._origin is not None and "S" not in self._quantities and self._origin.has_images
+
+    def _entries_between(self, first: int, end: int) -> slice | Array:
+        if isinstance(self._entries, slice):
+            before = self._entries.start or 0
+            return slice(before + first, before + end)
+        return self._entries[first:end]
+
+    def _entries_at(self, entries: Array) -> slice | Array:
+        if not self._lacks_shifts():
+            return self._entries
+        if isinstance(self._entries, slice):
+            before = self._entries.start or 0
+            return np.arange(before, before + self.n_entries)[entries]
+        return self._entries[entries]
+
+    def _settled(self, order: Array, origin: Origin) -> Array:
+        """These entries, sorted by row and rounded distance, in exact order."""
+        shifts = None
+        if origin.has_images:
+            shifts = origin.shifts()[self._entries] if self._lacks_shifts() else self.shifts
+        rows = np.repeat(np.arange(len(self)) + self._first_row, self.counts)
+        settle(
+            order, rows, self.indices, self.distances, shifts, origin.points, origin.asking,
+            origin.rows,
+        )
+        return order
 
 
 def read_only(array: Array) -> Array:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell._files import InputError, one_line
+from halfshell._terminal import printable
 
 __all__ = ["main"]
 
@@ -256,10 +257,12 @@ def _run_info(args: argparse.Namespace) -> int:
     from halfshell import _core
 
     build = dict(_core.build_info())
+    named = _core.default_kernel()  # by HALFSHELL_KERNEL, which is not checked before a search
+    is_known = named in hs.kernels()
     facts: dict[str, Any] = {
         "halfshell": hs.__version__,
         "kernels": list(hs.kernels()),
-        "kernel used": _core.default_kernel(),
+        "kernel used": named if is_known else None,
         "python": f"{platform.python_version()} ({platform.python_implementation()})",
         "numpy": np.__version__,
         "platform": f"{platform.system()} {platform.machine()}",
@@ -269,10 +272,15 @@ def _run_info(args: argparse.Namespace) -> int:
     facts.update({name: value for name, value in build.items() if name != "kernels"})
     if args.json:
         print(json.dumps(facts, indent=2))
-        return 0
-    for name, value in facts.items():
-        text = ", ".join(value) if isinstance(value, (list, tuple)) else value
-        print(f"{name:<14}{text}")
+    else:
+        for name, value in facts.items():
+            text = ", ".join(value) if isinstance(value, (list, tuple)) else value
+            print(printable(f"{name:<14}{'none' if value is None else text}"))
+    if not is_known:
+        raise InputError(
+            f"HALFSHELL_KERNEL={named}: is not a kernel of this CPU ({', '.join(hs.kernels())}); "
+            "searches that name none are refused"
+        )
     return 0
 
 

@@ -277,6 +277,46 @@ cells_stream_too(void)
     }
 }
 
+typedef struct told_fractions {
+    double last;
+    int    n;
+    bool   rises;
+} told_fractions;
+
+static bool
+note_fraction(void *context, double fraction)
+{
+    told_fractions *told = context;
+    told->rises = told->rises && fraction >= told->last && fraction <= 1.0;
+    told->last = fraction;
+    told->n++;
+    return true;
+}
+
+static void
+fractions_never_fall(void)
+{
+    const int         n = 8000;
+    double           *x = random_points(n, 3, 1.0);
+    const brute_scene scene = {.ndim = 3, .n = n, .x = x, .inclusive = true, .cutoff = 0.15};
+    const hs_points   points = points_of(&scene);
+    for (int threads = 1; threads <= 4; threads++) {
+        hs_options options = options_of(&scene);
+        hs_stream *stream = NULL;
+        hs_pairs  *block = NULL;
+        options.threads = threads;
+        told_fractions told = {.rises = true};
+        CHECK(hs_stream_open(&points, NULL, &options, 70000, &stream, NULL) == HS_OK);
+        do {
+            hs_pairs_free(block);
+            CHECK(hs_stream_next(stream, note_fraction, &told, &block, NULL) == HS_OK);
+        } while (block != NULL);
+        CHECK(told.rises && told.last == 1.0 && told.n > 2);
+        hs_stream_free(stream);
+    }
+    free(x);
+}
+
 void
 test_stream(void)
 {
@@ -289,4 +329,5 @@ test_stream(void)
     RUN(failures_are_told_and_leave_nothing);
     RUN(any_allocation_may_fail);
     RUN(cells_stream_too);
+    RUN(fractions_never_fall);
 }

@@ -264,3 +264,43 @@ def test_orthorhombic_takes_lengths_only():
     assert hs.Box.orthorhombic((1.0, 2.0)) == hs.Box.orthorhombic(1, 2)
     with pytest.raises(ValueError, match=r"lengths.*shape"):
         hs.Box.orthorhombic(np.eye(3))
+
+
+SIX = [5.0, 6.0, 7.0, 90.0, 90.0, 90.0]
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.array, np.float32])
+def test_six_bare_numbers_make_no_box(kind):
+    six = np.array(SIX, np.float32) if kind is np.float32 else kind(SIX)
+    with pytest.raises(ValueError, match=r"six bare numbers.*from_lengths_angles.*orthorhombic"):
+        hs.Box(six)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda points, box: hs.pairs(points, 1.0, box=box),
+        lambda points, box: hs.count_pairs(points, 1.0, box=np.array(box)),
+        lambda points, box: hs.neighbors(points, 1.0, box=np.array(box)),
+        lambda points, box: hs.nearest(points, 1, box=box),
+        lambda points, box: hs.CellList(points, 1.0, box=box),
+        lambda points, box: hs.rdf(points, 1.0, box=box),
+        lambda points, box: hs.pairs_between(points, points, 1.0, box=box),
+    ],
+)
+@pytest.mark.parametrize("ndim", [2, 3])
+def test_six_numbers_are_no_box_of_fewer_dimensions(call, ndim, rng):
+    with pytest.raises(ValueError, match=r"got \(6,\): .*Box.from_lengths_angles") as caught:
+        call(rng.random((4, ndim)), SIX)
+    assert f"points in {ndim} dimensions" in str(caught.value)
+
+
+def test_six_dimensions_stay_usable(rng):
+    points = rng.random((40, 6))
+    box = hs.Box.orthorhombic(*[1.0] * 6)
+    assert np.array_equal(box.vectors, np.eye(6)) and box == hs.Box(np.eye(6))
+    assert box == hs.Box.orthorhombic(np.ones(6)) and repr(box) == f"Box({np.eye(6).tolist()})"
+    expected = hs.pairs(points, 0.4, box=box)
+    assert len(expected[0]) > 0
+    for given in ([1.0] * 6, np.ones(6), np.eye(6)):
+        assert all(map(np.array_equal, hs.pairs(points, 0.4, box=given), expected))

@@ -228,7 +228,7 @@ def test_python_must_be_included_before(tmp_path):
 @needs_c
 def test_the_cython_example_builds_and_agrees(tmp_path, rng):
     if importlib.util.find_spec("Cython") is None:
-        pytest.skip("Cython is not installed: pip install 'halfshell[test]'")
+        pytest.skip("Cython is not installed: pip install cython")
     folder = tmp_path / "cython"
     shutil.copytree(CYTHON, folder, ignore=shutil.ignore_patterns("build", "*.c", "*.so"))
     command = [sys.executable, "setup.py", "build_ext", "--inplace"]

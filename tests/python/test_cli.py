@@ -510,9 +510,9 @@ def test_what_is_not_installed_is_named(monkeypatch, refusal, npz, tmp_path):
     (tmp_path / "a.xyz").write_text("1\n\nH 0 0 0\n")
     for name in ("ase", "ase.io", "ase.neighborlist", "matplotlib", "matplotlib.figure", "vesin"):
         monkeypatch.setitem(sys.modules, name, None)
-    extra = "pip install 'halfshell[cli]'"
-    assert extra in refusal("pairs", tmp_path / "a.xyz")
-    assert extra in refusal("pairs", npz, "--plot", tmp_path / "g.png")
+    assert "needs ase: pip install ase" in refusal("pairs", tmp_path / "a.xyz")
+    plot = refusal("pairs", npz, "--plot", tmp_path / "g.png")
+    assert "--plot needs matplotlib: pip install matplotlib" in plot
     assert "pip install vesin" in refusal("verify", npz, "--against", "vesin")
     assert "pip install ase" in refusal("verify", npz, "--against", "ase")
     assert sorted(os.listdir(tmp_path)) == ["a.xyz", "scene.npz"]
@@ -679,6 +679,24 @@ def test_info_names_version_kernels_and_build(command):
     told = json.loads(command("info", "--json")[1])
     assert told["kernels"] == list(hs.kernels())
     assert told["kernel used"] == (os.environ.get("HALFSHELL_KERNEL") or hs.kernels()[0])
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_info_says_that_a_kernel_of_the_environment_is_unknown(form):
+    run = subprocess.run(
+        [sys.executable, "-m", "halfshell", "info", *form],
+        capture_output=True, text=True, env={**os.environ, "HALFSHELL_KERNEL": "no\x1bsense"},
+    )  # fmt: skip
+    assert run.returncode == 2
+    assert run.stderr.startswith(
+        r"halfshell: error: HALFSHELL_KERNEL=no\x1bsense: is not a kernel of this CPU ("
+    )
+    assert "searches that name none are refused" in run.stderr and run.stderr.count("\n") == 1
+    if form:
+        told = json.loads(run.stdout)
+        assert told["kernel used"] is None and told["kernels"] == list(hs.kernels())
+    else:
+        assert "kernel used   none\n" in run.stdout
 
 
 def test_selftest_passes_its_status_on(monkeypatch, command):

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from halfshell import _files, cli
+from halfshell import _numpy_files, cli
 
 POINTS = np.arange(30.0).reshape(10, 3) % 7.0
 
@@ -198,7 +198,7 @@ def test_a_file_that_must_not_be_read(tmp_path, monkeypatch):
     def refuse(*arguments, **options):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(_files, "open", refuse, raising=False)  # also where root may read all
+    monkeypatch.setattr(_numpy_files, "open", refuse, raising=False)  # also where root may read all
     assert "Permission denied" in refused("pairs", path, "--cutoff", "1.0")
 
 

@@ -70,10 +70,12 @@ def test_readme_notebook_example_runs(capsys):
 
 def test_example_of_tables_runs():
     text = (ROOT / "docs/neighbors.md").read_text()
-    tables, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    tables, graphs, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     names = {}
     exec(compile(ast.parse(tables), "neighbors.md", "exec"), names)
     assert len(names["table"]) == 1000 and len(names["first"]) == 100
+    exec(compile(ast.parse(graphs), "neighbors.md", "exec"), names)
+    assert names["edge_index"].shape == (2, len(names["again"])) and names["distances"] is None
     exec(compile(ast.parse(cells), "neighbors.md", "exec"), names)
     assert len(names["near"]) == 10 and len(names["each"]) == 3
     assert names["within"][-1] == hs.count_pairs(names["points"], 1.0, box=[10.0] * 3)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+from halfshell import _pairs
 from subprocesses import RESIDENT, run
 
 BOX = np.array([[1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.4, 0.2, 1.1]])
@@ -171,16 +172,48 @@ def test_close_ends_it(rng):
     assert list(blocks) == []
 
 
-def test_progress_grows_to_one(rng):
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+@pytest.mark.parametrize("max_pairs", [1000, 70_000, 1 << 20])
+def test_progress_never_falls_and_ends_at_one(rng, threads, max_pairs):
     seen = []
-    points = rng.random((5000, 3))
-    n = sum(
-        len(d)
-        for d in hs.iter_pairs(points, 0.2, quantities="d", max_pairs=70_000, progress=seen.append)
+    points = rng.random((20_000, 3))
+    options = {"quantities": "d", "max_pairs": max_pairs, "threads": threads}
+    n = sum(len(d) for d in hs.iter_pairs(points, 0.12, progress=seen.append, **options))
+    assert n == hs.count_pairs(points, 0.12)
+    assert seen == sorted(seen) and seen[0] >= 0.0 and seen[-1] == 1.0
+    assert len(set(seen)) >= min(n // max_pairs, 5)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_progress_of_what_is_repeated_never_falls(rng, threads):
+    told = []
+
+    def hook(fraction):
+        told.append(fraction)
+        if len(told) % 5 == 4:
+            raise KeyError
+
+    stream = hs.iter_pairs(
+        rng.random((20_000, 3)), 0.12, max_pairs=300_000, progress=hook, threads=threads
     )
-    assert n == hs.count_pairs(points, 0.2)
-    of_walk = [fraction for fraction in seen if fraction > 0.0]
-    assert len(of_walk) >= n // 200_000 and of_walk == sorted(of_walk) and of_walk[-1] == 1.0
+    while True:
+        try:
+            next(stream)
+        except KeyError:
+            pass
+        except StopIteration:
+            break
+    assert told == sorted(told) and told[-1] == 1.0
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("sort", [False, True])
+def test_progress_of_all_pairs_at_once_never_falls(rng, threads, sort):
+    told = []
+    _pairs._pairs_with_progress(
+        rng.random((60_000, 3)), 0.08, progress=told.append, threads=threads, sort=sort
+    )
+    assert len(told) > 3 and told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
 
 
 def test_an_exception_of_the_hook_arrives_and_the_iterator_goes_on(rng):
@@ -261,6 +294,7 @@ def test_abandoning_it_leaves_nothing_behind():
 import gc, json
 import numpy as np
 import halfshell as hs
+from halfshell import _pairs
 points = np.random.default_rng(1).random((20_000, 3))
 
 def close():
@@ -308,6 +342,7 @@ def test_memory_does_not_grow_with_the_result():
 import json
 import numpy as np
 import halfshell as hs
+from halfshell import _pairs
 points = np.random.default_rng(1).random((20_000, 2))
 list(hs.iter_pairs(points[:100], 2.0))
 before = peak = resident()
@@ -328,6 +363,7 @@ def test_ctrl_c_within_a_block_and_between_blocks():
 import json, signal, threading, time
 import numpy as np
 import halfshell as hs
+from halfshell import _pairs
 points = np.random.default_rng(1).random((30_000, 3))
 sent = []
 

@@ -51,7 +51,7 @@ def test_types_around_queries(rng):
     result = hs.rdf(
         points, 0.3, bins=3, queries=queries, types=types, query_types=query_types, box=[1.0, 1.0]
     )
-    assert result.g.shape == (3, 3, 3) and np.isnan(result.g[2]).all()
+    assert result.g.shape == (3, 3, 3) and (result.g[2] == 0.0).all()
     for a in (0, 1):
         for b in range(3):
             some = hs.rdf(
@@ -70,10 +70,25 @@ def test_an_atoms_object_brings_its_box():
     assert np.flatnonzero(result.counts).tolist() == [25]  # at 2.55
 
 
-def test_no_points_and_absent_types():
-    assert np.isnan(hs.rdf([], 1.0, bins=2, box=[1.0] * 3).g).all()
-    result = hs.rdf([[0.0], [0.5]], 0.4, bins=2, types=[0, 2], box=[1.0])
-    assert np.isnan(result.g[1]).all() and not np.isnan(result.g[0, 2]).any()
+@pytest.mark.filterwarnings("error")
+def test_no_points_and_absent_types_have_a_g_of_zero():
+    assert hs.rdf([], 1.0, bins=2, box=[1.0] * 3).g.tolist() == [0.0, 0.0]
+    one = hs.rdf([[0.0]], 0.4, bins=2, box=[1.0])
+    assert one.g.tolist() == [0.0, 0.0] and one.counts.tolist() == [0, 0]
+    result = hs.rdf([[0.0], [0.3]], 0.4, bins=2, types=[0, 2], box=[1.0])
+    assert (result.g[1] == 0.0).all() and (result.g[:, 1] == 0.0).all()
+    assert result.g[0, 2].tolist() == result.g[2, 0].tolist() == [0.0, 2.5]
+    none = hs.rdf(np.empty((0, 1)), 0.4, bins=2, queries=[[0.5]], box=[1.0])
+    assert none.g.tolist() == [0.0, 0.0]
+    none = hs.rdf([[0.5]], 0.4, bins=2, queries=np.empty((0, 1)), box=[1.0])
+    assert none.g.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.filterwarnings("error")
+def test_shells_that_float64_does_not_hold_are_0_or_infinite():
+    points = [[0.0] * 3, [1e-120] * 3, [0.5] * 3]
+    result = hs.rdf(points, 4e-120, bins=2, box=[1.0] * 3)
+    assert result.counts.tolist() == [1, 0] and result.g.tolist() == [math.inf, 0.0]
 
 
 REFUSED = {
@@ -119,10 +134,10 @@ def test_plots(rng):
     pyplot.close(figure)
 
 
-def test_without_matplotlib_an_error_names_the_extra(monkeypatch):
+def test_without_matplotlib_an_error_names_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     result = hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0])
-    with pytest.raises(ImportError, match=r"halfshell\[cli\]"):
+    with pytest.raises(ImportError, match=r"plot needs matplotlib: pip install matplotlib$"):
         result.plot()
 
 

@@ -97,7 +97,15 @@ def test_a_missing_extra_is_named(command, monkeypatch, package):
     monkeypatch.setitem(sys.modules, name[package], None)
     status, _, err = command("--scenes", "uniform")
     assert status == 2
-    assert f"report needs {package}: pip install 'halfshell[cli]'" in err
+    assert f"report needs {package}: pip install {package}\n" in err
+
+
+def test_all_missing_extras_are_named_at_once(command, monkeypatch):
+    for name in ("scipy.spatial", "rich.console"):
+        monkeypatch.setitem(sys.modules, name, None)
+    status, _, err = command("--scenes", "uniform")
+    assert status == 2
+    assert "report needs scipy and rich: pip install scipy rich\n" in err
 
 
 def test_quick_is_a_choice_of_scenes_that_there_are():

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from halfshell._extras import how_to_install
 from halfshell._peers import LIBRARIES
 from halfshell._report.worker import receive, send
 
@@ -109,7 +110,7 @@ class PeerProcess:
             self._greeted = True
         if self.version is None:
             package = self.library.distribution
-            return {"status": "not installed", "note": f"pip install {package}"}
+            return {"status": "not installed", "note": how_to_install(package)}
         return None
 
     def _start(self) -> None:

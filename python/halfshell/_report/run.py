@@ -28,6 +28,7 @@ from halfshell._report.physics import (
 from halfshell._report.rows import ReportRow
 from halfshell._report.timing import Patience, Timing, take_turns
 from halfshell._report.truth import Truth, true_pairs
+from halfshell._terminal import printable
 
 __all__ = ["PEERS", "Plan", "Progress", "plan_of", "run"]
 
@@ -204,7 +205,7 @@ class _Stage:
         })  # fmt: skip
         row = replace(
             self.blank, kind="peer", method=other.name, version=other.version or "",
-            status=reply["status"], note=reply.get("note", ""),
+            status=reply["status"], note=printable(reply.get("note", "")),
         )  # fmt: skip
         if reply["status"] != "ok":
             return row

@@ -1,0 +1,219 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * groups.c: see groups.h. /proc/self/cgroup names the group of this process in each hierarchy,
+ * /proc/self/mountinfo the folders where the hierarchies are mounted. In a container such a folder
+ * may show but a part of the hierarchy, which begins at the `top` that mountinfo tells.
+ */
+#include "groups.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+#define LINE 8192
+#define PATH 4096
+
+typedef struct hierarchy {
+    const char *type;  /* of the file system */
+    const char *place; /* where it usually is, if mountinfo cannot be read */
+    const char *limit, *usage, *inactive, *active;
+} hierarchy;
+
+static const hierarchy VERSIONS[] = {
+    {"cgroup2", "/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file ",
+     "active_file "},
+    {"cgroup", "/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes",
+     "total_inactive_file ", "total_active_file "},
+};
+
+double
+hs_number_in_file(const char *path, const char *key)
+{
+    char         line[256];
+    double       value = -1.0;
+    const size_t length = strlen(key);
+    FILE        *file = fopen(path, "r");
+    if (file == NULL) {
+        return -1.0;
+    }
+    while (value < 0.0 && fgets(line, sizeof line, file) != NULL) {
+        if (strncmp(line, key, length) == 0 && sscanf(line + length, "%lf", &value) != 1) {
+            value = -1.0; /* "max", or another key that begins alike */
+        }
+    }
+    fclose(file);
+    return value;
+}
+
+static double
+number_in_folder(const char *folder, const char *name, const char *key)
+{
+    char path[LINE + 64];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return hs_number_in_file(path, key);
+}
+
+/* What one group still allows: file pages that it can drop count as free, a usage that cannot be
+ * read as none. */
+static double
+left_in_group(const hierarchy *version, const char *folder)
+{
+    const double limit = number_in_folder(folder, version->limit, "");
+    if (limit < 0.0) {
+        return INFINITY;
+    }
+    const double usage = number_in_folder(folder, version->usage, "");
+    const double inactive = number_in_folder(folder, "memory.stat", version->inactive);
+    const double active = number_in_folder(folder, "memory.stat", version->active);
+    const double kept = fmax(usage, 0.0) - fmax(inactive, 0.0) - fmax(active, 0.0);
+    return fmax(limit - fmax(kept, 0.0), 0.0);
+}
+
+/* The least over the group and those above it, up to where the hierarchy is mounted. */
+static double
+left_in_groups(const hierarchy *version, const char *root, const char *place, const char *top,
+               const char *group)
+{
+    char         folder[LINE];
+    double       left = INFINITY;
+    const size_t shortest = strlen(root) + strlen(place), n_top = strlen(top);
+    if (strcmp(top, "/") != 0) {
+        const bool is_below = strncmp(group, top, n_top) == 0 &&
+                              (group[n_top] == '/' || group[n_top] == '\0');
+        group = is_below ? group + n_top : ""; /* a container's folder shows its own group */
+    }
+    if (strstr(group, "/..") != NULL) { /* outside of what this process may see */
+        group = "";
+    }
+    if (snprintf(folder, sizeof folder, "%s%s%s", root, place, group) >= (int)sizeof folder) {
+        return INFINITY;
+    }
+    for (;;) {
+        left = fmin(left, left_in_group(version, folder));
+        char *slash = strrchr(folder, '/');
+        if (slash == NULL || slash < folder + shortest) {
+            return left;
+        }
+        *slash = '\0';
+    }
+}
+
+/* The text up to the next separator, which is cut off. */
+static char *
+next_field(char **rest, const char *separators)
+{
+    char *field = *rest;
+    *rest += strcspn(field, separators);
+    if (**rest != '\0') {
+        *(*rest)++ = '\0';
+    }
+    return field;
+}
+
+/* Whether a list such as "rw,cpu,memory" has this name. */
+static bool
+has_name(char *list, const char *name)
+{
+    while (*list != '\0') {
+        if (strcmp(next_field(&list, ","), name) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The group of this process in the hierarchy that limits memory; false if there is none. */
+static bool
+find_group(const hierarchy *version, const char *root, char *group)
+{
+    char line[LINE];
+    bool is_found = false;
+    snprintf(line, sizeof line, "%s/proc/self/cgroup", root);
+    FILE *file = fopen(line, "r");
+    if (file == NULL) {
+        return false;
+    }
+    while (!is_found && fgets(line, sizeof line, file) != NULL) {
+        char       *rest = line;
+        const char *number = next_field(&rest, ":\n");
+        char       *controllers = next_field(&rest, ":\n");
+        const char *path = next_field(&rest, "\n");
+        is_found = version == &VERSIONS[0] ? strcmp(number, "0") == 0 && *controllers == '\0'
+                                           : has_name(controllers, "memory");
+        if (is_found) {
+            snprintf(group, PATH, "%.*s", PATH - 1, path);
+        }
+    }
+    fclose(file);
+    return is_found;
+}
+
+/* mountinfo writes blanks, tabs, line ends and backslashes as three octal digits. */
+static void
+unescape(char *text)
+{
+    char *end = text;
+    for (; *text != '\0'; text++, end++) {
+        unsigned code;
+        if (*text == '\\' && sscanf(text + 1, "%3o", &code) == 1) {
+            *end = (char)code;
+            text += 3;
+        } else {
+            *end = *text;
+        }
+    }
+    *end = '\0';
+}
+
+/* A line "31 23 0:28 TOP PLACE rw shared:1 - TYPE SOURCE OPTIONS" of mountinfo, of this version and
+ * with memory? Version 2 does not tell: its groups have the files or not. */
+static bool
+is_mount_of(const hierarchy *version, char *line, char **top, char **place)
+{
+    char *rest = line;
+    for (int k = 0; k < 3; k++) {
+        (void)next_field(&rest, " \n");
+    }
+    *top = next_field(&rest, " \n");
+    *place = next_field(&rest, " \n");
+    rest = strstr(rest, "- ");
+    if (rest == NULL) {
+        return false;
+    }
+    rest += 2;
+    const char *type = next_field(&rest, " \n");
+    (void)next_field(&rest, " \n");
+    unescape(*top);
+    unescape(*place);
+    return strcmp(type, version->type) == 0 &&
+           (version == &VERSIONS[0] || has_name(next_field(&rest, " \n"), "memory"));
+}
+
+static double
+left_in_version(const hierarchy *version, const char *root)
+{
+    char   line[LINE], group[PATH], *top, *place;
+    double left = INFINITY;
+    if (!find_group(version, root, group)) {
+        return INFINITY;
+    }
+    snprintf(line, sizeof line, "%s/proc/self/mountinfo", root);
+    FILE *file = fopen(line, "r");
+    if (file == NULL) {
+        return left_in_groups(version, root, version->place, "/", group);
+    }
+    while (fgets(line, sizeof line, file) != NULL) {
+        if (is_mount_of(version, line, &top, &place)) {
+            left = fmin(left, left_in_groups(version, root, place, top, group));
+        }
+    }
+    fclose(file);
+    return left;
+}
+
+double
+hs_group_memory(const char *root)
+{
+    return fmin(left_in_version(&VERSIONS[0], root), left_in_version(&VERSIONS[1], root));
+}

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`import halfshell` loads little beside NumPy; the rest comes when it is first used."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import halfshell as hs
+
+#: What `import halfshell` may load of its own.
+OWN = {
+    "_available", "_batch", "_between", "_box", "_cache", "_core", "_count", "_cutoffs",
+    "_errors", "_exact_order", "_extras", "_foreign", "_graph", "_inputs", "_neighbors",
+    "_options", "_origin", "_pairs", "_table", "_table_forms", "_table_rows",
+}  # fmt: skip
+
+
+def fresh(script, *args):
+    """What a fresh interpreter prints as JSON."""
+    done = subprocess.run(
+        [sys.executable, "-c", script, *args], capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+def test_only_what_is_usual_is_imported():
+    script = """
+import json, sys
+import numpy, numpy.typing
+before = set(sys.modules)
+import halfshell
+print(json.dumps(sorted(set(sys.modules) - before)))
+"""
+    loaded = fresh(script)
+    own = {name.partition(".")[2] for name in loaded if name.startswith("halfshell.")}
+    assert own <= OWN
+    others = {name.partition(".")[0] for name in loaded} - {"halfshell"}
+    assert others <= {"__future__", "cython_runtime"} | set(sys.builtin_module_names)
+    # Known to be slow, wherever they come from.
+    assert not {"argparse", "ctypes", "dataclasses", "inspect", "re"} & set(loaded)
+
+
+@pytest.mark.parametrize("name", sorted(set(hs.__all__)))
+def test_every_name_is_there_when_it_is_first_used(name):
+    script = """
+import json, sys
+import halfshell as hs
+name = sys.argv[1]
+listed = name in dir(hs)
+first, second = getattr(hs, name), getattr(hs, name)
+print(json.dumps([listed, first is second, name in vars(hs), first.__module__]))
+"""
+    listed, same, kept, module = fresh(script, name)
+    assert listed and same and kept
+    assert module.startswith("halfshell.")
+
+
+def test_all_names_come_with_a_star():
+    script = "import json; from halfshell import *; print(json.dumps(sorted(globals())))"
+    assert set(hs.__all__) <= set(fresh(script))
+
+
+def test_what_is_not_there_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="module 'halfshell' has no attribute 'neighbours'"):
+        hs.neighbours  # noqa: B018
+    assert not hasattr(hs, "_nothing")
