@@ -78,6 +78,30 @@ every_type_and_dimension_gives_the_pairs_of_a_search(void)
     CHECK(n_pairs > 50000 && n_kept > 250);
 }
 
+/* Coordinates at both ends of the numbers: no scale keeps the digits of all. */
+static void
+digits_that_scaling_would_lose_are_kept(void)
+{
+    harness_random random = {1010};
+    int64_t        n_pairs = 0;
+    for (int kind = 0; kind < 2 * SCENE_KINDS; kind++) {
+        make_scene(&random, kind % SCENE_KINDS, 3, 60, 4.0, 1010, &shared);
+        shared.scene.cutoff = kind < SCENE_KINDS ? 0x1p1010 : 0x1.8p-1060;
+        for (int e = 0; e < 30; e++) {
+            shared.x[e] = ldexp(random_below(&random, 4), -1061);
+        }
+        const hs_points  points = points_of(&shared.scene);
+        const hs_options options = options_of(&shared.scene);
+        hs_verlet       *list = hs_verlet_new();
+        bool             rebuilt;
+        CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.0, false, &rebuilt,
+                               NULL) == HS_OK);
+        CHECK(list_difference(list, &points, shared.scene.box, options, &n_pairs) == NULL);
+        hs_verlet_free(list);
+    }
+    CHECK(n_pairs > 1000);
+}
+
 /* A pair at the cutoff, and a point of it that jumps by so many heights of a box that an upright one
  * is equivalent to. */
 static void
@@ -247,6 +271,7 @@ void
 test_refilter(void)
 {
     RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
+    RUN(digits_that_scaling_would_lose_are_kept);
     RUN(shifts_may_be_as_large_as_jumps_are);
     RUN(box_vectors_may_be_any_sum_of_shorter_ones);
     RUN(what_does_not_fit_is_told);
