@@ -78,7 +78,7 @@ other_scenes_get_lists_of_their_own(void)
         switch (what) {
         case 0: scene->cutoff = 1.125; break;
         case 1: scene->cutoff = 0.75; break;
-        case 2: scene->n = 59; break;
+        case 2: scene->n = 40; break;
         case 3: shared.box.periodic[1] = false; break;
         case 4: scene->box = NULL; break;
         default: scene->n = 60; break;
@@ -163,14 +163,15 @@ limits_leave_the_list_as_it_was(void)
 static void
 shifts_that_do_not_fit_name_a_point(void)
 {
-    static const double tilts[] = {0x1p31, -0x1p31, 0x1p40, -0x1p50, 0x1p60};
-    for (int t = 0; t < 5; t++) {
+    static const double tilts[] = {0x1p31, -0x1p31, 0x1p40, -0x1p50, 0x1p60, 0x1p60};
+    for (int t = 0; t < 6; t++) {
         double      x[6] = {0.0, 0.0, 3.5, 3.75, -3.5, -3.75};
         hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0.0, 8.0}}};
         brute_scene scene = {.ndim = 2, .n = 3, .x = x, .box = &box, .cutoff = 1.25};
         hs_verlet  *list = hs_verlet_new();
         hs_failure  failure;
         bool        rebuilt;
+        scene.cutoff = t == 5 ? 50.0 : 1.25; /* six times the second: more than 2^62 of the first */
         CHECK(update(list, &scene, 0.25, &rebuilt, NULL) == HS_OK && has_pairs_of(list, &scene));
         box.rows[1][0] = 8.0 * tilts[t];
         CHECK(update(list, &scene, 0.25, &rebuilt, &failure) == HS_ERR_SHIFT_RANGE);
