@@ -74,11 +74,13 @@ set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
     }
 }
 
+/* Of a square that is not negative, and no larger than the end of the last band. */
 static int32_t
 cell_of(const hs_edge_table *table, float square)
 {
     const int32_t cell = (int32_t)(hs_bits_of_float(square) >> table->shift) - table->first;
-    return square < 0.0f || cell < 0 ? 0 : cell > table->last ? table->last : cell;
+    HS_ASSERT(square >= 0.0f && cell <= table->last);
+    return cell < 0 ? 0 : cell;
 }
 
 /* Cells of 2^shift neighbouring floats each, from the first band that ends above zero to the last.
@@ -137,8 +139,7 @@ fill_cells(const hs_edges *edges, hs_edge_table *table)
         cell->out = INT32_MAX;
         if (cell->n_bands == 1) {
             cell->in = table->in[below] < 0.0f ? 0 : (int32_t)hs_bits_of_float(table->in[below]);
-            cell->out =
-                table->out[below] < 0.0f ? -1 : (int32_t)hs_bits_of_float(table->out[below]);
+            cell->out = (int32_t)hs_bits_of_float(table->out[below]); /* not below `least` */
         }
     }
 }

@@ -14,10 +14,7 @@
 static bool
 faces_hold(const hs_scene *scene, const hs_grid *grid, int k, double least)
 {
-    double from = hs_grid_face(grid, k, 0.0);
-    if (from != scene->lower[k]) {
-        return false;
-    }
+    double from = scene->lower[k]; /* where cell 0 begins */
     for (int64_t cell = 0; cell < grid->shape[k]; cell++) {
         const double to = cell + 1 < grid->shape[k] ? hs_grid_face(grid, k, (double)(cell + 1))
                                                      : scene->upper[k];

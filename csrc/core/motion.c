@@ -98,10 +98,10 @@ take_jump(tracking *track, tile *t, int p, int64_t *given)
     for (int k = 0; k < track->lattice.ndim; k++) {
         u[k] = t->u[k][p];
     }
-    if (!hs_wrap_point(&track->lattice, u, inside, turns, &track->magnitude) ||
-        !hs_lattice_shift(&track->lattice, turns, given)) {
+    if (!hs_wrap_point(&track->lattice, u, inside, turns, &track->magnitude)) {
         return false;
     }
+    (void)hs_lattice_shift(&track->lattice, turns, given); /* as wrapping has done with them */
     for (int k = 0; k < track->lattice.ndim; k++) {
         t->u[k][p] = inside[k];
     }

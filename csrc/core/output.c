@@ -133,13 +133,14 @@ hs_output_bytes_per_pair(const hs_output *output)
     return (int64_t)bytes;
 }
 
-/* The account knows of as many pairs as are about to be written, not of what is only reserved. */
+/* The account knows of as many pairs as are about to be written, not of what is only reserved: of n,
+ * which are more than it knows of. */
 static bool
 charge(hs_output *output, int64_t n)
 {
     hs_account   *account = output->account;
     const int64_t more = n - output->charged;
-    if (account == NULL || more <= 0) {
+    if (account == NULL) {
         return true;
     }
     if (!hs_account_allows(account, (double)more * (double)hs_output_bytes_per_pair(output))) {

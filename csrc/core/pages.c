@@ -35,14 +35,11 @@ map_aligned(size_t bytes, int flags, void **mapping, size_t *length)
         ((uintptr_t)start + HS_PAGES_STEP + HS_PAGES_FROM - 1) / HS_PAGES_FROM * HS_PAGES_FROM;
     char  *block = (char *)boundary;
     char  *first = block - HS_PAGES_STEP;
-    size_t before = (size_t)(first - start);
-    size_t after = reserved - before - HS_PAGES_STEP - rounded;
+    const size_t before = (size_t)(first - start); /* less than a huge page: the rest lies behind */
     if (before > 0) {
         munmap(start, before);
     }
-    if (after > 0) {
-        munmap(block + rounded, after);
-    }
+    munmap(block + rounded, HS_PAGES_FROM - before);
     *mapping = first;
     *length = HS_PAGES_STEP + rounded;
     return block;

@@ -35,8 +35,8 @@ integer_of(double x)
     int           exponent;
     const int64_t significand = (int64_t)ldexp(frexp(x, &exponent), 53);
     exponent -= 53;
-    if (exponent < 0) {
-        return exponent > -64 ? significand / (INT64_C(1) << -exponent) : 0;
+    if (exponent < 0) { /* -53 at least: it is an integer */
+        return significand / (INT64_C(1) << -exponent);
     }
     return exponent < 64 ? (int64_t)((uint64_t)significand << exponent) : 0;
 }

@@ -101,7 +101,8 @@ hs_search_set_asking(const hs_sets *sets, hs_search *search)
     const int64_t n = sets->points->n;
     search->has_queries = sets->queries != NULL;
     search->keeps_none = sets->keeps_none;
-    search->is_full = sets->is_full || search->has_queries;
+    HS_ASSERT(sets->is_full || !search->has_queries);
+    search->is_full = sets->is_full;
     search->n_in_all = search->has_queries ? sets->queries->n : n;
     search->pairs_per_half = !search->is_full ? 1.0
                              : n == 0         ? 0.0

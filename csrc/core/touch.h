@@ -15,4 +15,10 @@
  * what they hold is lost. HS_ERR_INTERRUPTED when the caller says so. */
 hs_status hs_touch_output(hs_team *team, const hs_options *options, hs_output *output);
 
+#ifdef HS_TESTING
+/* Bytes that one thread touches at a time; columns of less than eight times as many are left alone.
+ * Returns what it was before. */
+size_t hs_test_touch_parts(size_t bytes);
+#endif
+
 #endif

@@ -240,9 +240,8 @@ make_room(hs_listing *listing)
 {
     const int64_t n = listing->n_pairs;
     hs_store      i = {0}, j = {0}, code = {0};
-    bool          complete = true;
     /* ... which must lose none of its arrays if another one cannot be had. */
-    complete = complete && renew(&listing->for_i, n, &i);
+    bool complete = renew(&listing->for_i, n, &i);
     complete = complete && renew(&listing->for_j, n, &j);
     complete = complete && renew(&listing->for_code, n - listing->n_plain, &code);
     if (!complete) {

@@ -10,16 +10,12 @@
 #include <math.h>
 #include <string.h>
 
-/* The columns that are found: those wanted, or what putting them in order needs beside them. */
+/* The columns that are found: those wanted, and what putting them in order needs beside them. */
 static unsigned
-columns_of(const hs_refilter *refilter)
+columns_to_sort(const hs_refilter *refilter)
 {
-    const hs_options *options = &refilter->search->options;
-    if (!options->sorted) {
-        return options->want;
-    }
     const bool images = refilter->list->listing.images.n > 0;
-    return (options->want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I | HS_WANT_J |
+    return (refilter->search->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I | HS_WANT_J |
            (images ? HS_WANT_SHIFT : 0);
 }
 
@@ -28,7 +24,7 @@ find_sorted(hs_refilter *refilter, hs_output *output, hs_failure *failure)
 {
     hs_search *search = refilter->search;
     hs_output  found;
-    hs_output_init(&search->account, refilter->d, columns_of(refilter), 4, &found);
+    hs_output_init(&search->account, refilter->d, columns_to_sort(refilter), 4, &found);
     refilter->output = &found;
     hs_status status = hs_refilter_run(refilter, failure);
     if (status == HS_OK) {

@@ -170,9 +170,62 @@ in_any_box(void)
     CHECK(moved > 100000);
 }
 
+/* The range of both, and the lowest point that failed in either. */
+static void
+what_is_found_is_joined(void)
+{
+    static const int64_t failed[][3] = {{-1, -1, -1}, {-1, 7, 7}, {7, -1, 7}, {3, 7, 3}, {7, 3, 3}};
+    for (int f = 0; f < 5; f++) {
+        hs_folded one = hs_folded_none(), other = hs_folded_none();
+        one.failed = failed[f][0];
+        other.failed = failed[f][1];
+        one.lower[1] = one.upper[1] = 2.0;
+        other.lower[1] = -3.0;
+        other.upper[1] = 1.0;
+        one.x_largest[1] = 5.0;
+        other.magnitude = 8.0;
+        hs_folded_join(&one, &other);
+        CHECK(one.failed == failed[f][2]);
+        CHECK(one.lower[1] == -3.0 && one.upper[1] == 2.0);
+        CHECK(one.x_largest[1] == 5.0 && one.magnitude == 8.0);
+        CHECK(one.lower[0] == INFINITY && one.upper[0] == -INFINITY);
+    }
+}
+
+/* Coordinates of many points have the bits of those of one. */
+static void
+coordinates_are_summed_in_one_order(void)
+{
+    harness_random random = {77};
+    for (int trial = 0; trial < 200; trial++) {
+        const int     ndim = 1 + trial % HS_MAX_DIM;
+        const double *x[HS_MAX_DIM];
+        hs_lattice    lattice = {.ndim = ndim};
+        bool          same = true;
+        for (int k = 0; k < ndim; k++) {
+            x[k] = given[k];
+            lattice.normal[0][k] = random_unit(&random) - 0.5;
+            for (int i = 0; i < POINTS; i++) {
+                given[k][i] = ldexp(random_unit(&random) - 0.5, random_below(&random, 40) - 20);
+            }
+        }
+        hs_fold_coordinates(&lattice, 0, x, POINTS, folded_x[0]);
+        for (int i = 0; i < POINTS; i++) {
+            double r[HS_MAX_DIM];
+            for (int k = 0; k < ndim; k++) {
+                r[k] = given[k][i];
+            }
+            same = same && same_bits(hs_lattice_coordinate(&lattice, r, 0), folded_x[0][i]);
+        }
+        CHECK(same);
+    }
+}
+
 void
 test_fold(void)
 {
+    RUN(what_is_found_is_joined);
+    RUN(coordinates_are_summed_in_one_order);
     RUN(along_an_axis);
     RUN(in_any_box);
 }

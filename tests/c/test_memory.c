@@ -163,6 +163,71 @@ searches_are_the_same(void)
     hs_test_use_arena(false);
 }
 
+static void
+impossible_sizes_are_refused(void)
+{
+    static const int64_t counts[] = {-1, INT64_MIN, INT64_MAX, INT64_C(1) << 61, INT64_C(1) << 32};
+    static const size_t  sizes[] = {1, 8, 8, 1, (size_t)1 << 31};
+    const int64_t        before = hs_test_live_blocks();
+    hs_account           account = new_account();
+    for (int c = 0; c < 5; c++) {
+        if (HS_ADDRESS_SANITIZER && c == 3) {
+            continue; /* it ends a program that wants so much of malloc */
+        }
+        CHECK(hs_alloc(NULL, HS_FOR_CELLS, counts[c], sizes[c]) == NULL);
+        CHECK(hs_alloc(&account, HS_FOR_CELLS, counts[c], sizes[c]) == NULL);
+    }
+    CHECK(account.held == 0 && hs_test_live_blocks() == before);
+    void *large = hs_alloc(&account, HS_FOR_CELLS, 3, (size_t)1 << 31); /* virtual */
+    CHECK(large == NULL || account.held == INT64_C(3) << 31);
+    hs_free(&account, large);
+    CHECK(account.held == 0 && hs_test_live_blocks() == before);
+}
+
+/* What is kept stays, what is given back is no longer held; where blocks are the system's. */
+static void
+large_blocks_are_trimmed(void)
+{
+    enum { MB = 1 << 20 };
+    for (int counted = 0; counted < 2; counted++) {
+        hs_account     account = new_account();
+        hs_account    *of = counted ? &account : NULL;
+        unsigned char *block = hs_alloc(of, HS_FOR_CELLS, 9 * MB, 1);
+        unsigned char *small = hs_alloc(of, HS_FOR_CELLS, 100, 1);
+        memset(block, 7, 9 * MB);
+        hs_trim(of, small, 10);
+        hs_trim(of, block, 10 * MB); /* no less than it has */
+        CHECK(!counted || account.held == 9 * MB + 100);
+        hs_trim(of, block, 4 * MB);
+        CHECK(!counted || account.held == 4 * MB + 100 || account.held == 9 * MB + 100);
+        CHECK(block[0] == 7 && block[4 * MB - 1] == 7);
+        hs_free(of, block);
+        hs_free(of, small);
+        CHECK(account.held == 0);
+        hs_account_close(&account);
+    }
+}
+
+/* A new start for the arena: the same block comes first again. */
+static void
+arenas_are_used_again(void)
+{
+    hs_account account = new_account();
+    hs_account_reset(&account); /* there is none */
+    hs_test_use_arena(true);
+    char *first = hs_alloc(&account, HS_FOR_CELLS, 100, 1);
+    char *second = hs_alloc(&account, HS_FOR_CELLS, 100, 1);
+    hs_free(&account, first);
+    hs_free(&account, second);
+    hs_account_reset(&account);
+    char *again = hs_alloc(&account, HS_FOR_CELLS, 100, 1);
+    CHECK(!HS_HAVE_ARENA || again == first);
+    hs_free(&account, again);
+    hs_test_use_arena(false);
+    hs_account_close(&account);
+    CHECK(account.held == 0);
+}
+
 void
 test_memory(void)
 {
@@ -170,4 +235,7 @@ test_memory(void)
     RUN(arena_is_filled_to_its_end);
     RUN(last_block_makes_room);
     RUN(searches_are_the_same);
+    RUN(impossible_sizes_are_refused);
+    RUN(large_blocks_are_trimmed);
+    RUN(arenas_are_used_again);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_output.c: options.out, pairs written into arrays of the caller, and nothing beyond them. */
+#include "../../csrc/core/output.h"
 #include "output_checks.h"
 #include "random_scenes.h"
 
@@ -179,6 +180,56 @@ the_callers_memory_is_not_counted(void)
     CHECK(with_own.bytes[HS_FOR_SHIFTS] >= n * 12 && counters.bytes[HS_FOR_SHIFTS] == 0);
 }
 
+/* Pairs of j and D that grow as they come, to the last that the limit allows. */
+static void
+outputs_grow_to_their_limit(void)
+{
+    hs_account account;
+    hs_options options = hs_options_default();
+    hs_output  output;
+    int64_t    n = 0;
+    options.memory_limit = 1e6;
+    hs_account_init(&account, &options);
+    hs_output_init(&account, 3, HS_WANT_J | HS_WANT_VECTOR, 8, &output);
+    CHECK(hs_output_bytes_per_pair(&output) == 32 && !hs_output_has_room(&output, 0));
+    while (hs_output_reserve(&output, 10, 0.0) == HS_OK) {
+        double *to = hs_output_next(&output, HS_WANT_VECTOR);
+        CHECK(hs_output_has_room(&output, 10));
+        for (int e = 0; e < 30; e++) {
+            to[e] = (double)(3 * n + e);
+        }
+        n += 10;
+        output.n_pairs = n;
+    }
+    const double *vector = hs_output_column(&output, HS_WANT_VECTOR);
+    bool          kept = true;
+    for (int64_t e = 0; e < 3 * n; e++) {
+        kept = kept && vector[e] == (double)e;
+    }
+    CHECK(kept && n <= 31250 && n + 10 > 31250 && account.held == 32 * n);
+    CHECK(!hs_output_has_room(&output, 10));
+    hs_output_free(&output);
+    CHECK(account.held == 0);
+}
+
+/* What no memory holds is refused at once; guesses of it are forgotten. */
+static void
+endless_outputs_are_refused(void)
+{
+    hs_output output;
+    hs_output_init(NULL, 8, HS_WANT_VECTOR | HS_WANT_SHIFT, 8, &output);
+    CHECK(!hs_output_has_room(&output, 0));
+    hs_output_expect(&output, 1e18);
+    CHECK(output.capacity == 1024 && hs_output_has_room(&output, 1024));
+    hs_output_expect(&output, INFINITY);
+    CHECK(output.capacity == 1024 && !hs_output_has_room(&output, 1025));
+    CHECK(hs_output_reserve(&output, INT64_C(1) << 57, 0.0) == HS_ERR_MEMORY);
+    CHECK(hs_output_reserve(&output, INT64_C(1) << 60, 0.5) == HS_ERR_MEMORY);
+    CHECK(output.capacity == 1024);
+    CHECK(hs_output_reserve(&output, 2000, 0.0) == HS_OK && output.capacity >= 2000);
+    hs_output_free(&output);
+}
+
 void
 test_output(void)
 {
@@ -187,4 +238,6 @@ test_output(void)
     RUN(no_room_asks_for_the_number);
     RUN(no_pairs_need_no_room);
     RUN(the_callers_memory_is_not_counted);
+    RUN(outputs_grow_to_their_limit);
+    RUN(endless_outputs_are_refused);
 }

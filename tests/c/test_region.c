@@ -9,24 +9,17 @@
 #include "../../csrc/core/pages.h"
 #include "../../csrc/core/pool.h"
 #include "../../csrc/core/region.h"
+#include "address_space.h"
 #include "harness.h"
 
 #if defined(__linux__)
-#include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #endif
 
 void test_region(void);
 
 #define MB ((size_t)1 << 20)
 #define GB ((size_t)1 << 30)
-
-#if defined(__linux__) && !HS_ADDRESS_SANITIZER
-#define HAS_PAGES 1
-#else
-#define HAS_PAGES 0
-#endif
 
 static uint64_t
 word_at(size_t k)
@@ -222,27 +215,7 @@ failures_lose_nothing(void)
     CHECK(hs_test_live_blocks() == before);
 }
 
-#if HAS_PAGES && !defined(__SANITIZE_THREAD__)
-
-/* The number in a file, 0 if there is none. */
-static unsigned long
-number_in(const char *path)
-{
-    unsigned long number = 0;
-    FILE         *file = fopen(path, "r");
-    if (file != NULL && fscanf(file, "%lu", &number) != 1)
-        number = 0;
-    if (file != NULL)
-        fclose(file);
-    return number;
-}
-
-/* Bytes of address space. */
-static size_t
-mapped(void)
-{
-    return number_in("/proc/self/statm") * (size_t)sysconf(_SC_PAGESIZE);
-}
+#if CAN_LIMIT_ADDRESSES
 
 /* Resident bytes of this process, exactly. -1: not told. */
 static int64_t
@@ -399,7 +372,7 @@ test_region(void)
     RUN(detach_keeps_the_front);
     RUN(chunks_stay_aligned);
     RUN(failures_lose_nothing);
-#if HAS_PAGES && !defined(__SANITIZE_THREAD__)
+#if CAN_LIMIT_ADDRESSES
     RUN(only_what_is_written_costs);
     RUN(the_tail_is_given_back);
     RUN(limited_address_space);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_sums.c: sums of products are exact until they are rounded once, whoever adds them. */
+#include "../../csrc/core/memory.h"
 #include "../../csrc/core/sums.h"
 #include "bigint.h"
 #include "harness.h"
@@ -148,10 +149,35 @@ weights_must_be_finite(void)
     }
 }
 
+/* Weights with places of their own need two arrays; more sums than can be counted are refused. */
+static void
+sums_need_memory(void)
+{
+    const double  weights[] = {0x1p400, 0x1p-400};
+    const int64_t before = hs_test_live_blocks();
+    hs_weights    taken;
+    hs_failure    failure;
+    hs_sums       sums;
+    for (int nth = 1; nth <= 2; nth++) {
+        hs_test_fail_allocation(nth);
+        CHECK(hs_weights_init(NULL, weights, identity, 2, &taken, &failure) == HS_ERR_MEMORY);
+        hs_test_fail_allocation(0);
+        CHECK(taken.value == NULL && taken.place == NULL && hs_test_live_blocks() == before);
+    }
+    CHECK(hs_weights_init(NULL, weights, identity, 2, &taken, &failure) == HS_OK);
+    CHECK(hs_sums_init(NULL, INT64_MAX / 2, &taken, &taken, &sums) == HS_ERR_MEMORY);
+    CHECK(hs_sums_init(NULL, INT64_MAX / 4096, &taken, &taken, &sums) == HS_ERR_MEMORY);
+    CHECK(hs_sums_init(NULL, 2, &taken, &taken, &sums) == HS_OK);
+    hs_sums_free(NULL, &sums);
+    hs_weights_free(NULL, &taken);
+    CHECK(hs_test_live_blocks() == before);
+}
+
 void
 test_sums(void)
 {
     RUN(sums_are_rounded_once);
     RUN(limbs_do_not_overflow);
     RUN(weights_must_be_finite);
+    RUN(sums_need_memory);
 }

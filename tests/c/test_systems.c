@@ -239,6 +239,128 @@ nothing_is_lost_when_memory_is_short(void)
     CHECK(hs_test_live_blocks() == before);
 }
 
+/* What all systems share is checked before any is read. */
+static void
+bad_arguments_are_refused(void)
+{
+    static batch made;
+    hs_options   options = hs_options_default();
+    hs_failure   failure;
+    hs_pairs    *pairs = NULL;
+    int64_t      counts[N_SYSTEMS];
+    make_batch(4, &made);
+    hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    hs_systems systems = {N_SYSTEMS, made.first, NULL, NULL, NULL};
+    static const double bad[] = {NAN, INFINITY, -1.0};
+    for (int b = 0; b < 3; b++) {
+        options.cutoff = bad[b];
+        CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_CUTOFF);
+        CHECK(memcmp(&failure.value, &bad[b], sizeof failure.value) == 0);
+    }
+    options.cutoff = 1.0;
+    options.kernel = "none of that name";
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_KERNEL);
+    options.kernel = NULL;
+    points.n = INT64_C(1) << 31;
+    points.row_stride = 0; /* one point so many times takes no memory */
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_TOO_MANY);
+    CHECK(failure.value == 0x1p31 && pairs == NULL);
+    points.n = 5;
+    systems.n = -1;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_ARGUMENT);
+    systems.n = 0;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_OK);
+    CHECK(hs_pairs_length(pairs) == 0);
+    hs_pairs_free(pairs);
+}
+
+static double
+some_limit(void *context)
+{
+    ++*(int *)context;
+    return 1e9;
+}
+
+/* Into arrays of the caller, by one thread or more than there are systems; all in one box. */
+static void
+results_go_to_the_callers_arrays(void)
+{
+    enum { ROOM = 20000 };
+    static batch    made;
+    static int64_t  i[ROOM], j[ROOM];
+    hs_pair_arrays  out = {.capacity = ROOM, .index_bytes = 8, .i = i, .j = j};
+    hs_options      options = hs_options_default();
+    hs_failure      failure;
+    int             n_asked = 0;
+    make_batch(6, &made);
+    made.first[1] = made.first[2] = 0; /* the first systems are empty */
+    const hs_points points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    for (int k = 0; k < 3; k++) {
+        made.box.rows[k][k] = 4.0;
+    }
+    options.cutoff = 0.7;
+    options.find_limit = some_limit;
+    options.find_context = &n_asked;
+    for (int threads = 1; threads <= 4; threads += 3) {
+        for (int n = 3; n <= N_SYSTEMS; n += N_SYSTEMS - 3) {
+            const hs_systems systems = {n, made.first, &made.box, NULL, NULL};
+            const hs_points  some = points_of(&made, 0, made.first[n]);
+            hs_pairs        *own = NULL, *into = NULL;
+            options.threads = threads;
+            options.out = NULL;
+            CHECK(hs_systems_find(&some, &systems, &options, &own, &failure) == HS_OK);
+            const int64_t found = hs_pairs_length(own);
+            CHECK(found > 50 && found <= ROOM);
+            options.out = &out;
+            CHECK(hs_systems_find(&some, &systems, &options, &into, &failure) == HS_OK);
+            CHECK(hs_pairs_length(into) == found && hs_pairs_array(into, HS_WANT_I) == NULL);
+            CHECK(memcmp(i, hs_pairs_array(own, HS_WANT_I), (size_t)found * 8) == 0);
+            CHECK(memcmp(j, hs_pairs_array(own, HS_WANT_J), (size_t)found * 8) == 0);
+            out.capacity = found - 1;
+            hs_pairs_free(into);
+            CHECK(hs_systems_find(&some, &systems, &options, &into, &failure) == HS_ERR_CAPACITY);
+            CHECK(into == NULL && failure.expected_pairs == (double)found);
+            out.capacity = ROOM;
+            hs_pairs_free(own);
+        }
+    }
+    CHECK(n_asked > 0 && points.n > 0);
+}
+
+/* Points too far away for the shifts or the precision of one system are named among all. */
+static void
+far_points_are_named_among_all(void)
+{
+    double           x[8] = {0.0, 0.0, 0.5, 0.5, 0.0, 3.9, 0.0, -3.9};
+    const int64_t    first[] = {0, 2, 4};
+    hs_box           box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
+    const hs_points  points = {x, 4, 2, HS_FLOAT64, 16, 8};
+    const hs_systems systems = {2, first, &box, NULL, NULL};
+    hs_options       options = hs_options_default();
+    hs_pairs        *pairs = NULL;
+    hs_failure       failure;
+    int64_t          counts[2];
+    options.cutoff = 1.0;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_OK);
+    CHECK(counts[0] == 1 && counts[1] == 1);
+    options.want = HS_WANT_SHIFT;
+    for (int sorted = 0; sorted < 2; sorted++) {
+        options.sorted = sorted;
+        CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) ==
+              HS_ERR_SHIFT_RANGE);
+        CHECK(pairs == NULL && (failure.row == 2 || failure.row == 3));
+    }
+    options.sorted = false;
+    x[6] = 0x1p60; /* more turns than are counted */
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(failure.row == 3);
+    options.precision = HS_DOUBLE;
+    options.want = HS_WANT_I;
+    const hs_status status = hs_systems_find(&points, &systems, &options, &pairs, &failure);
+    CHECK(status == HS_ERR_ROUNDING || status == HS_ERR_SHIFT_RANGE);
+    CHECK(failure.row == 3);
+}
+
 void
 test_systems(void)
 {
@@ -247,4 +369,7 @@ test_systems(void)
     RUN(polls_are_counted);
     RUN(a_shortage_is_told_in_pairs_and_bytes);
     RUN(nothing_is_lost_when_memory_is_short);
+    RUN(bad_arguments_are_refused);
+    RUN(results_go_to_the_callers_arrays);
+    RUN(far_points_are_named_among_all);
 }
