@@ -14,10 +14,13 @@
  * Along a periodic axis of length L, all x lie in [-L/2, L/2] first, and L/2 takes part as one more
  * number. Across the face, the difference of two points is the sum of L/2 - |x| and L/2 - |y|, and
  * each of these stays what it is or more than the cutoff.
+ *
+ * Queries take part as if they were points: the differences that count are between both.
  */
 #include "condense.h"
 
 #include "keys.h"
+#include "scale.h"
 #include "wrap.h"
 
 #include <math.h>
@@ -26,38 +29,16 @@
 /* Along one axis: what condensing leaves where all points are apart. */
 #define UNITS_PER_POINT 8.0
 
-/* What moves a column of coordinates besides the points' own values. */
-#define OPEN (-1)    /* nothing */
-#define COUPLED (-2) /* rows that have entries in other columns as well */
-
-static int
-entries_of_row(const hs_box *box, int l)
-{
-    int entries = 0;
-    for (int k = 0; k < box->ndim; k++) {
-        entries += box->rows[l][k] != 0.0;
-    }
-    return entries;
-}
-
-/* OPEN, COUPLED, or the one row that has its only entry in this column. */
-static int
-mover_of(const hs_box *box, int column)
-{
-    int mover = OPEN;
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        if (box->periodic[l] && box->rows[l][column] != 0.0) {
-            mover = mover == OPEN && entries_of_row(box, l) == 1 ? l : COUPLED;
-        }
-    }
-    return mover;
-}
+/* Among the keys: half a box vector. Points are numbers from 0 on, queries from -2 on downwards. */
+#define HALF (-1)
 
 /* How one call condenses. */
 typedef struct condensing {
     hs_account       *account;
     const hs_options *options;
-    hs_cloud         *cloud;
+    hs_cloud         *of[HS_CONDENSED_SETS]; /* points, and queries if there are any */
+    int               n_sets;
+    int64_t           n;            /* of both together */
     hs_condensed     *condensed;
     bool              changes_rows; /* boxes may be condensed as well */
     hs_scale          to_units, from_units;
@@ -65,21 +46,38 @@ typedef struct condensing {
     hs_keys           keys;         /* room for n + 1 */
 } condensing;
 
+/* The number that stands for entry i of a set among the keys. */
+static int32_t
+id_of(int set, int64_t i)
+{
+    return set == 0 ? (int32_t)i : (int32_t)(HALF - 1 - i);
+}
+
+/* The coordinate that a number stands for. */
+static double *
+coordinate_of(const condensing *doing, int k, int32_t id)
+{
+    return id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - (int64_t)id];
+}
+
 /* Rows are left alone where points are kept as given: what is decided on those would not be the
  * same. That is so in coupled boxes, for precision="double", and where scaling loses digits. */
 static bool
-rows_may_change(const hs_options *options, const hs_box *box, const hs_cloud *cloud, int unit)
+rows_may_change(const condensing *doing, const hs_box *box, int unit)
 {
     if (box == NULL) {
         return true;
     }
     for (int k = 0; k < box->ndim; k++) {
-        if (mover_of(box, k) == COUPLED) {
+        if (hs_mover_of(box, k) == HS_COUPLED) {
             return false;
         }
     }
-    return options->precision != HS_DOUBLE &&
-           (unit <= 0 || hs_cloud_smallest(cloud) >= ldexp(1.0, unit - 1022));
+    bool keeps_digits = doing->options->precision != HS_DOUBLE;
+    for (int set = 0; set < doing->n_sets && keeps_digits && unit > 0; set++) {
+        keeps_digits = hs_cloud_smallest(doing->of[set]) >= ldexp(1.0, unit - 1022);
+    }
+    return keeps_digits;
 }
 
 static bool
@@ -172,28 +170,31 @@ placed(const condensing *doing, double place)
     return doing->condensed->is_scaled ? place : hs_scale_apply(doing->from_units, place);
 }
 
-/* Lists the magnitudes beyond `from`, and `half` as number -1 if it is one; returns how many. The
+/* Lists the magnitudes beyond `from`, `half` among them if it is one; returns how many. The
  * largest of the others is where places begin. */
 static int64_t
-collect(condensing *doing, double *x, double from, double half, places *at)
+collect(condensing *doing, int k, double from, double half, places *at)
 {
     hs_keys *keys = &doing->keys;
     int64_t  found = 0;
     double   largest = 0.0;
-    for (int64_t i = 0; i < doing->cloud->n; i++) {
-        if (fabs(x[i]) > from) {
-            keys->keys[found] = bits_of(x[i]);
-            keys->ids[found++] = (int32_t)i;
-            continue;
-        }
-        largest = hs_larger(fabs(x[i]), largest);
-        if (doing->condensed->is_scaled) {
-            x[i] = hs_scale_apply(doing->to_units, x[i]);
+    for (int set = 0; set < doing->n_sets; set++) {
+        double *x = doing->of[set]->x[k];
+        for (int64_t i = 0; i < doing->of[set]->n; i++) {
+            if (fabs(x[i]) > from) {
+                keys->keys[found] = bits_of(x[i]);
+                keys->ids[found++] = id_of(set, i);
+                continue;
+            }
+            largest = hs_larger(fabs(x[i]), largest);
+            if (doing->condensed->is_scaled) {
+                x[i] = hs_scale_apply(doing->to_units, x[i]);
+            }
         }
     }
     if (half > from) {
         keys->keys[found] = bits_of(half);
-        keys->ids[found++] = -1;
+        keys->ids[found++] = HALF;
     }
     at->last = at->place = hs_scale_apply(doing->to_units, largest);
     at->moved = 0.0;
@@ -202,11 +203,11 @@ collect(condensing *doing, double *x, double from, double half, places *at)
 
 /* Condenses the numbers of a column from `from` on, and *half, which is 0 along an open axis. */
 static hs_status
-condense_numbers(condensing *doing, double *x, double from, double *half)
+condense_numbers(condensing *doing, int k, double from, double *half)
 {
     const hs_keys  *keys = &doing->keys;
     places          at;
-    const int64_t   found = collect(doing, x, from, *half, &at);
+    const int64_t   found = collect(doing, k, from, *half, &at);
     const hs_status status = hs_keys_sort(&doing->keys, 0, found);
     double          place = 0.0;
     *half = placed(doing, hs_scale_apply(doing->to_units, *half)); /* unless it is far */
@@ -217,59 +218,84 @@ condense_numbers(condensing *doing, double *x, double from, double *half)
             const double x_units = is_far ? at.last : hs_scale_apply(doing->to_units, size);
             place = placed(doing, next_place(&at, x_units, is_far));
         }
-        if (keys->ids[e] < 0) {
+        if (keys->ids[e] == HALF) {
             *half = place;
         } else {
-            x[keys->ids[e]] = copysign(place, x[keys->ids[e]]);
+            double *x = coordinate_of(doing, k, keys->ids[e]);
+            *x = copysign(place, *x);
         }
     }
     return status;
 }
 
+/* The range of a column, of both sets in each. */
 static void
-measure_column(hs_cloud *cloud, int k)
+measure_column(const condensing *doing, int k)
 {
-    cloud->lower[k] = INFINITY;
-    cloud->upper[k] = -INFINITY;
-    for (int64_t i = 0; i < cloud->n; i++) {
-        cloud->lower[k] = hs_smaller(cloud->x[k][i], cloud->lower[k]);
-        cloud->upper[k] = hs_larger(cloud->x[k][i], cloud->upper[k]);
+    double lower = INFINITY, upper = -INFINITY;
+    for (int set = 0; set < doing->n_sets; set++) {
+        const hs_cloud *cloud = doing->of[set];
+        for (int64_t i = 0; i < cloud->n; i++) {
+            lower = hs_smaller(cloud->x[k][i], lower);
+            upper = hs_larger(cloud->x[k][i], upper);
+        }
     }
+    for (int set = 0; set < doing->n_sets; set++) {
+        doing->of[set]->lower[k] = lower;
+        doing->of[set]->upper[k] = upper;
+    }
+}
+
+/* Wraps what is far in this column of both sets. */
+static hs_status
+wrap_column(condensing *doing, int k, double length, hs_failure *failure)
+{
+    hs_condensed *condensed = doing->condensed;
+    for (int set = 0; set < doing->n_sets; set++) {
+        hs_cloud       *cloud = doing->of[set];
+        int64_t       **turns = &condensed->turns[set][k];
+        const hs_status status =
+            wrap_far(doing->account, doing->options->want & HS_WANT_SHIFT, length, doing->far,
+                     cloud->n, cloud->x[k], turns, failure);
+        condensed->has_turns = condensed->has_turns || *turns != NULL;
+        if (status != HS_OK) {
+            failure->in_queries = set > 0;
+            return status;
+        }
+    }
+    return HS_OK;
 }
 
 static hs_status
 condense_column(condensing *doing, int k, hs_failure *failure)
 {
-    hs_cloud     *cloud = doing->cloud;
-    hs_condensed *condensed = doing->condensed;
-    const double  far = doing->far;
-    const int     row = mover_of(condensed->box, k);
-    double       *entry = row >= 0 ? &condensed->rows.rows[row][k] : NULL;
-    double        half = row >= 0 ? 0.5 * fabs(*entry) : 0.0;
-    const bool    is_far = hs_larger(-cloud->lower[k], cloud->upper[k]) > far || half > far;
+    const hs_cloud *cloud = doing->of[0]; /* its range is that of both */
+    hs_condensed   *condensed = doing->condensed;
+    const double    far = doing->far;
+    const int       row = hs_mover_of(condensed->box, k);
+    double         *entry = row >= 0 ? &condensed->rows.rows[row][k] : NULL;
+    double          half = row >= 0 ? 0.5 * fabs(*entry) : 0.0;
+    const bool      is_far = hs_larger(-cloud->lower[k], cloud->upper[k]) > far || half > far;
     if (!is_far && !condensed->is_scaled) {
         return HS_OK;
     }
     if (is_far && row >= 0) {
-        const hs_status status =
-            wrap_far(doing->account, doing->options->want & HS_WANT_SHIFT, fabs(*entry), far,
-                     cloud->n, cloud->x[k], &condensed->turns[k], failure);
-        condensed->has_turns = condensed->has_turns || condensed->turns[k] != NULL;
+        const hs_status status = wrap_column(doing, k, fabs(*entry), failure);
         if (status != HS_OK) {
             return status;
         }
     }
     const bool condenses = is_far && (row < 0 || half > far);
     /* What is dense enough already is left alone, so that one outlier costs no sorting. */
-    const double dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)cloud->n);
+    const double dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)doing->n);
     const double from = condenses ? hs_smaller(dense, far) : INFINITY;
-    const hs_status status = condense_numbers(doing, cloud->x[k], from, &half);
+    const hs_status status = condense_numbers(doing, k, from, &half);
     if (row >= 0 && condenses) {
         *entry = copysign(2.0 * half, *entry);
     } else if (row >= 0 && condensed->is_scaled) {
         *entry = hs_scale_apply(doing->to_units, *entry);
     }
-    measure_column(cloud, k);
+    measure_column(doing, k);
     return status;
 }
 
@@ -298,41 +324,45 @@ free_keys(hs_account *account, hs_keys *keys)
 static hs_status
 condense_columns(condensing *doing, hs_failure *failure)
 {
-    hs_cloud *cloud = doing->cloud;
-    cloud->largest = 0.0;
+    const hs_cloud *cloud = doing->of[0];
+    double          largest = 0.0;
     for (int k = 0; k < cloud->ndim; k++) {
-        const int mover = mover_of(doing->condensed->box, k);
-        if (mover == OPEN || (mover >= 0 && doing->changes_rows)) {
+        const int mover = hs_mover_of(doing->condensed->box, k);
+        if (mover == HS_OPEN || (mover >= 0 && doing->changes_rows)) {
             const hs_status status = condense_column(doing, k, failure);
             if (status != HS_OK) {
                 return status;
             }
         }
-        const double reach = hs_larger(-cloud->lower[k], cloud->upper[k]);
-        cloud->largest = hs_larger(reach, cloud->largest);
+        largest = hs_larger(hs_larger(-cloud->lower[k], cloud->upper[k]), largest);
+    }
+    for (int set = 0; set < doing->n_sets; set++) {
+        doing->of[set]->largest = largest;
     }
     return HS_OK;
 }
 
 hs_status
 hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
-            hs_cloud *cloud, hs_condensed *condensed, hs_failure *failure)
+            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
 {
     const double far = ldexp(1.0, unit + HS_FAR_EXPONENT);
     condensed->box = box;
     condensed->is_scaled = condensed->has_turns = false;
     memset(condensed->turns, 0, sizeof condensed->turns);
-    if (cloud->n == 0 || !anything_is_far(cloud, box, far)) {
+    if (cloud->n == 0 || (asking != NULL && asking->n == 0) || !anything_is_far(cloud, box, far)) {
         return HS_OK;
     }
     condensing doing = {.account = account,
                         .options = options,
-                        .cloud = cloud,
+                        .of = {cloud, asking},
+                        .n_sets = asking != NULL ? 2 : 1,
+                        .n = cloud->n + (asking != NULL ? asking->n : 0),
                         .condensed = condensed,
-                        .changes_rows = rows_may_change(options, box, cloud, unit),
                         .to_units = hs_scale_of(unit),
                         .from_units = hs_scale_of(-unit),
                         .far = far};
+    doing.changes_rows = rows_may_change(&doing, box, unit);
     if (doing.changes_rows) {
         condensed->is_scaled = unit < 0;
         if (box != NULL) {
@@ -340,7 +370,7 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
             condensed->box = &condensed->rows;
         }
     }
-    const hs_status status = allocate_keys(account, options, cloud->n + 1, &doing.keys)
+    const hs_status status = allocate_keys(account, options, doing.n + 1, &doing.keys)
                                  ? condense_columns(&doing, failure)
                                  : HS_ERR_MEMORY;
     free_keys(account, &doing.keys);
@@ -350,8 +380,10 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
 void
 hs_condensed_free(hs_account *account, hs_condensed *condensed)
 {
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        hs_free(account, condensed->turns[k]);
-        condensed->turns[k] = NULL;
+    for (int set = 0; set < HS_CONDENSED_SETS; set++) {
+        for (int k = 0; k < HS_MAX_DIM; k++) {
+            hs_free(account, condensed->turns[set][k]);
+            condensed->turns[set][k] = NULL;
+        }
     }
 }

@@ -14,21 +14,27 @@
 /* Far is beyond 2^54 units: numbers there are multiples of four units. */
 #define HS_FAR_EXPONENT 54
 
+/* Points, queries. */
+#define HS_CONDENSED_SETS 2
+
 typedef struct hs_condensed {
     const hs_box *box;               /* in place of the caller's: borrowed, or `rows` */
     hs_box        rows;
     bool          is_scaled;         /* points and rows are in units of 2^unit now */
-    bool          has_turns;         /* some point was wrapped into the box, and S is wanted: */
-    int64_t      *turns[HS_MAX_DIM]; /* owned; n each for a column whose points were, else NULL */
+    bool          has_turns;         /* something was wrapped into the box, and S is wanted: */
+    /* Owned, of points and of queries; n each for a column where some were, else NULL. */
+    int64_t      *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
 } hs_condensed;
 
 /*
  * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other. Does
- * nothing but look at ranges where nothing is far. box: checked. HS_ERR_SHIFT_RANGE only where S
- * is wanted. hs_condensed_free in any case.
+ * nothing but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
+ * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
+ * hs_condensed_free in any case.
  */
 hs_status hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
-                      hs_cloud *cloud, hs_condensed *condensed, hs_failure *failure);
+                      hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
+                      hs_failure *failure);
 
 void hs_condensed_free(hs_account *account, hs_condensed *condensed);
 

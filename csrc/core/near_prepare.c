@@ -10,6 +10,8 @@
 #define LEAF_POINTS 8
 /* Largest distances below this scale the scene by themselves. */
 #define SMALL_LIMIT 0x1p-800
+/* In largest distances: what lies beyond is drawn together, which a tree that is kept is not. */
+#define FAR 0x1p50
 /* Periods below this do. */
 #define SMALL_BOX 0x1p-500
 
@@ -88,9 +90,11 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
     hs_scene      queries, *asking = sets->queries != NULL ? &queries : NULL;
     hs_options    options = search->options;
     const int32_t leaf_points = near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS;
+    hs_sets       bounded = *sets;
+    bounded.within = limit < INFINITY ? limit : 0.0;
     options.cutoff = scene_cutoff(box, limit);
     near->asking = &near->tree;
-    hs_status status = hs_scene_init_sets(&search->account, search->team, sets, box, &options,
+    hs_status status = hs_scene_init_sets(&search->account, search->team, &bounded, box, &options,
                                           &search->scene, asking, failure);
     if (status != HS_OK) {
         return status;
@@ -178,6 +182,10 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
     }
     if (kept == NULL || status != HS_OK) {
         return kept == NULL ? HS_STATUS_END : status;
+    }
+    const hs_scene *scene = &kept->search->scene;
+    if (scene->is_heap || scene->cloud.largest > FAR * hs_scale_apply(scene->scale, limit)) {
+        return HS_STATUS_END;
     }
     if (sets->queries != NULL) {
         status = hs_scene_like(&search->account, search->team, &kept->search->scene, sets->queries,

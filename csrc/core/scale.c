@@ -9,6 +9,9 @@
 #define ORDINARY_EXPONENT 20
 /* Points of a skewed box may be 2^51 box vectors away; others are refused. */
 #define FARTHEST 0x1p52
+/* Open axes that are so many times as long leave less than 2^-10 of a coupled box certain: wrapping
+ * errs by some 2^-99 of the largest coordinate (wrap.h). */
+#define DROWNING 0x1p88
 /* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
  * and a binary order apart. */
 #define WHOLE_EXPONENT 8
@@ -22,17 +25,44 @@ exponent_of(double x)
     return x == 0.0 ? NO_EXPONENT : ilogb(x);
 }
 
+static int
+entries_of_row(const hs_box *box, int l)
+{
+    int entries = 0;
+    for (int k = 0; k < box->ndim; k++) {
+        entries += box->rows[l][k] != 0.0;
+    }
+    return entries;
+}
+
+int
+hs_mover_of(const hs_box *box, int column)
+{
+    int mover = HS_OPEN;
+    for (int l = 0; box != NULL && l < box->ndim; l++) {
+        if (box->periodic[l] && box->rows[l][column] != 0.0) {
+            mover = mover == HS_OPEN && entries_of_row(box, l) == 1 ? l : HS_COUPLED;
+        }
+    }
+    return mover;
+}
+
 hs_box_size
 hs_box_size_of(const hs_box *box)
 {
-    hs_box_size found = {0.0, INFINITY, INFINITY};
+    hs_box_size found = {0.0, INFINITY, INFINITY, 0, false};
     for (int l = 0; box != NULL && l < box->ndim; l++) {
         double row_largest = 0.0;
+        int    entries = 0;
         for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
             const double size = fabs(box->rows[l][k]);
             row_largest = hs_larger(size, row_largest);
+            entries += size > 0.0;
+            found.is_coupled = found.is_coupled || (size > 0.0 && found.moved >> k & 1u);
+            found.moved |= (unsigned)(size > 0.0) << k;
             found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
         }
+        found.is_coupled = found.is_coupled || entries > 1;
         found.largest = hs_larger(row_largest, found.largest);
         if (box->periodic[l]) {
             found.short_row = hs_smaller(row_largest, found.short_row);
@@ -59,6 +89,32 @@ hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
                                                     : cloud->largest);
 }
 
+bool
+hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers)
+{
+    const double largest = hs_larger(box->largest, cloud->largest);
+    return exponent_of(largest) - unit <= powers;
+}
+
+/* The largest coordinate that wrapping leaves as it is. */
+static double
+open_reach(const hs_cloud *cloud, const hs_box_size *box)
+{
+    double reach = 0.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        if (!(box->moved >> k & 1u)) {
+            reach = hs_larger(hs_larger(-cloud->lower[k], cloud->upper[k]), reach);
+        }
+    }
+    return reach;
+}
+
+bool
+hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
+{
+    return box->is_coupled && open_reach(cloud, box) > DROWNING * hs_larger(box->largest, cutoff);
+}
+
 int
 hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
                    int largest, bool *extreme)
@@ -70,6 +126,8 @@ hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff,
     if (found - exponent > largest) {
         exponent = found - largest;
     }
+    const int wide = exponent_of(open_reach(cloud, box)) - HS_LARGEST_WIDE_EXPONENT;
+    exponent = exponent < wide ? wide : exponent;
     *extreme = false;
     if (exponent > 0) {
         double smallest = fmin(box->smallest, hs_cloud_smallest(cloud));

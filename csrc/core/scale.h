@@ -7,13 +7,22 @@
 
 /* Sizes of the periodic box entries. */
 typedef struct hs_box_size {
-    double largest;   /* 0 without rows */
-    double smallest;  /* not counting zeros; infinity without rows */
-    double short_row; /* the least of the rows' largest entries; infinity without rows */
+    double   largest;    /* 0 without rows */
+    double   smallest;   /* not counting zeros; infinity without rows */
+    double   short_row;  /* the least of the rows' largest entries; infinity without rows */
+    unsigned moved;      /* bit k: some row has an entry in column k */
+    bool     is_coupled; /* a row has several entries, or a column has */
 } hs_box_size;
 
 /* box: NULL for none. */
 hs_box_size hs_box_size_of(const hs_box *box);
+
+/* What moves a column of coordinates besides the points' own values. */
+#define HS_OPEN (-1)    /* nothing */
+#define HS_COUPLED (-2) /* rows that have entries in other columns as well */
+
+/* HS_OPEN, HS_COUPLED, or the one row that has its only entry in this column. box: NULL for none. */
+int hs_mover_of(const hs_box *box, int column);
 
 /* The cutoff, or a smaller one if that is beyond all distances as well. */
 double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
@@ -28,6 +37,13 @@ int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutof
 #define HS_LARGEST_EXPONENT 56
 /* Where no float32 is made of them they stay below 2^901, so that sums of a few are finite. */
 #define HS_LARGEST_WIDE_EXPONENT 900
+
+/* Whether all numbers are at most so many powers of two above a length of this exponent. */
+bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers);
+
+/* Whether coordinates along open axes are so large that a coupled box is lost in the rounding of
+ * what is wrapped into it. */
+bool hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
 /* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
  * digits. unit: as hs_unit_exponent. */

@@ -9,6 +9,9 @@
 #include <math.h>
 #include <string.h>
 
+/* Box vectors in a cutoff, along one of them, that nobody has memory for. */
+#define MOST_IMAGES 0x1p64
+
 /* Columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
@@ -78,6 +81,9 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
     scene->keeps_originals =
         scene->extreme || (m > 0 && (!scene->lattice.aligned || options->precision == HS_DOUBLE));
     scene->turns.known = m > 0 && (scene->keeps_originals || (options->want & HS_WANT_SHIFT));
+    if (m > 0 && !(options->want & HS_WANT_SHIFT) && options->precision != HS_DOUBLE) {
+        hs_scene_fold_far(scene);
+    }
     for (int k = 0; k < scene->ndim; k++) {
         cloud->lower[k] = hs_scale_apply(scene->pending, cloud->lower[k]);
         cloud->upper[k] = hs_scale_apply(scene->pending, cloud->upper[k]);
@@ -111,6 +117,16 @@ box_is_vanishing(const hs_lattice *lattice)
         }
     }
     return false;
+}
+
+/* Whether open axes leave nothing of the box, so that the points cannot be in cells. */
+static bool
+no_scale_holds(const hs_scene *scene, const hs_box *box)
+{
+    const hs_box_size size = hs_box_size_of(box);
+    return (box_is_vanishing(&scene->lattice) ||
+            hs_open_drowns_box(&scene->cloud, &size, scene->sought)) &&
+           scene->sought <= MOST_IMAGES * size.short_row;
 }
 
 static hs_status
@@ -165,6 +181,7 @@ start_scene(const hs_points *points, hs_scene *scene)
     scene->ndim = points->ndim;
     scene->n = points->n;
     scene->keeps_originals = scene->x_is_beside = scene->is_asked = scene->is_kept = false;
+    scene->is_heap = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
     memset(scene->x_largest, 0, sizeof scene->x_largest);
@@ -188,6 +205,9 @@ hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs
     if (status == HS_OK) {
         hs_scene_share(kept, asking);
         status = wrap_points(account, team, &as_kept, asking, &magnitude, failure);
+    }
+    if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
+        status = HS_STATUS_END; /* a scene without turns will do */
     }
     failure->in_queries = status != HS_OK;
     if (status == HS_OK) {
@@ -269,10 +289,10 @@ set_scale(const hs_condensed *condensed, int unit, hs_scene *scene, const hs_sce
 
 /* The turns that condensing made, added to those that wrapping made after it. */
 static void
-add_turns(const hs_condensed *condensed, hs_scene *scene)
+add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
 {
     for (int k = 0; condensed->has_turns && k < scene->ndim; k++) {
-        const int64_t *more = condensed->turns[k];
+        const int64_t *more = condensed->turns[set][k];
         const int      row = scene->lattice.row_of_axis[k];
         for (int64_t i = 0; more != NULL && i < scene->n; i++) {
             hs_turns_set(&scene->turns, row, i, hs_turns_get(&scene->turns, row, i) + more[i]);
@@ -289,8 +309,15 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     const bool empty = scene->n == 0 || (asking != NULL && asking->n == 0);
     if (condensed->has_turns) { /* more than the points themselves tell */
         scene->cloud.largest = INFINITY;
+        if (asking != NULL) {
+            asking->cloud.largest = INFINITY;
+        }
     }
-    hs_lattice_init(empty ? NULL : condensed->box, scene->ndim, scene->pending, &scene->lattice);
+    const hs_box *box = empty ? NULL : condensed->box;
+    hs_lattice_init(box, scene->ndim, scene->pending, &scene->lattice);
+    if (scene->is_kept && no_scale_holds(scene, box)) {
+        hs_scene_make_heap(scene);
+    }
     hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
     if (hs_scene_is_drowned(scene)) {
         hs_scene_name_farthest(scene, asking, failure);
@@ -302,8 +329,35 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     return fill_scene(account, team, options, scene, asking, failure);
 }
 
-/* Chooses the scale of a scene whose points are as given, and fills it. Condensing is for points
- * alone: what is far apart from them may be near to queries. */
+/* Whether points and queries are drawn together where they are far. Others that come later may be
+ * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
+ * holds everything, cells of queries and of lists that last are those of the points as given. */
+static bool
+may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_size *size, int unit)
+{
+    const bool is_bounded = scene->within > 0.0 && scene->sought == scene->within;
+    if (scene->is_kept || (scene->is_wide && !is_bounded)) {
+        return false;
+    }
+    return scene->is_wide || (asking == NULL && !scene->is_plain) ||
+           hs_open_drowns_box(&scene->cloud, size, scene->sought) ||
+           !hs_fits_one_scale(&scene->cloud, size, unit, HS_LARGEST_WIDE_EXPONENT);
+}
+
+/* The cutoff that scale and condensing go by. */
+static double
+settle_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
+{
+    const hs_cloud *cloud = &scene->cloud;
+    if (scene->within > 0.0 &&
+        !hs_fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
+                           HS_FAR_EXPONENT)) {
+        return scene->within;
+    }
+    return scene->is_kept || scene->is_plain ? cutoff : hs_enough_cutoff(cloud, size, cutoff);
+}
+
+/* Chooses the scale of a scene whose points are as given, and fills it. */
 static hs_status
 scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
@@ -312,18 +366,21 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
     hs_status         status = HS_OK;
-    const bool as_given = scene->is_kept || scene->is_plain;
-    scene->sought = as_given ? options->cutoff : hs_enough_cutoff(cloud, &size, options->cutoff);
+    scene->sought = settle_cutoff(scene, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
-    if (asking == NULL && !as_given) {
-        status = hs_condense(account, options, box, unit, cloud, &condensed, failure);
+    if (may_condense(scene, asking, &size, unit)) {
+        status = hs_condense(account, options, box, unit, cloud,
+                             asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {
         set_scale(&condensed, unit, scene, asking);
         status = fill_scaled(account, team, options, &condensed, scene, asking, failure);
     }
     if (status == HS_OK) {
-        add_turns(&condensed, scene);
+        add_turns(&condensed, 0, scene);
+        if (asking != NULL) {
+            add_turns(&condensed, 1, asking);
+        }
     }
     hs_condensed_free(account, &condensed);
     return status;
@@ -339,6 +396,7 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     scene->is_plain = sets->is_plain;
     scene->is_wide = sets->is_wide;
     scene->least_cutoff = sets->least_cutoff;
+    scene->within = sets->within;
     if (asking != NULL) {
         start_scene(sets->queries, asking);
     }

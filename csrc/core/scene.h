@@ -42,9 +42,12 @@ typedef struct hs_scene {
     double     formula_error; /* precision="double": its |D| against the true one */
     bool       is_asked;      /* by queries: the bounds above hold for these too */
     bool       is_kept;       /* and for others that come later */
+    bool       is_heap;       /* kept, but no scale holds it: one cell with everything, which no
+                               * search can use: each makes a scene of its own */
     bool       is_plain;      /* as hs_sets says */
     bool       is_wide;       /* the same */
     double     least_cutoff;  /* the same */
+    double     within;        /* the same */
 } hs_scene;
 
 /* Who looks for neighbours among whom; borrowed. */
@@ -52,8 +55,8 @@ typedef struct hs_sets {
     const hs_points *points;
     const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
     bool             is_kept; /* queries come later: bounds with room for them */
-    bool             is_plain; /* points are not drawn together (condense.h): images are those of
-                                * the points as given */
+    bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
+                                * and points are drawn together (condense.h) only if need be */
     bool             is_wide; /* nobody makes float32 of X: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (near_kept.h) */
@@ -62,6 +65,7 @@ typedef struct hs_sets {
                                * has each pair once; always so with queries */
     double           least_cutoff; /* the smallest positive length that pairs are compared with,
                                     * where there are several; 0: the cutoff alone */
+    double           within;  /* where is_wide: no pair further apart than this matters; 0: any */
 } hs_sets;
 
 /*
@@ -89,6 +93,9 @@ void hs_scene_share(const hs_scene *scene, hs_scene *asking);
 
 /* The scene's x_largest, lower and upper cover what wrapping found in both. */
 void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
+
+/* A scene that is kept for numbers that no scale holds: all points on one spot of open space. */
+void hs_scene_make_heap(hs_scene *scene);
 
 /* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
  * its scale would round. */
@@ -119,6 +126,11 @@ hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept,
 
 /* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
+
+/* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
+ * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled;
+ * scene_wrap.c. */
+void hs_scene_fold_far(hs_scene *scene);
 
 /* Wraps the points into the box; scene_wrap.c. Sets x_largest, the range of t_k of the points in
  * lower and upper, and *magnitude as hs_wrap_point says. */

@@ -6,6 +6,7 @@
 #include "scene.h"
 
 #include <math.h>
+#include <string.h>
 
 /* How much further from the box than the points queries may be that come later, and how many box
  * vectors at least, before they need bounds of their own. Bounds that are so much wider cost next
@@ -56,6 +57,23 @@ hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
     }
 }
 
+void
+hs_scene_make_heap(hs_scene *scene)
+{
+    hs_cloud *cloud = &scene->cloud;
+    for (int k = 0; k < scene->ndim; k++) {
+        memset(cloud->x[k], 0, (size_t)cloud->n * sizeof(double));
+        cloud->lower[k] = cloud->upper[k] = 0.0;
+    }
+    cloud->largest = 0.0;
+    scene->scale = scene->unscale = scene->pending = hs_scale_of(0);
+    scene->cutoff = scene->cutoff_low = scene->radius = 1.0;
+    scene->formula_error = 0.0;
+    scene->extreme = false;
+    scene->is_heap = true;
+    hs_lattice_init(NULL, scene->ndim, scene->pending, &scene->lattice);
+}
+
 static double
 largest_entry(const hs_lattice *lattice)
 {
@@ -96,10 +114,10 @@ bool
 hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
 {
     const hs_scale scale = kept->scale;
-    if (kept->n == 0) { /* nobody is found, wherever queries are */
-        return true;
+    if (kept->n == 0) { /* nobody is found, wherever queries are, but they need a place */
+        return hs_scale_apply(scale, cloud->largest) < INFINITY;
     }
-    if (kept->extreme || !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
+    if (kept->extreme || kept->is_heap || !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
         return false;
     }
     /* Scaling down must not reach the subnormal numbers. */

@@ -4,6 +4,7 @@
 
 #include "skew.h"
 #include "slabs.h"
+#include "wrap.h"
 
 #include <math.h>
 #include <string.h>
@@ -21,6 +22,60 @@ is_inside(const hs_scene *scene, int k)
 {
     const double half = 0.5 * scene->lattice.period[k];
     return scene->cloud.lower[k] >= -half && scene->cloud.upper[k] <= half;
+}
+
+/* The given row that alone has an entry in column k, and no other entry; -1 when there is none. */
+static int
+own_row(const hs_lattice *lattice, int k)
+{
+    int own = -1, rows = 0, entries = 0;
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        if (lattice->given[r][k] != 0.0) {
+            own = r;
+            rows++;
+        }
+    }
+    for (int c = 0; own >= 0 && c < lattice->ndim; c++) {
+        entries += lattice->given[own][c] != 0.0;
+    }
+    return rows == 1 && entries == 1 ? own : -1;
+}
+
+/* The length that the given numbers of column k repeat after; 0 where that is not known. */
+static double
+given_length(const hs_scene *scene, int k)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    const int         own = own_row(lattice, k);
+    if (own >= 0) {
+        return fabs(lattice->given[own][k]);
+    }
+    return lattice->aligned && !scene->extreme && lattice->row_of_axis[k] >= 0
+               ? hs_scale_apply(scene->unscale, lattice->period[k])
+               : 0.0;
+}
+
+void
+hs_scene_fold_far(hs_scene *scene)
+{
+    hs_cloud *cloud = &scene->cloud;
+    for (int k = 0; k < scene->ndim; k++) {
+        const double reach = hs_larger(-cloud->lower[k], cloud->upper[k]);
+        const bool   overflows = !(hs_scale_apply(scene->pending, reach) < INFINITY);
+        if (!overflows && !scene->keeps_originals) {
+            continue;
+        }
+        const double length = given_length(scene, k);
+        if (!(length > 0.0) || !(overflows || reach / length >= HS_WRAP_LIMIT)) {
+            continue;
+        }
+        for (int64_t i = 0; i < cloud->n; i++) {
+            int64_t turned;
+            cloud->x[k][i] = hs_wrap_axis(cloud->x[k][i], length, &turned);
+        }
+        cloud->lower[k] = -0.5 * length;
+        cloud->upper[k] = 0.5 * length;
+    }
 }
 
 static void
