@@ -15,6 +15,7 @@ from setuptools import Extension, setup
 if sys.platform == "win32":
     compile_args = ["/std:c11", "/O2", "/fp:precise"]
     link_args = []
+    include_dirs = [numpy.get_include()]
 else:
     compile_args = [
         "-std=c11",
@@ -30,6 +31,8 @@ else:
         "-Wmissing-prototypes",
     ]
     link_args = ["-pthread"]
+    include_dirs = []
+    compile_args += ["-isystem", numpy.get_include()]  # no warnings of NumPy's headers
     if os.environ.get("HS_WERROR"):
         compile_args += ["-Werror"]
     if os.environ.get("HS_DEBUG"):
@@ -51,7 +54,7 @@ setup(
             "halfshell._core",
             sources=sources,
             depends=headers,
-            include_dirs=[numpy.get_include()],
+            include_dirs=include_dirs,
             extra_compile_args=compile_args,
             extra_link_args=link_args,
         )

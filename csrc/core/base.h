@@ -59,11 +59,12 @@ __extension__ typedef __int128 hs_int128;
 __extension__ typedef unsigned __int128 hs_uint128;
 #endif
 
-/* The address sanitizer watches malloc: under it, memory comes from nowhere else. */
+/* The sanitizers of addresses and of memory watch malloc: under them, memory comes from nowhere
+ * else. */
 #if defined(__SANITIZE_ADDRESS__)
 #define HS_ADDRESS_SANITIZER 1
 #elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
+#if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer)
 #define HS_ADDRESS_SANITIZER 1
 #endif
 #endif

@@ -12,10 +12,36 @@
 #define MXCSR_SUBNORMAL 0x0012u /* flags: an operand was subnormal, a result was too small */
 #define CAN_FLUSH 1
 
+/* The C library of MinGW computes with the x87 unit, whose rounding is its own: the control word
+ * stands above the 32 bits of MXCSR. */
+#if defined(__MINGW32__)
+#define X87_ROUNDING 0x0c00u
+
+static uint64_t
+enter_x87(void)
+{
+    uint16_t word;
+    __asm__ __volatile__("fnstcw %0" : "=m"(word));
+    const uint16_t nearest = (uint16_t)(word & ~X87_ROUNDING);
+    __asm__ __volatile__("fldcw %0" : : "m"(nearest));
+    return word;
+}
+
+static void
+leave_x87(uint64_t saved)
+{
+    const uint16_t word = (uint16_t)saved;
+    __asm__ __volatile__("fldcw %0" : : "m"(word));
+}
+#else
+#define enter_x87() UINT64_C(0)
+#define leave_x87(saved) ((void)(saved))
+#endif
+
 hs_fpenv
 hs_fpenv_enter(void)
 {
-    const hs_fpenv saved = {_mm_getcsr()};
+    const hs_fpenv saved = {_mm_getcsr() | enter_x87() << 32};
     _mm_setcsr(MXCSR_DEFAULT);
     return saved;
 }
@@ -23,7 +49,8 @@ hs_fpenv_enter(void)
 void
 hs_fpenv_leave(hs_fpenv saved)
 {
-    _mm_setcsr((unsigned)saved.control);
+    leave_x87(saved.control >> 32);
+    _mm_setcsr((unsigned)(saved.control & UINT32_MAX));
 }
 
 void

@@ -12,6 +12,9 @@
 #define WIN32_LEAN_AND_MEAN
 #include <process.h>
 #include <windows.h>
+/* windows.h defines these words of ours, as nothing. */
+#undef near
+#undef far
 
 typedef SRWLOCK            hs_mutex;
 typedef CONDITION_VARIABLE hs_condition;

@@ -9,6 +9,23 @@
 #define TURNS_TAIL (INT64_C(1) << 26) /* splits 62 bits into 36 and 26, both exact as doubles */
 #define WRAP_PASSES 4 /* each pass gains 50 bits; from 2^51 turns two are enough, two are spare */
 
+#define LARGE 0x1p900
+#define REDUCE 0x1p-100
+
+/*
+ * x - n * length, which must be a double, for an integer 1 <= |n| < 2^52 within 3/4 of x / length.
+ * By a product of two words, because some C libraries round twice in fma(). The first difference is
+ * exact by Sterbenz's lemma, the second because its result is a double. Nothing underflows: all are
+ * multiples of the last digit of `length`. Nothing overflows: large numbers are scaled.
+ */
+static double
+rest(double x, double n, double length)
+{
+    const double scale = fabs(x) > LARGE ? REDUCE : 1.0;
+    const hs_dw  product = hs_two_product(-n, scale * length);
+    return ((scale * x + product.hi) + product.lo) / scale;
+}
+
 double
 hs_wrap_axis(double x, double length, int64_t *turns)
 {
@@ -22,15 +39,12 @@ hs_wrap_axis(double x, double length, int64_t *turns)
     if (fabs(n) <= 1.0) {
         inside = x - n * length; /* n * length is exact, the difference by Sterbenz's lemma */
     } else if (fabs(n) < HS_WRAP_LIMIT) {
-        /* The quotient was rounded, so n may be one off; either way x - n * length is a double,
-         * and a fused multiply-add returns it. */
-        inside = fma(-n, length, x);
-        if (inside > half) {
-            n += 1.0;
-        } else if (inside < -half) {
-            n -= 1.0;
+        /* The quotient was rounded, so n may be one off; either way x - n * length is a double. */
+        inside = rest(x, n, length);
+        if (fabs(inside) > half) {
+            n += inside > half ? 1.0 : -1.0;
+            inside = rest(x, n, length);
         }
-        inside = fma(-n, length, x);
     } else {
         *turns = HS_WRAP_UNKNOWN;
         return remainder(x, length); /* exact by IEEE 754 for any quotient */

@@ -6,8 +6,15 @@
 #ifndef HS_KERNEL_CHECKS_H
 #define HS_KERNEL_CHECKS_H
 
+#if defined(_WIN32)
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+#undef near /* windows.h defines these as nothing */
+#undef far
+#else
 #include <sys/mman.h>
 #include <unistd.h>
+#endif
 
 #include "../../csrc/kernels/kernel.h"
 #include "harness.h"
@@ -20,15 +27,59 @@ typedef struct guarded {
     size_t bytes;
 } guarded;
 
+#if defined(_WIN32)
+
+static inline size_t
+page_size(void)
+{
+    SYSTEM_INFO info;
+    GetSystemInfo(&info);
+    return info.dwPageSize;
+}
+
+static inline char *
+new_pages(size_t bytes)
+{
+    return VirtualAlloc(NULL, bytes, MEM_RESERVE | MEM_COMMIT, PAGE_READWRITE);
+}
+
+static inline bool
+forbid(char *page, size_t bytes)
+{
+    DWORD before;
+    return VirtualProtect(page, bytes, PAGE_NOACCESS, &before) != 0;
+}
+
+#else
+
+static inline size_t
+page_size(void)
+{
+    return (size_t)sysconf(_SC_PAGESIZE);
+}
+
+static inline char *
+new_pages(size_t bytes)
+{
+    char *pages = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    return pages == MAP_FAILED ? NULL : pages;
+}
+
+static inline bool
+forbid(char *page, size_t bytes)
+{
+    return mprotect(page, bytes, PROT_NONE) == 0;
+}
+
+#endif
+
 static inline guarded
 guarded_pages(size_t needed)
 {
-    const size_t page = (size_t)sysconf(_SC_PAGESIZE);
+    const size_t page = page_size();
     const size_t bytes = (needed + page - 1) / page * page;
-    char *all = mmap(NULL, bytes + 2 * page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS,
-                     -1, 0);
-    if (all == MAP_FAILED || mprotect(all, page, PROT_NONE) != 0 ||
-        mprotect(all + page + bytes, page, PROT_NONE) != 0) {
+    char        *all = new_pages(bytes + 2 * page);
+    if (all == NULL || !forbid(all, page) || !forbid(all + page + bytes, page)) {
         abort();
     }
     return (guarded){all + page, bytes};

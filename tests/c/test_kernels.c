@@ -10,7 +10,7 @@
 
 void test_kernels(void);
 
-enum { SHORT = 3 * 32 + 2 }; /* past three times the widest vector */
+enum { SHORT_BLOCK = 3 * 32 + 2 }; /* past three times the widest vector */
 
 static numbers scene;
 
@@ -20,7 +20,7 @@ every_kernel_lists_what_the_plain_loop_lists(void)
     harness_random   random = {271828};
     const hs_kernel *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
-        for (int32_t n = 0; n <= SHORT; n++) {
+        for (int32_t n = 0; n <= SHORT_BLOCK; n++) {
             for (int ndim = 1; ndim <= HS_MAX_DIM; ndim++) {
                 const int32_t n_points = 1 + (int32_t)(random_bits(&random) % 5);
                 fill_with_integers(&random, ndim, n, n_points, &scene);
@@ -73,7 +73,7 @@ infinity_and_nan_are_listed_as_unsure(void)
     const hs_kernel   *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         for (int trial = 0; trial < 1000; trial++) {
-            const int32_t n = (int32_t)(random_bits(&random) % (SHORT + 1));
+            const int32_t n = (int32_t)(random_bits(&random) % (SHORT_BLOCK + 1));
             const int     ndim = 1 + trial % HS_MAX_DIM, which = (int)(random_bits(&random) % 5);
             fill_with_integers(&random, ndim, n, 3, &scene);
             for (int32_t c = 0; c < n; c++) {
@@ -129,7 +129,7 @@ kernels_differ_between_the_thresholds_only(void)
         for (int trial = 0; trial < 3000; trial++) {
             const bool    expanded = trial % 2;
             const int     ndim = 1 + trial / 2 % HS_MAX_DIM;
-            const int32_t n = (int32_t)(random_bits(&random) % (SHORT + 1));
+            const int32_t n = (int32_t)(random_bits(&random) % (SHORT_BLOCK + 1));
             fill_with_integers(&random, ndim, n, 1, &scene);
             for (int a = 0; a < ndim; a++) {
                 for (int32_t c = 0; c < n; c++) {

@@ -349,7 +349,7 @@ an_interrupt_leaves_nothing(void)
     hs_failure   failure;
     options.cutoff = 1.0;
     for (int i = 0; i < POINTS; i++)
-        x[i] = (double)((i * 7919L) % POINTS);
+        x[i] = (double)(i * INT64_C(7919) % POINTS);
     hs_account_init(&s.account, &options);
     CHECK(hs_scene_init(&s.account, NULL, &points, NULL, &options, &s.scene, &failure) == HS_OK);
     CHECK(hs_grid_init(&s.scene, &s.dense, &failure) == HS_OK);

@@ -88,16 +88,21 @@ axis_is_exact_beyond_the_limit(void)
 static void
 axis_handles_faces_and_extremes(void)
 {
-    static const double lengths[] = {1.0, 3.0, 0.1, 0x1p-900, 0x1.fffffffffffffp+900, 7e22};
-    for (int l = 0; l < 6; l++) {
+    /* Three times the last but one is more than DBL_MAX, which is 2.6 times it. */
+    static const double lengths[] = {1.0, 3.0, 0.1, 0x1p-900, 0x1.fffffffffffffp+900, 7e22,
+                                     DBL_MAX / 2.6, 0x1.23p-1060};
+    for (size_t l = 0; l < sizeof lengths / sizeof lengths[0]; l++) {
         const double length = lengths[l], half = 0.5 * length;
         const double at[] = {0.0,           -0.0,          half,           -half,
                              length,        -length,       1.5 * length,   -1.5 * length,
                              nextafter(half, INFINITY),    nextafter(-half, -INFINITY),
                              nextafter(length, 0.0),       nextafter(1.5 * length, INFINITY),
-                             DBL_MAX,       -DBL_MAX,      0x1p-1074,      -0x1p-1074};
+                             DBL_MAX,       -DBL_MAX,      0x1p-1074,      -0x1p-1074,
+                             7.0 * half,    1234567.8 * half};
         for (size_t e = 0; e < sizeof at / sizeof at[0]; e++) {
             int64_t      turns;
+            if (isinf(at[e]))
+                continue;
             const double inside = hs_wrap_axis(at[e], length, &turns);
             CHECK(is_half_at_most(inside, length));
             if (turns != HS_WRAP_UNKNOWN) {

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shared fixtures: every kernel of this CPU, and a hypothesis profile that never wavers."""
+"""Shared fixtures: every kernel of this CPU, a hypothesis profile that never wavers, and whose
+warnings are errors."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +14,23 @@ settings.register_profile(
     "halfshell", derandomize=True, deadline=None, database=None, max_examples=100
 )
 settings.load_profile("halfshell")
+
+
+def pytest_configure(config):
+    """Show what other packages warn of inside themselves, which changes with their releases.
+
+    All other warnings are errors, as pyproject.toml says: those of our code and of its calls (they
+    count as the caller's), of floating-point arithmetic inside NumPy, and of pytest.
+    """
+    checkout = Path(__file__).resolve().parents[2]
+    files = [path for name in ("tests", "benchmarks") for path in (checkout / name).rglob("*.py")]
+    ours = "|".join(sorted({"halfshell", "__main__", *(path.stem for path in files)}))
+    for line in (
+        rf"default:::(?!({ours})(\.|$))",
+        "error::RuntimeWarning:numpy",
+        "error::pytest.PytestWarning",
+    ):
+        config.addinivalue_line("filterwarnings", line)
 
 
 @pytest.fixture(params=hs.kernels(), scope="session")

@@ -429,6 +429,14 @@ def test_more_images_than_memory_are_refused():
 
 
 def test_inputs_are_left_alone(rng):
-    points = rng.random((40, 3))
-    points.flags.writeable = False
-    hs.nearest(points, 3, queries=points, box=np.ones(3), quantities="jdDS")
+    points = rng.random((40, 3)) * 3.0 - 1.0  # to be wrapped
+    queries, box = points[::2] + 5.0, np.ones(3)
+    before = [a.copy() for a in (points, queries, box)]
+    results = hs.nearest(points, 3, queries=queries, box=box, quantities="jdDS")
+    for array, copy in zip((points, queries, box), before):
+        assert array.tobytes() == copy.tobytes()
+        array.flags.writeable = False
+    again = hs.nearest(points, 3, queries=queries, box=box, quantities="jdDS")
+    for first, found in zip(results, again):
+        assert first.tobytes() == found.tobytes()
+        assert not any(np.shares_memory(found, array) for array in (points, queries, box))

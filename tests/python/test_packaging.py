@@ -16,15 +16,33 @@ from halfshell import _include
 HEADERS = ["halfshell.h", "halfshell_capi.h"]
 
 
+def checkout_files():
+    """Files under version control; without it, as in a source distribution, all that is there."""
+    listed = None
+    if (ROOT / ".git").exists() and shutil.which("git"):
+        command = ["git", "-C", str(ROOT), "ls-files", "-z"]
+        listed = subprocess.run(command, capture_output=True, text=True)
+    if listed is not None and listed.returncode == 0:
+        return {name for name in listed.stdout.split("\0") if (ROOT / name).is_file()}
+    left = {"build", "dist", "__pycache__", "PKG-INFO", "setup.cfg"}
+    names = {path.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file()}
+    return {
+        name.as_posix()
+        for name in names
+        if not left & set(name.parts)
+        and not name.parts[0].startswith((".venv", ".git", ".pytest", ".hyp", ".mypy", ".ruff"))
+        and not any(part.endswith(".egg-info") for part in name.parts)
+        and name.suffix not in {".so", ".o"}
+    }
+
+
 @pytest.fixture
 def copy(tmp_path):
-    """A copy of what a build reads, for builds leave files behind."""
+    """A copy of the checkout, for builds leave files behind."""
     folder = tmp_path / "checkout"
-    leftovers = shutil.ignore_patterns("__pycache__", "*.egg-info", "*.so", "*.o")
-    for name in ("csrc", "python"):
-        shutil.copytree(ROOT / name, folder / name, ignore=leftovers)
-    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, folder / name)
+    for name in checkout_files():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / name, folder / name)
     return folder
 
 
@@ -51,13 +69,17 @@ def test_a_wheel_has_the_headers_and_nothing_else_of_the_core(copy, tmp_path):
     assert (package / "py.typed").exists() and (package / "scenes" / "__init__.py").exists()
 
 
-def test_a_source_distribution_has_the_whole_core(copy, tmp_path):
+def test_a_source_distribution_has_the_whole_checkout(copy, tmp_path):
+    leftover = copy / "tests" / "c" / "build" / "tsan" / "main.c"
+    leftover.parent.mkdir(parents=True)
+    leftover.touch()
     build(copy, "sdist", "--dist-dir", tmp_path / "dist")
     (archive,) = (tmp_path / "dist").glob("*.tar.gz")
     with tarfile.open(archive) as files:
-        names = {name.split("/", 1)[-1] for name in files.getnames()}
-    core = {path.relative_to(ROOT).as_posix() for path in CSRC.rglob("*.[ch]")}
-    assert core <= names
+        names = {one.name.split("/", 1)[-1] for one in files.getmembers() if one.isfile()}
+    made = {name for name in names if name in ("PKG-INFO", "setup.cfg") or ".egg-info/" in name}
+    assert names - made == checkout_files() - {".gitignore"}
+    assert archive.stat().st_size < 3_000_000
 
 
 def test_an_editable_installation_uses_the_checkout(tmp_path, monkeypatch):
