@@ -29,10 +29,12 @@ hs_cells_layout(const hs_cells *cells, hs_layout *layout)
                           .occupied_only = search->is_sparse,
                           .start = search->bins.start,
                           .order = search->bins.order};
+    const hs_fpenv saved = hs_fpenv_enter();
     for (int k = 0; k < grid->ndim; k++) {
         layout->shape[k] = grid->shape[k];
         layout->cell_size[k] = hs_scale_apply(search->scene.unscale, grid->cell_size[k]);
     }
+    hs_fpenv_leave(saved);
 }
 
 /* Index along axis k of a point with coordinate t. */

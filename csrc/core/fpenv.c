@@ -67,7 +67,8 @@ hs_fpenv_met_subnormal(void)
 
 #elif defined(__aarch64__)
 
-/* FPCR holds rounding, flushing and traps, all off when zero; FPSR the flags. Each is 32 bits. */
+/* FPCR holds rounding, flushing and traps, all off when zero; FPSR the flags, which trap nothing.
+ * Each is 32 bits. */
 hs_fpenv
 hs_fpenv_enter(void)
 {
@@ -107,24 +108,20 @@ hs_fpenv_leave(hs_fpenv saved)
 
 #else
 
-#include <fenv.h>
-
 /* Flushing cannot be reached from here; CPUs of this kind start without it. */
 hs_fpenv
 hs_fpenv_enter(void)
 {
-    const hs_fpenv saved = {(uint64_t)(uint32_t)fegetround() |
-                            (uint64_t)(uint32_t)fetestexcept(FE_ALL_EXCEPT) << 32};
-    fesetround(FE_TONEAREST);
+    hs_fpenv saved;
+    (void)feholdexcept(&saved.standard); /* no flag set, and where it can be, no trap */
+    (void)fesetround(FE_TONEAREST);
     return saved;
 }
 
 void
 hs_fpenv_leave(hs_fpenv saved)
 {
-    fesetround((int)(uint32_t)saved.control);
-    feclearexcept(FE_ALL_EXCEPT);
-    feraiseexcept((int)(uint32_t)(saved.control >> 32));
+    (void)fesetenv(&saved.standard);
 }
 
 #endif

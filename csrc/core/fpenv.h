@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * fpenv.h: the floating-point environment that the exact stages need: round to nearest, no
- * flushing of subnormal numbers. Every entry into the core enters it and leaves it.
+ * flushing of subnormal numbers, no trap. Every entry into the core enters it before it touches a
+ * float, and leaves it; threads of a team live in it.
  */
 #ifndef HS_FPENV_H
 #define HS_FPENV_H
@@ -9,8 +10,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#if !defined(__SSE2__) && !defined(_M_X64) && !defined(__aarch64__) && !defined(_M_ARM64)
+#include <fenv.h>
+#define HS_FPENV_STANDARD 1
+#endif
+
 typedef struct hs_fpenv {
-    uint64_t control; /* the control register as it was */
+#if defined(HS_FPENV_STANDARD)
+    fenv_t standard;
+#else
+    uint64_t control; /* the control register as it was, and the flags */
+#endif
 } hs_fpenv;
 
 /* Save the control register, then set the defaults. */

@@ -2,6 +2,7 @@
 /* histogram.c: the public histogram of all pairs, which stores none of them. */
 #include "arguments.h"
 #include "cells.h"
+#include "fpenv.h"
 #include "parallel.h"
 #include "poll.h"
 #include "request.h"
@@ -216,13 +217,10 @@ fill_histogram(void *context, hs_search *search, int64_t *n_pairs, hs_failure *f
 
 /* The sets of points as a histogram wants them. */
 static hs_status
-histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
-             const hs_histogram *histogram, hs_failure *failure)
+fill_sets(const hs_sets *among, const hs_box *box, const hs_options *options,
+          const hs_histogram *histogram, hs_failure *failure)
 {
-    hs_failure   ignored;
-    hs_sets      sets = *among;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
+    hs_sets         sets = *among;
     const hs_status status =
         options != NULL ? check_histogram(histogram, failure) : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
@@ -236,6 +234,20 @@ histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
     const hs_options counting = options_of(histogram, options);
     const hs_request request = {.sets = &sets, .box = box, .options = &counting};
     return hs_request_use(&request, fill_histogram, &filled, failure);
+}
+
+/* Edges are compared before there is a search. */
+static hs_status
+histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
+             const hs_histogram *histogram, hs_failure *failure)
+{
+    hs_failure ignored;
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    const hs_fpenv  saved = hs_fpenv_enter();
+    const hs_status status = fill_sets(among, box, options, histogram, failure);
+    hs_fpenv_leave(saved);
+    return status;
 }
 
 hs_status
