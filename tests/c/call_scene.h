@@ -109,28 +109,4 @@ call_fill_scene(call_scene *s)
                   .n_points = N_OF_CALL};
 }
 
-/* Cells, a list with a step behind it and a stream, from arguments that are good. */
-static inline void
-call_make_objects(call *c)
-{
-    bool rebuilt = false;
-    CHECK(hs_cells_build(c->points, c->box, c->options, &c->cells, NULL) == HS_OK);
-    CHECK(hs_stream_open(c->points, c->box, c->options, c->max_pairs, &c->stream, NULL) == HS_OK);
-    c->list = hs_verlet_new();
-    CHECK(hs_verlet_update(c->list, c->points, c->box, c->options, c->skin, false, &rebuilt,
-                           NULL) == HS_OK);
-    CHECK(rebuilt);
-}
-
-static inline void
-call_free_objects(call *c)
-{
-    hs_stream_free(c->stream);
-    hs_cells_free(c->cells);
-    hs_verlet_free(c->list);
-    c->stream = NULL;
-    c->cells = NULL;
-    c->list = NULL;
-}
-
 #endif

@@ -144,6 +144,35 @@ call_verlet_find(call *c, hs_failure *failure)
     return call_take_pairs(c, status, pairs);
 }
 
+/* What a function works on: those of cells, a stream and a list that it uses, from arguments that
+ * are good. A list has a step behind it, unless the function takes the first one. */
+static inline void
+call_make_objects(call *c, unsigned uses)
+{
+    bool rebuilt;
+    if (uses & USES_CELLS)
+        CHECK(hs_cells_build(c->points, c->box, c->options, &c->cells, NULL) == HS_OK);
+    if (uses & USES_STREAM)
+        CHECK(hs_stream_open(c->points, c->box, c->options, c->max_pairs, &c->stream, NULL) ==
+              HS_OK);
+    if (uses & USES_LIST)
+        c->list = hs_verlet_new();
+    if ((uses & USES_LIST) && !(uses & USES_SKIN))
+        CHECK(hs_verlet_update(c->list, c->points, c->box, c->options, c->skin, false, &rebuilt,
+                               NULL) == HS_OK);
+}
+
+static inline void
+call_free_objects(call *c)
+{
+    hs_stream_free(c->stream);
+    hs_cells_free(c->cells);
+    hs_verlet_free(c->list);
+    c->stream = NULL;
+    c->cells = NULL;
+    c->list = NULL;
+}
+
 #define OF_VERLET \
     (OF_SCENE | USES_OPTIONS | USES_CUTOFF | NEEDS_FINITE | USES_KERNEL | USES_RESULT | USES_LIST)
 

@@ -135,41 +135,12 @@ make_call(const alloc_kind *kind)
                  .systems = &s.systems,
                  .visit = &s.visit,
                  .k = 5,
-                 .max_pairs = 50,
+                 .max_pairs = 500,
                  .skin = 0.25 * s.options.cutoff,
                  .has_result = true,
                  .ndim = 3,
                  .index_bytes = 8,
                  .n_points = kind->n};
-}
-
-/* What the function works on, new for each attempt. */
-static void
-make_objects(unsigned uses)
-{
-    call *c = &s.c;
-    bool  rebuilt;
-    if (uses & USES_CELLS)
-        CHECK(hs_cells_build(c->points, c->box, c->options, &c->cells, NULL) == HS_OK);
-    if (uses & USES_STREAM)
-        CHECK(hs_stream_open(c->points, c->box, c->options, c->max_pairs, &c->stream, NULL) ==
-              HS_OK);
-    if (uses & USES_LIST)
-        c->list = hs_verlet_new();
-    if ((uses & USES_LIST) && !(uses & USES_SKIN)) /* else the call takes the first step */
-        CHECK(hs_verlet_update(c->list, c->points, c->box, c->options, c->skin, false, &rebuilt,
-                               NULL) == HS_OK);
-}
-
-static void
-free_objects(void)
-{
-    hs_stream_free(s.c.stream);
-    hs_cells_free(s.c.cells);
-    hs_verlet_free(s.c.list);
-    s.c.stream = NULL;
-    s.c.cells = NULL;
-    s.c.list = NULL;
 }
 
 /* One call whose nth allocation fails; 0: none. Whether that was asked for at all. */
@@ -178,7 +149,7 @@ attempt(const call_kind *function, int nth, uint64_t expected, int *n_failed)
 {
     const int64_t before = hs_test_live_blocks();
     hs_failure    failure;
-    make_objects(function->uses);
+    call_make_objects(&s.c, function->uses);
     s.c.retries = 1;
     hs_test_fail_allocation(nth);
     hs_status  status = function->run(&s.c, &failure);
@@ -192,7 +163,7 @@ attempt(const call_kind *function, int nth, uint64_t expected, int *n_failed)
         CHECK(status == HS_OK);
     }
     CHECK(nth == 0 || s.c.answer == expected);
-    free_objects();
+    call_free_objects(&s.c);
     CHECK(hs_test_live_blocks() == before);
     return disturbed;
 }
@@ -263,7 +234,7 @@ attempt_step(const alloc_kind *kind, double by, int nth, uint64_t *after, int *n
     const int64_t before = hs_test_live_blocks();
     bool          rebuilt;
     make_call(kind);
-    make_objects(USES_LIST);
+    call_make_objects(&s.c, USES_LIST);
     const uint64_t was = pairs_of_list();
     move_points(kind, by);
     hs_test_fail_allocation(nth);
@@ -281,7 +252,7 @@ attempt_step(const alloc_kind *kind, double by, int nth, uint64_t *after, int *n
     }
     *after = nth == 0 ? pairs_of_list() : *after;
     CHECK(pairs_of_list() == *after && *after != was);
-    free_objects();
+    call_free_objects(&s.c);
     CHECK(hs_test_live_blocks() == before);
     return disturbed;
 }

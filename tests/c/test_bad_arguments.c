@@ -201,7 +201,7 @@ call_spoilt(const call_kind *kind, const fault *spoilt, bool has_failure)
     const bool        notices = (kind->uses & spoilt->needs) == spoilt->needs;
     const hs_status   expected = notices ? spoilt->status : HS_OK;
     call_fill_scene(&s);
-    call_make_objects(&s.c);
+    call_make_objects(&s.c, kind->uses);
     spoilt->spoil(&s);
     memset(&failure, POISON, sizeof failure);
     memset(&s.counters, POISON, sizeof s.counters);
@@ -240,7 +240,7 @@ numbers_that_are_only_large_are_fine(void)
             s.points.row_stride = s.queries.row_stride = strides[t];
             s.first[0] = 0;
             s.first[1] = s.first[2] = s.first[3] = 1;
-            call_make_objects(&s.c);
+            call_make_objects(&s.c, call_kinds[k].uses);
             if (call_kinds[k].run(&s.c, NULL) != HS_OK)
                 complain(&call_kinds[k], "one point", "stride");
             call_free_objects(&s.c);
@@ -248,7 +248,7 @@ numbers_that_are_only_large_are_fine(void)
         call_fill_scene(&s);
         s.options.out = &s.out;
         s.out.capacity = INT64_MAX;
-        call_make_objects(&s.c);
+        call_make_objects(&s.c, call_kinds[k].uses);
         if (call_kinds[k].run(&s.c, NULL) != HS_OK)
             complain(&call_kinds[k], "out", "capacity");
         call_free_objects(&s.c);
@@ -270,7 +270,7 @@ arrays_without_entries_may_be_missing(void)
     static call_scene s;
     hs_pairs         *pairs;
     call_fill_scene(&s);
-    call_make_objects(&s.c);
+    call_make_objects(&s.c, USES_CELLS);
     const hs_points  none = {.ndim = 3};
     const hs_systems empty = {.n = 0};
     CHECK(hs_neighbors_count(&none, NULL, &s.box, &s.options, NULL, NULL) == HS_OK);
@@ -326,7 +326,7 @@ objects_that_are_null_hold_nothing(void)
     hs_cells_free(NULL);
     hs_verlet_free(NULL);
     call_fill_scene(&s);
-    call_make_objects(&s.c);
+    call_make_objects(&s.c, USES_CELLS);
     hs_cells_points(s.c.cells, NULL);
     hs_cells_layout(s.c.cells, NULL);
     hs_cells_indices(s.c.cells, NULL);
