@@ -136,8 +136,8 @@ class NeighborTable(TableRows):
 
         Notes
         -----
-        A table with distances keeps a copy of points, queries and box for this. In a box that
-        repeats, a table without shifts searches for them once more.
+        For this a table with distances keeps a copy of points, queries and box. One without shifts
+        searches for them once more if the box repeats.
 
         Examples
         --------
@@ -148,13 +148,7 @@ class NeighborTable(TableRows):
         """
         _inputs.as_choice(by, "by", ("distance",))
         order = _table_forms.order_by_distance(self.offsets, self.distances)
-        self._column("j")
-        if self._origin is None:
-            raise AttributeError(
-                "this table does not know its points: sort one that neighbors or CellList has made"
-            )
-        order = self._settled(order, self._origin)
-        return self._with(self.offsets, order, self._is_complete, False)
+        return self._with(self.offsets, self._settled(order), self._is_complete, False)
 
     # ---- other forms -----------------------------------------------------------------------
 
@@ -311,7 +305,7 @@ class NeighborTable(TableRows):
 
         Notes
         -----
-        D and S of the table point from i to j, the other way round, against the edges:
+        D and S point against the edges, from i to j:
         ``points[edge_index[0]] - points[edge_index[1]] + S @ box == D``.
 
         Examples

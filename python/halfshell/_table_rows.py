@@ -214,14 +214,18 @@ class TableRows:
             return np.arange(before, before + self.n_entries)[entries]
         return self._entries[entries]
 
-    def _settled(self, order: Array, origin: Origin) -> Array:
+    def _settled(self, order: Array) -> Array:
         """These entries, sorted by row and rounded distance, in exact order."""
-        shifts = None
+        indices, origin, shifts = self.indices, self._origin, None
+        if origin is None:
+            raise AttributeError(
+                "this table does not know its points: sort one that neighbors or CellList has made"
+            )
         if origin.has_images:
             shifts = origin.shifts()[self._entries] if self._lacks_shifts() else self.shifts
         rows = np.repeat(np.arange(len(self)) + self._first_row, self.counts)
         settle(
-            order, rows, self.indices, self.distances, shifts, origin.points, origin.asking,
+            order, rows, indices, self.distances, shifts, origin.points, origin.asking,
             origin.rows,
         )
         return order

@@ -6,6 +6,7 @@ import io
 import math
 import re
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +14,10 @@ import halfshell as hs
 from halfshell._peers import LIBRARIES
 from halfshell._report import figures, html, table, words
 from halfshell._report.facts import machine_facts
+from halfshell._report.rows import read_csv
 from report_helpers import bare, parse, row
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -119,3 +123,40 @@ def test_figures_are_the_same_bytes_each_time(rows):
 
 def test_every_method_has_a_mark():
     assert set(figures.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
+
+
+# Geometry ----------------------------------------------------------------------------------
+
+
+def outside(figure):
+    """How far what is drawn reaches beyond the picture, in inches."""
+    agg = pytest.importorskip("matplotlib.backends.backend_agg")
+    with figures._rules():
+        canvas = agg.FigureCanvasAgg(figure)
+        canvas.draw()
+        drawn, page = figure.get_tightbbox(canvas.get_renderer()), figure.bbox_inches
+    return max(-drawn.x0, -drawn.y0, drawn.x1 - page.x1, drawn.y1 - page.y1)
+
+
+@pytest.mark.parametrize("n", range(1, len(figures.LOOKS) + 1))
+def test_the_key_is_whole_for_any_methods(n):
+    ours = {"exact", "double", "single", "float32"}
+    for names in (list(figures.LOOKS)[:n], list(figures.LOOKS)[-n:]):
+        shown = [row(name, "halfshell" if name in ours else "peer") for name in names]
+        figure = figures.key_figure(shown)
+        (legend,) = figure.legends
+        assert len(legend.get_texts()) == n
+        extent = legend.get_window_extent()
+        assert extent.x0 >= 0.02 * figure.bbox.width and extent.x1 <= 0.98 * figure.bbox.width
+        assert extent.y0 >= 0.0 and extent.y1 <= figure.bbox.height
+        assert figure.bbox.width == pytest.approx(7.6 * figure.dpi)
+
+
+def test_no_figure_of_the_committed_report_is_cut():
+    with (ROOT / "docs" / "report" / "report.csv").open(newline="", encoding="utf-8") as stream:
+        rows = read_csv(stream)[1]
+    made = [figures.key_figure(rows), figures.map_figure(rows), figures.cost_figure(rows),
+            figures.drift_figure(rows)]  # fmt: skip
+    for name in list(dict.fromkeys(one.scene for one in rows))[::8]:
+        made.append(figures.scene_figure([one for one in rows if one.scene == name]))
+    assert all(outside(figure) < 1e-6 for figure in made if figure is not None)

@@ -76,16 +76,27 @@ def _smaller(svg: str) -> str:
     return re.sub(r">\s+<", "><", svg).strip()
 
 
+_KEY_WIDTH = 7.6  # inches
+_KEY_FILLED = 0.95  # of it at most: letters of a browser may be a little wider
+
+
 def key_figure(rows: Sequence[ReportRow]) -> Any:
     """Say which mark is which method, once for all scenes."""
     with _rules():
-        figure = _figure(7.6, 0.55)
+        figure = _figure(_KEY_WIDTH, 1.0, layout=None)
         shown = [name for name in reversed(LOOKS) if name in methods_of(rows, "halfshell", "peer")]
         marks = [_mark(name) for name in shown]
         names = [f"precision {name}" if name in ("exact", "double", "single") else
                  "float32 input" if name == "float32" else name for name in shown]  # fmt: skip
-        figure.legend(marks, names, loc="center", ncols=7, frameon=False, handletextpad=0.2)
-    return figure
+        for columns in range(7, 0, -1):  # as many as fit
+            legend = figure.legend(marks, names, loc="center", ncols=columns, frameon=False,
+                                   handletextpad=0.2)  # fmt: skip
+            extent = legend.get_window_extent()
+            if columns == 1 or extent.width <= _KEY_FILLED * figure.bbox.width:
+                figure.set_figheight(extent.height / figure.dpi + 0.1)
+                return figure
+            legend.remove()
+    raise AssertionError("one column is always taken")
 
 
 def _mark(name: str) -> Any:
