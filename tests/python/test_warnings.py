@@ -33,8 +33,8 @@ def test_warnings_inside_other_packages_are_shown(module, category):
 
 
 def test_floating_point_warnings_inside_numpy_are_errors():
-    with pytest.raises(RuntimeWarning, match="overflow"):
-        np.linalg.norm([1e200, 1e200])
+    with pytest.raises(RuntimeWarning, match="a change"):
+        warn_in("numpy._core._methods", RuntimeWarning)
 
 
 def test_what_we_call_wrongly_is_an_error():
