@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* One line per test file: MODULE(name) for test_<name>.c. */
 MODULE(exact)
+MODULE(exact_hair)
 MODULE(doubleword)
 MODULE(measure)
 MODULE(filter)
@@ -38,6 +39,10 @@ MODULE(near_search)
 MODULE(precision)
 MODULE(frame)
 MODULE(candidates)
+MODULE(skew)
+MODULE(order)
+MODULE(tree)
+MODULE(stencil)
 MODULE(parallel)
 MODULE(results)
 MODULE(output)

@@ -110,8 +110,10 @@ many_images_can_be_stopped(void)
     CHECK(wrong == 0 && nearer <= 29999 && nearer > 29900);
     hs_pairs_free(rows);
     CHECK(stop_everywhere(&scene, &query, 30000, 8) > 8);
-    x[3] = 400.0; /* the box is upright, but the query is far along its open axis */
+    x[3] = 6000.0; /* far along the open axis of the box: many images are about as near */
     box.periodic[0] = false;
+    CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
+    box.rows[1][0] = 0.5; /* which is not upright any more */
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
 }
 
@@ -227,6 +229,110 @@ clusters_of_all_sizes(void)
     }
 }
 
+/* Clusters in a box so long that what wrapping rounds is a good part of their size: a radius that
+ * should suffice may turn out too small, and floats tell nothing. */
+static void
+clusters_that_rounding_blurs(void)
+{
+    enum { N = 90 };
+    static double  x[2 * N];
+    harness_random random = {13};
+    for (int trial = 0; trial < 120; trial++) {
+        const int   exponent = 20 + 10 * (trial % 3), fine = exponent - 53 + trial / 3 % 16;
+        const double side = ldexp(1.0, exponent), step = ldexp(1.0, fine);
+        hs_box      box = {.ndim = 2,
+                           .periodic = {true, true},
+                           .rows = {{side, 0.0}, {0.375 * side, 0.875 * side}}};
+        brute_scene scene = {.ndim = 2, .n = N, .x = x, .box = &box, .cutoff = 40.0 * step};
+        for (int i = 0; i < N; i++) {
+            for (int k = 0; k < 2; k++) {
+                x[2 * i + k] = 0.3 * side * (i % 3) + step * 20.0 * random_unit(&random);
+                x[2 * i + k] += random_below(&random, 3) * box.rows[k][k];
+            }
+        }
+        CHECK(compare_rows(&scene, trial % 4 ? -1 : 30, 1 + random_below(&random, 12), 1) > 0);
+    }
+}
+
+/* A hundred thousand points of the lattice of whole numbers, whose nearest are known. */
+static void
+many_points_on_a_lattice(void)
+{
+    enum { SIDE = 45, N = SIDE * SIDE * SIDE, K = 6 };
+    double    *x = array_of(3 * N, sizeof *x);
+    int64_t    wrong = 0;
+    hs_options options = hs_options_default();
+    hs_pairs  *rows = NULL;
+    for (int i = 0; i < N; i++) {
+        x[3 * i] = i % SIDE;
+        x[3 * i + 1] = i / SIDE % SIDE;
+        x[3 * i + 2] = i / SIDE / SIDE;
+    }
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    options.threads = 2;
+    CHECK(hs_nearest_find(&points, NULL, NULL, K, &options, &rows, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
+    for (int64_t i = 0; i < N; i++) {
+        const int steps[] = {-SIDE * SIDE, -SIDE, -1, 1, SIDE, SIDE * SIDE};
+        int       n = 0;
+        for (int s = 0; s < 6; s++) {
+            const int k = s < 3 ? 2 - s : s - 3;
+            const double to = x[3 * i + k] + (s < 3 ? -1.0 : 1.0);
+            if (to >= 0.0 && to < SIDE) {
+                wrong += j[K * i + n] != i + steps[s] || d[K * i + n] != 1.0;
+                n++;
+            }
+        }
+        for (; n < K; n++)
+            wrong += d[K * i + n] != sqrt(2.0) || (d[K * i + n - 1] > 1.0 && j[K * i + n] <= j[K * i + n - 1]);
+    }
+    CHECK(wrong == 0);
+    hs_pairs_free(rows);
+    free(x);
+}
+
+/* Many dimensions, where each group needs nearly all leaves; and one leaf alone. */
+static void
+many_leaves_and_few(void)
+{
+    enum { N = 24000, D = 6 };
+    double        *x = array_of(D * N, sizeof *x);
+    harness_random random = {14};
+    int64_t        wrong = 0;
+    hs_options     options = hs_options_default();
+    hs_pairs      *rows = NULL;
+    for (int e = 0; e < D * N; e++)
+        x[e] = random_unit(&random);
+    for (int few = 0; few < 2; few++) {
+        const hs_points points = {x, few ? 5 : N, D, HS_FLOAT64, 8 * D, 8};
+        const hs_points queries = {x, few ? 3000 : 700, D, HS_FLOAT64, 8 * D, 8};
+        options.cutoff = INFINITY;
+        options.want = HS_WANT_J | HS_WANT_DISTANCE;
+        CHECK(hs_nearest_find(&points, &queries, NULL, 2, &options, &rows, NULL) == HS_OK);
+        const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+        for (int64_t i = 0; i < queries.n; i += few ? 37 : 23) {
+            double  least = INFINITY; /* of all but the point itself */
+            int64_t nearest = -1;
+            for (int64_t q = 0; q < points.n; q++) {
+                double square = 0.0;
+                for (int k = 0; k < D; k++)
+                    square += (x[D * q + k] - x[D * i + k]) * (x[D * q + k] - x[D * i + k]);
+                if (q != i && square < least) {
+                    least = square;
+                    nearest = q;
+                }
+            }
+            wrong += i < points.n ? j[2 * i] != i || j[2 * i + 1] != nearest : j[2 * i] != nearest;
+        }
+        hs_pairs_free(rows);
+    }
+    CHECK(wrong == 0);
+    free(x);
+}
+
 void
 test_near_search(void)
 {
@@ -237,4 +343,7 @@ test_near_search(void)
     RUN(too_many_images_are_refused);
     RUN(too_many_neighbours_are_refused);
     RUN(clusters_of_all_sizes);
+    RUN(clusters_that_rounding_blurs);
+    RUN(many_points_on_a_lattice);
+    RUN(many_leaves_and_few);
 }

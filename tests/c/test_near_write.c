@@ -101,6 +101,63 @@ columns_of_extreme_scenes(void)
     }
 }
 
+/* Numbers so large that scaling them down loses the digits of others, which decide. */
+static void
+columns_of_scenes_that_lose_digits(void)
+{
+    harness_random random = {78};
+    double         x[2 * 24];
+    for (int trial = 0; trial < 24; trial++) {
+        brute_scene scene = {.ndim = 2, .n = 24, .x = x, .inclusive = true};
+        scene.cutoff = trial % 3 == 0 ? 0x1p1010 : trial % 3 == 1 ? 1.0 : 0x1p-1040;
+        for (int e = 0; e < 2 * 24; e++) {
+            const int exponents[] = {1009, -1050, -1, -1060};
+            x[e] = ldexp(random_unit(&random) - 0.5, exponents[random_below(&random, 4)]);
+            if (random_below(&random, 3) == 0)
+                x[e] = trial % 2 ? 0x1p1009 : 0.0;
+        }
+        check_columns(&scene, NULL, 7, trial % 4 ? scene.cutoff : INFINITY);
+        CHECK(compare_rows(&scene, trial % 5 ? -1 : 8, 7, 1) > 0);
+    }
+}
+
+/* A tiny box, its points and its distances are those of an ordinary one, scaled. */
+static void
+tiny_boxes_are_scaled_ones(void)
+{
+    harness_random random = {79};
+    double         x[2][3 * 20];
+    for (int trial = 0; trial < 12; trial++) {
+        const int exponent = -300 - 60 * trial, d = 3, n = 20;
+        hs_pairs *rows[2];
+        for (int tiny = 0; tiny < 2; tiny++) {
+            hs_box box = {.ndim = d, .periodic = {true, true, trial % 2}};
+            for (int k = 0; k < d; k++)
+                box.rows[k][k] = ldexp(1.0, tiny ? exponent : 0);
+            box.rows[1][0] = trial % 3 ? 0.25 * box.rows[0][0] : 0.0;
+            for (int e = 0; e < d * n; e++)
+                x[tiny][e] = tiny ? ldexp(x[0][e], exponent)
+                                  : 0x1p-20 * random_below(&random, 1 << 21);
+            brute_scene     scene = {.ndim = d, .n = n, .x = x[tiny], .box = &box};
+            const hs_points points = points_of(&scene);
+            hs_options      options = options_of(&scene);
+            options.cutoff = INFINITY;
+            options.want = WANT_ALL & ~HS_WANT_I;
+            CHECK(hs_nearest_find(&points, NULL, &box, 30, &options, &rows[tiny], NULL) == HS_OK);
+        }
+        CHECK(same_array(rows[0], rows[1], HS_WANT_J, 8));
+        CHECK(same_array(rows[0], rows[1], HS_WANT_SHIFT, 12));
+        const double *a = hs_pairs_array(rows[0], HS_WANT_DISTANCE);
+        const double *b = hs_pairs_array(rows[1], HS_WANT_DISTANCE);
+        bool          scaled = true;
+        for (int64_t e = 0; e < 30 * n; e++)
+            scaled = scaled && ldexp(a[e], exponent) == b[e];
+        CHECK(scaled);
+        hs_pairs_free(rows[0]);
+        hs_pairs_free(rows[1]);
+    }
+}
+
 /* Points in their box: nothing is turned, and the shifts are those of images. */
 static void
 images_have_their_shifts(void)
@@ -166,6 +223,8 @@ test_near_write(void)
 {
     RUN(each_column_alone_is_the_same);
     RUN(columns_of_extreme_scenes);
+    RUN(columns_of_scenes_that_lose_digits);
+    RUN(tiny_boxes_are_scaled_ones);
     RUN(images_have_their_shifts);
     RUN(shifts_may_be_too_large);
 }

@@ -128,6 +128,38 @@ double_names_the_farthest(void)
     CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_OK && count == 3);
 }
 
+/* Whole numbers: in each neighbourhood hundreds of pairs are exactly as far as the cutoff. */
+static void
+many_ties_are_decided(void)
+{
+    enum { SIDE = 14, N = SIDE * SIDE * SIDE };
+    static double x[3 * N];
+    hs_box        box = {.ndim = 3,
+                         .periodic = {true, true, true},
+                         .rows = {{SIDE, 0, 0}, {0, SIDE, 0}, {0, 0, SIDE}}};
+    for (int i = 0; i < N; i++) {
+        x[3 * i] = i % SIDE;
+        x[3 * i + 1] = i / SIDE % SIDE;
+        x[3 * i + 2] = i / SIDE / SIDE;
+    }
+    brute_scene     scene = {.ndim = 3, .n = N, .x = x, .box = &box, .cutoff = 5.0};
+    const hs_points points = points_of(&scene);
+    for (int trial = 0; trial < 8; trial++) {
+        hs_options options = options_of(&scene);
+        int64_t    count = -1, expected = 0;
+        box.rows[1][0] = trial & 2 ? SIDE : 0.0; /* an equivalent box, one that is reduced */
+        options.inclusive = trial & 1;
+        options.precision = trial & 4 ? HS_DOUBLE : HS_EXACT;
+        for (int c = 0; c < 11 * 11 * 11; c++) {
+            const int a = c % 11 - 5, b = c / 11 % 11 - 5, e = c / 121 - 5;
+            const int square = a * a + b * b + e * e;
+            expected += square > 0 && square < 25 + options.inclusive;
+        }
+        CHECK(hs_pairs_count(&points, &box, &options, &count, NULL) == HS_OK);
+        CHECK(count == expected / 2 * N);
+    }
+}
+
 void
 test_precision(void)
 {
@@ -135,4 +167,5 @@ test_precision(void)
     RUN(single_does_not_flush);
     RUN(cutoff_zero_and_ends_of_the_range);
     RUN(double_names_the_farthest);
+    RUN(many_ties_are_decided);
 }
