@@ -279,6 +279,74 @@ points_of_any_type_and_number(void)
     CHECK(cells == NULL && failure.value == 0x1p31);
 }
 
+/* Cells whose scale would round the queries, or that had to round their own points: as a search of
+ * its own. */
+static void
+scales_that_do_not_serve(void)
+{
+    harness_random random = {11};
+    double         x[40], y[40];
+    for (int trial = 0; trial < 60; trial++) {
+        const int   scale = trial % 3 ? 1000 : 600, other = trial % 2 ? -1060 : -600;
+        brute_scene scene = {.ndim = 2, .n = 20, .x = x, .cutoff = ldexp(1.0, scale)};
+        brute_scene asking = {.ndim = 2, .n = 20, .x = y};
+        hs_cells   *cells = NULL;
+        for (int e = 0; e < 40; e++) {
+            const bool large = trial % 5 || random_below(&random, 2);
+            x[e] = ldexp(random_unit(&random), large ? scale + 1 : other);
+            y[e] = ldexp(random_unit(&random), e % 3 ? other : scale);
+        }
+        const hs_points points = points_of(&scene), queries = points_of(&asking);
+        hs_options      options = options_of(&scene);
+        CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+        options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR;
+        for (int call = 0; call < 4; call++) {
+            hs_pairs *kept = NULL, *fresh = NULL;
+            int64_t   expected = 0;
+            options.cutoff = ldexp(1.0, call & 1 ? scale : other);
+            const hs_points *from = call & 2 ? &queries : NULL;
+            CHECK(hs_cells_neighbors(cells, from, &options, &kept, NULL) == HS_OK);
+            CHECK(hs_neighbors_find(&points, from, NULL, &options, &fresh, NULL) == HS_OK);
+            CHECK(same_array(kept, fresh, HS_WANT_J, 8));
+            CHECK(same_array(kept, fresh, HS_WANT_DISTANCE, 8));
+            CHECK(same_array(kept, fresh, HS_WANT_VECTOR, 16));
+            for (int i = 0; i < 20; i++) {
+                for (int j = 0; j < 20; j++) {
+                    brute_rows     none = {.m = 0};
+                    const int64_t  still[HS_MAX_DIM] = {0};
+                    brute_scene    at = {.ndim = 2, .cutoff = options.cutoff};
+                    const double  *p = (from != NULL ? y : x) + 2 * i;
+                    expected += (from != NULL || i != j) &&
+                                brute_sign(&at, &none, p, x + 2 * j, still) <= 0;
+                }
+            }
+            CHECK(hs_pairs_length(fresh) == expected);
+            hs_pairs_free(kept);
+            hs_pairs_free(fresh);
+        }
+        hs_cells_free(cells);
+    }
+}
+
+/* Cells that were made for cutoff 0 answer it, again and again. */
+static void
+cells_for_equal_points(void)
+{
+    double     x[50];
+    hs_options options = hs_options_default();
+    hs_cells  *cells = NULL;
+    int64_t    count = -1;
+    for (int i = 0; i < 50; i++)
+        x[i] = i % 10;
+    const hs_points points = {x, 50, 1, HS_FLOAT64, 8, 8};
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 100);
+    CHECK(hs_cells_count(cells, &points, &options, &count, NULL) == HS_OK && count == 250);
+    options.cutoff = 1.0;
+    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 325);
+    hs_cells_free(cells);
+}
+
 void
 test_candidates(void)
 {
@@ -288,4 +356,6 @@ test_candidates(void)
     RUN(ranges_that_are_refused);
     RUN(failures_leave_nothing_behind);
     RUN(points_of_any_type_and_number);
+    RUN(scales_that_do_not_serve);
+    RUN(cells_for_equal_points);
 }

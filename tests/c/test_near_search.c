@@ -333,6 +333,26 @@ many_leaves_and_few(void)
     free(x);
 }
 
+/* Boxes so long that a ball as large as the density says holds thousands of images of few points. */
+static void
+long_boxes_have_many_images(void)
+{
+    static double  x[3 * 120];
+    harness_random random = {15};
+    for (int e = 0; e < 3 * 120; e++)
+        x[e] = random_unit(&random);
+    for (int trial = 0; trial < 12; trial++) {
+        hs_box      box = {.ndim = 3, .periodic = {true, true, true}};
+        brute_scene scene = {.ndim = 3, .n = trial % 2 ? 2 : 120, .x = x, .box = &box};
+        scene.cutoff = trial % 2 ? 3.0 : 0.75;
+        box.rows[0][0] = box.rows[1][1] = 1.0;
+        box.rows[2][2] = trial % 4 < 2 ? 1e6 : 1e15;
+        box.rows[1][0] = trial % 3 ? 0.25 : 0.0;
+        CHECK(compare_rows(&scene, -1, 10, 1) > 0);
+        CHECK(compare_rows(&scene, scene.n / 2, 10, 1) > 0);
+    }
+}
+
 void
 test_near_search(void)
 {
@@ -346,4 +366,5 @@ test_near_search(void)
     RUN(clusters_that_rounding_blurs);
     RUN(many_points_on_a_lattice);
     RUN(many_leaves_and_few);
+    RUN(long_boxes_have_many_images);
 }

@@ -164,6 +164,56 @@ far_points_pass_the_range(void)
     }
 }
 
+/* Each is within a unit in the last place of the same number. */
+static bool
+same_distances(const hs_pairs *a, const hs_pairs *b)
+{
+    const double *one = hs_pairs_array(a, HS_WANT_DISTANCE);
+    const double *other = hs_pairs_array(b, HS_WANT_DISTANCE);
+    bool          same = hs_pairs_length(a) == hs_pairs_length(b);
+    for (int64_t e = 0; same && e < hs_pairs_length(a); e++)
+        same = one[e] == other[e] ||
+               fabs(one[e] - other[e]) <= 2.0 * (nextafter(one[e], INFINITY) - one[e]);
+    return same;
+}
+
+/* Shifts beyond 2^53, which batch kernels do not take: points that are so many vectors apart. */
+static void
+shifts_beyond_float64(void)
+{
+    enum { MANY = 60 };
+    harness_random random = {7};
+    double         x[2 * MANY];
+    for (int trial = 0; trial < 12; trial++) {
+        const double    tilt = 0.125, times = trial % 2 ? 0x1p49 : -0x1p49;
+        const hs_box    box = skewed(times, tilt), upright = skewed(0.0, tilt);
+        brute_scene     scene = {.ndim = 2, .n = MANY, .x = x, .box = &box, .inclusive = true};
+        const hs_points points = points_of(&scene);
+        scene.cutoff = trial % 3 ? 1.25 : 0.25;
+        for (int i = 0; i < MANY; i++) {
+            x[2 * i] = 0.25 * random_below(&random, 8);
+            x[2 * i + 1] = 0.25 * random_below(&random, 8) + 1000.0 * (i % 3 - 1);
+        }
+        for (int full = 0; full < 2; full++) {
+            hs_options options = options_of(&scene);
+            hs_pairs  *skew = NULL, *expected = NULL;
+            options.want = HS_WANT_J | HS_WANT_DISTANCE;
+            for (int of = 0; of < 2; of++) {
+                const hs_box *in = of ? &box : &upright;
+                hs_pairs    **rows = of ? &skew : &expected;
+                const hs_status status =
+                    full ? hs_neighbors_find(&points, NULL, in, &options, rows, NULL)
+                         : hs_nearest_find(&points, NULL, in, 25, &options, rows, NULL);
+                CHECK(status == HS_OK);
+            }
+            CHECK(same_array(skew, expected, HS_WANT_J, 8));
+            CHECK(same_distances(skew, expected));
+            hs_pairs_free(skew);
+            hs_pairs_free(expected);
+        }
+    }
+}
+
 /* Each point is within the range, and their difference is not. */
 static void
 differences_pass_the_range(void)
@@ -235,6 +285,7 @@ test_skew(void)
 {
     RUN(equivalent_boxes_have_the_same_pairs);
     RUN(far_points_pass_the_range);
+    RUN(shifts_beyond_float64);
     RUN(differences_pass_the_range);
     RUN(nearly_flat_boxes);
 }
