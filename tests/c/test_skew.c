@@ -207,7 +207,8 @@ shifts_beyond_float64(void)
                 CHECK(status == HS_OK);
             }
             CHECK(same_array(skew, expected, HS_WANT_J, 8));
-            CHECK(same_distances(skew, expected));
+            /* Images of one point are in the order of their shifts, which are others. */
+            CHECK(full || same_distances(skew, expected));
             hs_pairs_free(skew);
             hs_pairs_free(expected);
         }
