@@ -258,6 +258,33 @@ failures_leave_nothing_behind(void)
     hs_cells_free(cells);
 }
 
+/* Less memory than the ranges need, step by step: refused, or the same ranges. */
+static void
+memory_limits_are_kept(void)
+{
+    static double  x[2 * SPARSE_POINTS];
+    harness_random random = {12};
+    hs_layout      layout;
+    brute_scene    scene = {.ndim = 2, .n = SPARSE_POINTS, .x = x, .cutoff = 0.4};
+    hs_pairs      *ranges = NULL;
+    int            refused = 0;
+    make_sparse(&random, 2, x);
+    hs_cells  *cells = build(&scene, &layout);
+    hs_options options = options_of(&scene);
+    CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, NULL) == HS_OK);
+    const int64_t n = hs_pairs_length(ranges);
+    hs_pairs_free(ranges);
+    for (double limit = 1.0; limit < 1e8; limit *= 1.3) {
+        options.memory_limit = limit;
+        const hs_status status = hs_cells_candidates(cells, NULL, &options, &ranges, NULL);
+        CHECK(status == HS_OK ? hs_pairs_length(ranges) == n : status == HS_ERR_MEMORY);
+        refused += status == HS_ERR_MEMORY;
+        hs_pairs_free(ranges);
+    }
+    CHECK(refused > 10 && refused < 65);
+    hs_cells_free(cells);
+}
+
 /* float32 points, and so many that no memory could hold them: only one number is there. */
 static void
 points_of_any_type_and_number(void)
@@ -355,6 +382,7 @@ test_candidates(void)
     RUN(ranges_of_occupied_cells);
     RUN(ranges_that_are_refused);
     RUN(failures_leave_nothing_behind);
+    RUN(memory_limits_are_kept);
     RUN(points_of_any_type_and_number);
     RUN(scales_that_do_not_serve);
     RUN(cells_for_equal_points);

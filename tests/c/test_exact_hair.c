@@ -49,6 +49,36 @@ hairs_beside_the_cutoff(void)
     CHECK(signs[0] > 100 && signs[1] > 10 && signs[2] > 100);
 }
 
+/* (1 + 2^-52)^2 = 1^2 + (2^-26)^2 + (2^-26)^2 + (2^-52)^2: less than that by so little that only the
+ * hair, or nothing but integers, can tell. */
+static void
+sums_a_little_below_the_cutoff(void)
+{
+    const double fourths[] = {0.0,
+                              0x1p-52,
+                              0x1p-52 * (1.0 - 0x1p-20),
+                              0x1p-52 * (1.0 - 0x1p-40),
+                              0x1p-52 * (1.0 + 0x1p-40),
+                              0x1p-53};
+    const double fifths[] = {0.0, 5e-324, 0x1p-600, 0x1p-540, 0x1p-120, 0x1p-70};
+    const double cutoff = 1.0 + 0x1p-52;
+    hs_stages    stages = {0};
+    int          wrong = 0;
+    for (int trial = 0; trial < 72; trial++) {
+        static const double rows[8][8];
+        const double p[5] = {0.0};
+        const double q[5] = {1.0, 0x1p-26, -0x1p-26, fourths[trial / 2 % 6], fifths[trial / 12]};
+        const big    r = big_from_double(cutoff);
+        const int    sign =
+            big_compare(big_square(5, 0, rows, p, q, (const int64_t[8]){0}), big_product(r, r));
+        hs_metric metric;
+        hs_metric_init(&metric, 5, 0, NULL, cutoff, trial & 1);
+        wrong += hs_metric_within(&metric, p, q, NULL, &stages) !=
+                 (sign < 0 || (sign == 0 && (trial & 1)));
+    }
+    CHECK(wrong == 0);
+}
+
 /* The fixed formula of precision="double", with and without rows. */
 static void
 double_takes_one_comparison(void)
@@ -60,6 +90,7 @@ double_takes_one_comparison(void)
     for (int inclusive = 0; inclusive < 2; inclusive++) {
         hs_metric_init(&open, 2, 0, NULL, 5.0, inclusive);
         CHECK(hs_metric_within_double(&open, p, q, NULL) == inclusive);
+        CHECK(hs_metric_within_double(&open, p, q, back) == inclusive);
         hs_metric_init(&periodic, 2, 2, rows, 5.0, inclusive);
         CHECK(hs_metric_within_double(&periodic, p, q, NULL) == inclusive);
         CHECK(hs_metric_within_double(&periodic, p, q, back));
@@ -70,5 +101,6 @@ void
 test_exact_hair(void)
 {
     RUN(hairs_beside_the_cutoff);
+    RUN(sums_a_little_below_the_cutoff);
     RUN(double_takes_one_comparison);
 }

@@ -229,6 +229,29 @@ clusters_of_all_sizes(void)
     }
 }
 
+/* Where all that are wanted are within the cutoff, rows are the same without one. */
+static void
+check_unlimited(const brute_scene *scene, int64_t k)
+{
+    const hs_points points = points_of(scene);
+    hs_options      options = options_of(scene);
+    hs_pairs       *limited = NULL, *unlimited = NULL;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
+    CHECK(hs_nearest_find(&points, NULL, scene->box, k, &options, &limited, NULL) == HS_OK);
+    options.cutoff = INFINITY;
+    CHECK(hs_nearest_find(&points, NULL, scene->box, k, &options, &unlimited, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(limited, HS_WANT_J), *of = hs_pairs_array(unlimited, HS_WANT_J);
+    const double  *d = hs_pairs_array(limited, HS_WANT_DISTANCE);
+    const double  *without = hs_pairs_array(unlimited, HS_WANT_DISTANCE);
+    int64_t        wrong = 0;
+    for (int64_t e = 0; e < hs_pairs_length(limited); e++)
+        wrong += j[e] >= 0 ? j[e] != of[e] || d[e] != without[e]
+                           : of[e] >= 0 && without[e] <= scene->cutoff;
+    CHECK(wrong == 0);
+    hs_pairs_free(limited);
+    hs_pairs_free(unlimited);
+}
+
 /* Clusters in a box so long that what wrapping rounds is a good part of their size: a radius that
  * should suffice may turn out too small, and floats tell nothing. */
 static void
@@ -251,6 +274,7 @@ clusters_that_rounding_blurs(void)
             }
         }
         CHECK(compare_rows(&scene, trial % 4 ? -1 : 30, 1 + random_below(&random, 12), 1) > 0);
+        check_unlimited(&scene, 5);
     }
 }
 
@@ -350,6 +374,7 @@ long_boxes_have_many_images(void)
         box.rows[1][0] = trial % 3 ? 0.25 : 0.0;
         CHECK(compare_rows(&scene, -1, 10, 1) > 0);
         CHECK(compare_rows(&scene, scene.n / 2, 10, 1) > 0);
+        check_unlimited(&scene, 10);
     }
 }
 

@@ -7,6 +7,8 @@
 #include "../../csrc/core/memory.h"
 #include "harness.h"
 
+#include <math.h>
+
 void test_order(void);
 
 enum { MOST = 3000, RUNS = 40, D = 2 };
@@ -168,10 +170,23 @@ whichever_allocation_fails_nothing_is_left(void)
     CHECK(ended && nth == 6);
 }
 
+/* Sizes that no block of a search has. */
+static void
+blocks_at_the_ends_of_the_range(void)
+{
+    hs_group group = {.largest = UINT32_C(0x7f800000)};
+    CHECK(hs_group_extent(&group) == INFINITY);
+    group.largest = 0;
+    CHECK(hs_group_extent(&group) == 0.0);
+    CHECK(hs_block_most_hits(INT32_MAX) == INT32_MAX);
+    CHECK(hs_block_most_hits(1000) >= 1000);
+}
+
 void
 test_order(void)
 {
     RUN(blocks_are_sorted_by_number_and_shift);
     RUN(shifts_may_pass_their_range);
+    RUN(blocks_at_the_ends_of_the_range);
     RUN(whichever_allocation_fails_nothing_is_left);
 }

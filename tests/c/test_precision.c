@@ -124,6 +124,10 @@ double_names_the_farthest(void)
     q[2] = 1.0;
     CHECK(hs_between_count(&points, &queries, &box, &options, &count, &failure) == HS_ERR_ROUNDING);
     CHECK(failure.row == 1 && !failure.in_queries);
+    x[0] = 0x1p60; /* as far as the next two: the first is named */
+    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(failure.row == 0);
+    x[0] = 0.5;
     options.precision = HS_EXACT;
     CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_OK && count == 3);
 }

@@ -80,6 +80,11 @@ too_many_rows_are_refused(void)
     CHECK(count_images(0.0, 1e5, &options, &count) == HS_ERR_MEMORY);
     CHECK(count_images(0.375, 1e5, &options, &count) == HS_ERR_MEMORY);
     CHECK(count_images(0.0, 1e300, &options, &count) == HS_ERR_MEMORY);
+    for (int exponent = 25; exponent < 900; exponent += 25) {
+        const hs_status expected = exponent == 25 ? HS_ERR_TOO_MANY : HS_ERR_MEMORY;
+        CHECK(count_images(0.0, ldexp(1.0, exponent), &options, &count) == expected);
+        CHECK(count_images(0.375, ldexp(1.0, exponent), &options, &count) == expected);
+    }
     options.memory_limit = 2e5;
     CHECK(count_images(0.0, 200.0, &options, &count) == HS_ERR_MEMORY);
     CHECK(count_images(0.375, 200.0, &options, &count) == HS_ERR_MEMORY);
