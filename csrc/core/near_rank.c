@@ -12,10 +12,8 @@
 void
 hs_near_ranker_free(hs_near_ranker *ranker)
 {
-    if (ranker->near != NULL) {
-        hs_shared_release(ranker->near->shared, (void **)&ranker->keys);
-        hs_shared_release(ranker->near->shared, (void **)&ranker->spare);
-    }
+    hs_shared_release(ranker->near->shared, (void **)&ranker->keys);
+    hs_shared_release(ranker->near->shared, (void **)&ranker->spare);
 }
 
 static bool
@@ -327,7 +325,7 @@ hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si, con
         n = keep_nearest(ranker, n, wanted);
     }
     hs_near_sort(&ranker->pace, &ranker->keys, &ranker->spare, n, limit);
-    if (!group->is_complete && wanted > 0) {
+    if (!group->is_complete) { /* then there are as many as are wanted */
         const double last = ranker->keys[wanted - 1].square;
         if (last + closeness(ranker, last) > reach * (1.0 - 0x1p-40)) {
             return HS_OK;

@@ -71,11 +71,11 @@ static bool
 cut_by_sample(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
 {
     const int32_t  n = node->end - node->first;
-    const int      wanted = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
-    const int      m = n < wanted ? n : wanted;
+    const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
     const int32_t *order = builder->order + node->first;
     int32_t        picked[LARGE_SAMPLE];
     double         numbers[LARGE_SAMPLE], widest = 0.0;
+    HS_ASSERT(n >= m); /* leaves hold as many as the smallest sample */
     for (int s = 0; s < m; s++) {
         picked[s] = order[(int64_t)n * (2 * s + 1) / (2 * m)];
     }

@@ -120,9 +120,55 @@ coordinates_and_turns_travel_with_their_point(void)
     }
 }
 
+/* Boxes and open ranges that are whole multiples of the cutoff or its parts, with points on the
+ * faces between cells and a last place beside them. */
+static void
+cells_are_cut_by_faces(void)
+{
+    harness_random   random = {10};
+    const hs_options defaults = hs_options_default();
+    const double     units[] = {1.0, 0.1, 0.3, 1.0 / 3.0, 0x1p-30};
+    int              cut = 0;
+    for (int trial = 0; trial < 300; trial++) {
+        const int    ndim = 1 + trial % 3;
+        const double unit = units[trial % 5];
+        hs_account   account;
+        hs_options   options = defaults;
+        hs_scene     scene;
+        hs_grid      grid;
+        hs_bins      bins;
+        memset(&shared.box, 0, sizeof shared.box);
+        shared.box.ndim = ndim;
+        shared.scene = (brute_scene){.ndim = ndim, .n = SCENE_POINTS, .x = shared.x};
+        shared.scene.box = trial % 4 ? &shared.box : NULL;
+        options.cutoff = unit * (1 + trial / 5 % 2);
+        for (int k = 0; k < ndim; k++) {
+            shared.box.periodic[k] = trial % 4 != 2 || k == 0;
+            shared.box.rows[k][k] = unit * (4 + random_below(&random, 9));
+        }
+        for (int e = 0; e < ndim * SCENE_POINTS; e++) {
+            const double x = unit * random_below(&random, 12) * (trial % 7 ? 1.0 : 0.5);
+            const int    step = random_below(&random, 4);
+            shared.x[e] = step == 0 ? nextafter(x, -1.0) : step == 1 ? nextafter(x, 99.0) : x;
+            if (trial % 2)
+                shared.x[e] += trial % 3 ? -5.0 * unit : 0.25 * unit * random_unit(&random);
+        }
+        if (!sort_scene(&account, &options, &scene, &grid, &bins))
+            continue;
+        for (int k = 0; k < ndim; k++)
+            cut += grid.by_faces[k];
+        check_order(&scene, &grid, &bins);
+        hs_bins_free(&account, &bins);
+        hs_scene_free(&account, &scene);
+        hs_account_close(&account);
+    }
+    CHECK(cut > 20);
+}
+
 void
 test_bins(void)
 {
     RUN(every_point_is_once_in_its_own_cell);
     RUN(coordinates_and_turns_travel_with_their_point);
+    RUN(cells_are_cut_by_faces);
 }
