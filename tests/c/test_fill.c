@@ -124,10 +124,57 @@ shifts_that_do_not_fit_name_a_point(void)
     }
 }
 
+static bool
+go_on_until(void *context, double fraction)
+{
+    int *left = context;
+    (void)fraction;
+    return (*left)-- > 0;
+}
+
+/* Over a million entries in long rows: kept by one walk, or written to the caller's arrays at once;
+ * the caller may stop either at any time. */
+static void
+long_rows_are_the_same_by_one_walk(void)
+{
+    enum { N = 2500 };
+    static double  x[3 * N];
+    harness_random random = {15};
+    for (int e = 0; e < 3 * N; e++) {
+        x[e] = random_unit(&random);
+    }
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL, *into = NULL;
+    hs_status       status = HS_ERR_INTERRUPTED;
+    caller_arrays   c;
+    int             n_stopped = 0;
+    options.cutoff = 0.45;
+    options.want = HS_WANT_I | HS_WANT_J;
+    options.poll = go_on_until;
+    for (int polls = 0; status != HS_OK && polls < 1000; polls += 1 + polls / 4) {
+        int left = polls;
+        options.poll_context = &left;
+        status = hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL);
+        CHECK(status == HS_OK || (status == HS_ERR_INTERRUPTED && rows == NULL));
+        n_stopped += status != HS_OK;
+    }
+    CHECK(status == HS_OK && n_stopped > 0 && hs_pairs_length(rows) > 1 << 20);
+    options.poll = NULL;
+    make_arrays(options.want, 3, 8, hs_pairs_length(rows), &c);
+    options.out = &c.arrays;
+    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &into, NULL) == HS_OK);
+    CHECK(same_as_result(&c, rows, hs_pairs_length(rows)));
+    free_arrays(&c);
+    hs_pairs_free(into);
+    hs_pairs_free(rows);
+}
+
 void
 test_fill(void)
 {
     RUN(every_shape_of_columns_has_the_same_rows);
     RUN(crowds_are_counted_when_they_cannot_be_kept);
+    RUN(long_rows_are_the_same_by_one_walk);
     RUN(shifts_that_do_not_fit_name_a_point);
 }

@@ -265,6 +265,14 @@ bad_arguments_are_refused(void)
     points.row_stride = 0; /* one point so many times takes no memory */
     CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_TOO_MANY);
     CHECK(failure.value == 0x1p31 && pairs == NULL);
+    points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    options.memory_limit = 100.0; /* of one cutoff for all */
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs > 0.0 && pairs == NULL);
+    options.memory_limit = INFINITY;
+    options.want = 1u << 20;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_ARGUMENT);
+    options.want = HS_WANT_I;
     points.n = 5;
     systems.n = -1;
     CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_ARGUMENT);
@@ -327,6 +335,19 @@ results_go_to_the_callers_arrays(void)
     CHECK(n_asked > 0 && points.n > 0);
 }
 
+/* Many systems without points before those that have some. */
+static void
+empty_systems_cost_nothing(void)
+{
+    static batch made;
+    make_batch(8, &made);
+    for (int s = 1; s <= 25; s++) {
+        made.first[s] = 0;
+    }
+    CHECK(compare(&made, hs_options_default(), true, 1) > 100);
+    CHECK(compare(&made, hs_options_default(), false, 3) > 100);
+}
+
 /* Points too far away for the shifts or the precision of one system are named among all. */
 static void
 far_points_are_named_among_all(void)
@@ -371,5 +392,6 @@ test_systems(void)
     RUN(nothing_is_lost_when_memory_is_short);
     RUN(bad_arguments_are_refused);
     RUN(results_go_to_the_callers_arrays);
+    RUN(empty_systems_cost_nothing);
     RUN(far_points_are_named_among_all);
 }

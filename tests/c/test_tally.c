@@ -156,6 +156,17 @@ types_out_of_range_are_named(void)
         made.wanted.of_points.types = NULL;
         CHECK(find_line(&made, 5, &failure) == HS_ERR_TYPES);
     }
+    hs_options options = hs_options_default();
+    hs_points  points = {made.x, POINTS, 1, HS_FLOAT64, 8, 8};
+    make_line(&random, 0, &made);
+    made.wanted.n_types = TYPES;
+    made.wanted.of_points.types = made.types; /* and none for the queries */
+    CHECK(hs_pairs_histogram(&points, &points, NULL, &options, &made.wanted, &failure) ==
+          HS_ERR_TYPES);
+    made.wanted.n_types = 1 << 16; /* more pairs of them than int32 numbers */
+    made.wanted.of_queries.types = made.types;
+    CHECK(hs_pairs_histogram(&points, &points, NULL, &options, &made.wanted, &failure) ==
+          HS_ERR_MEMORY);
     made.wanted.n_edges = INT64_C(1) << 30; /* more than slots can number */
     CHECK(find_line(&made, 0, &failure) == HS_ERR_EDGES);
 }
@@ -182,6 +193,7 @@ lattice_pairs_are_all_at_an_edge(void)
         for (int inclusive = 0; inclusive < 2; inclusive++) {
             hs_histogram wanted = {.n_edges = n_edges, .edges = edges, .inclusive = inclusive,
                                    .last_inclusive = inclusive, .n_types = 1, .counts = counts};
+            options.threads = 1 + inclusive;
             CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, NULL) == HS_OK);
             CHECK(counters.ambiguous > 4000);
             for (int k = 0; k < n_edges; k++) { /* N - t pairs at distance t */
@@ -192,6 +204,28 @@ lattice_pairs_are_all_at_an_edge(void)
                 CHECK(counts[k] == expected);
             }
         }
+    }
+}
+
+/* Two spots, an edge's distance apart: more pairs of a visit are open than are decided together. */
+static void
+pairs_of_two_spots_are_all_at_the_edge(void)
+{
+    enum { HERE = 100, THERE = 1100, N = HERE + THERE };
+    static double    x[N];
+    const double     edges[2] = {0.5, 1.0};
+    int64_t          counts[2];
+    hs_options       options = hs_options_default();
+    const hs_points  points = {x, N, 1, HS_FLOAT64, 8, 8};
+    const int64_t    close = HERE * (HERE - 1) / 2 + THERE * (THERE - 1) / 2;
+    for (int i = 0; i < N; i++) {
+        x[i] = i < HERE ? 0.0 : 1.0;
+    }
+    for (int inclusive = 0; inclusive < 2; inclusive++) {
+        const hs_histogram wanted = {.n_edges = 2, .edges = edges, .inclusive = inclusive,
+                                     .last_inclusive = inclusive, .n_types = 1, .counts = counts};
+        CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, NULL) == HS_OK);
+        CHECK(counts[0] == close && counts[1] == (inclusive ? HERE * THERE : 0));
     }
 }
 
@@ -224,5 +258,6 @@ test_tally(void)
     RUN(either_side_may_have_the_odd_weights);
     RUN(types_out_of_range_are_named);
     RUN(lattice_pairs_are_all_at_an_edge);
+    RUN(pairs_of_two_spots_are_all_at_the_edge);
     RUN(points_on_one_spot_are_in_the_first_bin);
 }
