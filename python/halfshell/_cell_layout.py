@@ -97,19 +97,19 @@ class CellLayout:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        return cast(tuple[int, ...], self._layout["shape"])
+        return cast("tuple[int, ...]", self._layout["shape"])
 
     @property
     def cell_sizes(self) -> tuple[float, ...]:
-        return cast(tuple[float, ...], self._layout["cell_sizes"])
+        return cast("tuple[float, ...]", self._layout["cell_sizes"])
 
     @property
     def cell_start(self) -> npt.NDArray[np.int32]:
-        return cast(npt.NDArray[np.int32], self._layout["cell_start"])
+        return cast("npt.NDArray[np.int32]", self._layout["cell_start"])
 
     @property
     def order(self) -> npt.NDArray[np.int32]:
-        return cast(npt.NDArray[np.int32], self._layout["order"])
+        return cast("npt.NDArray[np.int32]", self._layout["order"])
 
     @property
     def cell_ids(self) -> npt.NDArray[np.int64] | None:

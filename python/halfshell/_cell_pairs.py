@@ -93,7 +93,7 @@ class CellPairs(CellLayout):
             *self._arguments(cutoff, options, as_progress(progress)), quantities,
             _inputs.as_index_bytes(index_dtype), most,
         )
-        return cast(PairBlocks[Any], blocks)
+        return cast("PairBlocks[Any]", blocks)
 
     def for_each_pair(
         self,

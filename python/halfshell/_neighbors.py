@@ -162,7 +162,7 @@ def coordination(
         queries,
     )
     if counts is not NotImplemented:
-        return cast(npt.NDArray[np.int64], counts)
+        return cast("npt.NDArray[np.int64]", counts)
     scene, _, asking = _scene(points, cutoff, queries, box, periodic)
     return _core.coordination(
         *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,

@@ -134,7 +134,7 @@ def iter_pairs(
         precision, kernel, memory_limit, as_progress(progress), threads, quantities,
         _inputs.as_index_bytes(index_dtype), most,
     )
-    return cast(PairBlocks[Any], blocks)
+    return cast("PairBlocks[Any]", blocks)
 
 
 def most_pairs(max_pairs: Any) -> int:

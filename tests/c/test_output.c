@@ -230,6 +230,31 @@ endless_outputs_are_refused(void)
     hs_output_free(&output);
 }
 
+/* Memory of a result that was not taken is kept for the next one, and counts as what it is. */
+static void
+a_result_that_is_freed_is_held_with_all_it_wrote(void)
+{
+    const brute_scene *scene = scene_of(SCENE_ALIGNED, true);
+    hs_options         options = options_of(scene);
+    options.cutoff = 12.0;
+    const unsigned wants[] = {HS_WANT_DISTANCE, HS_WANT_VECTOR, HS_WANT_SHIFT, HS_WANT_BOTH};
+    const size_t   widths[] = {8, 24, 12, 16};
+    const size_t   before = hs_pool_limit();
+    hs_pool_set_limit((size_t)1 << 30);
+    for (int w = 0; w < 4; w++) {
+        hs_pool_clear();
+        CHECK(hs_pool_held() == 0);
+        options.want = wants[w];
+        hs_pairs     *pairs = find_anew(scene, &options);
+        const int64_t n = hs_pairs_length(pairs);
+        CHECK(n > 400000);
+        hs_pairs_free(pairs);
+        CHECK(hs_pool_held() >= (size_t)n * widths[w]);
+    }
+    hs_pool_clear();
+    hs_pool_set_limit(before);
+}
+
 void
 test_output(void)
 {
@@ -240,4 +265,5 @@ test_output(void)
     RUN(the_callers_memory_is_not_counted);
     RUN(outputs_grow_to_their_limit);
     RUN(endless_outputs_are_refused);
+    RUN(a_result_that_is_freed_is_held_with_all_it_wrote);
 }

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The functions of _core refuse what the Python layer never gives them: there is no other check
+between them and memory."""
+
+import re
+
+import numpy as np
+import pytest
+
+from halfshell import _core
+
+POINTS = np.random.default_rng(3).uniform(0.0, 3.0, (12, 3))
+BATCH = np.repeat(np.arange(3), 4)
+CUTOFFS = np.full(3, 1.5)
+BOXES = np.stack([3.0 * np.eye(3)] * 3)
+
+NO_ARRAYS = [None, 3, 1.5, "points", b"points", (), POINTS.tolist(), memoryview(POINTS), object()]
+
+
+def count(points, box=None, periodic=0):
+    return _core.count_pairs(
+        points, 1.5, box, periodic, True, "exact", None, None, None, None
+    )  # fmt: skip
+
+
+def batch(name, numbers, cutoffs=None, boxes=None, box=None, periodic=0):
+    shared = (POINTS, 1.5, box, periodic, True, "exact", None, None, None, None)
+    if name == "batch_pairs":
+        return _core.batch_pairs(*shared, "ij", False, 8, None, numbers, cutoffs, boxes)
+    return _core.batch_count(*shared, numbers, cutoffs, boxes)
+
+
+@pytest.mark.parametrize("points", NO_ARRAYS, ids=lambda value: type(value).__name__)
+def test_points_are_an_array(points):
+    message = f"points must be an array, got {type(points).__name__}"
+    with pytest.raises(TypeError, match=re.escape(message)):
+        count(points)
+    if points is not None:
+        with pytest.raises(TypeError, match="queries must be an array, got"):
+            _core.coordination(
+                POINTS, 1.5, None, 0, True, "exact", None, None, None, None, points
+            )  # fmt: skip
+    with pytest.raises(TypeError, match="points must be an array, got"):
+        _core.box_wrap(points, np.eye(3), 7)
+
+
+@pytest.mark.parametrize("dtype", ["i8", "f2", "c16", "O", ">f8", "f16"])
+def test_points_are_native_floats(dtype):
+    with pytest.raises(TypeError, match="points must be native float32 or float64"):
+        count(POINTS.astype(dtype))
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 2, 3), (4, 0), (4, 9)])
+def test_points_are_rows_of_1_to_8_numbers(shape):
+    with pytest.raises(ValueError, match=r"points must have shape \(n, d\)"):
+        count(np.zeros(shape))
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        3.0, "box", np.eye(3).tolist(), np.eye(3, dtype=np.float32), np.eye(3, dtype=int),
+        np.eye(3).astype(">f8"), np.tri(3).T, np.ones(2), np.ones((3, 2)), np.ones((2, 3)),
+        np.ones((3, 3, 3)), np.float64(3.0), np.ones(()),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_a_box_is_an_array_of_its_size(box):
+    with pytest.raises(ValueError, match=r"box must be a float64 array of shape \(3, 3\)"):
+        count(POINTS, box, 7)
+
+
+@pytest.mark.parametrize("periodic", [-1, 1 << 64])
+def test_periodic_is_bits(periodic):
+    with pytest.raises(OverflowError):
+        count(POINTS, np.eye(3), periodic)
+    with pytest.raises(TypeError):
+        count(POINTS, np.eye(3), "7")
+
+
+@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize(
+    "numbers",
+    [None, BATCH.tolist(), BATCH.astype(np.int32), BATCH.astype(float), BATCH.astype(">i8"),
+     BATCH[:-1], np.repeat(BATCH, 2)[::2]],
+    ids=["none", "list", "int32", "float", "swapped", "short", "strided"],
+)  # fmt: skip
+def test_numbers_are_int64_one_a_point(name, numbers):
+    with pytest.raises(TypeError, match="batch must be an int64 array with a number a point"):
+        batch(name, numbers)
+
+
+@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize(
+    "cutoffs",
+    [1.5, CUTOFFS.tolist(), CUTOFFS.astype(np.float32), CUTOFFS.astype(int),
+     CUTOFFS.astype(">f8"), CUTOFFS[:, None], np.repeat(CUTOFFS, 2)[::2], np.float64(1.5)],
+    ids=["float", "list", "float32", "int", "swapped", "2 axes", "strided", "scalar"],
+)  # fmt: skip
+def test_cutoffs_are_float64(name, cutoffs):
+    with pytest.raises(TypeError, match="a float64 array with 1 axes is expected"):
+        batch(name, BATCH, cutoffs)
+
+
+@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+@pytest.mark.parametrize(
+    "boxes",
+    [3.0, BOXES.tolist(), BOXES.astype(np.float32), BOXES[0], BOXES[None], np.tri(3) + BOXES.T,
+     BOXES[:, ::-1]],
+    ids=["float", "list", "float32", "2 axes", "4 axes", "fortran", "reversed"],
+)  # fmt: skip
+def test_boxes_are_float64(name, boxes):
+    with pytest.raises(TypeError, match="a float64 array with 3 axes is expected"):
+        batch(name, BATCH, None, boxes, np.eye(3), 7)
+
+
+@pytest.mark.parametrize("name", ["batch_pairs", "batch_count"])
+def test_boxes_fit(name):
+    for boxes, cutoffs, box in [
+        (BOXES, None, None),
+        (BOXES[:, :2, :2].copy(), None, np.eye(3)),
+        (np.ones((3, 3, 2)), None, np.eye(3)),
+        (np.ones((3, 2, 3)), None, np.eye(3)),
+        (BOXES[:2], CUTOFFS, np.eye(3)),
+    ]:
+        with pytest.raises(ValueError, match="boxes do not fit points, box and cutoffs"):
+            batch(name, BATCH, cutoffs, boxes, box, 0 if box is None else 7)
+    assert len(batch(name, BATCH, CUTOFFS, BOXES, np.eye(3), 7)) > 0
