@@ -71,6 +71,9 @@ find_rows(hs_pairs *rows, hs_failure *failure)
         table.offsets = hs_output_column(&rows->offsets, HS_WANT_I);
         status = hs_table_prepare(&table, failure);
     }
+    if (status == HS_OK && !hs_walker_fits(search, &table.most, &failure->search_bytes)) {
+        status = HS_ERR_MEMORY; /* before anything is counted */
+    }
     if (status == HS_OK) {
         status = find_entries(rows, &table, failure);
     }

@@ -5,8 +5,12 @@
  */
 #include "order.h"
 
+#include "poll.h"
+
 #include <string.h>
 
+/* Candidates from which on passes over them are polled between: some milliseconds each. */
+#define LARGE (1 << 18)
 #define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the nearest cache */
 #define LEAD_BITS 8   /* of the only digit that few candidates are sorted by; one more for others */
 #define FEW 24        /* candidates that are quicker sorted by insertion */
@@ -235,9 +239,17 @@ sort_by_shift(const hs_block *block, const int64_t *shifts, bool upper, hs_order
     }
 }
 
+/* Between passes over a large block. */
+static hs_status
+poll_large(const hs_options *options, const hs_block *block)
+{
+    return block->n > LARGE ? hs_poll(options, 0.0) : HS_OK;
+}
+
 /* Candidates in their order. */
-static void
-arrange(int ndim, hs_block_use use, hs_block *block, const hs_order *order)
+static hs_status
+arrange(int ndim, const hs_options *options, hs_block_use use, hs_block *block,
+        const hs_order *order)
 {
     const int32_t n = block->n;
     int32_t *HS_RESTRICT     origin = block->origin;
@@ -254,7 +266,11 @@ arrange(int ndim, hs_block_use use, hs_block *block, const hs_order *order)
             column[c] = values[origin[c]];
         }
         memcpy(values, column, (size_t)n * sizeof *values);
+        if (poll_large(options, block) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
     }
+    return HS_OK;
 }
 
 /* Whether each number is above the one before, as in one cell, or where points are numbered as they
@@ -270,8 +286,12 @@ is_ascending(const int32_t *numbers, int32_t n)
 }
 
 hs_status
-hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_order *order)
+hs_order_block(const hs_lattice *lattice, const hs_options *options, hs_block_use use,
+               hs_block *block, hs_order *order)
 {
+    if (poll_large(options, block) != HS_OK) { /* it was gathered */
+        return HS_ERR_INTERRUPTED;
+    }
     if (is_ascending(block->id, block->n)) {
         for (int32_t c = 0; c < block->n; c++) {
             block->origin[c] = c;
@@ -286,9 +306,11 @@ hs_order_block(const hs_lattice *lattice, hs_block_use use, hs_block *block, hs_
         for (int l = lattice->n_periodic - 1; l >= 0; l--) {
             sort_by_shift(block, order->shifts + l, false, order);
             sort_by_shift(block, order->shifts + l, true, order);
+            if (poll_large(options, block) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
         }
         sort_again_by_number(block, order);
     }
-    arrange(lattice->ndim, use, block, order);
-    return HS_OK;
+    return arrange(lattice->ndim, options, use, block, order);
 }

@@ -162,8 +162,8 @@ fill_block(hs_walker *walker)
     if (!walker->is_ordered) {
         return HS_OK;
     }
-    const hs_status status = hs_order_block(&walker->search->scene.lattice, walker->use, block,
-                                            &walker->order);
+    const hs_status status = hs_order_block(&walker->search->scene.lattice, &walker->options,
+                                            walker->use, block, &walker->order);
     if (status == HS_ERR_SHIFT_RANGE) {
         walker->failed_point = hs_search_asking(walker->search)->order[walker->group.first];
     }

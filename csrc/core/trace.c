@@ -2,10 +2,15 @@
 /* trace.c: see trace.h. */
 #include "trace.h"
 
+#include "poll.h"
+
 #include <string.h>
 
 /* Integers up to here are float64 numbers, and what the batch kernels take. */
 #define WIDEST_SHIFT (INT64_C(1) << 53)
+
+/* Loaded between two polls: some milliseconds. */
+#define POLL_CANDIDATES (1 << 18)
 
 /* Turns and images up to here are few: sums of four of them are int32. */
 #define MOST_FEW 0x1p28
@@ -171,14 +176,15 @@ load_metric(hs_trace *trace, const hs_run *run, int32_t n)
 }
 
 /* Writes down all candidates of the block, as far as that is not done yet. */
-static void
+static hs_status
 load(hs_trace *trace, bool metric)
 {
+    int32_t unpolled = 0;
     const bool given = trace->needs_given && !trace->has_given;
     metric = metric && !trace->has_metric;
     trace->has_images = trace->has_images && !metric;
     if (!given && !metric) {
-        return;
+        return HS_OK;
     }
     for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
         const int32_t n = run[1].at - run->at;
@@ -188,9 +194,17 @@ load(hs_trace *trace, bool metric)
         if (given) {
             load_given(trace, run, n);
         }
+        unpolled += n;
+        if (unpolled > POLL_CANDIDATES && trace->polls != NULL) {
+            unpolled = 0;
+            if (hs_poll(trace->polls, 0.0) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
+        }
     }
     trace->has_given = trace->needs_given;
     trace->has_metric = trace->has_metric || metric;
+    return HS_OK;
 }
 
 int32_t
@@ -317,7 +331,9 @@ hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
 {
     const hs_bins *bins = hs_search_asking(trace->search);
     metric = metric || !trace->is_narrow; /* shifts of the points as given are the metric's too */
-    load(trace, metric);
+    if (load(trace, metric) != HS_OK) {
+        return HS_ERR_INTERRUPTED;
+    }
     if (metric) {
         look_up_points(trace);
         look_up_images(trace);

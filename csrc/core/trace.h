@@ -22,6 +22,7 @@ typedef struct hs_trace_block {
 typedef struct hs_trace {
     const hs_search *search; /* borrowed */
     const hs_block  *block;  /* borrowed */
+    const hs_options *polls; /* borrowed; asked while a large block is loaded; NULL: never */
     hs_trace_block   of;
     bool     has_metric, has_given; /* `of` is the block's: q and image; turned or few */
     bool     is_plain;       /* shifts over B are those over the rows as given */
@@ -67,7 +68,7 @@ int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t
 /*
  * Fills the arrays of the batch: S, when needs_given, and unless `metric` is false and S needs
  * nothing else, what the metric measures between. HS_OK; HS_ERR_SHIFT_RANGE when a shift passes its
- * range, with the number of the point.
+ * range, with the number of the point; HS_ERR_INTERRUPTED.
  */
 hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
 

@@ -214,6 +214,19 @@ hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
     return candidates < HS_BLOCK_CANDIDATES;
 }
 
+bool
+hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
+{
+    const int ndim = search->scene.ndim, m = search->scene.lattice.n_periodic;
+    /* What each takes at least, gathered, in order and traced. */
+    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 3 * sizeof(int32_t)) +
+                        (double)(ndim + 1) * sizeof(float) + (double)ndim * sizeof(double) +
+                        (double)m * sizeof(int64_t);
+    *bytes = (double)most->candidates * each;
+    return most->candidates <= HS_ORDER_CANDIDATES &&
+           hs_account_allows(&search->account, *bytes);
+}
+
 static hs_status
 init_links(hs_search *search, hs_walker *walker)
 {
@@ -255,6 +268,7 @@ init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_
     if (status == HS_OK) {
         status = hs_trace_init(search, &walker->block, use == HS_BLOCK_LISTS_PLACES,
                                &walker->trace);
+        walker->trace.polls = &walker->options;
     }
     return status;
 }

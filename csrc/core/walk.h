@@ -85,6 +85,9 @@ int32_t hs_walker_capacity(const hs_search *search);
  * then a walk with HS_BLOCK_SIZES can tell. */
 bool hs_walker_bound(const hs_search *search, hs_neighbourhood *most);
 
+/* Whether hs_walker_init_ordered has a chance with it; *bytes: what it would take at least. */
+bool hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes);
+
 /* `visit` NULL: hits are only counted, in n_found; with HS_BLOCK_SIZES not even that, but `most` is
  * found, for the groups of hs_walker_init_ordered. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,

@@ -160,9 +160,147 @@ flushing_is_switched_on_and_off(void)
     hs_fpenv_leave(saved);
 }
 
+/* Unmasks every trap that this CPU has, or puts back what was there. */
+static uint64_t
+unmask_traps(void)
+{
+#if defined(__SSE2__)
+    const uint64_t before = _mm_getcsr();
+    _mm_setcsr(0);
+    return before;
+#elif defined(__aarch64__)
+    uint64_t before;
+    __asm__ __volatile__("mrs %0, fpcr" : "=r"(before));
+    __asm__ __volatile__("msr fpcr, %0" : : "r"(UINT64_C(0x9f00)));
+    return before;
+#else
+    return 0;
+#endif
+}
+
+/* Whether traps were still unmasked and no flag was set. */
+static bool
+mask_traps(uint64_t before)
+{
+#if defined(__SSE2__)
+    const bool same = _mm_getcsr() == 0;
+    _mm_setcsr((unsigned)before);
+    return same;
+#elif defined(__aarch64__)
+    __asm__ __volatile__("msr fpcr, %0" : : "r"(before));
+    return true;
+#else
+    (void)before;
+    return true;
+#endif
+}
+
+enum { N_TRAPPED = 200 };
+
+typedef struct trapped_scene {
+    double     x[3 * N_TRAPPED];
+    hs_points  points;
+    hs_box     box;
+    hs_options options;
+} trapped_scene;
+
+static void
+make_trapped_scene(trapped_scene *s)
+{
+    harness_random random = {17};
+    for (int e = 0; e < 3 * N_TRAPPED; e++)
+        s->x[e] = ldexp(floor(random_unit(&random) * 1e6), -1074);
+    s->points = (hs_points){s->x, N_TRAPPED, 3, HS_FLOAT64, 3 * sizeof(double), sizeof(double)};
+    s->box = (hs_box){.ndim = 3};
+    for (int k = 0; k < 3; k++) {
+        s->box.rows[k][k] = 0x1p-1054;
+        s->box.periodic[k] = k < 2;
+    }
+    s->options = hs_options_default();
+    s->options.cutoff = 0x1p-1056;
+    s->options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+}
+
+/* One of each family of entries; returns what it found, or -1. */
+static int64_t
+search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
+{
+    const double edges[] = {0.0, 0x1p-1070, 0x1p-1056};
+    int64_t      count = -1, bins[3] = {0}, rows[N_TRAPPED];
+    hs_pairs    *pairs = NULL;
+    hs_status    status = HS_OK;
+    hs_layout    layout;
+    hs_plan      plan;
+    bool         rebuilt;
+    const hs_histogram histogram = {.n_edges = 3, .edges = edges, .last_inclusive = true,
+                                    .n_types = 1, .counts = bins};
+    switch (family) {
+    case 0: status = hs_pairs_find(&s->points, &s->box, &s->options, &pairs, NULL); break;
+    case 1: status = hs_pairs_count(&s->points, &s->box, &s->options, &count, NULL); break;
+    case 2:
+        status = hs_neighbors_find(&s->points, &s->points, &s->box, &s->options, &pairs, NULL);
+        break;
+    case 3: status = hs_neighbors_count(&s->points, NULL, &s->box, &s->options, rows, NULL); break;
+    case 4:
+        status = hs_pairs_histogram(&s->points, NULL, &s->box, &s->options, &histogram, NULL);
+        count = bins[0] + bins[1] + bins[2];
+        break;
+    case 5: status = hs_nearest_find(&s->points, NULL, &s->box, 3, &s->options, &pairs, NULL); break;
+    case 6: status = hs_cells_pairs(cells, &s->options, &pairs, NULL); break;
+    case 7: status = hs_cells_neighbors(cells, &s->points, &s->options, &pairs, NULL); break;
+    case 8: status = hs_cells_nearest(cells, &s->points, 2, &s->options, &pairs, NULL); break;
+    case 9: status = hs_cells_find(cells, &s->points, rows, NULL); break;
+    case 10: status = hs_cells_candidates(cells, NULL, &s->options, &pairs, NULL); break;
+    case 11: hs_cells_layout(cells, &layout); count = layout.n_cells; break;
+    case 12:
+        status = hs_verlet_update(list, &s->points, &s->box, &s->options, 0x1p-1060, true, &rebuilt,
+                                  NULL);
+        break;
+    case 13: status = hs_verlet_find(list, &s->options, &pairs, NULL); break;
+    case 14: status = hs_plan_make(&s->points, &s->box, &s->options, &plan, NULL); break;
+    case 15: status = hs_box_measure(&s->box, NULL, NULL, NULL); break;
+    case 16: status = hs_box_wrap(&s->box, &s->points, NULL, NULL, NULL); break;
+    default: {
+        hs_stream *stream = NULL;
+        status = hs_stream_open(&s->points, &s->box, &s->options, 50, &stream, NULL);
+        if (status == HS_OK)
+            status = hs_stream_next(stream, NULL, NULL, &pairs, NULL);
+        hs_stream_free(stream);
+    }
+    }
+    count = pairs != NULL ? hs_pairs_length(pairs) : count;
+    hs_pairs_free(pairs);
+    return status == HS_OK ? count : -2;
+}
+
+/* A comparison of subnormal numbers would end the process here. */
+static void
+no_entry_meets_the_callers_traps(void)
+{
+    static trapped_scene s;
+    hs_cells            *cells = NULL;
+    hs_verlet           *list = hs_verlet_new();
+    make_trapped_scene(&s);
+    CHECK(hs_cells_build(&s.points, &s.box, &s.options, &cells, NULL) == HS_OK);
+    for (int threads = 1; threads <= 2; threads++) {
+        s.options.threads = threads;
+        for (int family = 0; family <= 17; family++) {
+            const int64_t  plain = search_by(family, &s, cells, list);
+            const uint64_t before = unmask_traps();
+            const int64_t  trapped = search_by(family, &s, cells, list);
+            const bool     is_left = mask_traps(before);
+            CHECK(plain != -2 && trapped == plain);
+            CHECK(is_left);
+        }
+    }
+    hs_cells_free(cells);
+    hs_verlet_free(list);
+}
+
 void
 test_fpenv(void)
 {
+    RUN(no_entry_meets_the_callers_traps);
     RUN(flushing_is_switched_on_and_off);
     RUN(entering_sets_and_leaving_restores);
     RUN(decisions_ignore_the_callers_environment);
