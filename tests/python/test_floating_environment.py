@@ -56,6 +56,19 @@ class Environment:
         ctypes.memmove(ctypes.addressof(buffer) + offset, word.to_bytes(size, "little"), size)
         C.fesetenv(buffer)
 
+    def trap_subnormals(self):
+        """An operand that is subnormal ends the process, where the CPU can trap."""
+        if WINDOWS:
+            C._controlfp(0, 0x80000)
+            return
+        buffer = ctypes.create_string_buffer(64)
+        C.fegetenv(buffer)
+        offset, size, _ = CONTROL
+        word = int.from_bytes(buffer.raw[offset : offset + size], "little")
+        word = word | 1 << 15 if ARM else word & ~0x100
+        ctypes.memmove(ctypes.addressof(buffer) + offset, word.to_bytes(size, "little"), size)
+        C.fesetenv(buffer)
+
     def restore(self):
         C.fesetenv(self.saved)
 
@@ -187,3 +200,33 @@ def test_searching_raises_no_floating_point_warnings(rng):
         with np.errstate(all="raise"):
             hs.pairs(points, cutoff, box=box, quantities="ijSdD")
             np.array([1.0]) / np.array([2.0])
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_traps_of_the_caller_end_no_search(threads):
+    # Python and NumPy compare numbers themselves: only what goes straight to the core.
+    points, cutoff = np.array([[0.0], [1e-311], [5e-311]]), 2e-311
+    box = np.array([1e-309])
+    how = {"quantities": "ijSdD", "threads": threads}
+    cells = hs.CellList(points, cutoff, box=box)
+
+    def searches():
+        yield hs.pairs(points, cutoff, box=box, **how)
+        yield hs.pairs_between(points, points, cutoff, box=box, **how)
+        yield hs.coordination(points, cutoff, threads=threads)
+        yield hs.neighbors(points, cutoff, queries=points, threads=threads).indices
+        yield np.array(hs.count_pairs(points, cutoff, threads=threads))
+        yield cells.pairs()
+        yield hs.CellList(points, cutoff).cell_of(points)
+
+    expected = list(searches())
+    state = Environment()
+    try:
+        state.trap_subnormals()
+        found = list(searches())
+    finally:
+        state.restore()
+        if WINDOWS:
+            C._controlfp(0x80000, 0x80000)
+    assert all(map(same_arrays, found, expected))
+    assert len(found[0][0]) == 1
