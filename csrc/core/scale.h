@@ -21,7 +21,8 @@ hs_box_size hs_box_size_of(const hs_box *box);
 #define HS_OPEN (-1)    /* nothing */
 #define HS_COUPLED (-2) /* rows that have entries in other columns as well */
 
-/* HS_OPEN, HS_COUPLED, or the one row that has its only entry in this column. box: NULL for none. */
+/* HS_OPEN, HS_COUPLED, or the row that alone has an entry in this column, and no other entry.
+ * box: NULL for none. */
 int hs_mover_of(const hs_box *box, int column);
 
 /* The cutoff, or a smaller one if that is beyond all distances as well. */

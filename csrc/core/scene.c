@@ -255,38 +255,6 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     return status;
 }
 
-/* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. */
-static void
-set_scale(const hs_condensed *condensed, int unit, hs_scene *scene, const hs_scene *asking)
-{
-    const hs_box_size size = hs_box_size_of(condensed->box);
-    int               exponent = unit;
-    bool              also_extreme = false;
-    /* The smallest length that pairs are compared with. */
-    const double      least = scene->least_cutoff > 0.0
-                                  ? hs_smaller(scene->least_cutoff, scene->sought)
-                                  : scene->sought;
-    scene->extreme = false;
-    if (!condensed->is_scaled) {
-        const int largest = scene->is_wide ? HS_LARGEST_WIDE_EXPONENT : HS_LARGEST_EXPONENT;
-        exponent =
-            hs_choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
-        if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
-            (void)hs_choose_exponent(&asking->cloud, &size, least, unit, largest, &also_extreme);
-        }
-    }
-    scene->extreme = scene->extreme || also_extreme;
-    scene->scale = hs_scale_of(exponent);
-    scene->unscale = hs_scale_of(-exponent);
-    scene->pending = condensed->is_scaled ? hs_scale_of(0) : scene->scale;
-    scene->cutoff = scene->cutoff_low = hs_scale_apply(scene->scale, scene->sought);
-    if (scene->extreme && scene->sought > 0.0) {
-        /* The scaled cutoff may have been rounded or flushed: take bounds. */
-        scene->cutoff_low -= HS_SCALING_LOSS;
-        scene->cutoff += HS_SCALING_LOSS;
-    }
-}
-
 /* The turns that condensing made, added to those that wrapping made after it. */
 static void
 add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
@@ -329,34 +297,6 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     return fill_scene(account, team, options, scene, asking, failure);
 }
 
-/* Whether points and queries are drawn together where they are far. Others that come later may be
- * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
- * holds everything, cells of queries and of lists that last are those of the points as given. */
-static bool
-may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_size *size, int unit)
-{
-    const bool is_bounded = scene->within > 0.0 && scene->sought == scene->within;
-    if (scene->is_kept || (scene->is_wide && !is_bounded)) {
-        return false;
-    }
-    return scene->is_wide || (asking == NULL && !scene->is_plain) ||
-           hs_open_drowns_box(&scene->cloud, size, scene->sought) ||
-           !hs_fits_one_scale(&scene->cloud, size, unit, HS_LARGEST_WIDE_EXPONENT);
-}
-
-/* The cutoff that scale and condensing go by. */
-static double
-settle_cutoff(const hs_scene *scene, const hs_box_size *size, double cutoff)
-{
-    const hs_cloud *cloud = &scene->cloud;
-    if (scene->within > 0.0 &&
-        !hs_fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
-                           HS_FAR_EXPONENT)) {
-        return scene->within;
-    }
-    return scene->is_kept || scene->is_plain ? cutoff : hs_enough_cutoff(cloud, size, cutoff);
-}
-
 /* Chooses the scale of a scene whose points are as given, and fills it. */
 static hs_status
 scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
@@ -366,14 +306,14 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
     hs_status         status = HS_OK;
-    scene->sought = settle_cutoff(scene, &size, options->cutoff);
+    scene->sought = hs_scene_settle_cutoff(scene, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
-    if (may_condense(scene, asking, &size, unit)) {
+    if (hs_scene_may_condense(scene, asking, &size, unit)) {
         status = hs_condense(account, options, box, unit, cloud,
                              asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {
-        set_scale(&condensed, unit, scene, asking);
+        hs_scene_set_scale(condensed.box, condensed.is_scaled, unit, scene, asking);
         status = fill_scaled(account, team, options, &condensed, scene, asking, failure);
     }
     if (status == HS_OK) {

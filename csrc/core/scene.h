@@ -85,7 +85,23 @@ hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *
                              const hs_box *box, const hs_options *options, hs_scene *scene,
                              hs_scene *asking, hs_failure *failure);
 
-/* Steps of that; scene_sets.c. Both clouds get the range of both. */
+/* Steps of that; scene_scale.c. The cutoff that scale and condensing go by. */
+struct hs_box_size;
+double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size,
+                              double cutoff);
+
+/* Whether points and queries are drawn together where they are far. Others that come later may be
+ * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
+ * holds everything, cells of queries and of lists that last are those of the points as given. */
+bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
+                           const struct hs_box_size *size, int unit);
+
+/* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled: condensing has
+ * brought the points and this box to units. */
+void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
+                        const hs_scene *asking);
+
+/* More steps; scene_sets.c. Both clouds get the range of both. */
 void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
 
 /* What has been settled for the points is settled for the queries. */

@@ -117,7 +117,8 @@ hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
     if (kept->n == 0) { /* nobody is found, wherever queries are, but they need a place */
         return hs_scale_apply(scale, cloud->largest) < INFINITY;
     }
-    if (kept->extreme || kept->is_heap || !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
+    if (kept->extreme || kept->is_heap ||
+        !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
         return false;
     }
     /* Scaling down must not reach the subnormal numbers. */
