@@ -245,7 +245,9 @@ search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
         status = hs_pairs_histogram(&s->points, NULL, &s->box, &s->options, &histogram, NULL);
         count = bins[0] + bins[1] + bins[2];
         break;
-    case 5: status = hs_nearest_find(&s->points, NULL, &s->box, 3, &s->options, &pairs, NULL); break;
+    case 5:
+        status = hs_nearest_find(&s->points, NULL, &s->box, 3, &s->options, &pairs, NULL);
+        break;
     case 6: status = hs_cells_pairs(cells, &s->options, &pairs, NULL); break;
     case 7: status = hs_cells_neighbors(cells, &s->points, &s->options, &pairs, NULL); break;
     case 8: status = hs_cells_nearest(cells, &s->points, 2, &s->options, &pairs, NULL); break;
