@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_near_search.c: rows of nearest points are right where groups, ranges of them, images and ties
- * are at their limits, and refused beyond these.
+ * test_near_search.c: rows of nearest points are right where groups, ranges of them, images and
+ * ties are at their limits, and refused beyond these.
  */
 #include "harness.h"
 #include "near_checks.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_near_stops.c: long searches for nearest points can be stopped wherever they ask whether to go
- * on, and fail wherever memory ends, with nothing left.
+ * test_near_stops.c: long searches for nearest points can be stopped wherever they ask whether to
+ * go on, and fail wherever memory ends, with nothing left.
  */
 #include "harness.h"
 #include "pair_checks.h"
