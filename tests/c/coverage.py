@@ -65,8 +65,10 @@ def export(program, profile):
     """The functions of the program, each with its regions and branches, as llvm-cov has them."""
     command = [os.environ.get("LLVM_COV", "llvm-cov"), "export", program]
     command += ["-instr-profile", profile]
-    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    return json.loads(output)["data"][0]["functions"]
+    result = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+    if result.returncode:
+        sys.exit(f"{command[0]} failed")
+    return json.loads(result.stdout)["data"][0]["functions"]
 
 
 def place_of(function, branch, files):
@@ -153,8 +155,10 @@ def print_table(totals, part):
         if part in file:
             print(f"{file:32} {branches:9} {missed:10} {100 - 100 * missed / branches:8.1f} %")
     for folder, (branches, missed) in sorted(sums.items()):
-        print(f"{'all of ' + folder:32} {branches:9} {missed:10} "
-              f"{100 - 100 * missed / branches:8.1f} %")
+        print(
+            f"{'all of ' + folder:32} {branches:9} {missed:10} "
+            f"{100 - 100 * missed / branches:8.1f} %"
+        )
 
 
 def main():
@@ -179,8 +183,10 @@ def main():
             print(f"{LIST.name}, covered by now or not there:  {entry}")
     for entry in bare:
         print(f"{LIST.name}, without a reason:  {entry}")
-    print(f"{missing} uncovered branches are not in {LIST.name}, "
-          f"{needless} of its {sum(listed.values())} entries belong to none, {len(bare)} have no reason")
+    print(
+        f"{missing} uncovered branches are not in {LIST.name}; of its {sum(listed.values())} "
+        f"entries {needless} belong to none, {len(bare)} have no reason"
+    )
     return 1 if missing or needless or bare else 0
 
 

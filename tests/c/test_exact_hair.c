@@ -49,8 +49,8 @@ hairs_beside_the_cutoff(void)
     CHECK(signs[0] > 100 && signs[1] > 10 && signs[2] > 100);
 }
 
-/* (1 + 2^-52)^2 = 1^2 + (2^-26)^2 + (2^-26)^2 + (2^-52)^2: less than that by so little that only the
- * hair, or nothing but integers, can tell. */
+/* (1 + 2^-52)^2 = 1^2 + (2^-26)^2 + (2^-26)^2 + (2^-52)^2: less than that by so little that only
+ * the hair, or nothing but integers, can tell. */
 static void
 sums_a_little_below_the_cutoff(void)
 {

@@ -100,7 +100,9 @@ blocks_are_sorted_by_number_and_shift(void)
     CHECK(hs_block_init(&account, D, HS_BLOCK_LISTS_PLACES, MOST, RUNS, &block) == HS_OK);
     CHECK(hs_order_init(&account, &block, &order) == HS_OK);
     for (int trial = 0; trial < 1600; trial++) {
-        const int32_t n = trial % 4 == 3 ? MOST / 3 * (1 + trial % 3) : trial % 4 == 2 ? 400 : trial % 300;
+        const int32_t n = trial % 4 == 3   ? MOST / 3 * (1 + trial % 3)
+                          : trial % 4 == 2 ? 400
+                                           : trial % 300;
         const int     bits = 1 + trial % 31;
         const hs_box  box = {.ndim = D,
                              .periodic = {true, true},

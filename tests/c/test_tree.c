@@ -16,10 +16,12 @@ void test_tree(void);
  * order in which samples meet few of these, so that nearly each cut leaves one point alone.
  */
 enum { N = 28 };
-static const double lopsided[N] = {4096.0, 0.0, 0.0,   2.0,  0.0,    8192.0, 0.0,
-                                   8.0,    16384.0, 512.0, 0.0, 0.0,  16.0,   64.0,
-                                   0.0,    32.0, 0.0,   32768.0, 1024.0, 256.0, 0.0,
-                                   0.0,    128.0, 0.0,  2048.0, 32.0,  1.0,    0.0};
+static const double lopsided[N] = {
+    4096.0, 0.0, 0.0, 2.0, 0.0, 8192.0, 0.0,
+    8.0, 16384.0, 512.0, 0.0, 0.0, 16.0, 64.0,
+    0.0, 32768.0, 1024.0, 256.0, 0.0, 0.0, 128.0,
+    0.0, 0.0, 2048.0, 32.0, 1.0, 0.0, 4.0,
+};
 
 static void
 lopsided_points_need_many_nodes(void)
