@@ -132,10 +132,11 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
         for (int k = 0; k < d; k++) {
             x[k] = hs_scale_apply(scale, cloud->x[k][i]);
         }
-        if (!wrap_row(lattice, x, inside, turns) || !hs_lattice_shift(lattice, turns, given)) {
+        if (!wrap_row(lattice, x, inside, turns)) {
             failure->row = i;
             return HS_ERR_SHIFT_RANGE;
         }
+        (void)hs_lattice_shift(lattice, turns, given); /* as wrapping has done with them */
         for (int k = 0; wrapped != NULL && k < d; k++) {
             const bool stays = inside[k] == x[k]; /* scaling may have lost its last digits */
             wrapped[i * d + k] =

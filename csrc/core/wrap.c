@@ -53,12 +53,16 @@ hs_wrap_axis(double x, double length, int64_t *turns)
     return inside;
 }
 
-/* sum + low -= factor * entry, by a compensated step (Ogita, Rump and Oishi 2005, Dot2). */
+/* sum + low -= factor * entry, by a compensated step (Ogita, Rump and Oishi 2005, Dot2). A factor
+ * that is split must be below 2^996: large entries are taken smaller, exactly. */
 HS_ALWAYS_INLINE void
 subtract_product(double factor, double entry, double *sum, double *low, double *absolute)
 {
-    const hs_dw product = hs_two_product(-factor, entry);
-    const hs_dw partial = hs_two_sum(*sum, product.hi);
+    const bool   is_large = fabs(entry) > 0x1p900;
+    const double shrink = is_large ? 0x1p-64 : 1.0, grow = is_large ? 0x1p64 : 1.0;
+    const hs_dw  scaled = hs_two_product(-factor, entry * shrink);
+    const hs_dw  product = {scaled.hi * grow, scaled.lo * grow};
+    const hs_dw  partial = hs_two_sum(*sum, product.hi);
     *sum = partial.hi;
     *low += partial.lo + product.lo;
     *absolute += fabs(product.hi);

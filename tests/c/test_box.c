@@ -321,6 +321,49 @@ plans_describe_the_search(void)
     CHECK(plan.all_pairs && plan.n_periodic == 0 && plan.images[0] == 0);
 }
 
+/* Box vectors near the end of the numbers, whose sums are beyond it, and as many binary orders below
+ * as a product of doubles that is split needs. */
+static void
+the_largest_boxes_are_measured_and_wrapped_into(void)
+{
+    hs_box          box = {.ndim = 2, .periodic = {true, true}};
+    double          x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4];
+    int64_t         shift[4];
+    for (int exponent = 0; exponent > -80; exponent--) {
+        double scaled[4];
+        for (int e = 0; e < 4; e++) {
+            scaled[e] = ldexp(x[e], exponent);
+        }
+        const hs_points points = {scaled, 2, 2, HS_FLOAT64, 16, 8};
+        const double    length = ldexp(0x1p1023, exponent);
+        box.rows[0][0] = box.rows[1][1] = length;
+        CHECK(hs_box_measure(&box, heights, NULL, NULL) == HS_OK);
+        CHECK(heights[0] == length && heights[1] == length);
+        CHECK(hs_box_wrap(&box, &points, wrapped, shift, NULL) == HS_OK);
+        CHECK(wrapped[0] == 0.5 * length && shift[0] == -1);
+        CHECK(wrapped[1] == scaled[1] && shift[1] == 0);
+        CHECK(wrapped[2] == 0.5 * length && shift[2] == 1);
+        CHECK(wrapped[3] == 0.25 * length && shift[3] == 2);
+    }
+}
+
+/* Few heights, but many widths. */
+static void
+turns_of_a_sheared_box_may_be_too_many(void)
+{
+    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0}, {0x1p40, 1}}};
+    double          x[4] = {0.5, 0.5, 0.5, 2.5}, wrapped[4];
+    int64_t         shift[4];
+    hs_failure      failure;
+    const hs_points points = {x, 2, 2, HS_FLOAT64, 16, 8};
+    CHECK(hs_box_wrap(&box, &points, wrapped, shift, &failure) == HS_OK);
+    CHECK(shift[2] == INT64_C(5) << 39 && shift[3] == -2);
+    CHECK(wrapped[2] == 0x1p39 + 0.5 && wrapped[3] == 0.5);
+    x[3] = 0x1p20;
+    CHECK(hs_box_wrap(&box, &points, wrapped, shift, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(failure.row == 1);
+}
+
 void
 test_box(void)
 {
@@ -335,5 +378,7 @@ test_box(void)
     RUN(too_many_points_are_refused_unread);
     RUN(shifts_too_wide_name_their_point);
     RUN(no_points_are_no_pairs_whatever_the_cutoff);
+    RUN(the_largest_boxes_are_measured_and_wrapped_into);
+    RUN(turns_of_a_sheared_box_may_be_too_many);
     RUN(plans_describe_the_search);
 }

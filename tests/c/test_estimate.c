@@ -65,7 +65,7 @@ expectations_are_near_the_truth(void)
 static void
 samples_end_early_in_a_crowd(void)
 {
-    enum { N = 40000 };
+    enum { N = 100000 };
     static double    x[3 * N];
     harness_random   random = {4};
     const hs_points  points = {x, N, 3, HS_FLOAT64, 24, 8};

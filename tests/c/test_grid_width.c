@@ -73,6 +73,21 @@ small_cells_of_many_dimensions_are_made_larger(void)
     CHECK(n_pairs > 1000);
 }
 
+static void
+small_cells_of_many_points_are_made_larger(void)
+{
+    enum { N = 5000 };
+    static double  x[6 * N];
+    harness_random random = {67};
+    brute_scene    scene = {.ndim = 6, .n = N, .x = x, .cutoff = 0.35};
+    int64_t        n_pairs = 0;
+    const double   sizes[] = {0.35, 0.1};
+    for (int e = 0; e < 6 * N; e++) {
+        x[e] = random_unit(&random);
+    }
+    CHECK(sizes_agree(&scene, sizes, 2, &n_pairs) && n_pairs > 1000);
+}
+
 /* Boxes so short that a cutoff passes more images than are counted are refused with any cells. */
 static void
 endless_images_are_refused_with_any_cells(void)
@@ -156,6 +171,7 @@ test_grid_width(void)
 {
     RUN(any_size_of_cells_gives_the_same_pairs);
     RUN(small_cells_of_many_dimensions_are_made_larger);
+    RUN(small_cells_of_many_points_are_made_larger);
     RUN(endless_images_are_refused_with_any_cells);
     RUN(faces_at_multiples_of_the_cutoff_lose_no_pair);
     RUN(few_points_are_not_worth_a_thread);

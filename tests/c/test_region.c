@@ -56,6 +56,9 @@ is_aligned(const void *data, size_t alignment)
 static void
 reserve_gives_room(void)
 {
+    hs_region none = {0};
+    hs_region_expect(&none, GB); /* advice for what is not there */
+    CHECK(none.data == NULL && none.capacity == 0);
     static const size_t sizes[] = {0, 1, 64, 4096, 100000, 1 * MB, 2 * MB - 1, 2 * MB, 5 * MB + 3};
     hs_pool_clear();
     for (int k = 0; k < 9; k++) {

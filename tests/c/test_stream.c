@@ -85,6 +85,36 @@ large_results_are_left_and_taken_up(void)
     free(x);
 }
 
+/* Of which only the number is wanted. */
+static void
+blocks_without_columns_count_the_pairs(void)
+{
+    double           *x = random_points(3000, 2, 1.0);
+    const brute_scene scene = {.ndim = 2, .n = 3000, .x = x, .inclusive = true, .cutoff = 0.2};
+    const hs_points   points = points_of(&scene);
+    hs_options        options = options_of(&scene);
+    int64_t           count = 0, all = 0;
+    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK);
+    options.want = 0;
+    for (int threads = 1; threads <= 3; threads += 2) {
+        hs_stream *stream = NULL;
+        hs_pairs  *block = NULL;
+        hs_failure failure;
+        options.threads = threads;
+        all = 0;
+        CHECK(hs_stream_open(&points, NULL, &options, 10007, &stream, &failure) == HS_OK);
+        do {
+            hs_pairs_free(block);
+            CHECK(hs_stream_next(stream, NULL, NULL, &block, &failure) == HS_OK);
+            all += block != NULL ? hs_pairs_length(block) : 0;
+            CHECK(block == NULL || hs_pairs_length(block) == 10007 || all == count);
+        } while (block != NULL);
+        CHECK(all == count && count > 100000);
+        hs_stream_free(stream);
+    }
+    free(x);
+}
+
 /* The same in a box that is smaller than the cutoff: blocks of several images. */
 static void
 images_are_left_and_taken_up(void)
@@ -322,6 +352,7 @@ test_stream(void)
 {
     RUN(blocks_are_the_pairs_in_their_order);
     RUN(large_results_are_left_and_taken_up);
+    RUN(blocks_without_columns_count_the_pairs);
     RUN(images_are_left_and_taken_up);
     RUN(points_may_change_after_the_call);
     RUN(interrupted_calls_can_be_made_again);
