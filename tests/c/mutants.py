@@ -9,7 +9,8 @@ The first form tries NUMBER changes chosen by SEED in csrc/core/*.c, the second 
 lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not changed,
 and judged by the C tests that reach its function, quick ones first, until one fails, crashes or
 takes far longer than it should. --binding changes csrc/binding instead: mutants_python.py has
-the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first build quick.
+the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first build quick. $MUTANT_FLAGS:
+further flags; with -fsanitize=address,undefined the sanitizers judge too, in several times as long.
 
 Prints a line for each mutant, and the rate at the end:
 
@@ -46,6 +47,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 COMPILER = os.environ.get("CC", "cc").split()
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", "-w"]
+FURTHER = os.environ.get("MUTANT_FLAGS", "").split()
 LIBRARIES = ["-lm", "-lpthread"] + ["-Wl,--wrap=pthread_create"] * sys.platform.startswith("linux")
 PARTS = ["csrc/core", "csrc/kernels", "tests/c"]
 
@@ -96,7 +98,7 @@ def sources(tree):
 
 
 def digest(paths):
-    total = hashlib.sha256(" ".join(COMPILER).encode())
+    total = hashlib.sha256(" ".join(COMPILER + FLAGS + FURTHER).encode())
     for path in sorted(paths):
         total.update(path.read_bytes())
     return total.hexdigest()
@@ -115,7 +117,9 @@ def copy_tree(target):
 def compile_object(tree, source, target, flags=()):
     """From within the tree, by a relative path: objects then only differ where the code does."""
     name = source.relative_to(tree)
-    return run([*COMPILER, *FLAGS, *flags, "-c", name, "-o", target], cwd=tree, timeout=300)
+    return run(
+        [*COMPILER, *FLAGS, *FURTHER, *flags, "-c", name, "-o", target], cwd=tree, timeout=300
+    )
 
 
 def build(pool, tree, folder, flags=()):
@@ -138,8 +142,8 @@ def trace(pool, work):
     folder, program = work / "reach", work / "reach" / "core_tests"
     objects = build(pool, work / "base", folder, REACH_FLAGS)
     (folder / "reach.c").write_text(REACH_C)
-    demand([*COMPILER, "-O2", "-fPIE", "-pie", folder / "reach.c", *objects, "-o", program,
-            *LIBRARIES])  # fmt: skip
+    linking = [*COMPILER, *FURTHER, "-O2", "-fPIE", "-pie", folder / "reach.c", *objects]
+    demand([*linking, "-o", program, *LIBRARIES])
     environment = {**os.environ, "REACHED": str(folder / "reached")}
     said = run([program, "-t"], env=environment, timeout=3600).stdout
     names, seconds = [], {}
@@ -194,7 +198,7 @@ class CTests:
             self.free.put(work / f"job{number}")
 
     def link(self, objects, program):
-        demand([*COMPILER, *objects, "-o", program, *LIBRARIES])
+        demand([*COMPILER, *FURTHER, *objects, "-o", program, *LIBRARIES])
 
     def near(self, mutation, source):
         """Tests that enter the function, and of these first those that reach the line or the last

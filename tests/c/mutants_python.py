@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The judge of mutants of csrc/binding, for mutants.py --binding: the Python tests, with a package
+whose extension has the mutant in it. Takes the Python that runs it, with NumPy and pytest."""
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import Queue
+
+from mutants import COMPILER, ROOT, demand, run
+
+PARTS = ["csrc", "csrc/core", "csrc/kernels", "csrc/binding"]
+TESTS = ROOT / "tests" / "python"
+FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-fPIC", "-pthread", "-w"]
+NAME = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
+
+# Themes of each file of the binding, as names of tests say them, besides its own name.
+THEMES = {
+    "convert": "core_arguments boundary_cases dtypes array_forms",
+    "call": "core_arguments interrupt threads boundary_cases",
+    "plain": "plain array_forms",
+    "outputs": "quantities table array_forms",
+    "result": "quantities boundary_cases",
+    "foreign": "boundary",
+    "tuples": "for_each_pair explain cell_list",
+    "py_pairs": "quantities pairs_small count",
+    "py_neighbors": "neighbors between table",
+    "py_cells": "cell_",
+    "py_stream": "iter_pairs",
+    "py_visit": "for_each_pair",
+    "py_info": "environment cache available",
+    "py_batch": "batch core_arguments",
+    "capi": "capi",
+    "module": "capi iter_pairs",
+}
+# Tests of many files, which come next. Left out at the end are those of programs and pages, and
+# those that run other builds or other libraries.
+FIRST = ["core_arguments", "plain", "quantities", "errors", "no_memory"]
+LEFT_OUT = ["adversarial", "benchmark", "report", "cli", "c_interface", "packaging", "docs"]
+LEFT_OUT += ["typing", "golden", "selftest", "scene", "peers"]
+SECONDS = 300  # of processor time, for the tests of one file
+
+
+class PythonTests:
+    folder = "csrc/binding"
+
+    def __init__(self, work, jobs):
+        self.work = work / "binding"
+        self.free = Queue()
+        import numpy
+
+        self.includes = ["-I" + numpy.get_include(), "-I" + sysconfig.get_path("include")]
+        self.copy_sources(self.work / "base")
+        objects = self.work / "objects"
+        shutil.rmtree(objects, ignore_errors=True)
+        objects.mkdir()
+        sources = sorted(path for part in PARTS for path in (self.work / "base" / part).glob("*.c"))
+        with ThreadPoolExecutor(jobs) as pool:
+            done = list(pool.map(lambda s: self.compile(s, objects / (s.stem + ".o")), sources))
+        errors = "".join(d.stderr for d in done if d.returncode)
+        if errors:
+            sys.exit(errors)
+        self.objects = sorted(objects.glob("*.o"))
+        for number in range(jobs):
+            tree = self.work / f"job{number}"
+            self.copy_sources(tree)
+            package = tree / "python" / "halfshell"
+            shutil.rmtree(package, ignore_errors=True)
+            shutil.copytree(ROOT / "python" / "halfshell", package)
+            for old in package.glob("_core.*.so"):
+                old.unlink()
+            self.free.put(tree)
+        self.check_unchanged()
+
+    def copy_sources(self, tree):
+        for part in PARTS:
+            (tree / part).mkdir(parents=True, exist_ok=True)
+            for path in (ROOT / part).iterdir():
+                if path.suffix in (".c", ".h"):
+                    shutil.copy(path, tree / part)
+
+    def compile(self, source, target):
+        tree = source.parents[2]
+        name = source.relative_to(tree)
+        command = [*COMPILER, *FLAGS, *self.includes, "-c", name, "-o", target]
+        return run(command, cwd=tree, timeout=300)
+
+    def link(self, tree, objects):
+        linker = shlex.split(sysconfig.get_config_var("LDSHARED"))
+        demand([*linker, *objects, "-o", tree / "python" / "halfshell" / NAME, "-lm", "-pthread"])
+
+    def check_unchanged(self):
+        """That the package is found, and passes what comes first."""
+        tree = self.free.get()
+        self.link(tree, self.objects)
+        failed = self.first_failure(tree, [TESTS / f"test_{name}.py" for name in FIRST])
+        self.free.put(tree)
+        if failed:
+            sys.exit(f"the tests fail as they are: {failed}")
+
+    def near(self, name):
+        """Files of tests, those of the mutant's theme first."""
+        stem = name.removesuffix(".c")
+        themes = [*THEMES.get(stem, "").split(), stem.removeprefix("py_"), *FIRST]
+        files = [
+            path
+            for path in sorted(TESTS.glob("test_*.py"))
+            if not any(word in path.stem for word in LEFT_OUT)
+        ]
+
+        def rank(path):
+            return next((n for n, theme in enumerate(themes) if theme in path.stem), len(themes))
+
+        return sorted(files, key=rank)
+
+    def first_failure(self, tree, files):
+        """The first test that fails, or how the process ends; "" if all pass."""
+        environment = {**os.environ, "PYTHONPATH": str(tree / "python")}
+        for path in files:
+            command = [
+                sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider",
+                "-o", "addopts=", str(path),
+            ]  # fmt: skip
+            try:
+                done = run(command, cwd=TESTS, env=environment, timeout=3 * SECONDS)
+            except subprocess.TimeoutExpired:
+                return f"{path.name} hangs"
+            if done.returncode not in (0, 5):
+                lines = [line for line in done.stdout.splitlines() if line.startswith("FAILED")]
+                return lines[0].split(" ")[1] if lines else f"{path.name} crashes"
+        return ""
+
+    def judge(self, mutation, source):
+        tree = self.free.get()
+        try:
+            return self.judge_in(tree, mutation, source)
+        finally:
+            self.free.put(tree)
+
+    def judge_in(self, tree, mutation, source):
+        path = tree / self.folder / mutation.file
+        target = tree / (Path(mutation.file).stem + ".o")
+        path.write_text(mutation.apply(source))
+        compiled = self.compile(path, target)
+        path.write_text(source)
+        if compiled.returncode:
+            return "no compile", ""
+        if target.read_bytes() == (self.work / "objects" / target.name).read_bytes():
+            return "same code", ""
+        self.link(tree, [o for o in self.objects if o.name != target.name] + [target])
+        failed = self.first_failure(tree, self.near(mutation.file))
+        return ("killed", failed) if failed else ("lived", "")
