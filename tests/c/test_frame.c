@@ -126,17 +126,6 @@ large_frames_can_be_stopped(void)
     hs_frame_free(&frame);
 }
 
-static void
-too_many_points_are_refused(void)
-{
-    const double    x = 0.0;
-    const hs_points points = {&x, INT64_C(1) << 31, 1, HS_FLOAT64, 0, 0};
-    hs_frame        frame = {0};
-    hs_failure      failure;
-    CHECK(take(&points, &frame, &failure) == HS_ERR_TOO_MANY);
-    CHECK(failure.value == 0x1p31 && frame.rows == NULL);
-}
-
 /* As many, of one type and dimension, in boxes that repeat along the same axes. */
 static void
 frames_match_or_do_not(void)
@@ -177,6 +166,5 @@ test_frame(void)
     RUN(any_layout_is_copied);
     RUN(the_first_that_is_not_finite_is_named);
     RUN(large_frames_can_be_stopped);
-    RUN(too_many_points_are_refused);
     RUN(frames_match_or_do_not);
 }
