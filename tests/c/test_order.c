@@ -113,7 +113,7 @@ blocks_are_sorted_by_number_and_shift(void)
         fill(&random, n, 1 + trial % RUNS, INT64_C(1) << bits, 1 << trial % 11, &block);
         by_shifts = use == HS_BLOCK_LISTS_PLACES;
         sort_plainly(&block, &lattice, sorted);
-        CHECK(hs_order_block(&lattice, use, &block, &order) == HS_OK);
+        CHECK(hs_order_block(&lattice, &options, use, &block, &order) == HS_OK);
         wrong += !is_sorted(&block, sorted, use);
     }
     CHECK(wrong == 0);
@@ -138,9 +138,10 @@ shifts_may_pass_their_range(void)
     CHECK(hs_block_init(&account, D, HS_BLOCK_LISTS_PLACES, MOST, RUNS, &block) == HS_OK);
     CHECK(hs_order_init(&account, &block, &order) == HS_OK);
     fill(&random, 50, RUNS, 4, 1000, &block);
-    CHECK(hs_order_block(&lattice, HS_BLOCK_LISTS_IDS, &block, &order) == HS_OK);
+    CHECK(hs_order_block(&lattice, &options, HS_BLOCK_LISTS_IDS, &block, &order) == HS_OK);
     fill(&random, 50, RUNS, 4, 1000, &block);
-    CHECK(hs_order_block(&lattice, HS_BLOCK_LISTS_PLACES, &block, &order) == HS_ERR_SHIFT_RANGE);
+    CHECK(hs_order_block(&lattice, &options, HS_BLOCK_LISTS_PLACES, &block, &order) ==
+          HS_ERR_SHIFT_RANGE);
     hs_order_free(&account, &block, &order);
     hs_block_free(&account, &block);
     hs_account_close(&account);
