@@ -53,7 +53,7 @@ check_indices(const hs_cells *cells, const brute_scene *scene, const hs_layout *
         for (int k = d - 1; k >= 0; k--) {
             const int64_t at = indices[c * d + k];
             wrong += at < 0 || at >= layout->shape[k];
-            id = id * layout->shape[k] + at;
+            id = layout->occupied_only ? 0 : id * layout->shape[k] + at;
             if (order == 0)
                 order = (at > indices[(c - 1) * d + k]) - (at < indices[(c - 1) * d + k]);
         }

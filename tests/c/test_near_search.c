@@ -94,7 +94,7 @@ too_many_neighbours_are_refused(void)
     options.cutoff = INFINITY;
     options.want = HS_WANT_J;
     options.memory_limit = 1e6;
-    for (int exponent = 20; exponent <= 62; exponent += 21)
+    for (int exponent = 20; exponent <= 62; exponent += 42)
         CHECK(hs_nearest_find(&points, NULL, &box, INT64_C(1) << exponent, &options, &rows, NULL) ==
               HS_ERR_MEMORY);
     options.kernel = "none";
