@@ -43,10 +43,10 @@ else:
 
 sources = [
     source
-    for folder in ("core", "kernels", "binding")
+    for folder in ("core/*", "kernels", "binding")
     for source in sorted(glob(f"csrc/{folder}/*.c"))
 ]
-headers = sorted(glob("csrc/*.h") + glob("csrc/*/*.h"))
+headers = sorted(glob("csrc/**/*.h", recursive=True))
 
 setup(
     ext_modules=[

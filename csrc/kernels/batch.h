@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * batch.h: the contract of the batch kernels: the float stages of the decision (core/exact.h) and
- * the measuring of D, for many pairs at once.
+ * batch.h: the contract of the batch kernels: the float stages of the decision
+ * (core/exact/metric.h) and the measuring of D, for many pairs at once.
  *
- * Both give, pair by pair, what the functions of core/exact.h give for one: the same verdicts by
- * the same stages, the same bits. What they cannot do they leave to those functions. Like these
- * they must be called with round to nearest and without flushing.
+ * Both give, pair by pair, what the functions of core/exact/metric.h give for one: the same
+ * verdicts by the same stages, the same bits. What they cannot do they leave to those functions.
+ * Like these they must be called with round to nearest and without flushing.
  */
 #ifndef HS_BATCH_H
 #define HS_BATCH_H
 
-#include "../core/base.h"
-#include "../core/exact.h"
+#include "../core/base/base.h"
+#include "../core/exact/metric.h"
 
 /* Arrays of a batch, also those that are written to, have room for n entries rounded up to a
  * multiple of this. Past n they hold any finite numbers; zeros will do. */
@@ -31,7 +31,7 @@ typedef struct hs_batch {
 } hs_batch;
 
 /*
- * verdict[e] is an hs_verdict (core/exact_float.h). HS_UNDECIDED leaves pair e to
+ * verdict[e] is an hs_verdict (core/exact/metric_float.h). HS_UNDECIDED leaves pair e to
  * hs_metric_settle. Adds the pairs that it decides to *stages.
  */
 typedef void (*hs_judge_fn)(const hs_metric *metric, const hs_batch *batch, uint8_t *verdict,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* batch_baseline.c: the batch kernels for CPUs of any kind. See batch.h. */
-#include "../core/exact_float.h"
+#include "../core/exact/metric_float.h"
 #include "batch.h"
 #include "target.h"
 

@@ -8,7 +8,8 @@
  *
  * Each is one loop over groups of LANES pairs, made for 1, 2, 3 and any number of axes, with and
  * without shifts, by inlining with constants. What a line computes is explained where the same is
- * done for one pair: core/exact_float.h, core/measure.c. Undefines both parameters at its end.
+ * done for one pair: core/exact/metric_float.h, core/exact/metric_measure.c. Undefines both
+ * parameters at its end.
  */
 #if !defined(JUDGE) || !defined(MEASURE)
 #error "define JUDGE and MEASURE before including batch_template.h"

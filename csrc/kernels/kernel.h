@@ -25,8 +25,8 @@
 #ifndef HS_KERNEL_H
 #define HS_KERNEL_H
 
-#include "../core/base.h"
-#include "../core/filter.h"
+#include "../core/base/base.h"
+#include "../core/exact/filter.h"
 #include "../halfshell.h"
 #include "batch.h"
 

@@ -3,7 +3,7 @@
 #ifndef HS_SIMD_AVX2_H
 #define HS_SIMD_AVX2_H
 
-#include "../core/base.h"
+#include "../core/base/base.h"
 
 enum { LANES = 8 };
 typedef __m256   floats;

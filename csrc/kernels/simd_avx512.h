@@ -3,7 +3,7 @@
 #ifndef HS_SIMD_AVX512_H
 #define HS_SIMD_AVX512_H
 
-#include "../core/base.h"
+#include "../core/base/base.h"
 
 enum { LANES = 16 };
 typedef __m512   floats;

@@ -10,7 +10,7 @@
 #ifndef HS_SIMD_NEON_H
 #define HS_SIMD_NEON_H
 
-#include "../core/base.h"
+#include "../core/base/base.h"
 
 enum { LANES = 4 };
 typedef float32x4_t floats;

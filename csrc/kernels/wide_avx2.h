@@ -3,7 +3,7 @@
 #ifndef HS_WIDE_AVX2_H
 #define HS_WIDE_AVX2_H
 
-#include "../core/base.h"
+#include "../core/base/base.h"
 
 enum { LANES = 4 };
 typedef __m256d reals;

@@ -3,7 +3,7 @@
 #ifndef HS_WIDE_AVX512_H
 #define HS_WIDE_AVX512_H
 
-#include "../core/base.h"
+#include "../core/base/base.h"
 
 enum { LANES = 8 };
 typedef __m512d  reals;

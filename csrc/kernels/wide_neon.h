@@ -3,7 +3,7 @@
 #ifndef HS_WIDE_NEON_H
 #define HS_WIDE_NEON_H
 
-#include "../core/base.h"
+#include "../core/base/base.h"
 
 enum { LANES = 2 };
 typedef float64x2_t reals;

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "../core/doubleword.h"
+#include "../core/exact/doubleword.h"
 
 enum { LANES = 1 };
 typedef double reals;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* main.c: runs the C tests. Usage: core_tests [-t] [part of a test's name]; -t: times */
-#include "harness.h"
+#include "support/harness.h"
 
 int         harness_failures;
 int         harness_tests;

@@ -5,7 +5,7 @@ Usage: python3 mutants.py [--jobs N] [--work FOLDER] SEED NUMBER [part of a file
        python3 mutants.py [--jobs N] [--work FOLDER] --at FILE:LINE[-LINE] ...
        python3 mutants.py [...] --binding SEED NUMBER [part of a file's name]
 
-The first form tries NUMBER changes chosen by SEED in csrc/core/*.c, the second all changes of some
+The first form tries NUMBER changes chosen by SEED in csrc/core/*/*.c, the second all changes of some
 lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not changed,
 and judged by the C tests that reach its function, quick ones first, until one fails, crashes or
 takes far longer than it should. --binding changes csrc/binding instead: mutants_python.py has
@@ -94,7 +94,8 @@ def demand(command, **options):
 
 
 def sources(tree):
-    return sorted(path for part in PARTS for path in (tree / part).glob("*.c"))
+    found = (path for part in PARTS for path in (tree / part).rglob("*.c"))
+    return sorted(path for path in found if not {"build", "fuzz", "golden"} & set(path.parts))
 
 
 def digest(paths):
@@ -107,11 +108,11 @@ def digest(paths):
 def copy_tree(target):
     """The sources, in a place of their own: they may change while this runs."""
     shutil.rmtree(target, ignore_errors=True)
-    for part in [*PARTS, "csrc"]:
-        (target / part).mkdir(parents=True, exist_ok=True)
-        for path in (ROOT / part).iterdir():
-            if path.suffix in (".c", ".h"):
-                shutil.copy(path, target / part)
+    for part in ("csrc", "tests/c"):
+        for path in (ROOT / part).rglob("*.[ch]"):
+            place = target / path.relative_to(ROOT)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, place)
 
 
 def compile_object(tree, source, target, flags=()):
@@ -127,7 +128,7 @@ def build(pool, tree, folder, flags=()):
     folder.mkdir(exist_ok=True)
 
     def one(source):
-        extra = flags if "core" in source.parts[-2:] else ["-fPIE"] if flags else ()
+        extra = flags if "core" in source.parts else ["-fPIE"] if flags else ()
         done = compile_object(tree, source, folder / (source.stem + ".o"), extra)
         return done.stderr if done.returncode else ""
 
@@ -179,7 +180,7 @@ class CTests:
     def __init__(self, work, jobs):
         self.work, self.lock, self.passes = work, Lock(), {}
         self.free = Queue()
-        stamp = digest([*sources(ROOT), *HERE.glob("*.h"), *(ROOT / "csrc").glob("*/*.h")])
+        stamp = digest([*sources(ROOT), *HERE.rglob("*.h"), *(ROOT / "csrc").rglob("*.h")])
         kept = work / "reached.json"
         old = json.loads(kept.read_text()) if kept.exists() else {}
         with ThreadPoolExecutor(jobs) as pool:
@@ -244,7 +245,7 @@ class CTests:
             self.free.put(tree)
 
     def judge_in(self, tree, mutation, source):
-        path = tree / self.folder / mutation.file
+        path = next((tree / self.folder).rglob(mutation.file))
         target, program = tree / (path.stem + ".o"), tree / "core_tests"
         path.write_text(mutation.apply(source))
         compiled = compile_object(tree, path, target)
@@ -264,7 +265,7 @@ class CTests:
 
 def choose(folder, options):
     """Mutations, and the text of each file."""
-    texts = {path.name: path.read_text() for path in sorted((ROOT / folder).glob("*.c"))}
+    texts = {path.name: path.read_text() for path in sorted((ROOT / folder).rglob("*.c"))}
     found = [m for name, text in texts.items() for m in mutations(name, text)]
     if options.at:
         lines = set()

@@ -14,7 +14,7 @@ from queue import Queue
 
 from mutants import COMPILER, ROOT, demand, run
 
-PARTS = ["csrc", "csrc/core", "csrc/kernels", "csrc/binding"]
+PARTS = ["csrc/core", "csrc/kernels", "csrc/binding"]
 TESTS = ROOT / "tests" / "python"
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-fPIC", "-pthread", "-w"]
 NAME = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
@@ -59,7 +59,7 @@ class PythonTests:
         objects = self.work / "objects"
         shutil.rmtree(objects, ignore_errors=True)
         objects.mkdir()
-        sources = sorted(path for part in PARTS for path in (self.work / "base" / part).glob("*.c"))
+        sources = sorted(path for part in PARTS for path in (self.work / "base" / part).rglob("*.c"))
         with ThreadPoolExecutor(jobs) as pool:
             done = list(pool.map(lambda s: self.compile(s, objects / (s.stem + ".o")), sources))
         errors = "".join(d.stderr for d in done if d.returncode)

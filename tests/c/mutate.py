@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Halve every error constant of csrc/core/bounds.h in turn and demand that a C test fails.
+"""Halve every error constant of csrc/core/exact/bounds.h in turn and demand that a C test fails.
 
 Usage: python3 mutate.py [part of a constant's name]. Uses $CC, or cc. Prints a table; the exit
 code is 1 if a constant can be halved without a test noticing, or if the tests fail as they are.
@@ -15,13 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-CORE = HERE.parent.parent / "csrc" / "core"
+CORE = HERE.parent.parent / "csrc" / "core" / "exact"
 COMPILER = os.environ.get("CC", "cc").split()
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", f"-I{HERE}"]
 
-MODULES = ["doubleword", "exact", "filter", "expanded", "measure"]
-SOURCES = [CORE / f"{name}.c" for name in ("exact", "exact_integer", "measure", "filter")]
-SOURCES += [HERE / f"test_{name}.c" for name in MODULES]
+MODULES = ["doubleword", "metric", "filter", "expanded", "metric_measure"]
+SOURCES = [CORE / f"{name}.c" for name in ("metric", "metric_integer", "metric_measure", "filter")]
+SOURCES += [HERE / "exact" / f"test_{name}.c" for name in MODULES]
 
 
 def constants():

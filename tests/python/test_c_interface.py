@@ -192,11 +192,11 @@ def test_the_header_stands_alone():
 )
 def test_flags_that_break_the_arithmetic_are_refused(flags):
     with pytest.raises(AssertionError, match="-ffast-math and the like break them"):
-        compile(*flags.split(), "-fsyntax-only", CSRC / "core" / "decide.c")
+        compile(*flags.split(), "-fsyntax-only", CSRC / "core" / "search" / "decide.c")
 
 
 FUSED = """
-#include "core/base.h"
+#include "core/base/base.h"
 #include <stdio.h>
 int main(void) {
     volatile double x = 0x1.0000002p27, y = -0x1p54;

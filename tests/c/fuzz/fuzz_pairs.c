@@ -5,7 +5,7 @@
  */
 #include <stdio.h>
 
-#include "../pair_checks.h"
+#include "../support/pair_checks.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -145,7 +145,8 @@ fail(const fuzz_scene *f, const char *what)
     abort();
 }
 
-/* What validation must say, as far as it can be told without deciding whether rows are dependent. */
+/* What validation must say, as far as it can be told without deciding whether rows are
+ * dependent. */
 static hs_status
 status_of(const fuzz_scene *f)
 {
@@ -201,8 +202,8 @@ most_periods(const fuzz_scene *f, bool points_alone)
 }
 
 /*
- * Left out are skewed boxes whose vectors differ by more than float64 has digits: then the search looks
- * at very many images.
+ * Left out are skewed boxes whose vectors differ by more than float64 has digits: then the search
+ * looks at very many images.
  */
 static bool
 is_searchable(const fuzz_scene *f)

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * golden.c: a hash of everything that a dozen searches return, for every kernel of this CPU. Prints
- * one line for each scene and exits with 1 if kernels or numbers of threads differ. `make golden` builds it with
- * several compilers, levels of optimisation and CPUs: all must print the same.
+ * one line for each scene and exits with 1 if kernels or numbers of threads differ. `make golden`
+ * builds it with several compilers, levels of optimisation and CPUs: all must print the same.
  *
  * Scenes are made by integers, multiplication and addition, so that they are the same bits
  * everywhere.
  */
 #include "../../../csrc/halfshell.h"
-#include "../harness.h"
+#include "../support/harness.h"
 
 #define FNV_START UINT64_C(0xcbf29ce484222325)
 

@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * api_candidates.c: what cells say without a distance test: where points are, which points the
+ * cells around a query hold. See halfshell.h.
+ */
+#include "arguments.h"
+#include "api_cells.h"
+#include "../base/fpenv.h"
+#include "../base/poll.h"
+#include "../search/cell_rows.h"
+
+#include <string.h>
+
+void
+hs_cells_layout(const hs_cells *cells, hs_layout *layout)
+{
+    if (layout == NULL) {
+        return;
+    }
+    if (cells == NULL) {
+        *layout = (hs_layout){.ndim = 0};
+        return;
+    }
+    const hs_search *search = &cells->search;
+    const hs_grid   *grid = &search->grid;
+    *layout = (hs_layout){.ndim = grid->ndim,
+                          .n_points = search->bins.n,
+                          .n_cells = grid->n_cells,
+                          .occupied_only = search->is_sparse,
+                          .start = search->bins.start,
+                          .order = search->bins.order};
+    const hs_fpenv saved = hs_fpenv_enter();
+    for (int k = 0; k < grid->ndim; k++) {
+        layout->shape[k] = grid->shape[k];
+        layout->cell_size[k] = hs_scale_apply(search->scene.unscale, grid->cell_size[k]);
+    }
+    hs_fpenv_leave(saved);
+}
+
+/* Index along axis k of a point with coordinate t. */
+static int64_t
+index_along(const hs_search *search, int k, double t)
+{
+    return search->is_sparse ? hs_sparse_index(&search->grid, k, t)
+                             : hs_grid_index(&search->grid, k, t);
+}
+
+/* The occupied cell with these indices, or -1. */
+static int64_t
+find_occupied(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
+{
+    const int64_t    row = hs_sparse_find_row(sparse, index, hint);
+    hs_sparse_cursor cursor = {0, 0};
+    int32_t          first, end;
+    if (row < 0) {
+        return -1;
+    }
+    cursor.low = cursor.high = sparse->row_cell[row];
+    hs_sparse_window(sparse, row, index[0], index[0], &cursor, &first, &end);
+    return end > first ? cursor.low : -1;
+}
+
+static int64_t
+cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t *hint)
+{
+    int64_t index[HS_MAX_DIM], cell = 0;
+    for (int k = 0; k < scene->ndim; k++) {
+        index[k] = index_along(search, k, hs_scene_coordinate(scene, i, k));
+        cell += index[k] * search->grid.stride[k];
+    }
+    return search->is_sparse ? find_occupied(&search->sparse, index, hint) : cell;
+}
+
+hs_status
+hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_scene   scene;
+    hs_account account;
+    hs_options options = hs_options_default();
+    if (cells == NULL || points == NULL || !hs_has_entries(cell, points)) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
+    const hs_fpenv saved = hs_fpenv_enter();
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    options.cutoff = cells->search.options.cutoff;
+    hs_account_init(&account, &options);
+    hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
+    if (status == HS_OK) {
+        status = hs_scene_wrapped_like(&account, &cells->search.scene, points, &options, &scene,
+                                       failure);
+    }
+    if (status == HS_OK) {
+        int64_t hint = 0;
+        for (int64_t i = 0; i < points->n; i++) {
+            cell[i] = cell_of_point(&cells->search, &scene, i, &hint);
+        }
+        hs_scene_free(&account, &scene);
+    }
+    hs_account_close(&account);
+    hs_fpenv_leave(saved);
+    return status;
+}
+
+void
+hs_cells_indices(const hs_cells *cells, int64_t *indices)
+{
+    if (cells == NULL || indices == NULL) {
+        return;
+    }
+    const hs_search *search = &cells->search;
+    const hs_sparse *sparse = &search->sparse;
+    const int        d = search->grid.ndim;
+    if (search->is_sparse) {
+        for (int64_t row = 0; row < sparse->n_rows; row++) {
+            for (int64_t c = sparse->row_cell[row]; c < sparse->row_cell[row + 1]; c++) {
+                indices[c * d] = sparse->cell_x[c];
+                memcpy(indices + c * d + 1, sparse->row_index + row * (d - 1),
+                       (size_t)(d - 1) * sizeof *indices);
+            }
+        }
+        return;
+    }
+    for (int64_t c = 0; c < search->grid.n_cells; c++) {
+        for (int k = 0; k < d; k++) {
+            indices[c * d + k] = c / search->grid.stride[k] % search->grid.shape[k];
+        }
+    }
+}
+
+/* Ranges of points in cell order, of one query after the other. */
+typedef struct range_list {
+    const hs_search *search;
+    hs_link         *links;
+    int64_t         *hints;
+    const int64_t   *offsets; /* where the ranges of each query begin; NULL: they are counted */
+    int64_t         *counts;
+    int64_t         *first, *end;
+} range_list;
+
+static void
+add_range(range_list *list, int64_t query, int32_t first, int32_t end)
+{
+    if (first < end) {
+        const int64_t at = list->counts[query]++;
+        if (list->offsets != NULL) {
+            list->first[list->offsets[query] + at] = first;
+            list->end[list->offsets[query] + at] = end;
+        }
+    }
+}
+
+/* Cells low to high of the link's row; along a periodic first axis they may run over images. */
+static void
+add_window(range_list *list, int64_t query, hs_link *link, int64_t low, int64_t high)
+{
+    const hs_search *search = list->search;
+    const int64_t    n_x = search->grid.shape[0];
+    const bool       repeats = search->scene.lattice.row_of_axis[0] >= 0;
+    int64_t          turn = repeats ? hs_floor_divide(low, n_x) : 0;
+    do {
+        int32_t first, end;
+        hs_link_window(search, link, low - turn * n_x, high - turn * n_x, &first, &end);
+        add_range(list, query, first, end);
+        turn++;
+    } while (repeats && turn * n_x <= high);
+}
+
+static hs_status
+add_queries(range_list *list)
+{
+    const hs_search *search = list->search;
+    const hs_bins   *asking = hs_search_asking(search);
+    int64_t unpolled = HS_POLL_POINTS; /* rows of cells: there may be thousands for one query */
+    for (int64_t si = 0; si < asking->n; si++) {
+        hs_row       row;
+        hs_row_group group;
+        if (unpolled >= HS_POLL_POINTS) {
+            if (hs_poll(&search->options, (double)si / (double)asking->n) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
+            unpolled = 0;
+        }
+        hs_row_open_at(search, (int32_t)si, &row, &group);
+        const int64_t n_links = hs_row_links(search, &row, list->links, list->hints);
+        unpolled += search->stencil.n_rows + 1;
+        for (int64_t l = 0; l < n_links; l++) {
+            hs_link *link = &list->links[l];
+            add_window(list, asking->order[si], link, group.x_first + link->first,
+                       group.x_last + link->last);
+        }
+    }
+    return HS_OK;
+}
+
+/* Offsets from counts, which are zero again. */
+static int64_t
+sum_counts(int64_t n, int64_t *counts, int64_t *offsets)
+{
+    int64_t sum = 0;
+    for (int64_t q = 0; q < n; q++) {
+        offsets[q] = sum;
+        sum += counts[q];
+        counts[q] = 0;
+    }
+    offsets[n] = sum;
+    return sum;
+}
+
+static hs_status
+find_ranges(hs_pairs *rows, range_list *list, hs_failure *failure)
+{
+    const int64_t n = hs_search_asking(list->search)->n;
+    int64_t      *offsets = NULL;
+    hs_status     status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
+    if (status == HS_OK) {
+        rows->offsets.n_pairs = n + 1;
+        offsets = hs_output_column(&rows->offsets, HS_WANT_I);
+        memset(list->counts, 0, (size_t)n * sizeof *list->counts);
+        status = add_queries(list);
+    }
+    if (status == HS_OK) {
+        const int64_t n_ranges = sum_counts(n, list->counts, offsets);
+        failure->search_bytes = (double)n_ranges * 2.0 * sizeof(int64_t);
+        status = hs_output_reserve(&rows->output, n_ranges, 0.0);
+        rows->output.n_pairs = status == HS_OK ? n_ranges : 0;
+    }
+    if (status == HS_OK) {
+        list->offsets = offsets;
+        list->first = hs_output_column(&rows->output, HS_WANT_I);
+        list->end = hs_output_column(&rows->output, HS_WANT_J);
+        status = add_queries(list);
+    }
+    return status;
+}
+
+/* With an open search: room to work in, and the ranges. */
+static hs_status
+list_ranges(hs_pairs *rows, hs_failure *failure)
+{
+    hs_search    *search = &rows->search;
+    hs_account   *account = &search->account;
+    const int64_t n = hs_search_asking(search)->n, n_links = search->stencil.n_rows;
+    range_list    list = {.search = search};
+    list.links = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.links);
+    list.hints = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.hints);
+    list.counts = hs_alloc(account, HS_FOR_INDICES, n, sizeof *list.counts);
+    hs_status status = HS_ERR_MEMORY;
+    if (list.links != NULL && list.hints != NULL && list.counts != NULL) {
+        memset(list.hints, 0, (size_t)n_links * sizeof *list.hints);
+        status = find_ranges(rows, &list, failure);
+    }
+    hs_free(account, list.counts);
+    hs_free(account, list.hints);
+    hs_free(account, list.links);
+    return status;
+}
+
+hs_status
+hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+                    hs_pairs **result, hs_failure *failure)
+{
+    hs_sets    sets = hs_cells_sets(cells, queries, true);
+    hs_failure ignored;
+    if (!hs_can_return(result, options) || cells == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
+    hs_pairs *rows = hs_pairs_new();
+    if (rows == NULL) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
+    }
+    hs_search     *search = &rows->search;
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_status status = hs_check_arguments(&cells->points, queries, NULL, options, failure);
+    if (status == HS_OK) {
+        status = hs_search_reuse(&sets, options, search, failure);
+    } else {
+        hs_search_begin(options, search); /* for hs_pairs_free */
+        hs_search_report(search, 0);
+    }
+    if (status == HS_OK) {
+        hs_output_init(&search->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8,
+                       &rows->output);
+        hs_output_init(&search->account, cells->points.ndim, HS_WANT_I, 8, &rows->offsets);
+        status = list_ranges(rows, failure);
+        hs_search_report(search, 0);
+        hs_search_close(search);
+    } else if (status == HS_STATUS_END) {
+        hs_search_begin(options, search); /* for hs_pairs_free */
+        hs_search_report(search, 0);
+        status = options->cutoff == cells->search.options.cutoff ? HS_ERR_FAR : HS_ERR_CUTOFF;
+        failure->value = status == HS_ERR_CUTOFF ? options->cutoff : 0.0;
+    }
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        failure->limit_bytes = status == HS_ERR_MEMORY ? search->account.limit : 0.0;
+        hs_pairs_free(rows);
+        return status;
+    }
+    *result = rows;
+    return HS_OK;
+}

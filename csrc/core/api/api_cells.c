@@ -1,0 +1,222 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* api_cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
+#include "arguments.h"
+#include "api_cells.h"
+#include "../base/fpenv.h"
+#include "../base/poll.h"
+#include "api_stream.h"
+#include "api_visit.h"
+
+#include <string.h>
+
+static void
+copy_points(const hs_points *points, double *copy)
+{
+    for (int64_t i = 0; i < points->n; i++) {
+        const char *row = (const char *)points->data + i * points->row_stride;
+        for (int k = 0; k < points->ndim; k++) {
+            const char *entry = row + k * points->column_stride;
+            if (points->real == HS_FLOAT32) {
+                float value;
+                memcpy(&value, entry, sizeof value);
+                *copy++ = value;
+            } else {
+                memcpy(copy++, entry, sizeof *copy);
+            }
+        }
+    }
+}
+
+/* The points in memory of our own: nobody changes them while they are asked. */
+static hs_status
+keep_points(const hs_points *points, hs_cells *cells)
+{
+    const int64_t width = points->ndim * (int64_t)sizeof(double);
+    cells->copy = hs_alloc(&cells->search.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
+    if (cells->copy == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    copy_points(points, cells->copy);
+    cells->points = (hs_points){.data = cells->copy,
+                                .n = points->n,
+                                .ndim = points->ndim,
+                                .real = HS_FLOAT64,
+                                .row_stride = (ptrdiff_t)width,
+                                .column_stride = sizeof(double)};
+    return HS_OK;
+}
+
+/* The options that cells are built with: whatever may be asked for later is kept. */
+static hs_options
+options_of_cells(const hs_options *options)
+{
+    hs_options of_cells = *options;
+    of_cells.want = HS_WANT_SHIFT;
+    of_cells.sorted = false;
+    of_cells.out = NULL;
+    return of_cells;
+}
+
+static hs_status
+build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
+            hs_failure *failure)
+{
+    const hs_options of_cells = options_of_cells(options);
+    hs_search       *search = &cells->search;
+    hs_search_begin(&of_cells, search);
+    hs_status status = hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL,
+                                          &of_cells, failure);
+    if (status == HS_OK) {
+        status = keep_points(points, cells);
+    }
+    if (status == HS_OK) {
+        /* Pairs are for later calls to keep, or only to count. */
+        const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
+        search->team = hs_team_create(hs_search_threads(points->n, options));
+        status = hs_search_build(&sets, cells->has_box ? &cells->box : NULL, search, failure);
+        hs_team_free(search->team);
+        search->team = NULL;
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
+    /* What they point to is the caller's again. */
+    hs_search_report(search, 0);
+    search->options.poll = NULL;
+    search->options.counters = NULL;
+    search->options.kernel = NULL;
+    return status;
+}
+
+hs_status
+hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
+               hs_cells **result, hs_failure *failure)
+{
+    hs_failure ignored;
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (result == NULL || options == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
+    if (cells == NULL) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
+    }
+    cells->copy = NULL;
+    cells->trees = hs_near_kept_new();
+    cells->has_box = box != NULL;
+    if (box != NULL) {
+        cells->box = *box;
+    }
+    const hs_fpenv  saved = hs_fpenv_enter();
+    hs_status       status = build_cells(points, options, cells, failure);
+    if (status == HS_OK && cells->trees == NULL) {
+        status = HS_ERR_MEMORY;
+    }
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_cells_free(cells);
+        return status;
+    }
+    *result = cells;
+    return HS_OK;
+}
+
+void
+hs_cells_free(hs_cells *cells)
+{
+    if (cells == NULL) {
+        return;
+    }
+    hs_search_close(&cells->search);
+    hs_free(&cells->search.account, cells->copy);
+    hs_account_close(&cells->search.account);
+    hs_near_kept_free(cells->trees);
+    hs_free(NULL, cells);
+}
+
+void
+hs_cells_points(const hs_cells *cells, hs_points *points)
+{
+    if (points != NULL) {
+        *points = cells != NULL ? cells->points : (hs_points){.data = NULL};
+    }
+}
+
+const hs_box *
+hs_cells_box(const hs_cells *cells)
+{
+    return cells != NULL && cells->has_box ? &cells->box : NULL;
+}
+
+hs_sets
+hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full)
+{
+    if (cells == NULL) { /* which the search refuses */
+        return (hs_sets){.points = NULL};
+    }
+    return (hs_sets){.points = &cells->points,
+                     .queries = queries,
+                     .is_full = is_full,
+                     .built = &cells->search};
+}
+
+hs_status
+hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
+               hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, NULL, false);
+    return hs_pairs_find_in(&sets, hs_cells_box(cells), options, pairs, failure);
+}
+
+hs_status
+hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+               int64_t *count, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
+    return hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
+}
+
+hs_status
+hs_cells_neighbors(const hs_cells *cells, const hs_points *queries, const hs_options *options,
+                   hs_pairs **rows, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, queries, true);
+    return hs_neighbors_find_in(&sets, hs_cells_box(cells), options, rows, failure);
+}
+
+hs_status
+hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
+                         const hs_options *options, int64_t *counts, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, queries, true);
+    return hs_neighbors_count_in(&sets, hs_cells_box(cells), options, counts, failure);
+}
+
+hs_status
+hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
+                 const hs_options *options, hs_pairs **rows, hs_failure *failure)
+{
+    hs_sets sets = hs_cells_sets(cells, queries, true);
+    sets.trees = cells != NULL ? cells->trees : NULL;
+    return hs_nearest_find_in(&sets, hs_cells_box(cells), k, options, rows, failure);
+}
+
+hs_status
+hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
+                hs_stream **stream, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, NULL, false);
+    return hs_stream_open_in(&sets, hs_cells_box(cells), options, max_pairs, stream, failure);
+}
+
+hs_status
+hs_cells_visit(const hs_cells *cells, const hs_options *options, const hs_visit *visit,
+               int64_t *n_visited, hs_failure *failure)
+{
+    const hs_sets sets = hs_cells_sets(cells, NULL, false);
+    return hs_pairs_visit_in(&sets, hs_cells_box(cells), options, visit, n_visited, failure);
+}

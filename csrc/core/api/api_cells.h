@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* api_cells.h: what kept cells are, for those who ask them. */
+#ifndef HS_API_CELLS_H
+#define HS_API_CELLS_H
+
+#include "../nearest/nearest_kept.h"
+#include "../collect/result.h"
+
+struct hs_cells {
+    hs_search search; /* open, never walked itself: calls borrow from it */
+    hs_points points; /* of `copy` */
+    hs_box    box;
+    bool      has_box;
+    double   *copy;   /* owned; points as given, for cutoffs and queries that need other cells */
+    hs_near_kept *trees; /* owned; for nearest points, which cells are of no use for */
+};
+
+/* Queries, or NULL, among the points of the cells. cells NULL: there are no points to search. */
+hs_sets hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full);
+
+#endif

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* api_nearest.c: the public searches for the k nearest points: trees, then groups
+ * (nearest_search.h). */
+#include "arguments.h"
+#include "../base/fpenv.h"
+#include "../nearest/nearest_prepare.h"
+#include "../nearest/nearest_search.h"
+#include "../collect/result.h"
+#include "../base/poll.h"
+
+/* Room for k entries for each point that asks. */
+static hs_status
+make_room(hs_near *near, int64_t n_asking, hs_failure *failure)
+{
+    const double n = (double)n_asking * (double)near->k;
+    if (n < 0x1p62 && hs_output_reserve(near->rows, n_asking * near->k, 0.0) == HS_OK) {
+        near->rows->n_pairs = n_asking * near->k;
+        return HS_OK;
+    }
+    failure->expected_pairs = n;
+    failure->expected_bytes = n * (double)hs_output_bytes_per_pair(near->rows);
+    failure->limit_bytes = near->search->account.limit;
+    return HS_ERR_MEMORY;
+}
+
+static hs_status
+find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *failure)
+{
+    hs_search    *search = near->search;
+    const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
+    const double  limit = search->options.cutoff;
+    hs_status     status = make_room(near, n_asking, failure);
+    if (status == HS_OK) {
+        status = hs_near_prepare(near, sets, box, limit, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_near_search(near, failure);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = search->account.limit;
+    }
+    hs_near_release(near);
+    hs_search_close(search);
+    return status;
+}
+
+static hs_status
+check_nearest(const hs_sets *sets, const hs_box *box, int64_t k, const hs_options *options,
+              hs_failure *failure)
+{
+    const hs_status status =
+        hs_check_arguments(sets->points, sets->queries, box, options, failure);
+    if (status != HS_OK || k < 1) {
+        return status != HS_OK ? status : HS_ERR_ARGUMENT;
+    }
+    if (!(options->cutoff >= 0.0)) {
+        failure->value = options->cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_options *options,
+                   hs_pairs **result, hs_failure *failure)
+{
+    hs_failure ignored;
+    hs_sets    sets = *among;
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    hs_pairs *rows = hs_pairs_new();
+    if (rows == NULL) {
+        return hs_end_early(HS_ERR_MEMORY, options, failure);
+    }
+    sets.is_plain = sets.is_wide = true;
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_options     of_rows = *options;
+    of_rows.sorted = false;
+    of_rows.out = NULL;
+    of_rows.precision = HS_EXACT;
+    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+    hs_search_begin(&of_rows, &rows->search);
+    hs_near near = {.search = &rows->search,
+                    .k = k,
+                    .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
+                    .omits_self = sets.queries == NULL,
+                    .rows = &rows->output};
+    hs_status status = check_nearest(&sets, box, k, &of_rows, failure);
+    if (status == HS_OK) {
+        hs_output_init(&rows->search.account, sets.points->ndim, of_rows.want,
+                       options->index_bytes, &rows->output);
+        status = find_nearest(&near, &sets, box, failure);
+    }
+    hs_search_report(&rows->search, rows->output.n_pairs);
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_pairs_free(rows);
+        return status;
+    }
+    *result = rows;
+    return HS_OK;
+}
+
+hs_status
+hs_nearest_find(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
+                const hs_options *options, hs_pairs **result, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
+    return hs_nearest_find_in(&sets, box, k, options, result, failure);
+}

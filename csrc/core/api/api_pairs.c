@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* api_pairs.c: the public searches: find and count. */
+#include "../../halfshell.h"
+
+#include "arguments.h"
+#include "../search/estimate.h"
+#include "../collect/crew.h"
+#include "../collect/record.h"
+#include "call.h"
+#include "../collect/sort_pairs.h"
+
+#include <math.h>
+#include <string.h>
+
+hs_options
+hs_options_default(void)
+{
+    return (hs_options){.inclusive = true,
+                        .want = HS_WANT_I | HS_WANT_J,
+                        .index_bytes = 8,
+                        .threads = 1,
+                        .memory_limit = INFINITY};
+}
+
+/* By the caller's thread, straight into an output that grows. */
+static hs_status
+record_alone(hs_search *search, hs_output *output, hs_failure *failure)
+{
+    hs_recorder recorder = {0};
+    hs_walker   walker;
+    hs_status   status = hs_walker_init(search, hs_record_use(output->columns), hs_record_hits,
+                                        &recorder, &walker);
+    if (status == HS_OK) {
+        status = hs_recorder_init(&search->account, output, walker.block.most_hits, &recorder);
+    }
+    if (status == HS_OK) {
+        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);
+    }
+    hs_recorder_free(&search->account, &recorder);
+    hs_walker_close(search, &walker);
+    return status;
+}
+
+/* All pairs, unsorted. */
+static hs_status
+record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
+{
+    if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
+        return hs_parallel_record(search, output, failure);
+    }
+    hs_output_expect(output, search->grid.expected_pairs);
+    return search->team != NULL ? hs_parallel_record(search, output, failure)
+                                : record_alone(search, output, failure);
+}
+
+/* As the output, but first into one of its own, with what else tells pairs apart. */
+static hs_status
+sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
+{
+    hs_output found;
+    hs_output_init(&search->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
+    hs_status status = record_pairs(search, &found, failure);
+    if (status == HS_OK) {
+        status = hs_sort_pairs(search, &found, output);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->expected_pairs = (double)found.n_pairs;
+    }
+    hs_output_free(&found);
+    return status;
+}
+
+/* A hs_fill_fn. */
+static hs_status
+fill_pairs(hs_pairs *pairs, hs_failure *failure)
+{
+    hs_search *search = &pairs->search;
+    hs_output *output = &pairs->output;
+    hs_status  status = hs_estimate_by_sample(search, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    if (search->options.sorted) {
+        status = sort_pairs(search, output, failure);
+    } else {
+        status = record_pairs(search, output, failure);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
+    }
+    return hs_pairs_conclude(output, status, failure);
+}
+
+hs_status
+hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure)
+{
+    if (status != HS_OK) {
+        return status;
+    }
+    if (!output->fixed) {
+        return hs_output_reserve(output, 0, 1.0);
+    }
+    if (output->n_pairs > output->capacity) {
+        failure->expected_pairs = (double)output->n_pairs;
+        return HS_ERR_CAPACITY;
+    }
+    return HS_OK;
+}
+
+hs_pairs *
+hs_pairs_new(void)
+{
+    hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
+    if (pairs != NULL) {
+        memset(&pairs->output, 0, sizeof pairs->output);
+        memset(&pairs->offsets, 0, sizeof pairs->offsets);
+    }
+    return pairs;
+}
+
+hs_status
+hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
+              hs_pairs **result, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points};
+    return hs_pairs_find_in(&sets, box, options, result, failure);
+}
+
+hs_status
+hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                 hs_pairs **result, hs_failure *failure)
+{
+    const hs_request request = {.sets = sets, .box = box, .options = options};
+    if (!hs_can_return(result, options)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    return hs_request_fill(&request, fill_pairs, result, failure);
+}
+
+/* A hs_use_fn: of pairs, or of those that are ordered where every point is asked for all. */
+static hs_status
+count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    const hs_status status = hs_parallel_count(search, n_pairs, failure);
+    if (status == HS_OK) {
+        *(int64_t *)context = *n_pairs;
+    }
+    return status;
+}
+
+hs_status
+hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
+               int64_t *count, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points};
+    return hs_pairs_count_in(&sets, box, options, count, failure);
+}
+
+hs_status
+hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                  int64_t *count, hs_failure *failure)
+{
+    if (count == NULL || options == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_options       counting = *options;
+    const hs_request request = {.sets = sets, .box = box, .options = &counting};
+    counting.want = 0;
+    counting.sorted = false;
+    counting.out = NULL;
+    return hs_request_use(&request, count_pairs, count, failure);
+}
+
+int64_t
+hs_pairs_length(const hs_pairs *pairs)
+{
+    return pairs != NULL ? pairs->output.n_pairs : 0;
+}
+
+const void *
+hs_pairs_array(const hs_pairs *pairs, unsigned which)
+{
+    return pairs == NULL || pairs->output.fixed || !hs_is_quantity(which)
+               ? NULL
+               : hs_output_column(&pairs->output, which);
+}
+
+void *
+hs_pairs_take(hs_pairs *pairs, unsigned which)
+{
+    return pairs == NULL || pairs->output.fixed || !hs_is_quantity(which)
+               ? NULL
+               : hs_output_take(&pairs->output, which);
+}
+
+void
+hs_array_free(void *array)
+{
+    hs_buffer_free(array);
+}
+
+void
+hs_pairs_free(hs_pairs *pairs)
+{
+    if (pairs == NULL) {
+        return;
+    }
+    hs_output_free(&pairs->output);
+    hs_output_free(&pairs->offsets);
+    hs_account_close(&pairs->search.account);
+    hs_free(NULL, pairs);
+}

@@ -1,0 +1,278 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* api_stream.c: see api_stream.h. */
+#include "api_stream.h"
+
+#include "arguments.h"
+#include "../base/fpenv.h"
+#include "../collect/result.h"
+#include "../collect/crew.h"
+#include "../base/poll.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Pairs that are looked for at a time, at least: less would not pay for walkers and threads. */
+#define LEAST_FILL (INT64_C(1) << 16)
+
+/* Pairs that room is reserved for before any is found, at most; larger blocks grow. */
+#define MOST_EXPECTED 0x1p24
+
+struct hs_stream {
+    hs_search   search;    /* open, with a team only while it is walked */
+    hs_output   held;      /* pairs from `begin` on wait to be handed out */
+    int64_t     begin;
+    int64_t     max_pairs;
+    hs_bookmark next;      /* where to go on looking */
+    double      told;      /* the largest fraction that poll has been called with */
+    hs_poll_fn  poll;      /* of the caller, during hs_stream_next */
+    void       *context;
+};
+
+static int64_t
+waiting(const hs_stream *stream)
+{
+    return stream->held.n_pairs - stream->begin;
+}
+
+static bool
+is_over(const hs_stream *stream)
+{
+    return stream->next.point == hs_search_asking(&stream->search)->n;
+}
+
+/* An empty output, columns as the options say. */
+static void
+open_output(const hs_stream *stream, hs_account *account, hs_output *output)
+{
+    const hs_options *options = &stream->search.options;
+    hs_output_init(account, stream->search.scene.ndim, options->want, options->index_bytes,
+                   output);
+}
+
+/* Appends the first n pairs that wait. */
+static hs_status
+copy_waiting(const hs_stream *stream, int64_t first, int64_t n, hs_output *to)
+{
+    const hs_status status = hs_output_reserve(to, n, 0.0);
+    if (status == HS_OK) {
+        hs_output_copy(to, to->n_pairs, &stream->held, first, first + n);
+        to->n_pairs += n;
+    }
+    return status;
+}
+
+static int64_t
+fill_of(const hs_stream *stream)
+{
+    return stream->max_pairs > LEAST_FILL ? stream->max_pairs : LEAST_FILL;
+}
+
+/* The pairs from `first` on in an output of their own, with room for what comes. */
+static hs_status
+move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
+{
+    const double expected = fmin((double)fill_of(stream), stream->search.grid.expected_pairs);
+    open_output(stream, &stream->search.account, moved);
+    hs_output_expect(moved, fmin(expected, MOST_EXPECTED));
+    const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
+    if (status != HS_OK) {
+        hs_output_free(moved);
+    }
+    return status;
+}
+
+/* Looks for as many pairs as a block has. What an unfinished attempt has found is forgotten. */
+static hs_status
+fill(hs_stream *stream, hs_failure *failure)
+{
+    hs_search *search = &stream->search;
+    hs_output  moved;
+    if (stream->begin > 0 || stream->held.capacity == 0) {
+        const hs_status status = move_waiting(stream, stream->begin, &moved);
+        if (status != HS_OK) {
+            return status;
+        }
+        hs_output_free(&stream->held);
+        stream->held = moved;
+        stream->begin = 0;
+    }
+    const int64_t before = stream->held.n_pairs;
+    search->team = hs_team_create(hs_search_threads(search->bins.n, &search->options));
+    const hs_status status = hs_parallel_record_on(search, &stream->held, fill_of(stream),
+                                                   &stream->next, failure);
+    hs_team_free(search->team);
+    search->team = NULL;
+    if (status != HS_OK) {
+        stream->held.n_pairs = before;
+        return status;
+    }
+    return hs_poll(&search->options,
+                   (double)stream->next.point / (double)hs_search_asking(search)->n);
+}
+
+/* The first n pairs that wait, as all that is held, which is not copied: the rest is. */
+static hs_status
+give_away(hs_stream *stream, int64_t n, hs_output *given)
+{
+    hs_output       rest;
+    const hs_status status = move_waiting(stream, n, &rest);
+    if (status == HS_OK) {
+        *given = stream->held;
+        hs_account_give(given->account, given->charged * hs_output_bytes_per_pair(given));
+        given->account = NULL;
+        given->charged = 0;
+        given->n_pairs = n;
+        stream->held = rest;
+    }
+    return status;
+}
+
+/* The first n pairs that wait, copied. */
+static hs_status
+copy_out(hs_stream *stream, int64_t n, hs_output *copy)
+{
+    open_output(stream, NULL, copy);
+    const hs_status status = copy_waiting(stream, stream->begin, n, copy);
+    if (status == HS_OK) {
+        stream->begin += n;
+    } else {
+        hs_output_free(copy);
+    }
+    return status;
+}
+
+static hs_status
+take_block(hs_stream *stream, hs_pairs **result)
+{
+    const int64_t n = waiting(stream) < stream->max_pairs ? waiting(stream) : stream->max_pairs;
+    hs_pairs     *block = hs_pairs_new();
+    if (block == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(&block->search.account, 0, sizeof block->search.account);
+    /* What is held becomes the block where that leaves less to be copied. */
+    const bool      gives = stream->begin == 0 && waiting(stream) - n < n;
+    const hs_status status = gives ? give_away(stream, n, &block->output)
+                                   : copy_out(stream, n, &block->output);
+    if (status != HS_OK) {
+        hs_free(NULL, block);
+        return status;
+    }
+    *result = block;
+    return HS_OK;
+}
+
+/* A hs_poll_fn: what is looked for a second time, because it did not fit a block or the caller
+ * stopped, does not tell less than the first time. */
+static bool
+tell(void *context, double fraction)
+{
+    hs_stream *stream = context;
+    stream->told = hs_larger(stream->told, fraction);
+    return stream->poll(stream->context, stream->told);
+}
+
+hs_status
+hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
+               hs_failure *failure)
+{
+    hs_failure ignored;
+    if (block != NULL) {
+        *block = NULL;
+    }
+    if (stream == NULL || block == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_status      status = HS_OK;
+    stream->poll = poll;
+    stream->context = context;
+    hs_search_set_poll(poll != NULL ? tell : NULL, stream, &stream->search);
+    while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_over(stream)) {
+        status = fill(stream, failure);
+    }
+    if (status == HS_OK && waiting(stream) > 0) {
+        status = take_block(stream, block);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = stream->search.account.limit;
+    }
+    hs_search_set_poll(NULL, NULL, &stream->search);
+    hs_fpenv_leave(saved);
+    return status;
+}
+
+/* What there is to do with a search; the caller's own only during the call. */
+static hs_options
+options_of_stream(const hs_options *options)
+{
+    hs_options of_stream = *options;
+    of_stream.sorted = false;
+    of_stream.out = NULL;
+    of_stream.counters = NULL;
+    return of_stream;
+}
+
+hs_status
+hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                  int64_t max_pairs, hs_stream **result, hs_failure *failure)
+{
+    hs_sets    of_pairs = *sets;
+    hs_failure ignored;
+    if (result != NULL) {
+        *result = NULL;
+    }
+    if (result == NULL || options == NULL || max_pairs < 1) {
+        return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
+    }
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    of_pairs.keeps_none = true;
+    const hs_options of_stream = options_of_stream(options);
+    hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
+    if (stream == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    hs_search      *search = &stream->search;
+    const hs_fpenv  saved = hs_fpenv_enter();
+    const hs_status status = hs_search_open(&of_pairs, box, &of_stream, search, failure);
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_account_close(&search->account);
+        hs_free(NULL, stream);
+        return status;
+    }
+    hs_team_free(search->team); /* threads last for a call only */
+    search->team = NULL;
+    search->options.kernel = NULL; /* it is chosen, and its name is the caller's again */
+    hs_search_set_poll(NULL, NULL, search);
+    open_output(stream, &search->account, &stream->held);
+    stream->begin = 0;
+    stream->max_pairs = max_pairs;
+    stream->next = (hs_bookmark){.point = 0};
+    stream->told = 0.0;
+    *result = stream;
+    return HS_OK;
+}
+
+hs_status
+hs_stream_open(const hs_points *points, const hs_box *box, const hs_options *options,
+               int64_t max_pairs, hs_stream **stream, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points};
+    return hs_stream_open_in(&sets, box, options, max_pairs, stream, failure);
+}
+
+void
+hs_stream_free(hs_stream *stream)
+{
+    if (stream == NULL) {
+        return;
+    }
+    hs_output_free(&stream->held);
+    hs_search_close(&stream->search);
+    hs_account_close(&stream->search.account);
+    hs_free(NULL, stream);
+}

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* api_visit.c: see api_visit.h. */
+#include "api_visit.h"
+
+#include "arguments.h"
+#include "../base/fpenv.h"
+#include "../collect/crew.h"
+#include "../base/poll.h"
+#include "../collect/record.h"
+#include "call.h"
+
+#define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
+
+/* A function that wants to stop: a status that nothing else here has. It stops all threads, as any
+ * failure does, and the caller is told that all went well. */
+#define STOPPED HS_ERR_CAPACITY
+
+/* Work of a call in candidates, for polling: functions take tens of nanoseconds and more. */
+#define CALL_WORK 32
+
+/* What one thread works with. */
+typedef struct visitor {
+    const hs_visit *visit;     /* borrowed */
+    hs_output       part;      /* owned; the pairs that are being visited */
+    hs_recorder     recorder;  /* owned; of the part */
+    int64_t         n_visited;
+} visitor;
+
+static int
+call_each(const hs_visit *visit, const hs_pair_arrays *pairs, int ndim, int64_t *n_taken)
+{
+    const int64_t *i = pairs->i, *j = pairs->j;
+    for (int64_t e = 0; e < pairs->capacity; e++) {
+        const double d = pairs->distance[e];
+        if (visit->pair(i[e], j[e], pairs->shift + e * ndim, pairs->vector + e * ndim, d * d,
+                        visit->user) != 0) {
+            *n_taken = e + 1;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* A hs_visit_fn. */
+static hs_status
+visit_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+{
+    visitor        *doing = context;
+    const hs_visit *visit = doing->visit;
+    hs_output      *part = &doing->part;
+    part->n_pairs = 0;
+    const hs_status status = hs_record_hits(&doing->recorder, walker, first, hits);
+    if (status != HS_OK) {
+        return status;
+    }
+    const hs_pair_arrays pairs = {.capacity = part->n_pairs,
+                                  .index_bytes = part->index_bytes,
+                                  .i = hs_output_column(part, HS_WANT_I),
+                                  .j = hs_output_column(part, HS_WANT_J),
+                                  .distance = hs_output_column(part, HS_WANT_DISTANCE),
+                                  .vector = hs_output_column(part, HS_WANT_VECTOR),
+                                  .shift = hs_output_column(part, HS_WANT_SHIFT)};
+    int64_t   n_taken = part->n_pairs;
+    const int stops = visit->pairs != NULL
+                          ? visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user)
+                          : call_each(visit, &pairs, part->ndim, &n_taken);
+    (void)hs_fpenv_enter(); /* whatever the function has done to it */
+    doing->n_visited += n_taken;
+    walker->work_since_poll += CALL_WORK * part->n_pairs;
+    return stops != 0 ? STOPPED : HS_OK;
+}
+
+static hs_status
+open_visitor(hs_search *search, const hs_visit *visit, visitor *doing)
+{
+    *doing = (visitor){.visit = visit};
+    hs_output_init(NULL, search->scene.ndim, WANTED, sizeof(int64_t), &doing->part);
+    return hs_recorder_init(&search->account, &doing->part, HS_MOST_HITS, &doing->recorder);
+}
+
+static void
+close_visitor(hs_search *search, visitor *doing)
+{
+    hs_recorder_free(&search->account, &doing->recorder);
+    hs_output_free(&doing->part);
+}
+
+/* Everybody visits what they find. */
+static hs_status
+visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+{
+    const int n_threads = hs_team_size(search->team);
+    visitor  *visitors = hs_alloc(&search->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
+    hs_status status = visitors != NULL ? HS_OK : HS_ERR_MEMORY;
+    int       opened = 0;
+    while (status == HS_OK && opened < n_threads) {
+        status = open_visitor(search, visit, &visitors[opened++]);
+    }
+    if (status == HS_OK) {
+        const hs_visitors all = {.use = HS_BLOCK_LISTS_PLACES,
+                                 .visit = visit_hits,
+                                 .contexts = visitors,
+                                 .context_size = sizeof *visitors};
+        status = hs_parallel_visit(search, &all, NULL, failure);
+    }
+    *n_visited = 0;
+    while (opened > 0) {
+        *n_visited += visitors[--opened].n_visited;
+        close_visitor(search, &visitors[opened]);
+    }
+    hs_free(&search->account, visitors);
+    return status == STOPPED ? HS_OK : status;
+}
+
+/* What one search calls, and how many pairs it has handed over. */
+typedef struct visiting {
+    const hs_visit *visit;
+    int64_t        *n_visited;
+} visiting;
+
+/* A hs_use_fn. */
+static hs_status
+visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    const visiting *doing = context;
+    if (!doing->visit->thread_safe) { /* threads only make the search ready */
+        hs_team_free(search->team);
+        search->team = NULL;
+    }
+    const hs_status status = visit_all(search, doing->visit, n_pairs, failure);
+    *doing->n_visited = *n_pairs;
+    return status;
+}
+
+hs_status
+hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                  const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+{
+    visiting doing = {.visit = visit, .n_visited = n_visited};
+    hs_sets  of_pairs = *sets;
+    if (n_visited != NULL) {
+        *n_visited = 0;
+    }
+    if (n_visited == NULL || options == NULL || visit == NULL ||
+        (visit->pair == NULL && visit->pairs == NULL)) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    hs_options of_visit = *options;
+    of_visit.want = WANTED;
+    of_visit.sorted = false;
+    of_visit.index_bytes = 8;
+    of_visit.out = NULL;
+    of_pairs.keeps_none = true;
+    const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_visit};
+    return hs_request_use(&request, visit_pairs, &doing, failure);
+}
+
+hs_status
+hs_pairs_visit(const hs_points *points, const hs_box *box, const hs_options *options,
+               const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+{
+    const hs_sets sets = {.points = points};
+    return hs_pairs_visit_in(&sets, box, options, visit, n_visited, failure);
+}

@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* os_thread.h: the few thread functions that team.c needs, on POSIX and on Windows. */
+#ifndef HS_OS_THREAD_H
+#define HS_OS_THREAD_H
+
+#include "base.h"
+
+#define HS_BRIEFLY_MS 50 /* a wait that ends on its own */
+
+#if defined(_WIN32)
+
+#define WIN32_LEAN_AND_MEAN
+#include <process.h>
+#include <windows.h>
+/* windows.h defines these words of ours, as nothing. */
+#undef near
+#undef far
+
+typedef SRWLOCK            hs_mutex;
+typedef CONDITION_VARIABLE hs_condition;
+typedef HANDLE             hs_thread;
+typedef DWORD              hs_thread_id;
+typedef unsigned           hs_thread_result;
+#define HS_THREAD_CALL __stdcall
+typedef hs_thread_result(HS_THREAD_CALL *hs_thread_fn)(void *);
+
+#define hs_mutex_init(mutex) InitializeSRWLock(mutex)
+#define hs_mutex_lock(mutex) AcquireSRWLockExclusive(mutex)
+#define hs_mutex_unlock(mutex) ReleaseSRWLockExclusive(mutex)
+#define hs_mutex_destroy(mutex) ((void)(mutex))
+#define hs_condition_init(condition) InitializeConditionVariable(condition)
+#define hs_condition_wait(condition, mutex) \
+    ((void)SleepConditionVariableSRW(condition, mutex, INFINITE, 0))
+#define hs_condition_wait_briefly(condition, mutex) \
+    ((void)SleepConditionVariableSRW(condition, mutex, HS_BRIEFLY_MS, 0))
+#define hs_condition_wake(condition) WakeAllConditionVariable(condition)
+#define hs_condition_destroy(condition) ((void)(condition))
+
+HS_ALWAYS_INLINE bool
+hs_thread_start(hs_thread *thread, hs_thread_fn run, void *context)
+{
+    *thread = (HANDLE)_beginthreadex(NULL, 0, run, context, 0, NULL);
+    return *thread != NULL;
+}
+
+HS_ALWAYS_INLINE void
+hs_thread_join(hs_thread thread)
+{
+    (void)WaitForSingleObject(thread, INFINITE);
+    (void)CloseHandle(thread);
+}
+
+#define hs_thread_self() GetCurrentThreadId()
+#define hs_thread_is(id) (GetCurrentThreadId() == (id))
+
+/* There are no signals to block. */
+typedef int hs_signals;
+#define hs_signals_block(saved) ((void)(*(saved) = 0))
+#define hs_signals_restore(saved) ((void)(saved))
+
+#else
+
+#include <pthread.h>
+#include <signal.h>
+#include <time.h>
+
+typedef pthread_mutex_t hs_mutex;
+typedef pthread_cond_t  hs_condition;
+typedef pthread_t       hs_thread;
+typedef pthread_t       hs_thread_id;
+typedef void           *hs_thread_result;
+#define HS_THREAD_CALL
+typedef hs_thread_result (*hs_thread_fn)(void *);
+
+#define hs_mutex_init(mutex) ((void)pthread_mutex_init(mutex, NULL))
+#define hs_mutex_lock(mutex) ((void)pthread_mutex_lock(mutex))
+#define hs_mutex_unlock(mutex) ((void)pthread_mutex_unlock(mutex))
+#define hs_mutex_destroy(mutex) ((void)pthread_mutex_destroy(mutex))
+#define hs_condition_init(condition) ((void)pthread_cond_init(condition, NULL))
+#define hs_condition_wait(condition, mutex) ((void)pthread_cond_wait(condition, mutex))
+#define hs_condition_wake(condition) ((void)pthread_cond_broadcast(condition))
+#define hs_condition_destroy(condition) ((void)pthread_cond_destroy(condition))
+
+HS_ALWAYS_INLINE bool
+hs_thread_start(hs_thread *thread, hs_thread_fn run, void *context)
+{
+    return pthread_create(thread, NULL, run, context) == 0;
+}
+
+HS_ALWAYS_INLINE void
+hs_thread_join(hs_thread thread)
+{
+    (void)pthread_join(thread, NULL);
+}
+
+#define hs_thread_self() pthread_self()
+#define hs_thread_is(id) (pthread_equal(pthread_self(), (id)) != 0)
+
+HS_ALWAYS_INLINE void
+hs_condition_wait_briefly(hs_condition *condition, hs_mutex *mutex)
+{
+    struct timespec until;
+    (void)clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_nsec += HS_BRIEFLY_MS * 1000000L;
+    if (until.tv_nsec >= 1000000000L) {
+        until.tv_nsec -= 1000000000L;
+        until.tv_sec++;
+    }
+    (void)pthread_cond_timedwait(condition, mutex, &until);
+}
+
+/* Threads inherit what their maker blocks: every signal goes to a thread of the caller's. */
+typedef sigset_t hs_signals;
+
+HS_ALWAYS_INLINE void
+hs_signals_block(hs_signals *saved)
+{
+    sigset_t all;
+    (void)sigfillset(&all);
+    (void)pthread_sigmask(SIG_SETMASK, &all, saved);
+}
+
+HS_ALWAYS_INLINE void
+hs_signals_restore(const hs_signals *saved)
+{
+    (void)pthread_sigmask(SIG_SETMASK, saved, NULL);
+}
+
+#endif
+
+/* Returns *counter and adds 1 to it, as one step. */
+HS_ALWAYS_INLINE int64_t
+hs_fetch_increment(volatile int64_t *counter)
+{
+#if defined(_MSC_VER) && !defined(__clang__)
+    return InterlockedIncrement64(counter) - 1;
+#else
+    return __atomic_fetch_add(counter, 1, __ATOMIC_RELAXED);
+#endif
+}
+
+#endif

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* poll.h: what a search and its caller say to each other: whether to go on, and what was wrong. */
+#ifndef HS_POLL_H
+#define HS_POLL_H
+
+#include "../../halfshell.h"
+#include "base.h"
+
+/* Points that loading, wrapping and sorting handle between two questions: some milliseconds. */
+#define HS_POLL_POINTS (INT64_C(1) << 17)
+
+/* Nothing in it applies yet. */
+#define HS_NO_FAILURE ((hs_failure){.row = -1, .column = -1, .system = -1})
+
+/* HS_OK, or HS_ERR_INTERRUPTED when the caller wants to stop. */
+HS_ALWAYS_INLINE hs_status
+hs_poll(const hs_options *options, double fraction)
+{
+    return options->poll == NULL || options->poll(options->poll_context, fraction)
+               ? HS_OK
+               : HS_ERR_INTERRUPTED;
+}
+
+#endif

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* status.c: one sentence for each status; the version of the core. */
+#include "../../halfshell.h"
+
+int
+hs_version(void)
+{
+    return HS_VERSION;
+}
+
+const char *
+hs_status_text(hs_status status)
+{
+    switch (status) {
+    case HS_OK: return "success";
+    case HS_ERR_MEMORY: return "not enough memory";
+    case HS_ERR_CUTOFF: return "cutoff must be finite and not negative";
+    case HS_ERR_NOT_FINITE: return "points must be finite";
+    case HS_ERR_BOX_FINITE: return "box must be finite";
+    case HS_ERR_BOX_DEPENDENT: return "periodic box vectors must be linearly independent";
+    case HS_ERR_BOX_SKEWED: return "the box is too skewed or too long for float64";
+    case HS_ERR_TOO_MANY: return "too many points, systems or pairs";
+    case HS_ERR_SHIFT_RANGE: return "a shift does not fit its integer type";
+    case HS_ERR_ROUNDING: return "too far from the box for precision=\"double\"";
+    case HS_ERR_KERNEL: return "no such kernel on this CPU, or not compiled as it must be";
+    case HS_ERR_FAR: return "queries lie too far from the points that are in cells";
+    case HS_ERR_CAPACITY: return "the arrays that were given are too small";
+    case HS_ERR_EDGES: return "edges must be finite, not negative and ascending";
+    case HS_ERR_TYPES: return "types must be from 0 on and below the number of types";
+    case HS_ERR_WEIGHTS: return "weights must be finite";
+    case HS_ERR_INTERRUPTED: return "interrupted";
+    case HS_ERR_ARGUMENT: return "an argument is out of its range, or an array is missing";
+    case HS_STATUS_END: break;
+    }
+    return "unknown status";
+}

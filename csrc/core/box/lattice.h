@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * lattice.h: the box as the search uses it. The periodic box vectors are replaced by a short
+ * basis B of the same lattice, and each grid axis gets a unit normal along which points are
+ * binned. Axis-aligned boxes keep their own coordinate axes and cost no arithmetic.
+ */
+#ifndef HS_LATTICE_H
+#define HS_LATTICE_H
+
+#include "../../halfshell.h"
+#include "../base/base.h"
+
+/* Multiplying by 2^-exponent, in two steps because 2^1074 is not a double. */
+typedef struct hs_scale {
+    int    exponent;
+    double first, second; /* powers of two; first * second == 2^-exponent */
+} hs_scale;
+
+hs_scale hs_scale_of(int exponent);
+
+HS_ALWAYS_INLINE double
+hs_scale_apply(hs_scale scale, double value)
+{
+    return value * scale.first * scale.second;
+}
+
+/*
+ * r counts periodic box vectors (0 ... n_periodic - 1), k counts grid axes (0 ... ndim - 1).
+ * Lengths are scaled. A point X has the grid coordinate t_k = normal[k] . X. Matrices are set as
+ * far as ndim and n_periodic go: what lies beyond is neither cleared nor read.
+ */
+typedef struct hs_lattice {
+    int     ndim;
+    int     n_periodic;
+    bool    aligned;                         /* B is diagonal: t_k is coordinate k itself */
+    bool    reduced;                         /* B is not the given rows (up to sign) */
+    int     vector_of_row[HS_MAX_DIM];         /* box vector that periodic row r is */
+    int     row_of_axis[HS_MAX_DIM];         /* row of B along grid axis k, or -1: open */
+    double  given[HS_MAX_DIM][HS_MAX_DIM];   /* periodic rows as given, not scaled */
+    double  scaled[HS_MAX_DIM][HS_MAX_DIM];  /* the same, scaled */
+    int64_t U[HS_MAX_DIM][HS_MAX_DIM];       /* B = U * scaled */
+    double  rows[HS_MAX_DIM][HS_MAX_DIM];    /* B, scaled, rounded to float64 ... */
+    double  row_error[HS_MAX_DIM];           /* ... each entry within this; 0 when aligned */
+    double  normal[HS_MAX_DIM][HS_MAX_DIM];  /* unit vectors */
+    double  period[HS_MAX_DIM];              /* normal[k] . B along k: the height; 0 when open */
+    double  volume_mantissa; /* the volume of the periodic rows, scaled, ... */
+    int     volume_exponent; /* ... is mantissa * 2^exponent: products of lengths overflow */
+    double  direction[HS_MAX_DIM][HS_MAX_DIM]; /* D = sum_k (normal[k] . D) direction[k] */
+} hs_lattice;
+
+/* t_k of X, rounded; coordinate k itself in an aligned lattice. */
+HS_ALWAYS_INLINE double
+hs_lattice_coordinate(const hs_lattice *lattice, const double *x, int k)
+{
+    if (lattice->aligned) {
+        return x[k];
+    }
+    double t = 0.0;
+    for (int c = 0; c < lattice->ndim; c++) {
+        t += lattice->normal[k][c] * x[c];
+    }
+    return t;
+}
+
+/* Periodic entries finite and periodic rows independent, decided exactly. NULL box: HS_OK. */
+hs_status hs_box_check(const hs_box *box, hs_failure *failure);
+
+/* The lattice in a short basis, for searching. box: checked, or NULL for open space in ndim
+ * dimensions. */
+void hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice);
+
+/* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows, axis k
+ * is box vector k. Only rows, normals, periods and the volume are set. */
+void hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice);
+
+/* Volume of the periodic rows, each length times 2^exponent; 1 without rows. */
+double hs_lattice_volume(const hs_lattice *lattice, int exponent);
+
+/* S over the periodic rows as given, from a shift over B; false when it passes 2^62. */
+bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
+
+#endif

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * grid.h: cells. How many along each grid axis, which one a point is in, and how many cells away a
+ * neighbour can be. The number of cells follows the number of points, never the volume.
+ */
+#ifndef HS_GRID_H
+#define HS_GRID_H
+
+#include "../scene/scene.h"
+
+typedef struct hs_grid {
+    int      ndim;
+    int64_t  n_cells;             /* product of shape, at most 2 n + HS_GRID_SPARE_CELLS */
+    int64_t  shape[HS_MAX_DIM];   /* cells along each axis, at least 1 */
+    int64_t  stride[HS_MAX_DIM];  /* cell id = sum of index * stride; the first axis is fastest */
+    double   lower[HS_MAX_DIM];   /* t of the first face; of place 0 in a sparse grid */
+    int64_t  skipped[HS_MAX_DIM]; /* sparse grids: cells before the first that holds points */
+    double   cell_size[HS_MAX_DIM];
+    double   cells_per_length[HS_MAX_DIM];
+    bool     by_faces[HS_MAX_DIM]; /* cells begin at the numbers hs_grid_face() gives, exactly */
+    double   range[HS_MAX_DIM];   /* largest |difference of computed t_k| of a pair */
+    int64_t  reach[HS_MAX_DIM];   /* the same in cells, images counted on */
+    double   shift_error;         /* bound on the error of a shifted coordinate minus a centre */
+    double   expected_pairs;      /* if the points were spread evenly over the region they occupy */
+} hs_grid;
+
+#define HS_GRID_SPARE_CELLS 64
+
+/* Volume of a ball in ndim dimensions. */
+double hs_ball_volume(int ndim, double radius);
+
+/* HS_ERR_MEMORY when a cutoff spans more than 2^31 images, HS_ERR_BOX_SKEWED when rounding does. */
+hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
+
+/*
+ * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
+ * there would be too many of them, or too many around each. HS_STATUS_END where there can be none.
+ * grid_width.c.
+ */
+hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
+                            hs_failure *failure);
+
+/* Steps of both. Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the
+ * volume that they are in. */
+hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid,
+                        hs_failure *failure);
+
+/* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
+ * whether it had to. */
+bool hs_grid_cap_counts(const hs_scene *scene, double *counts);
+
+/* So many cells along each axis. HS_ERR_MEMORY as hs_grid_set_axis. */
+hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid);
+
+/* `count` cells of equal width along axis k: sets all but the stride, from the scene's range there
+ * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
+hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
+
+/*
+ * Tries one cell more along each axis, each a whole part of the radius wide (one of parts[k]) and
+ * no wider. Not for scenes that others ask: the points alone are looked at. grid_faces.c.
+ */
+void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
+
+/* The same cells, not cut by faces, for a scene whose cutoff was `cutoff_before` and is smaller
+ * now. Fails as above. */
+hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before,
+                         hs_grid *grid);
+
+/* Relative room for the few roundings between a bound and its use. */
+#define HS_GRID_SLACK 0x1p-40
+
+/* Cells per axis that int32 windows and doubles tell apart. */
+#define HS_GRID_CELLS_PER_AXIS 0x1p31
+
+/* Added to places, times the number of cells, where axes are cut by faces: more than their
+ * rounding, so that the cell found is the right one or the next. */
+#define HS_GRID_BIAS 0x1p-44
+
+/* Where cell number `cell` begins, where axes are cut by faces. */
+HS_ALWAYS_INLINE double
+hs_grid_face(const hs_grid *grid, int k, double cell)
+{
+    return grid->lower[k] + cell * grid->cell_size[k];
+}
+
+/* Cell index along axis k of a point with coordinate t; points beyond a face count as on it. */
+HS_ALWAYS_INLINE int64_t
+hs_grid_index(const hs_grid *grid, int k, double t)
+{
+    const bool    by_faces = grid->by_faces[k];
+    const double  bias = by_faces ? HS_GRID_BIAS * (double)grid->shape[k] : 0.0;
+    const double  place = (t - grid->lower[k]) * grid->cells_per_length[k] + bias;
+    const int64_t last = grid->shape[k] - 1;
+    /* Compared first: it may be beyond any integer. */
+    int64_t cell = !(place < (double)last) ? last : place > 0.0 ? (int64_t)place : 0;
+    cell -= by_faces && cell > 0 && t < hs_grid_face(grid, k, (double)cell);
+    return cell;
+}
+
+#endif

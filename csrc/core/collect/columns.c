@@ -1,0 +1,245 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* columns.c: see columns.h. */
+#include "columns.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Pairs that the first columns hold: they come from the pool and are soon warm. */
+#define FIRST_CAPACITY 1024
+/* A guess of the number of pairs is made this much larger, so that most of the time one
+ * reservation is enough. Room that is not written to costs nothing. */
+#define GUESS_MARGIN 1.06
+#define MOST_GROWTH 8.0
+/* Pairs that the account is charged for at a time. */
+#define CHARGE_STEP (INT64_C(1) << 20)
+/* Of one column: half the address space. */
+#define MOST_BYTES (0.5 * (double)SIZE_MAX)
+
+static const hs_purpose purposes[HS_COLUMNS] = {HS_FOR_INDICES, HS_FOR_INDICES, HS_FOR_DISTANCES,
+                                                HS_FOR_VECTORS, HS_FOR_SHIFTS,  HS_FOR_INDICES};
+
+void
+hs_output_init(hs_account *account, int ndim, unsigned columns, int index_bytes, hs_output *output)
+{
+    memset(output, 0, sizeof *output);
+    output->account = account;
+    output->ndim = ndim;
+    output->columns = columns;
+    output->index_bytes = index_bytes;
+}
+
+size_t
+hs_output_width(const hs_output *output, unsigned bit)
+{
+    const size_t index = (size_t)output->index_bytes, d = (size_t)output->ndim;
+    switch (bit) {
+    case HS_WANT_DISTANCE: return sizeof(double);
+    case HS_WANT_VECTOR: return d * sizeof(double);
+    case HS_WANT_SHIFT: return d * sizeof(int32_t);
+    case HS_WANT_BOTH: return 2 * index;
+    default: return index;
+    }
+}
+
+static int
+column_of(unsigned bit)
+{
+    int k = 0;
+    while (bit >> k != 1u) {
+        k++;
+    }
+    return k;
+}
+
+void
+hs_output_fix(hs_output *output, const hs_pair_arrays *arrays)
+{
+    void *const data[HS_COLUMNS] = {arrays->i,      arrays->j,     arrays->distance,
+                                    arrays->vector, arrays->shift, arrays->both};
+    for (int k = 0; k < HS_COLUMNS; k++) {
+        output->column[k] = (hs_region){.data = data[k]};
+    }
+    output->fixed = true;
+    output->capacity = arrays->capacity;
+    output->index_bytes = arrays->index_bytes;
+}
+
+void *
+hs_output_column(const hs_output *output, unsigned bit)
+{
+    return output->columns & bit ? output->column[column_of(bit)].data : NULL;
+}
+
+void *
+hs_output_next(const hs_output *output, unsigned bit)
+{
+    char *column = hs_output_column(output, bit);
+    return column == NULL
+               ? NULL
+               : column + (size_t)output->n_pairs * hs_output_width(output, bit);
+}
+
+/* What some columns got is of no use where another was refused, and may be what that one lacks. */
+static void
+undo_resize(hs_output *output)
+{
+    for (int k = 0; k < HS_COLUMNS; k++) {
+        hs_region *column = &output->column[k];
+        if (output->capacity == 0) {
+            hs_region_release(column);
+        } else if (column->data != NULL) {
+            hs_region_shrink(column, ((size_t)output->capacity + HS_PADDING) *
+                                         hs_output_width(output, 1u << k));
+        }
+    }
+}
+
+/* Columns of at least `pairs` pairs and the padding; as before if that is refused. */
+static bool
+resize(hs_output *output, double pairs)
+{
+    for (int k = 0; k < HS_COLUMNS; k++) {
+        hs_region *column = &output->column[k];
+        if (!(output->columns >> k & 1u)) {
+            continue;
+        }
+        const size_t width = hs_output_width(output, 1u << k);
+        /* As numbers first: size_t may have 32 bits. */
+        if (!((pairs + HS_PADDING) * (double)width < MOST_BYTES)) {
+            undo_resize(output);
+            return false;
+        }
+        const size_t bytes = ((size_t)pairs + HS_PADDING) * width;
+        column->used = (size_t)output->n_pairs * width;
+        if (column->data == NULL ? !hs_region_reserve(column, bytes)
+                                 : column->capacity < bytes && !hs_region_grow(column, bytes)) {
+            undo_resize(output);
+            return false;
+        }
+        hs_region_expect(column, bytes);
+    }
+    output->capacity = (int64_t)pairs;
+    return true;
+}
+
+int64_t
+hs_output_bytes_per_pair(const hs_output *output)
+{
+    size_t bytes = 0;
+    for (int k = 0; k < HS_COLUMNS; k++) {
+        bytes += output->columns >> k & 1u ? hs_output_width(output, 1u << k) : 0;
+    }
+    return (int64_t)bytes;
+}
+
+/* The account knows of as many pairs as are about to be written, not of what is only reserved:
+ * of n, which are more than it knows of. */
+static bool
+charge(hs_output *output, int64_t n)
+{
+    hs_account   *account = output->account;
+    const int64_t more = n - output->charged;
+    if (account == NULL) {
+        return true;
+    }
+    if (!hs_account_allows(account, (double)more * (double)hs_output_bytes_per_pair(output))) {
+        return false;
+    }
+    for (int k = 0; k < HS_COLUMNS; k++) {
+        if (output->columns >> k & 1u) {
+            hs_account_take(account, purposes[k],
+                            more * (int64_t)hs_output_width(output, 1u << k));
+        }
+    }
+    output->charged = n;
+    return true;
+}
+
+void
+hs_output_expect(hs_output *output, double n)
+{
+    const double guess = n * GUESS_MARGIN + FIRST_CAPACITY;
+    if (!(guess < 0x1p40) || !resize(output, guess)) {
+        (void)resize(output, FIRST_CAPACITY); /* refused: grow as pairs come */
+    }
+}
+
+hs_status
+hs_output_reserve(hs_output *output, int64_t n, double fraction)
+{
+    const int64_t needed = output->n_pairs + n;
+    if (needed > output->capacity || output->capacity == 0) {
+        /* What is needed now, half as much again, or the whole as far as it can be foreseen. */
+        const double least = (double)needed + FIRST_CAPACITY;
+        const double grown = fmax(least, 1.5 * (double)output->capacity);
+        const double guess =
+            fraction > 0.0 ? GUESS_MARGIN * (double)output->n_pairs / fraction : 0.0;
+        const double bold = fmin(guess, MOST_GROWTH * least); /* early fractions tell little */
+        if (!resize(output, fmax(grown, bold)) && !resize(output, grown) &&
+            !resize(output, least)) {
+            return HS_ERR_MEMORY;
+        }
+    }
+    if (needed > output->charged) {
+        const int64_t step = output->n_pairs < CHARGE_STEP ? output->n_pairs : CHARGE_STEP;
+        if (!charge(output, needed + step) && !charge(output, needed)) {
+            return HS_ERR_MEMORY;
+        }
+    }
+    return HS_OK;
+}
+
+bool
+hs_output_has_room(const hs_output *output, int64_t n)
+{
+    const int64_t needed = output->n_pairs + n;
+    return output->fixed || (needed <= output->capacity && output->capacity > 0 &&
+                             (output->account == NULL || needed <= output->charged));
+}
+
+void
+hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t first, int64_t end)
+{
+    int64_t n = end - first;
+    if (output->fixed && n > output->capacity - at) {
+        n = output->capacity - at;
+    }
+    for (int k = 0; n > 0 && k < HS_COLUMNS; k++) {
+        if (output->columns >> k & 1u) {
+            const size_t width = hs_output_width(output, 1u << k);
+            memcpy(output->column[k].data + (size_t)at * width,
+                   part->column[k].data + (size_t)first * width, (size_t)n * width);
+        }
+    }
+}
+
+void *
+hs_output_take(hs_output *output, unsigned bit)
+{
+    if (!(output->columns & bit)) {
+        return NULL;
+    }
+    const int k = column_of(bit);
+    output->columns &= ~bit;
+    hs_region *column = &output->column[k];
+    column->used = (size_t)output->n_pairs * hs_output_width(output, bit);
+    return hs_region_detach(column, column->used);
+}
+
+void
+hs_output_free(hs_output *output)
+{
+    if (output->account != NULL) {
+        hs_account_give(output->account, output->charged * hs_output_bytes_per_pair(output));
+    }
+    for (int k = 0; k < HS_COLUMNS && !output->fixed; k++) {
+        hs_region *column = &output->column[k];
+        if (output->columns >> k & 1u) {
+            column->used = (size_t)output->n_pairs * hs_output_width(output, 1u << k);
+        }
+        hs_region_release(column);
+    }
+    output->columns = 0;
+    output->charged = 0;
+}

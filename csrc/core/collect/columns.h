@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * columns.h: the pairs that have been found, one growable column for each quantity that was asked
+ * for and none for the others. What is written here is what the caller gets.
+ */
+#ifndef HS_COLUMNS_H
+#define HS_COLUMNS_H
+
+#include "../memory/account.h"
+#include "../memory/region.h"
+
+#include "../../kernels/kernel.h"
+
+#define HS_COLUMNS 6 /* one for each HS_WANT_ bit, in their order */
+
+typedef struct hs_output {
+    hs_account *account;     /* borrowed; NULL: neither counted nor limited */
+    int         ndim;
+    int         index_bytes; /* 4 or 8, of i, j and both */
+    unsigned    columns;     /* HS_WANT_ bits that are kept */
+    bool        fixed;       /* the columns are the caller's and do not grow */
+    int64_t     n_pairs;     /* found; when fixed, also those that had no room */
+    int64_t     capacity;    /* pairs that fit, HS_PADDING more beside them unless fixed */
+    int64_t     charged;     /* pairs that the account has been charged for */
+    hs_region   column[HS_COLUMNS];
+} hs_output;
+
+/* An empty output. */
+void hs_output_init(hs_account *account, int ndim, unsigned columns, int index_bytes,
+                    hs_output *output);
+
+/* Bytes of one pair in the column of this HS_WANT_ bit. */
+size_t hs_output_width(const hs_output *output, unsigned bit);
+
+/* Bytes of one pair in all columns. */
+int64_t hs_output_bytes_per_pair(const hs_output *output);
+
+/* Write to the caller's arrays. */
+void hs_output_fix(hs_output *output, const hs_pair_arrays *arrays);
+
+/* The column of this HS_WANT_ bit; NULL where it is not kept. */
+void *hs_output_column(const hs_output *output, unsigned bit);
+
+/* Room in the column of this HS_WANT_ bit for the next pair; NULL where it is not kept. */
+void *hs_output_next(const hs_output *output, unsigned bit);
+
+/*
+ * Room for n more pairs. `fraction` of the search is done, from which the number in the end is
+ * guessed; 0: unknown. HS_ERR_MEMORY when the account or the system refuses. Not for fixed outputs.
+ */
+hs_status hs_output_reserve(hs_output *output, int64_t n, double fraction);
+
+/* Whether n more pairs fit as it is; a fixed output always takes what fits. */
+bool hs_output_has_room(const hs_output *output, int64_t n);
+
+/* Writes pairs [first, end) of `part`, which has the same columns, to place `at` on; a fixed output
+ * takes what fits. */
+void hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t first,
+                    int64_t end);
+
+/* Virtual room for about n pairs, before the first: saves growing. Never fails. */
+void hs_output_expect(hs_output *output, double n);
+
+/* Ownership of one column, cut to n_pairs, goes to the caller: hs_buffer_free. NULL where it is not
+ * kept. */
+void *hs_output_take(hs_output *output, unsigned bit);
+
+/* Harmless twice. A fixed output is let go of. */
+void hs_output_free(hs_output *output);
+
+#endif

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * crew.h: the walk over all points by several threads. Points are handed out in ranges; what a
+ * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
+ * that the result is the same for any number of threads.
+ */
+#ifndef HS_CREW_H
+#define HS_CREW_H
+
+#include "columns.h"
+#include "../search/walk.h"
+
+/* What each thread's walker shall do with its hits, in place of recording them. */
+typedef struct hs_visitors {
+    hs_block_use            use;
+    const hs_neighbourhood *most;  /* NULL, or for hs_walker_init_ordered */
+    hs_visit_fn             visit;
+    void                   *contexts; /* borrowed; of each thread, one behind another */
+    size_t                  context_size;
+} hs_visitors;
+
+/* Records all pairs in the output, by search->team. HS_ERR_SHIFT_RANGE sets failure->row. */
+hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
+
+/*
+ * The same from the bookmark on, until the output has `enough` pairs or all have been found: then
+ * the bookmark says where to go on. The output has at most HS_COMMIT_BYTES a thread and one block
+ * of candidates more than that. A failure leaves the bookmark, and in the output what it may.
+ */
+hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough,
+                                hs_bookmark *bookmark, hs_failure *failure);
+
+/* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
+hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors,
+                            hs_neighbourhood *most, hs_failure *failure);
+
+/* Counts them. */
+hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure);
+
+#endif

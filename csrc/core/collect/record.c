@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* record.c: see record.h. */
+#include "record.h"
+
+#include "record_measures.h"
+
+hs_block_use
+hs_record_use(unsigned columns)
+{
+    return columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT) ? HS_BLOCK_LISTS_PLACES
+                                                                         : HS_BLOCK_LISTS_IDS;
+}
+
+hs_status
+hs_recorder_init(hs_account *account, hs_output *output, int32_t most_hits,
+                 hs_recorder *recorder)
+{
+    const int64_t  n = most_hits + HS_PADDING, in_batch = HS_BATCH + HS_PADDING;
+    const unsigned columns = output->columns;
+    bool           complete = true;
+    *recorder = (hs_recorder){.output = output, .columns = columns};
+    if (hs_record_use(columns) == HS_BLOCK_LISTS_PLACES) {
+        recorder->ids = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+        complete = recorder->ids != NULL;
+    }
+    if (columns & HS_WANT_BOTH) {
+        recorder->ends[0] = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+        recorder->ends[1] = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
+        complete = complete && recorder->ends[0] != NULL && recorder->ends[1] != NULL;
+    }
+    if (columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) {
+        recorder->distance = hs_alloc(account, HS_FOR_CANDIDATES, in_batch, sizeof(double));
+        complete = complete && recorder->distance != NULL;
+    }
+    for (int k = 0; (columns & HS_WANT_VECTOR) && k < output->ndim; k++) {
+        recorder->vector[k] = hs_alloc(account, HS_FOR_CANDIDATES, in_batch, sizeof(double));
+        complete = complete && recorder->vector[k] != NULL;
+    }
+    if (!complete) {
+        hs_recorder_free(account, recorder);
+        return HS_ERR_MEMORY;
+    }
+    return HS_OK;
+}
+
+void
+hs_recorder_free(hs_account *account, hs_recorder *recorder)
+{
+    hs_free(account, recorder->ids);
+    hs_free(account, recorder->ends[0]);
+    hs_free(account, recorder->ends[1]);
+    hs_free(account, recorder->distance);
+    for (int k = 0; k < HS_MAX_DIM; k++) {
+        hs_free(account, recorder->vector[k]);
+    }
+    *recorder = (hs_recorder){0};
+}
+
+/* i and j side by side. */
+static void
+put_both(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
+{
+    const hs_output *output = recorder->output;
+    int32_t         *i = recorder->ends[0], *j = recorder->ends[1];
+    const int32_t    n = hits->end[hits->n - 1];
+    void            *both = hs_output_next(output, HS_WANT_BOTH);
+    kernel->emit_int32(hits, i, j);
+    for (int32_t h = 0; h < n; h++) {
+        if (output->index_bytes == 8) {
+            ((int64_t *)both)[2 * h] = i[h];
+            ((int64_t *)both)[2 * h + 1] = j[h];
+        } else {
+            ((int32_t *)both)[2 * h] = i[h];
+            ((int32_t *)both)[2 * h + 1] = j[h];
+        }
+    }
+}
+
+static void
+put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
+{
+    const hs_output *output = recorder->output;
+    const hs_emit_fn emit = output->index_bytes == 8 ? kernel->emit_int64 : kernel->emit_int32;
+    if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
+        emit(hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
+    }
+    if (recorder->columns & HS_WANT_BOTH) {
+        put_both(recorder, kernel, hits);
+    }
+}
+
+static hs_status
+record_places(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_hits *hits)
+{
+    const int32_t  n = hits->end[hits->n - 1];
+    const int32_t *id = walker->block.id;
+    hs_hits        by_id = *hits;
+    for (int32_t h = 0; h < n; h++) {
+        recorder->ids[h] = id[hits->label[h]];
+    }
+    by_id.label = recorder->ids;
+    put_indices(recorder, walker->search->kernel, &by_id);
+    return hs_put_measures(recorder, walker, first, hits);
+}
+
+hs_status
+hs_record_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+{
+    hs_recorder  *recorder = context;
+    hs_output    *output = recorder->output;
+    const int32_t n = hits->end[hits->n - 1];
+    hs_status     status = hs_output_reserve(output, n, hs_walk_fraction(walker));
+    if (status == HS_OK && walker->use == HS_BLOCK_LISTS_PLACES) {
+        status = record_places(recorder, walker, first, hits);
+    } else if (status == HS_OK) {
+        put_indices(recorder, walker->search->kernel, hits);
+    }
+    output->n_pairs += status == HS_OK ? n : 0;
+    return status;
+}

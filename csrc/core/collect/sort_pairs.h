@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* sort_pairs.h: the ascending order of pairs. */
+#ifndef HS_SORT_PAIRS_H
+#define HS_SORT_PAIRS_H
+
+#include "columns.h"
+#include "../search/search.h"
+
+/* What must be found, so that it can be put in order and has all that is wanted. */
+unsigned hs_sort_columns(const hs_search *search);
+
+/*
+ * Writes `found`, which has these columns with int32 indices, to `sorted`, ascending by (i, j, S).
+ * The account is charged for what `sorted` takes, and the poll asked now and then.
+ */
+hs_status hs_sort_pairs(hs_search *search, const hs_output *found, hs_output *sorted);
+
+#endif

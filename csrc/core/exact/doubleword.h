@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * doubleword.h: error-free transformations and double-word arithmetic. A double-word is an
+ * unevaluated sum hi + lo with |lo| at most half a unit in the last place of hi: about 106 bits.
+ *
+ * v = 2^-53. Every statement assumes round to nearest and neither overflow nor underflow; callers
+ * keep to a safe range (HS_RANGE_GUARD). Sources: [D] Dekker, Numer. Math. 18 (1971) 224; [K]
+ * Knuth, The Art of Computer Programming 2, 4.2.2; [JMP] Joldes, Muller, Popescu, ACM Trans. Math.
+ * Softw. 44 (2017) 15.
+ */
+#ifndef HS_DOUBLEWORD_H
+#define HS_DOUBLEWORD_H
+
+#include <float.h>
+#include <math.h>
+
+#include "../base/base.h"
+
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD == 2
+#error "doubles must be computed as doubles: on 32-bit x86 compile with -msse2 -mfpmath=sse"
+#endif
+
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(FP_FAST_FMA)
+#define HS_FAST_FMA 1
+#else
+#define HS_FAST_FMA 0 /* fma() may be a library call of a hundred instructions */
+#endif
+
+typedef struct hs_dw {
+    double hi, lo;
+} hs_dw;
+
+/* hi + lo == a + b exactly. [K] Holds for subnormal numbers too. */
+HS_ALWAYS_INLINE hs_dw
+hs_two_sum(double a, double b)
+{
+    const double sum = a + b;
+    const double b_part = sum - a;
+    const double a_part = sum - b_part;
+    return (hs_dw){sum, (a - a_part) + (b - b_part)};
+}
+
+/* hi + lo == a + b exactly, if a is 0 or |a| >= |b|. [D] */
+HS_ALWAYS_INLINE hs_dw
+hs_fast_two_sum(double a, double b)
+{
+    const double sum = a + b;
+    return (hs_dw){sum, b - (sum - a)};
+}
+
+/* hi + lo == a - b exactly. [K] */
+HS_ALWAYS_INLINE hs_dw
+hs_two_difference(double a, double b)
+{
+    return hs_two_sum(a, -b);
+}
+
+#if !HS_FAST_FMA
+/* hi + lo == a exactly, of at most 26 bits each, so that their products are exact. Veltkamp, [D] */
+HS_ALWAYS_INLINE hs_dw
+hs_split(double a)
+{
+    const double scaled = 0x1.0000002p27 * a; /* 2^27 + 1 */
+    const double hi = scaled - (scaled - a);
+    return (hs_dw){hi, a - hi};
+}
+#endif
+
+/* hi + lo == a * b exactly. [D] */
+HS_ALWAYS_INLINE hs_dw
+hs_two_product(double a, double b)
+{
+    const double product = a * b;
+#if HS_FAST_FMA
+    return (hs_dw){product, fma(a, b, -product)};
+#else
+    const hs_dw x = hs_split(a), y = hs_split(b);
+    return (hs_dw){product, ((x.hi * y.hi - product) + x.hi * y.lo + x.lo * y.hi) + x.lo * y.lo};
+#endif
+}
+
+/* hi + lo == a * a exactly. [D] */
+HS_ALWAYS_INLINE hs_dw
+hs_two_square(double a)
+{
+    const double square = a * a;
+#if HS_FAST_FMA
+    return (hs_dw){square, fma(a, a, -square)};
+#else
+    const hs_dw x = hs_split(a);
+    return (hs_dw){square, ((x.hi * x.hi - square) + 2.0 * (x.hi * x.lo)) + x.lo * x.lo};
+#endif
+}
+
+/* x + y, relative error at most 3 v^2 + 13 v^3, also where they cancel. [JMP] algorithm 6 */
+HS_ALWAYS_INLINE hs_dw
+hs_dw_add(hs_dw x, hs_dw y)
+{
+    const hs_dw s = hs_two_sum(x.hi, y.hi);
+    const hs_dw t = hs_two_sum(x.lo, y.lo);
+    const hs_dw r = hs_fast_two_sum(s.hi, s.lo + t.hi);
+    return hs_fast_two_sum(r.hi, t.lo + r.lo);
+}
+
+/*
+ * x + y as hs_dw_add. *lost, not negative, grows unless the sum is exact: of the operations above
+ * only s.lo + t.hi and t.lo + r.lo are rounded, and here what they lose is computed too. Exact for
+ * any x and y, normalised or not, because each transformation is [K].
+ */
+HS_ALWAYS_INLINE hs_dw
+hs_dw_add_watched(hs_dw x, hs_dw y, double *lost)
+{
+    const hs_dw s = hs_two_sum(x.hi, y.hi);
+    const hs_dw t = hs_two_sum(x.lo, y.lo);
+    const hs_dw inner = hs_two_sum(s.lo, t.hi);
+    const hs_dw r = hs_two_sum(s.hi, inner.hi);
+    const hs_dw outer = hs_two_sum(t.lo, r.lo);
+    *lost += fabs(inner.lo) + fabs(outer.lo);
+    return hs_two_sum(r.hi, outer.hi);
+}
+
+/*
+ * x * x with a relative error of at most 6 v^2. In units of v^2 x^2: 2 x.hi x.lo is at most 2 / v
+ * and its rounding costs 2; the sum with the low word of x.hi^2 (1 / v) costs 3; x.lo^2, which is
+ * left out, is 1.
+ */
+HS_ALWAYS_INLINE hs_dw
+hs_dw_square(hs_dw x)
+{
+    const hs_dw s = hs_two_square(x.hi);
+    return hs_fast_two_sum(s.hi, s.lo + (x.hi + x.hi) * x.lo);
+}
+
+/* sqrt(x) rounded once, from x > 0: one Newton step on a rounded square root doubles its digits,
+ * so that beside the last rounding there is only an error of a few v^2. */
+HS_ALWAYS_INLINE double
+hs_dw_sqrt(hs_dw x)
+{
+    const double root = sqrt(x.hi);
+    const hs_dw  square = hs_two_square(root);
+    return root + (((x.hi - square.hi) - square.lo) + x.lo) / (root + root);
+}
+
+#endif

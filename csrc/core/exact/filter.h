@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * filter.h: the two thresholds of a gathered neighbourhood. A kernel computes, in float32, an s of
+ * candidates y and points q given relative to a common centre: the direct form
+ * s = sum_k fl(y_k - q_k)^2, or the expanded form s = |y|^2 - 2 q y, which is |q|^2 less. With
+ * s > out the pair is surely beyond the cutoff, with s < in surely within it; what lies between is
+ * settled by metric.h. docs/exactness.md derives the bounds.
+ */
+#ifndef HS_FILTER_H
+#define HS_FILTER_H
+
+#include "../base/base.h"
+
+typedef struct hs_thresholds {
+    float in;  /* rounded down; -1 when nothing is sure */
+    float out; /* rounded up; +infinity when nothing is sure */
+} hs_thresholds;
+
+/* The same for the expanded form. A kernel compares with (float)(in - |q|^2) and
+ * (float)(out - |q|^2), where |q|^2 is summed in float64. */
+typedef struct hs_expanded {
+    double in;  /* -infinity when nothing is sure */
+    double out; /* +infinity when nothing is sure */
+} hs_expanded;
+
+/*
+ * ndim     number of squares in the sum
+ * cutoff   R > 0 or 0, a finite double
+ * extent   largest |y_k| plus largest |q_k|, over all components, as the floats that the kernel
+ *          reads; may be infinite or NaN (then nothing is sure)
+ * error    bound on how far each component of y and q, before it was rounded to float32, was from
+ *          the true value: |y64_k - Y_k| <= error for y and for q alike. Up to 2048 float64
+ *          roundings of y64 itself need not be counted
+ */
+hs_thresholds hs_thresholds_of(int ndim, double cutoff, double extent, double error);
+
+/* The same bounds for arithmetic with unit roundoff `unit` and smallest normal number `tiny`,
+ * before they are rounded to float32. The product uses 2^-24 and 2^-126; the tests also try every
+ * number of a tiny floating-point system. */
+void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
+                         double tiny, double *in, double *out);
+
+/* The same for the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
+hs_expanded hs_expanded_of(int ndim, double cutoff, double extent, double error);
+void hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,
+                        double tiny, double *in, double *out);
+
+/* Errors of the expanded form grow with extent^2, those of the direct form with extent * cutoff:
+ * worth it where this holds, which is wherever cells have the size that the cutoff asks for. */
+HS_ALWAYS_INLINE bool
+hs_expanded_pays(double cutoff, double extent)
+{
+    return extent <= 16.0 * cutoff;
+}
+
+#endif

@@ -1,0 +1,371 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* metric_integer.c: comparing |D| with the cutoff in integers of a fixed, sufficient size. */
+#include "metric_integer.h"
+
+#include <string.h>
+
+#include "limbs.h"
+
+/*
+ * Limbs of 64 bits that hold any component of D. In units of the smallest subnormal, 2^-1074, a
+ * float64 has at most 2098 bits and a multiple of one by an int64 at most 2161; eight of those and
+ * the two points sum to less than 2^2165. Two bits are for the sign and for the sum of 8 squares.
+ */
+#define MAX_LIMBS 34
+
+/* One axis has two points and up to eight rows; the cutoff stands alone. */
+#define MAX_TERMS (2 + HS_MAX_DIM)
+
+/* A float64 times an integer: +-(high * 2^64 + low) * 2^exponent. */
+typedef struct exact_term {
+    uint64_t low, high;
+    int      exponent;
+    bool     negative;
+} exact_term;
+
+/* What is added up along each axis, zeros left out, and what unit and width hold all of it. */
+typedef struct exact_sums {
+    exact_term terms[HS_MAX_DIM][MAX_TERMS];
+    int        n_terms[HS_MAX_DIM];
+    int        most_terms; /* of any axis */
+    exact_term cutoff;
+    int        lowest;  /* everything is a multiple of 2^lowest */
+    int        highest; /* and every term is below 2^highest */
+} exact_sums;
+
+/* A nonzero finite double as an odd significand with sign and exponent. */
+HS_ALWAYS_INLINE exact_term
+decompose(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    const int      field = (int)(bits >> 52) & 0x7ff;
+    const uint64_t fraction = bits & ((UINT64_C(1) << 52) - 1);
+    const uint64_t significand = fraction | (uint64_t)(field != 0) << 52;
+    const int      zeros = hs_trailing_zeros(significand);
+    return (exact_term){.low = significand >> zeros,
+                  .high = 0,
+                  .exponent = field + (field == 0) - 1075 + zeros,
+                  .negative = bits >> 63};
+}
+
+/* Widen the range to hold this term. */
+HS_ALWAYS_INLINE void
+include_term(exact_sums *sums, const exact_term *term)
+{
+    const int bits = term->high != 0 ? 64 + hs_bit_length(term->high) : hs_bit_length(term->low);
+    const int top = term->exponent + bits;
+    sums->lowest = term->exponent < sums->lowest ? term->exponent : sums->lowest;
+    sums->highest = top > sums->highest ? top : sums->highest;
+}
+
+HS_ALWAYS_INLINE void
+set_sums(exact_sums *sums, const hs_metric *metric, double cutoff, const hs_span *span)
+{
+    const double  *p = span->p, *q = span->q;
+    const int64_t *shift = span->shift;
+    sums->lowest = INT32_MAX;
+    sums->highest = INT32_MIN;
+    sums->most_terms = 1;
+    sums->cutoff.low = sums->cutoff.high = 0;
+    if (cutoff != 0.0) {
+        sums->cutoff = decompose(cutoff);
+        include_term(sums, &sums->cutoff);
+    }
+    for (int k = 0; k < metric->ndim; k++) {
+        exact_term *next = sums->terms[k];
+        if (q[k] != 0.0) {
+            *next = decompose(q[k]);
+            include_term(sums, next++);
+        }
+        if (p[k] != 0.0) {
+            *next = decompose(p[k]);
+            next->negative = !next->negative;
+            include_term(sums, next++);
+        }
+        for (int l = 0; shift != NULL && l < metric->n_rows; l++) {
+            const double entry = metric->rows[l][k];
+            if (shift[l] == 0 || entry == 0.0) {
+                continue;
+            }
+            const uint64_t times =
+                shift[l] < 0 ? ~(uint64_t)shift[l] + 1 : (uint64_t)shift[l];
+            *next = decompose(entry);
+            next->low = hs_multiply_add(next->low, times, 0, &next->high);
+            next->negative = next->negative != (shift[l] < 0);
+            include_term(sums, next++);
+        }
+        const int n_terms = (int)(next - sums->terms[k]);
+        sums->n_terms[k] = n_terms;
+        sums->most_terms = n_terms > sums->most_terms ? n_terms : sums->most_terms;
+    }
+}
+
+/* Limbs for a component of D, and twice as many for |D|^2; 0 when every input is zero. */
+static int
+count_limbs(const exact_sums *sums)
+{
+    if (sums->lowest > sums->highest) {
+        return 0;
+    }
+    const int bits =
+        sums->highest - sums->lowest + hs_bit_length((uint64_t)sums->most_terms - 1);
+    const int n = (bits + 2 + 63) / 64;
+    HS_ASSERT(n >= 1 && n <= MAX_LIMBS);
+    return n;
+}
+
+/* difference += term, n limbs in two's complement. */
+HS_ALWAYS_INLINE void
+add_term(uint64_t *difference, const exact_term *term, int lowest, int n)
+{
+    const int      distance = term->exponent - lowest;
+    const int      first = distance / 64, bits = distance % 64;
+    const uint64_t sign = term->negative ? UINT64_MAX : 0;
+    uint64_t       carry = term->negative; /* -x is ~x + 1 */
+    const uint64_t limb[3] = {
+        term->low << bits,
+        term->high << bits | (bits ? term->low >> (64 - bits) : 0),
+        bits ? term->high >> (64 - bits) : 0,
+    };
+    for (int i = 0; i < n; i++) {
+        const int      place = i - first;
+        const uint64_t value = place >= 0 && place < 3 ? limb[place] : 0;
+        difference[i] = hs_add_carry(difference[i], value ^ sign, &carry);
+    }
+}
+
+/* |component k of D| in n limbs; returns whether it was negative. */
+HS_ALWAYS_INLINE bool
+sum_terms(uint64_t *difference, const exact_sums *sums, int k, int n)
+{
+    for (int i = 0; i < n; i++) {
+        difference[i] = 0;
+    }
+    for (int t = 0; t < sums->n_terms[k]; t++) {
+        add_term(difference, &sums->terms[k][t], sums->lowest, n);
+    }
+
+    const bool     negative = difference[n - 1] >> 63;
+    const uint64_t sign = negative ? UINT64_MAX : 0;
+    uint64_t       carry = negative;
+    for (int i = 0; i < n; i++) {
+        difference[i] = hs_add_carry(difference[i] ^ sign, 0, &carry);
+    }
+    return negative;
+}
+
+/* total += value^2; n and 2 n limbs. */
+HS_ALWAYS_INLINE void
+add_square(uint64_t *total, const uint64_t *value, int n)
+{
+    for (int i = 0; i < n; i++) {
+        uint64_t carry = 0;
+        if (value[i] == 0) {
+            continue;
+        }
+        for (int j = 0; j < n; j++) {
+            total[i + j] = hs_multiply_add(value[i], value[j], total[i + j], &carry);
+        }
+        for (int j = i + n; j < 2 * n && carry != 0; j++) {
+            total[j] += carry;
+            carry = total[j] < carry;
+        }
+    }
+}
+
+/* Sign of a - b. */
+HS_ALWAYS_INLINE int
+compare_limbs(const uint64_t *a, const uint64_t *b, int n)
+{
+    for (int i = n - 1; i >= 0; i--) {
+        if (a[i] != b[i]) {
+            return a[i] < b[i] ? -1 : 1;
+        }
+    }
+    return 0;
+}
+
+/* The comparison; total and limit have 2 n limbs, value n. */
+HS_ALWAYS_INLINE int
+compare_squares(const exact_sums *sums, int ndim, int n, uint64_t *total, uint64_t *limit,
+                uint64_t *value)
+{
+    for (int i = 0; i < 2 * n; i++) {
+        total[i] = limit[i] = 0;
+    }
+    for (int k = 0; k < ndim; k++) {
+        sum_terms(value, sums, k, n);
+        add_square(total, value, n);
+    }
+    for (int i = 0; i < n; i++) {
+        value[i] = 0;
+    }
+    if (sums->cutoff.low != 0) {
+        add_term(value, &sums->cutoff, sums->lowest, n);
+    }
+    add_square(limit, value, n);
+    return compare_limbs(total, limit, 2 * n);
+}
+
+/* Everything fits 62 bits: the same with single words instead of limbs. */
+static int
+compare_small(const exact_sums *sums, int ndim)
+{
+    uint64_t total[2] = {0, 0}, limit[2] = {0, 0};
+    for (int k = 0; k < ndim; k++) {
+        int64_t value = 0;
+        for (int t = 0; t < sums->n_terms[k]; t++) {
+            const exact_term *term = &sums->terms[k][t];
+            const int64_t size = (int64_t)(term->low << (term->exponent - sums->lowest));
+            value += term->negative ? -size : size;
+        }
+        const uint64_t size = (uint64_t)(value < 0 ? -value : value);
+        uint64_t       high = 0, carry = 0;
+        const uint64_t low = hs_multiply_add(size, size, 0, &high);
+        total[0] = hs_add_carry(total[0], low, &carry);
+        total[1] += high + carry;
+    }
+    if (sums->cutoff.low != 0) {
+        const uint64_t size = sums->cutoff.low << (sums->cutoff.exponent - sums->lowest);
+        limit[0] = hs_multiply_add(size, size, 0, &limit[1]);
+    }
+    return compare_limbs(total, limit, 2);
+}
+
+/* Up to 126 bits, where the compiler can unroll every loop over limbs. */
+static int
+compare_medium(const exact_sums *sums, int ndim)
+{
+    uint64_t total[4], limit[4], value[2];
+    return compare_squares(sums, ndim, 2, total, limit, value);
+}
+
+static HS_NO_INLINE int
+compare_large(const exact_sums *sums, int ndim, int n)
+{
+    uint64_t total[2 * MAX_LIMBS], limit[2 * MAX_LIMBS], value[MAX_LIMBS];
+    return compare_squares(sums, ndim, n, total, limit, value);
+}
+
+int
+hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
+                   const int64_t *shift)
+{
+    exact_sums sums;
+    set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
+    const int n = count_limbs(&sums);
+    switch (n) {
+    case 0:
+        return 0;
+    case 1:
+        return compare_small(&sums, metric->ndim);
+    case 2:
+        return compare_medium(&sums, metric->ndim);
+    default:
+        return compare_large(&sums, metric->ndim, n);
+    }
+}
+
+/* Both squares in 2 n limbs, in the same unit. */
+HS_ALWAYS_INLINE int
+compare_two_sums(const exact_sums *one, const exact_sums *other, int ndim, int n, uint64_t *first,
+                 uint64_t *second, uint64_t *value)
+{
+    for (int i = 0; i < 2 * n; i++) {
+        first[i] = second[i] = 0;
+    }
+    for (int k = 0; k < ndim; k++) {
+        sum_terms(value, one, k, n);
+        add_square(first, value, n);
+        sum_terms(value, other, k, n);
+        add_square(second, value, n);
+    }
+    return compare_limbs(first, second, 2 * n);
+}
+
+static int
+compare_two_medium(const exact_sums *one, const exact_sums *other, int ndim)
+{
+    uint64_t first[4], second[4], value[2];
+    return compare_two_sums(one, other, ndim, 2, first, second, value);
+}
+
+static HS_NO_INLINE int
+compare_two_large(const exact_sums *one, const exact_sums *other, int ndim, int n)
+{
+    uint64_t first[2 * MAX_LIMBS], second[2 * MAX_LIMBS], value[MAX_LIMBS];
+    return compare_two_sums(one, other, ndim, n, first, second, value);
+}
+
+/* The same unit and width for both. */
+static void
+join_units(exact_sums *one, exact_sums *other)
+{
+    const int lowest = one->lowest < other->lowest ? one->lowest : other->lowest;
+    const int highest = one->highest > other->highest ? one->highest : other->highest;
+    const int terms = one->most_terms > other->most_terms ? one->most_terms : other->most_terms;
+    one->lowest = other->lowest = lowest;
+    one->highest = other->highest = highest;
+    one->most_terms = other->most_terms = terms;
+}
+
+int
+hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other)
+{
+    exact_sums a, b;
+    set_sums(&a, metric, 0.0, one);
+    set_sums(&b, metric, 0.0, other);
+    join_units(&a, &b);
+    const int n = count_limbs(&a);
+    return n == 0   ? 0
+           : n <= 2 ? compare_two_medium(&a, &b, metric->ndim)
+                    : compare_two_large(&a, &b, metric->ndim, n);
+}
+
+/* The limbs top, top - 1 and top - 2 as a double-word, in units of the lowest of them. */
+static hs_dw
+gather_limbs(const uint64_t *value, int top)
+{
+    hs_dw  sum = {0.0, 0.0};
+    double unit = 0x1p160; /* of the upper half of the highest limb */
+    for (int i = top; i > top - 3; i--) {
+        const uint64_t limb = i >= 0 ? value[i] : 0;
+        sum = hs_dw_add(sum, (hs_dw){(double)(limb >> 32) * unit, 0.0});
+        sum = hs_dw_add(sum, (hs_dw){(double)(limb & UINT32_MAX) * (unit * 0x1p-32), 0.0});
+        unit *= 0x1p-64;
+    }
+    return sum;
+}
+
+void
+hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
+                      const int64_t *shift, hs_dw *value, int *exponent)
+{
+    exact_sums sums;
+    uint64_t  component[HS_MAX_DIM][MAX_LIMBS];
+    bool      negative[HS_MAX_DIM];
+    int       top = -1; /* highest limb in use */
+    set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
+    const int n = count_limbs(&sums);
+    for (int k = 0; k < metric->ndim; k++) {
+        value[k] = (hs_dw){0.0, 0.0};
+        negative[k] = n > 0 && sum_terms(component[k], &sums, k, n);
+        for (int i = top + 1; i < n; i++) {
+            if (component[k][i] != 0) {
+                top = i;
+            }
+        }
+    }
+    *exponent = 0;
+    if (top < 0) {
+        return;
+    }
+    *exponent = sums.lowest + 64 * (top - 2);
+    for (int k = 0; k < metric->ndim; k++) {
+        value[k] = gather_limbs(component[k], top);
+        if (negative[k]) {
+            value[k] = (hs_dw){-value[k].hi, -value[k].lo};
+        }
+    }
+}

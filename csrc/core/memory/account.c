@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* account.c: see account.h. A header in front of each block remembers its size. */
+#include "account.h"
+
+#include "pages.h"
+
+#include <math.h>
+#include <stdlib.h>
+#ifdef HS_TESTING
+#include <stdatomic.h>
+#endif
+
+typedef struct block_header {
+    void   *raw;    /* what malloc returned, or the mapping */
+    size_t  length; /* of the mapping; 0 for malloc and for the arena */
+    int64_t bytes;  /* what the caller asked for */
+} block_header; /* raw == NULL: in the arena */
+
+_Static_assert(sizeof(block_header) <= HS_PAGES_HEADROOM, "the header lies in the headroom");
+_Static_assert(sizeof(block_header) <= HS_ALIGNMENT, "and in front of an aligned block");
+
+#ifdef HS_TESTING
+static _Atomic int64_t fail_countdown;
+static _Atomic int64_t live_blocks;
+static bool            arena_is_used;
+
+void
+hs_test_fail_allocation(int64_t nth)
+{
+    fail_countdown = nth;
+}
+
+bool
+hs_test_failure_is_due(void)
+{
+    return fail_countdown > 0;
+}
+
+int64_t
+hs_test_live_blocks(void)
+{
+    return live_blocks;
+}
+
+bool
+hs_test_allocation_fails(void)
+{
+    return fail_countdown > 0 && --fail_countdown == 0;
+}
+
+void
+hs_test_count_block(int change)
+{
+    live_blocks += change;
+}
+void
+hs_test_use_arena(bool on)
+{
+    arena_is_used = on;
+}
+#else
+enum { arena_is_used = 1 };
+#endif
+
+/* How far one block of the arena is from the next: that one's header lies between them. */
+HS_ALWAYS_INLINE size_t
+arena_step(size_t bytes)
+{
+    return (bytes + sizeof(block_header) + HS_ALIGNMENT - 1) & ~(size_t)(HS_ALIGNMENT - 1);
+}
+
+HS_ALWAYS_INLINE char *
+align(char *at)
+{
+    return at + (-(uintptr_t)at % HS_ALIGNMENT);
+}
+
+void
+hs_account_init(hs_account *account, const hs_options *options)
+{
+    *account = (hs_account){0};
+    account->limit = options->memory_limit;
+    account->find_limit = options->find_limit;
+    account->find_context = options->find_context;
+}
+
+bool
+hs_account_allows(hs_account *account, double bytes)
+{
+    const double wanted = (double)account->held + bytes;
+    if (account->find_limit != NULL && wanted > HS_LIMIT_FREE) {
+        /* What is free now, and what this call already holds, may be used by this call. */
+        const double found = account->find_limit(account->find_context) + (double)account->held;
+        account->limit = fmin(account->limit, found);
+        account->find_limit = NULL;
+    }
+    return wanted <= account->limit;
+}
+
+void
+hs_account_take(hs_account *account, hs_purpose purpose, int64_t bytes)
+{
+    account->held += bytes;
+    account->total.bytes[purpose] += bytes;
+    if (account->held > account->total.bytes_peak) {
+        account->total.bytes_peak = account->held;
+    }
+}
+
+void
+hs_account_give(hs_account *account, int64_t bytes)
+{
+    account->held -= bytes;
+}
+
+void
+hs_account_close(hs_account *account)
+{
+#ifdef HS_TESTING
+    live_blocks -= account->arena != NULL;
+#endif
+    free(account->arena);
+    account->arena = account->arena_next = NULL;
+}
+
+void
+hs_account_reset(hs_account *account)
+{
+    if (account->arena != NULL) {
+        account->arena_next = align(account->arena + sizeof(block_header));
+    }
+}
+
+/* The next block of the arena, or NULL when it has no room for that. */
+static void *
+take_from_arena(hs_account *account, size_t bytes)
+{
+    if (account->arena == NULL) {
+        account->arena = malloc(HS_ARENA_BYTES);
+        if (account->arena == NULL) {
+            return NULL;
+        }
+        account->arena_next = align(account->arena + sizeof(block_header));
+#ifdef HS_TESTING
+        live_blocks++;
+#endif
+    }
+    char *block = account->arena_next;
+    if (arena_step(bytes) > (size_t)(account->arena + HS_ARENA_BYTES - block)) {
+        return NULL;
+    }
+    account->arena_next = block + arena_step(bytes);
+    ((block_header *)block)[-1] = (block_header){.raw = NULL};
+    return block;
+}
+
+/* An aligned block with its header filled, but for the bytes. NULL when refused. */
+static void *
+take_block(hs_account *account, size_t bytes)
+{
+    void  *raw;
+    size_t length;
+    if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < HS_ARENA_BYTES) {
+        void *block = take_from_arena(account, bytes);
+        if (block != NULL) {
+            return block;
+        }
+    }
+    if (bytes >= HS_PAGES_FROM) {
+        void *block = hs_pages_alloc(bytes, &raw, &length);
+        if (block != NULL) {
+            ((block_header *)block)[-1] = (block_header){.raw = raw, .length = length};
+            return block;
+        }
+    }
+    raw = malloc(bytes + sizeof(block_header) + HS_ALIGNMENT);
+    if (raw == NULL) {
+        return NULL;
+    }
+    void *block = align((char *)raw + sizeof(block_header));
+    ((block_header *)block)[-1] = (block_header){.raw = raw};
+    return block;
+}
+
+void *
+hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
+{
+    if (count < 0) {
+        return NULL;
+    }
+    /* Dividing takes longer than all the rest where both are small. */
+    if (((uint64_t)count | size) >> 31 != 0 && (uint64_t)count > (PTRDIFF_MAX / 2) / size) {
+        return NULL;
+    }
+    const size_t bytes = (size_t)count * size;
+    if (account != NULL && !hs_account_allows(account, (double)bytes)) {
+        return NULL;
+    }
+#ifdef HS_TESTING
+    if (hs_test_allocation_fails()) {
+        return NULL;
+    }
+#endif
+    void *block = take_block(account, bytes);
+    if (block == NULL) {
+        return NULL;
+    }
+#ifdef HS_TESTING
+    hs_test_count_block(1);
+#endif
+    ((block_header *)block)[-1].bytes = (int64_t)bytes;
+    if (account != NULL) {
+        hs_account_take(account, purpose, (int64_t)bytes);
+    }
+    return block;
+}
+
+void
+hs_trim(hs_account *account, void *block, size_t bytes)
+{
+    block_header *header = (block_header *)block - 1;
+    if (header->length == 0 || (int64_t)bytes >= header->bytes) {
+        return;
+    }
+    header->length = hs_pages_trim(header->raw, header->length, block, bytes);
+    if (account != NULL) {
+        account->held -= header->bytes - (int64_t)bytes;
+    }
+    header->bytes = (int64_t)bytes;
+}
+
+void
+hs_account_reassign(hs_account *account, hs_purpose from, hs_purpose to, int64_t bytes)
+{
+    if (account != NULL) {
+        account->total.bytes[from] -= bytes;
+        account->total.bytes[to] += bytes;
+    }
+}
+
+void
+hs_free(hs_account *account, void *block)
+{
+    if (block == NULL) {
+        return;
+    }
+    const block_header header = ((block_header *)block)[-1];
+    if (account != NULL) {
+        account->held -= header.bytes;
+    }
+#ifdef HS_TESTING
+    hs_test_count_block(-1);
+#endif
+    if (header.raw == NULL) {
+        /* The last block makes room for another; the others wait for hs_account_close. */
+        if (account->arena_next == (char *)block + arena_step((size_t)header.bytes)) {
+            account->arena_next = block;
+        }
+    } else if (header.length > 0) {
+        hs_pages_free(header.raw, header.length);
+    } else {
+        free(header.raw);
+    }
+}

@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * account.h: the memory that the core works with: overflow-checked, 64-byte aligned, counted by
+ * purpose, and bounded by the caller's limit. Results have theirs from region.h; they are counted
+ * and bounded here too.
+ */
+#ifndef HS_ACCOUNT_H
+#define HS_ACCOUNT_H
+
+#include "../../halfshell.h"
+#include "../base/base.h"
+
+#define HS_ALIGNMENT 64 /* bytes; a cache line and the widest vector register */
+
+/*
+ * Small blocks of a call are cut from one larger one, its arena: a small search takes some twenty
+ * blocks, and that many calls of malloc cost more than the search. Not where tools watch over each
+ * block: sanitizers, and the tests, which switch it on where they mean it.
+ */
+#if defined(__SANITIZE_ADDRESS__)
+#define HS_HAVE_ARENA 0
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer)
+#define HS_HAVE_ARENA 0
+#endif
+#endif
+#ifndef HS_HAVE_ARENA
+#define HS_HAVE_ARENA 1
+#endif
+
+#define HS_ARENA_BYTES (32 << 10) /* what 64 points with a few hundred pairs take */
+
+/*
+ * What one call holds. The limit is asked for only when it could matter: finding out what the
+ * machine has left costs more than a small search.
+ */
+typedef struct hs_account {
+    hs_counters  total;       /* bytes[] and bytes_peak are kept here */
+    int64_t      held;        /* bytes held now */
+    double       limit;       /* bytes allowed */
+    hs_limit_fn  find_limit;  /* asked once, when held first passes HS_LIMIT_FREE; or NULL */
+    void        *find_context;
+    char        *arena;       /* owned, taken with the first small block; or NULL */
+    char        *arena_next;  /* where its next block begins */
+} hs_account;
+
+#define HS_LIMIT_FREE (64 << 20) /* bytes that are handed out without asking for the limit */
+
+void hs_account_init(hs_account *account, const hs_options *options);
+
+/* Gives the arena back, after the last block. Harmless twice, and on an account of zeros. */
+void hs_account_close(hs_account *account);
+
+/* The arena as it was at first, when none of its blocks is in use any more. */
+void hs_account_reset(hs_account *account);
+
+/* Whether `bytes` more may be held; settles the limit if it has not been needed before. */
+bool hs_account_allows(hs_account *account, double bytes);
+
+/* Charges the account for memory that is held elsewhere: ask hs_account_allows before. */
+void hs_account_take(hs_account *account, hs_purpose purpose, int64_t bytes);
+void hs_account_give(hs_account *account, int64_t bytes);
+
+/* Room for count * size bytes, uninitialised. NULL when refused. count 0 gives a valid pointer.
+ * account NULL: neither counted nor limited. */
+void *hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size);
+
+/*
+ * Keeps the first `bytes` bytes of a block and gives the rest back, where the system takes it:
+ * large blocks on Linux. Elsewhere nothing happens. The block stays where it is.
+ */
+void hs_trim(hs_account *account, void *block, size_t bytes);
+
+/* Counts `bytes` that were allocated for one purpose as for another. NULL-safe. */
+void hs_account_reassign(hs_account *account, hs_purpose from, hs_purpose to, int64_t bytes);
+
+/* NULL-safe. The block must come from hs_alloc with the same account. */
+void hs_free(hs_account *account, void *block);
+
+#ifdef HS_TESTING
+/* Make the nth allocation from now fail (1: the next), once; 0 switches this off. */
+void hs_test_fail_allocation(int64_t nth);
+/* Whether that one has not been asked for yet. */
+bool hs_test_failure_is_due(void);
+/* Blocks and arenas that are allocated and not yet freed, in the whole process. */
+int64_t hs_test_live_blocks(void);
+/* For other modules that hand out memory: asks whether this allocation is the one to fail, and
+ * counts a block more (1) or less (-1). */
+bool hs_test_allocation_fails(void);
+void hs_test_count_block(int change);
+/* Whether accounts have an arena, where the build has one; off at first. */
+void hs_test_use_arena(bool on);
+#endif
+
+#endif

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* account_shared.c: see account_shared.h. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L /* for os_thread.h */
+#endif
+#include "account_shared.h"
+
+#include "../base/os_thread.h"
+
+#include <string.h>
+
+struct hs_shared {
+    hs_account *account;
+    hs_mutex    mutex; /* guards it */
+};
+
+hs_shared *
+hs_shared_new(hs_account *account)
+{
+    hs_shared *shared = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *shared);
+    if (shared != NULL) {
+        shared->account = account;
+        hs_mutex_init(&shared->mutex);
+    }
+    return shared;
+}
+
+void
+hs_shared_free(hs_shared *shared)
+{
+    if (shared != NULL) {
+        hs_mutex_destroy(&shared->mutex);
+        hs_free(shared->account, shared);
+    }
+}
+
+bool
+hs_shared_resize(hs_shared *shared, void **block, int64_t held, int64_t count, size_t size)
+{
+    hs_mutex_lock(&shared->mutex);
+    void *larger = hs_alloc(shared->account, HS_FOR_CANDIDATES, count, size);
+    if (larger != NULL) {
+        if (*block != NULL) {
+            memcpy(larger, *block, (size_t)(held < count ? held : count) * size);
+        }
+        hs_free(shared->account, *block);
+        *block = larger;
+    }
+    hs_mutex_unlock(&shared->mutex);
+    return larger != NULL;
+}
+
+void
+hs_shared_release(hs_shared *shared, void **block)
+{
+    hs_mutex_lock(&shared->mutex);
+    hs_free(shared->account, *block);
+    *block = NULL;
+    hs_mutex_unlock(&shared->mutex);
+}

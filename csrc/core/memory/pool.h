@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * pool.h: memory of results that are gone, kept for the next ones: writing to memory that the
+ * process already has is several times faster than writing to new pages.
+ *
+ * This is the one exception to the rule that nothing here keeps state between calls (halfshell.h).
+ * No answer depends on it. It is bounded by a limit that the caller can set, 0 switches it off, and
+ * hs_pool_clear gives everything back.
+ *
+ * All functions may be called from many threads at once and after fork. The pool is guarded by a
+ * lock that nobody waits for: a lock that another thread holds at the moment of a fork stays taken
+ * in the child for ever. Who finds it taken does without the pool: new memory, and old memory
+ * straight back to the system. Only the four functions of halfshell.h try again for a while; where
+ * the lock never comes free they do nothing and return 0, for such a pool gives and takes no more.
+ */
+#ifndef HS_POOL_H
+#define HS_POOL_H
+
+#include "../../halfshell.h"
+#include "../base/base.h"
+
+#define HS_POOL_LIMIT ((size_t)256 << 20) /* bytes kept, unless set: one large result */
+
+/* Requests up to this size are scratch: copied and given back at once. Any chunk may serve them,
+ * and no chunk is made smaller, so that the second one of them finds what the first one left. */
+#define HS_POOL_SCRATCH ((size_t)1 << 20)
+
+enum { HS_POOL_CHUNKS = 16 }; /* chunks kept; few, since all are looked at for each request */
+
+
+/*
+ * A chunk (chunk.h) for a request of `expected` bytes, with recycled memory in it; owned by the
+ * caller. It may have less room than that if it can be grown. NULL: there is none.
+ */
+void *hs_pool_take(size_t expected);
+
+/* Keeps a chunk; the least recently kept ones make room. False: the caller still owns it. */
+bool hs_pool_give(void *data);
+
+#ifdef HS_TESTING
+/* Takes the lock for good, as a fork at the wrong moment does, or frees it. */
+void hs_test_pool_hold(bool hold);
+#endif
+
+#endif

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * nearest.h: what a search for the nearest points knows, and the parts that its steps are made of:
+ * images that can be near, a first radius, a radius that surely suffices.
+ */
+#ifndef HS_NEAREST_H
+#define HS_NEAREST_H
+
+#include "../collect/columns.h"
+#include "../search/search.h"
+#include "../memory/account_shared.h"
+#include "tree.h"
+
+typedef struct hs_near {
+    hs_search     *search;      /* borrowed: scene, bins, kernel, options */
+    hs_tree        tree;        /* of the points; owned unless the search is borrowed */
+    hs_tree        asking_tree; /* owned; of the queries, if there are any */
+    const hs_tree *asking;      /* the tree of those that ask */
+    int64_t        k;           /* points wanted for each */
+    int32_t        of_spot;     /* of one spot, in one image, no more points than this can count */
+    bool           omits_self;  /* without queries: a point is not its own neighbour */
+    double         limit;       /* largest distance in the scene's unit; infinity: none */
+    hs_metric      within;      /* decides on the largest distance, if there is one */
+    hs_metric      order;       /* decides which is nearer */
+    double         drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
+                                                   * whole periods */
+    double         smallest_period; /* infinity without one */
+    bool           has_layer;   /* some axes repeat, others, upright on them, are open: */
+    double         layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
+    hs_output     *rows;        /* borrowed */
+    hs_shared     *shared;      /* owned; for what threads need more of */
+} hs_near;
+
+/* Points that ask, or one of them, and how far they look. Lengths are the scene's. */
+typedef struct hs_near_group {
+    int32_t first, last;        /* in the order of their tree */
+    double  lower[HS_MAX_DIM];  /* range of X */
+    double  upper[HS_MAX_DIM];
+    double  t_lower[HS_MAX_DIM]; /* range of t_k along periodic axes */
+    double  t_upper[HS_MAX_DIM];
+    double  away;               /* no point is nearer than this, for the open axes alone */
+    double  radius;             /* everything up to here is looked at */
+    bool    is_complete;        /* and beyond there is nothing that could be wanted */
+} hs_near_group;
+
+/* Images of all points, within `reach` of a group along each periodic axis. */
+typedef struct hs_near_images {
+    const hs_near *near;
+    int64_t        low[HS_MAX_DIM], high[HS_MAX_DIM]; /* shifts over each row of B */
+    int32_t        shift[HS_MAX_DIM];                 /* the present one */
+    double         moved[HS_MAX_DIM];                 /* and what it adds to X */
+    double         error; /* on each component of (X_j + moved) - X_i, but for the last rounding */
+    double         count; /* of images */
+    bool           is_first;
+} hs_near_images;
+
+/* Number x in units, from the centre, and no further than the extent, which nothing in reach is. */
+HS_ALWAYS_INLINE float
+hs_near_relative(double x, double centre, double unit, double extent)
+{
+    const double y = (x - centre) * unit;
+    return (float)hs_larger(hs_smaller(y, extent), -extent);
+}
+
+/* How many points of a leaf can be of use in one image. */
+HS_ALWAYS_INLINE int32_t
+hs_near_of_leaf(const hs_near *near, const hs_tree_node *node)
+{
+    const int32_t n = node->end - node->first;
+    return node->is_spot && n > near->of_spot ? near->of_spot : n;
+}
+
+/* Of rows of the lattice. */
+void hs_near_measure_drift(hs_near *near);
+
+/* Where points lie along open axes, once they are in tree order. */
+void hs_near_measure_layer(hs_near *near);
+
+/* HS_ERR_MEMORY when there are more images than memory could hold points. */
+hs_status hs_near_images_start(const hs_near *near, const hs_near_group *group,
+                               hs_near_images *images);
+
+/* The next one, as shift and moved; false when there is none. */
+bool hs_near_images_next(hs_near_images *images);
+
+/* Range of the group's points, before anything else is asked about it. */
+void hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_group *group);
+
+/* Sets the radius: one within which about as many points are expected as are wanted, and a few
+ * more; in any case not more than can be of use. */
+void hs_near_guess(const hs_near *near, hs_near_group *group);
+
+/* What nothing of use is beyond: all points, or the largest distance. In periodic boxes infinity,
+ * unless there is a largest distance. */
+double hs_near_farthest(const hs_near *near, const hs_near_group *group);
+
+/* The present one, as it is kept. */
+void hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_near_image *image);
+
+/* Owned by a thread: the least squares found so far, and what is left to look at. */
+typedef struct hs_near_bounder {
+    double  *least;    /* a heap, the largest first */
+    int64_t  n, capacity;
+    int32_t *stack;
+    double  *gaps;     /* of the nodes on the stack */
+    int64_t  depth;    /* room there */
+    int64_t  work;     /* since the last poll */
+} hs_near_bounder;
+
+hs_status hs_near_bounder_init(const hs_near *near, hs_near_bounder *bounder);
+void      hs_near_bounder_free(const hs_near *near, hs_near_bounder *bounder);
+
+/* Sets the radius of a group of one point so that it surely suffices, and hardly more, from a first
+ * guess in it. HS_ERR_MEMORY, HS_ERR_INTERRUPTED. */
+hs_status hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *bounder,
+                        hs_near_group *group);
+
+/* Smallest radius, in the scene's unit: squares of nothing below it are looked at closely. */
+#define HS_NEAR_LEAST_RADIUS 0x1p-1000
+
+/* Exponent of the radius: 2^-exponent is the unit in which it is between 1 and 2. */
+int hs_near_exponent(double radius);
+
+#endif

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * nearest_leaves.h: the leaves that any of some neighbouring groups may need, found by one walk
+ * down the tree, so that each group has but a list of boxes to go through.
+ */
+#ifndef HS_NEAREST_LEAVES_H
+#define HS_NEAREST_LEAVES_H
+
+#include "nearest.h"
+
+/* Owned by a thread. */
+typedef struct hs_near_leaves {
+    int32_t        n;
+    float         *low[HS_MAX_DIM]; /* ranges of X, moved, less the centre, in units; clamped */
+    float         *high[HS_MAX_DIM];
+    hs_near_run   *runs;            /* their points; places are of no meaning */
+    int32_t       *label;           /* 0, 1, 2, ... */
+    int32_t       *hits;
+    hs_near_image *images;
+    int32_t        n_images;
+    int32_t       *stack;
+    double         centre[HS_MAX_DIM];
+    double         unit;            /* a power of two: lengths times this */
+    double         extent;          /* largest number of any range */
+    double         error;           /* of the images, as hs_near_images has it */
+    double         radius;          /* for groups up to this one; 0: for none */
+} hs_near_leaves;
+
+hs_status hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves);
+void      hs_near_leaves_free(const hs_near *near, hs_near_leaves *leaves);
+
+/* For groups with first guesses. Where there is nothing to be won the leaves are for none. */
+void hs_near_leaves_find(const hs_near *near, const hs_near_group *groups, int32_t n,
+                         hs_near_leaves *leaves);
+
+/* Those within `radius`, not above leaves->radius, of one of these groups: their number; which in
+ * leaves->hits, ascending. */
+int32_t hs_near_leaves_list(const hs_near *near, const hs_near_group *group, double radius,
+                            hs_near_leaves *leaves);
+
+#endif

@@ -1,0 +1,324 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* nearest_write.c: see nearest_write.h. */
+#include "nearest_write.h"
+
+#include "../collect/restore.h"
+
+#include <math.h>
+#include <string.h>
+
+#define WIDEST_SHIFT (INT64_C(1) << 53) /* what the batch kernels take */
+#define LINE 64           /* bytes that are fetched at once, */
+#define MOST_EXPECTED 512 /* and of a row */
+#define MOST_SQUARE 0x1p1000
+
+void
+hs_near_writer_init(const hs_near *near, hs_near_writer *writer)
+{
+    memset(writer, 0, sizeof *writer); /* kernels read a little beyond the last entry */
+    writer->near = near;
+    writer->j = hs_output_column(near->rows, HS_WANT_J);
+    writer->d = hs_output_column(near->rows, HS_WANT_DISTANCE);
+    writer->D = hs_output_column(near->rows, HS_WANT_VECTOR);
+    writer->S = hs_output_column(near->rows, HS_WANT_SHIFT);
+}
+
+void
+hs_near_expect(const hs_near_writer *writer, int32_t si)
+{
+    const hs_near *near = writer->near;
+    const int64_t  row = hs_search_asking(near->search)->order[si];
+    const int64_t  bytes[2] = {near->k * near->rows->index_bytes,
+                               near->k * (int64_t)sizeof(double)};
+    char *const    column[2] = {writer->j, (char *)writer->d};
+    for (int c = 0; c < 2; c++) {
+        char *line = column[c] != NULL ? column[c] + row * bytes[c] : NULL;
+        for (int64_t at = 0; line != NULL && at < bytes[c] && at < MOST_EXPECTED; at += LINE) {
+            HS_PREFETCH_WRITE(line + at);
+        }
+    }
+}
+
+HS_ALWAYS_INLINE void
+put_number(void *j, int index_bytes, int64_t at, int32_t number)
+{
+    if (j != NULL && index_bytes == 8) {
+        ((int64_t *)j)[at] = number;
+    } else if (j != NULL) {
+        ((int32_t *)j)[at] = number;
+    }
+}
+
+void
+hs_near_write_nothing(const hs_near *near, int64_t row, int64_t from)
+{
+    const hs_output *rows = near->rows;
+    const int        d = rows->ndim;
+    void            *j = hs_output_column(rows, HS_WANT_J);
+    double          *distance = hs_output_column(rows, HS_WANT_DISTANCE);
+    double          *vector = hs_output_column(rows, HS_WANT_VECTOR);
+    int32_t         *shift = hs_output_column(rows, HS_WANT_SHIFT);
+    for (int64_t at = row * near->k + from; at < (row + 1) * near->k; at++) {
+        put_number(j, rows->index_bytes, at, -1);
+        if (distance != NULL) {
+            distance[at] = INFINITY;
+        }
+        for (int k = 0; vector != NULL && k < d; k++) {
+            vector[at * d + k] = NAN;
+        }
+        for (int k = 0; shift != NULL && k < d; k++) {
+            shift[at * d + k] = 0;
+        }
+    }
+}
+
+/* Measures of the batch, in the unit of the metric. */
+static void
+measure(hs_near_writer *writer, double *const *vector)
+{
+    const hs_search *search = writer->near->search;
+    const hs_metric *metric = &writer->near->order;
+    uint8_t          done[HS_BATCH + HS_BATCH_PADDING] = {0};
+    hs_batch         batch = {.n = writer->n};
+    for (int k = 0; k < metric->ndim; k++) {
+        batch.p[k] = writer->p[k];
+        batch.q[k] = writer->q[k];
+    }
+    for (int r = 0; writer->is_shifted && r < metric->n_rows; r++) {
+        batch.shift[r] = writer->times[r];
+    }
+    if (!writer->is_wide) {
+        search->kernel->measure(metric, &batch, writer->distance, vector, done);
+    }
+    for (int32_t e = 0; e < writer->n; e++) {
+        double p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
+        for (int k = 0; !done[e] && k < metric->ndim; k++) {
+            p[k] = writer->p[k][e];
+            q[k] = writer->q[k][e];
+        }
+        if (!done[e]) {
+            writer->distance[e] = hs_metric_measure(
+                metric, p, q, writer->is_shifted ? writer->shift[e] : NULL, along);
+        }
+        for (int k = 0; !done[e] && vector != NULL && k < metric->ndim; k++) {
+            vector[k][e] = along[k];
+        }
+    }
+}
+
+/* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted to the
+ * one before it, which is then no further from the true one than that. */
+static void
+put_distances(hs_near_writer *writer, double *to)
+{
+    const hs_search *search = writer->near->search;
+    if (!search->scene.extreme && search->scene.unscale.exponent != 0) {
+        hs_restore_distances(writer->distance, writer->n, search->scene.unscale);
+    }
+    if (search->options.cutoff < INFINITY) {
+        hs_keep_all_within(writer->distance, writer->n, search->options.cutoff, true);
+    }
+    for (int32_t e = 0; e < writer->n; e++) {
+        const int64_t at = writer->at[e];
+        to[at] = writer->is_first[e] ? writer->distance[e]
+                                     : hs_larger(writer->distance[e], to[at - 1]);
+    }
+}
+
+static void
+put_vectors(const hs_near_writer *writer, double *const *vector, double *to)
+{
+    const hs_search *search = writer->near->search;
+    const hs_scale   same = {.exponent = 0, .first = 1.0, .second = 1.0};
+    const int        d = search->scene.ndim;
+    double           sign[HS_BATCH], packed[HS_BATCH * HS_MAX_DIM];
+    for (int32_t e = 0; e < writer->n; e++) {
+        sign[e] = 1.0;
+    }
+    hs_restore_vectors(packed, vector, sign, writer->n, d,
+                       search->scene.extreme ? same : search->scene.unscale);
+    for (int32_t e = 0; e < writer->n; e++) {
+        memcpy(to + writer->at[e] * d, packed + (int64_t)e * d, (size_t)d * sizeof *to);
+    }
+}
+
+void
+hs_near_flush(hs_near_writer *writer)
+{
+    double *vector[HS_MAX_DIM];
+    for (int k = 0; k < HS_MAX_DIM; k++) {
+        vector[k] = writer->vector[k];
+    }
+    if (writer->n > 0 && (writer->d != NULL || writer->D != NULL)) {
+        measure(writer, writer->D != NULL ? vector : NULL);
+    }
+    if (writer->d != NULL) {
+        put_distances(writer, writer->d);
+    }
+    if (writer->D != NULL) {
+        put_vectors(writer, vector, writer->D);
+    }
+    if (writer->is_shifted) {
+        memset(writer->times, 0, sizeof writer->times);
+        memset(writer->shift, 0, sizeof writer->shift);
+    }
+    writer->n = 0;
+    writer->is_shifted = writer->is_wide = false;
+}
+
+/* S over all box vectors; false when it does not fit int32. */
+static bool
+put_shift(const hs_near *near, const int64_t *given, int32_t *to)
+{
+    const hs_lattice *lattice = &near->search->scene.lattice;
+    const int         d = lattice->ndim;
+    bool              fits = true;
+    memset(to, 0, (size_t)d * sizeof *to);
+    for (int l = 0; l < lattice->n_periodic; l++) {
+        fits = fits && given[l] >= INT32_MIN && given[l] <= INT32_MAX;
+        to[lattice->vector_of_row[l]] = fits ? (int32_t)given[l] : 0;
+    }
+    return fits;
+}
+
+/* The metric's shifts, and S where that is wanted, of n entries from place `at` of the output and
+ * from the batch's next entry on: where they follow from the points' turns. */
+static hs_status
+put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
+          int32_t n, int64_t at)
+{
+    const hs_near *near = writer->near;
+    const hs_bins *asking = hs_search_asking(near->search);
+    for (int32_t e = 0; e < n; e++) {
+        int64_t *shift = writer->shift[writer->n + e];
+        double   q[HS_MAX_DIM];
+        int64_t  given[HS_MAX_DIM];
+        if (!hs_near_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
+            (writer->S != NULL &&
+             !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
+            writer->failed = asking->order[ranker->si];
+            return HS_ERR_SHIFT_RANGE;
+        }
+        for (int r = 0; r < asking->n_periodic; r++) {
+            writer->times[r][writer->n + e] = (double)shift[r];
+            writer->is_shifted = writer->is_shifted || shift[r] != 0;
+            writer->is_wide =
+                writer->is_wide || shift[r] > WIDEST_SHIFT || shift[r] < -WIDEST_SHIFT;
+        }
+    }
+    return HS_OK;
+}
+
+/* The metric's shifts where they are those of the images: few are not zero, as all were before. */
+static void
+put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n)
+{
+    const hs_near_block *block = ranker->block;
+    if (block->n_images == 1 && block->images[0].is_home) {
+        return;
+    }
+    for (int32_t e = 0; e < n; e++) {
+        const hs_near_image *image = hs_near_image_of(block, keys[e].place);
+        for (int r = 0; !image->is_home && r < writer->near->order.n_rows; r++) {
+            writer->times[r][writer->n + e] = image->shift[r];
+            writer->shift[writer->n + e][r] = image->shift[r];
+            writer->is_shifted = true;
+        }
+    }
+}
+
+/* n entries of the ranker's row, from `at` on; the batch has room for them. */
+static hs_status
+put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
+            int32_t n, int64_t at, bool is_first)
+{
+    const hs_near *near = writer->near;
+    const hs_bins *bins = &near->search->bins, *asking = hs_search_asking(near->search);
+    const int32_t  begin = writer->n;
+    const int      index_bytes = near->rows->index_bytes;
+    int32_t        number[HS_BATCH];
+    for (int32_t e = 0; e < n; e++) {
+        number[e] = ranker->block->number[keys[e].place];
+        put_number(writer->j, index_bytes, at + e, bins->order[number[e]]);
+    }
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
+        const double  own = asking->keeps_originals ? asking->originals[k][ranker->si]
+                                                    : asking->x[k][ranker->si];
+        for (int32_t e = 0; e < n; e++) {
+            writer->p[k][begin + e] = own;
+            writer->q[k][begin + e] = from[number[e]];
+        }
+    }
+    for (int32_t e = 0; e < n; e++) {
+        writer->at[begin + e] = at + e;
+        writer->is_first[begin + e] = is_first && e == 0;
+    }
+    hs_status status = HS_OK;
+    if (bins->keeps_originals || writer->S != NULL) {
+        status = put_given(writer, ranker, keys, n, at);
+    } else if (bins->n_periodic > 0) {
+        put_images(writer, ranker, keys, n);
+    }
+    writer->n += n;
+    return status;
+}
+
+/* How many of the ranked are within the largest distance: all before the first that is not. */
+static int64_t
+count_within(hs_near_ranker *ranker, int64_t count)
+{
+    const hs_near *near = ranker->near;
+    const hs_bins *asking = hs_search_asking(near->search);
+    const double   limit = near->limit * ranker->block->unit;
+    const double   square = limit * limit;
+    if (!(square < MOST_SQUARE)) { /* beyond all that a block holds */
+        return count;
+    }
+    while (count > 0) {
+        const hs_near_key *key = &ranker->keys[count - 1];
+        const double error = 2.0 * hs_near_error(ranker->block, near->tree.ndim,
+                                                 hs_larger(square, key->square));
+        double       p[HS_MAX_DIM], q[HS_MAX_DIM];
+        int64_t      shift[HS_MAX_DIM];
+        if (key->square + error < square) {
+            break;
+        }
+        for (int k = 0; k < asking->ndim; k++) {
+            p[k] = asking->keeps_originals ? asking->originals[k][ranker->si]
+                                           : asking->x[k][ranker->si];
+        }
+        if (key->square <= square + error &&
+            (!hs_near_pair(near, ranker->block, ranker->si, key->place, q, shift, NULL) ||
+             hs_metric_within(&near->within, p, q, shift, &ranker->stages))) {
+            break; /* shifts that pass their range are found when they are written */
+        }
+        count--;
+    }
+    return count;
+}
+
+hs_status
+hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
+{
+    const hs_near *near = writer->near;
+    const int64_t  row = hs_search_asking(near->search)->order[ranker->si];
+    count = count_within(ranker, count);
+    for (int64_t e = 0; e < count;) {
+        const int64_t room = HS_BATCH - writer->n;
+        const int32_t n = (int32_t)(count - e < room ? count - e : room);
+        const hs_status status =
+            put_entries(writer, ranker, ranker->keys + e, n, row * near->k + e, e == 0);
+        if (status != HS_OK) {
+            return status;
+        }
+        e += n;
+        if (writer->n == HS_BATCH) {
+            hs_near_flush(writer);
+        }
+    }
+    if (count < near->k) {
+        hs_near_write_nothing(near, row, count);
+    }
+    return HS_OK;
+}

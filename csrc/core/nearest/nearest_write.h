@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * nearest_write.h: rows of the nearest, to their places in the output: k entries for each point
+ * that asks, in the caller's order; what a row lacks is j = -1, d = infinity, D = NaN and S = 0.
+ */
+#ifndef HS_NEAREST_WRITE_H
+#define HS_NEAREST_WRITE_H
+
+#include "nearest_rank.h"
+
+/* Owned by a thread. A batch of entries that are still to be measured. */
+typedef struct hs_near_writer {
+    const hs_near *near; /* borrowed */
+    void          *j;    /* columns of the output; NULL where they are not wanted */
+    double        *d, *D;
+    int32_t       *S;
+    int32_t        n;
+    int64_t        at[HS_BATCH];       /* entry of the output */
+    bool           is_first[HS_BATCH]; /* of its row */
+    bool           is_shifted, is_wide;
+    double         p[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    double         q[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    double         times[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING]; /* the metric's shifts; ... */
+    int64_t        shift[HS_BATCH][HS_MAX_DIM]; /* ... zeros from the first entry that is free on */
+    double         distance[HS_BATCH + HS_BATCH_PADDING];
+    double         vector[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    int32_t        failed; /* the asking point, in the caller's numbers, of HS_ERR_SHIFT_RANGE */
+} hs_near_writer;
+
+void hs_near_writer_init(const hs_near *near, hs_near_writer *writer);
+
+/* The row of the ranker's point: the first `count` of its keys, as far as they are within the
+ * largest distance, and then what stands for nothing. HS_ERR_SHIFT_RANGE. */
+hs_status hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count);
+
+/* The row of point si comes soon: rows are far apart, and their memory is fetched meanwhile. */
+void hs_near_expect(const hs_near_writer *writer, int32_t si);
+
+/* Writes what is left of the batch: needed once, at the end. Entries do not refer to the block. */
+void hs_near_flush(hs_near_writer *writer);
+
+/* Nothing, from the given entry of a row of the caller's point `row` on. */
+void hs_near_write_nothing(const hs_near *near, int64_t row, int64_t from);
+
+#endif

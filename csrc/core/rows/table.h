@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * table.h: all neighbours of each asking point, one row a point, in the order of the caller's
+ * numbers. One walk counts them, a second one writes each row to its place: no row moves, and
+ * nothing is held but the result. A small table is found by one walk, and its rows are moved.
+ */
+#ifndef HS_TABLE_H
+#define HS_TABLE_H
+
+#include "../collect/columns.h"
+#include "../search/search.h"
+#include "../search/walk.h"
+
+/* A table that is being made, of a full search. */
+typedef struct hs_table {
+    hs_search       *search;  /* borrowed */
+    int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
+    hs_output       *entries; /* borrowed; columns for what is wanted */
+    hs_neighbourhood most;    /* set by hs_table_prepare */
+    hs_output        kept;    /* owned; rows in cell order, int32, until they have places */
+} hs_table;
+
+/* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE
+ * sets failure->row. */
+hs_status hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure);
+
+/* Before the rest: finds the largest neighbourhood. */
+hs_status hs_table_prepare(hs_table *table, hs_failure *failure);
+
+/* Fills offsets. Where few entries are expected, one walk finds them, and keeps them. */
+hs_status hs_table_measure(hs_table *table, hs_failure *failure);
+
+/* Offsets that hold the number of each row's entries: where it begins. */
+void hs_table_sum(hs_table *table);
+
+/* Then the entries, which have room for offsets[rows]. */
+hs_status hs_table_fill(hs_table *table, hs_failure *failure);
+
+/* Harmless twice. */
+void hs_table_free(hs_table *table);
+
+#endif

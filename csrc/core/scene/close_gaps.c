@@ -1,0 +1,389 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * close_gaps.c: see close_gaps.h.
+ *
+ * Why pairs stay what they are. Let u be the unit, so that the cutoff is below 2 u. The magnitudes
+ * of a column are taken in their order; whatever is more than 8 u beyond the one before it moves
+ * towards it, to some 4 u to 12 u from it, and all that follow move with it. Numbers up to 2^54 u
+ * move by multiples of 4 u: they are multiples of a unit in their last place, which is at most 2 u,
+ * and become smaller, so that nothing is rounded. Larger numbers are multiples of 4 u, so each is
+ * 4 u or more from all others: only which are equal matters, and each follows at the next multiple.
+ * So every difference of two coordinates stays what it is to the last bit, or was more than 2 u and
+ * is so still. None becomes larger, so all are float64 numbers.
+ *
+ * Along a periodic axis of length L, all x lie in [-L/2, L/2] first, and L/2 takes part as one more
+ * number. Across the face, the difference of two points is the sum of L/2 - |x| and L/2 - |y|, and
+ * each of these stays what it is or more than the cutoff.
+ *
+ * Queries take part as if they were points: the differences that count are between both.
+ */
+#include "close_gaps.h"
+
+#include "../base/radix_sort.h"
+#include "unit.h"
+#include "../box/wrap.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Along one axis: what condensing leaves where all points are apart. */
+#define UNITS_PER_POINT 8.0
+
+/* Among the keys: half a box vector. Points are numbers from 0 on, queries from -2 on downwards. */
+#define HALF (-1)
+
+/* How one call condenses. */
+typedef struct condensing {
+    hs_account       *account;
+    const hs_options *options;
+    hs_cloud         *of[HS_CONDENSED_SETS]; /* points, and queries if there are any */
+    int               n_sets;
+    int64_t           n;            /* of both together */
+    hs_condensed     *condensed;
+    bool              changes_rows; /* boxes may be condensed as well */
+    hs_scale          to_units, from_units;
+    double            far;          /* 2^54 u, in the caller's unit */
+    hs_keys           keys;         /* room for n + 1 */
+} condensing;
+
+/* The number that stands for entry i of a set among the keys. */
+static int32_t
+id_of(int set, int64_t i)
+{
+    return set == 0 ? (int32_t)i : (int32_t)(HALF - 1 - i);
+}
+
+/* The coordinate that a number stands for. */
+static double *
+coordinate_of(const condensing *doing, int k, int32_t id)
+{
+    return id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - (int64_t)id];
+}
+
+/* Rows are left alone where points are kept as given: what is decided on those would not be the
+ * same. That is so in coupled boxes, for precision="double", and where scaling loses digits. */
+static bool
+rows_may_change(const condensing *doing, const hs_box *box, int unit)
+{
+    if (box == NULL) {
+        return true;
+    }
+    for (int k = 0; k < box->ndim; k++) {
+        if (hs_mover_of(box, k) == HS_COUPLED) {
+            return false;
+        }
+    }
+    bool keeps_digits = doing->options->precision != HS_DOUBLE;
+    for (int set = 0; set < doing->n_sets && keeps_digits && unit > 0; set++) {
+        keeps_digits = hs_cloud_smallest(doing->of[set]) >= ldexp(1.0, unit - 1022);
+    }
+    return keeps_digits;
+}
+
+static bool
+anything_is_far(const hs_cloud *cloud, const hs_box *box, double far)
+{
+    bool found = cloud->largest > far;
+    for (int l = 0; box != NULL && l < box->ndim; l++) {
+        for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
+            found = found || 0.5 * fabs(box->rows[l][k]) > far;
+        }
+    }
+    return found;
+}
+
+/* Wraps what is far into the box; *turns is allocated once it is needed. */
+static hs_status
+wrap_far(hs_account *account, bool wants_turns, double length, double far, int64_t n, double *x,
+         int64_t **turns, hs_failure *failure)
+{
+    for (int64_t i = 0; i < n; i++) {
+        int64_t turned = 0;
+        if (!(fabs(x[i]) > far)) {
+            continue;
+        }
+        x[i] = hs_wrap_axis(x[i], length, &turned);
+        if (!wants_turns || turned == 0) {
+            continue;
+        }
+        if (turned == HS_WRAP_UNKNOWN) {
+            failure->row = i;
+            return HS_ERR_SHIFT_RANGE;
+        }
+        if (*turns == NULL) {
+            *turns = hs_alloc(account, HS_FOR_WRAPS, n, sizeof(int64_t));
+            if (*turns == NULL) {
+                return HS_ERR_MEMORY;
+            }
+            memset(*turns, 0, (size_t)n * sizeof(int64_t));
+        }
+        (*turns)[i] = turned;
+    }
+    return HS_OK;
+}
+
+static int64_t
+bits_of(double x)
+{
+    const double size = fabs(x); /* its bits order like the number */
+    int64_t      bits;
+    memcpy(&bits, &size, sizeof bits);
+    return bits;
+}
+
+static double
+number_of(int64_t bits)
+{
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* The magnitudes of a column, in their order and in units. */
+typedef struct places {
+    double last;  /* the last one, */
+    double place; /* where it went, */
+    double moved; /* and, unless it is far, by what */
+} places;
+
+/* Where the next magnitude goes, and those that are equal to it. */
+static double
+next_place(places *at, double x, bool is_far)
+{
+    const double after = 4.0 * (ceil(0.25 * at->place) + 1.0);
+    if (is_far) {
+        at->place = after;
+    } else {
+        if (x - at->last > 8.0) {
+            at->moved = 4.0 * floor(0.25 * (x - after));
+        }
+        at->place = x - at->moved;
+    }
+    at->last = x;
+    return at->place;
+}
+
+/* As a coordinate of the scene that results. */
+static double
+placed(const condensing *doing, double place)
+{
+    return doing->condensed->is_scaled ? place : hs_scale_apply(doing->from_units, place);
+}
+
+/* Lists the magnitudes beyond `from`, `half` among them if it is one; returns how many. The
+ * largest of the others is where places begin. */
+static int64_t
+collect(condensing *doing, int k, double from, double half, places *at)
+{
+    hs_keys *keys = &doing->keys;
+    int64_t  found = 0;
+    double   largest = 0.0;
+    for (int set = 0; set < doing->n_sets; set++) {
+        double *x = doing->of[set]->x[k];
+        for (int64_t i = 0; i < doing->of[set]->n; i++) {
+            if (fabs(x[i]) > from) {
+                keys->keys[found] = bits_of(x[i]);
+                keys->ids[found++] = id_of(set, i);
+                continue;
+            }
+            largest = hs_larger(fabs(x[i]), largest);
+            if (doing->condensed->is_scaled) {
+                x[i] = hs_scale_apply(doing->to_units, x[i]);
+            }
+        }
+    }
+    if (half > from) {
+        keys->keys[found] = bits_of(half);
+        keys->ids[found++] = HALF;
+    }
+    at->last = at->place = hs_scale_apply(doing->to_units, largest);
+    at->moved = 0.0;
+    return found;
+}
+
+/* Condenses the numbers of a column from `from` on, and *half, which is 0 along an open axis. */
+static hs_status
+condense_numbers(condensing *doing, int k, double from, double *half)
+{
+    const hs_keys  *keys = &doing->keys;
+    places          at;
+    const int64_t   found = collect(doing, k, from, *half, &at);
+    const hs_status status = hs_keys_sort(&doing->keys, 0, found);
+    double          place = 0.0;
+    *half = placed(doing, hs_scale_apply(doing->to_units, *half)); /* unless it is far */
+    for (int64_t e = 0; e < found && status == HS_OK; e++) {
+        if (e == 0 || keys->keys[e] != keys->keys[e - 1]) {
+            const double size = number_of(keys->keys[e]);
+            const bool   is_far = size > doing->far;
+            const double x_units = is_far ? at.last : hs_scale_apply(doing->to_units, size);
+            place = placed(doing, next_place(&at, x_units, is_far));
+        }
+        if (keys->ids[e] == HALF) {
+            *half = place;
+        } else {
+            double *x = coordinate_of(doing, k, keys->ids[e]);
+            *x = copysign(place, *x);
+        }
+    }
+    return status;
+}
+
+/* The range of a column, of both sets in each. */
+static void
+measure_column(const condensing *doing, int k)
+{
+    double lower = INFINITY, upper = -INFINITY;
+    for (int set = 0; set < doing->n_sets; set++) {
+        const hs_cloud *cloud = doing->of[set];
+        for (int64_t i = 0; i < cloud->n; i++) {
+            lower = hs_smaller(cloud->x[k][i], lower);
+            upper = hs_larger(cloud->x[k][i], upper);
+        }
+    }
+    for (int set = 0; set < doing->n_sets; set++) {
+        doing->of[set]->lower[k] = lower;
+        doing->of[set]->upper[k] = upper;
+    }
+}
+
+/* Wraps what is far in this column of both sets. */
+static hs_status
+wrap_column(condensing *doing, int k, double length, hs_failure *failure)
+{
+    hs_condensed *condensed = doing->condensed;
+    for (int set = 0; set < doing->n_sets; set++) {
+        hs_cloud       *cloud = doing->of[set];
+        int64_t       **turns = &condensed->turns[set][k];
+        const hs_status status =
+            wrap_far(doing->account, doing->options->want & HS_WANT_SHIFT, length, doing->far,
+                     cloud->n, cloud->x[k], turns, failure);
+        condensed->has_turns = condensed->has_turns || *turns != NULL;
+        if (status != HS_OK) {
+            failure->in_queries = set > 0;
+            return status;
+        }
+    }
+    return HS_OK;
+}
+
+static hs_status
+condense_column(condensing *doing, int k, hs_failure *failure)
+{
+    const hs_cloud *cloud = doing->of[0]; /* its range is that of both */
+    hs_condensed   *condensed = doing->condensed;
+    const double    far = doing->far;
+    const int       row = hs_mover_of(condensed->box, k);
+    double         *entry = row >= 0 ? &condensed->rows.rows[row][k] : NULL;
+    double          half = row >= 0 ? 0.5 * fabs(*entry) : 0.0;
+    const bool      is_far = hs_larger(-cloud->lower[k], cloud->upper[k]) > far || half > far;
+    if (!is_far && !condensed->is_scaled) {
+        return HS_OK;
+    }
+    if (is_far && row >= 0) {
+        const hs_status status = wrap_column(doing, k, fabs(*entry), failure);
+        if (status != HS_OK) {
+            return status;
+        }
+    }
+    const bool condenses = is_far && (row < 0 || half > far);
+    /* What is dense enough already is left alone, so that one outlier costs no sorting. */
+    const double dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)doing->n);
+    const double from = condenses ? hs_smaller(dense, far) : INFINITY;
+    const hs_status status = condense_numbers(doing, k, from, &half);
+    if (row >= 0 && condenses) {
+        *entry = copysign(2.0 * half, *entry);
+    } else if (row >= 0 && condensed->is_scaled) {
+        *entry = hs_scale_apply(doing->to_units, *entry);
+    }
+    measure_column(doing, k);
+    return status;
+}
+
+static bool
+allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
+{
+    keys->options = options;
+    keys->keys = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int64_t));
+    keys->ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int32_t));
+    keys->spare_keys = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int64_t));
+    keys->spare_ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int32_t));
+    return keys->keys != NULL && keys->ids != NULL && keys->spare_keys != NULL &&
+           keys->spare_ids != NULL;
+}
+
+static void
+free_keys(hs_account *account, hs_keys *keys)
+{
+    hs_free(account, keys->keys);
+    hs_free(account, keys->ids);
+    hs_free(account, keys->spare_keys);
+    hs_free(account, keys->spare_ids);
+}
+
+/* Columns in which there is something to do, one after the other. */
+static hs_status
+condense_columns(condensing *doing, hs_failure *failure)
+{
+    const hs_cloud *cloud = doing->of[0];
+    double          largest = 0.0;
+    for (int k = 0; k < cloud->ndim; k++) {
+        const int mover = hs_mover_of(doing->condensed->box, k);
+        if (mover == HS_OPEN || (mover >= 0 && doing->changes_rows)) {
+            const hs_status status = condense_column(doing, k, failure);
+            if (status != HS_OK) {
+                return status;
+            }
+        }
+        largest = hs_larger(hs_larger(-cloud->lower[k], cloud->upper[k]), largest);
+    }
+    for (int set = 0; set < doing->n_sets; set++) {
+        doing->of[set]->largest = largest;
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
+            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
+{
+    const double far = ldexp(1.0, unit + HS_FAR_EXPONENT);
+    condensed->box = box;
+    condensed->is_scaled = condensed->has_turns = false;
+    memset(condensed->turns, 0, sizeof condensed->turns);
+    if (cloud->n == 0 || (asking != NULL && asking->n == 0) || !anything_is_far(cloud, box, far)) {
+        return HS_OK;
+    }
+    condensing doing = {.account = account,
+                        .options = options,
+                        .of = {cloud, asking},
+                        .n_sets = asking != NULL ? 2 : 1,
+                        .n = cloud->n + (asking != NULL ? asking->n : 0),
+                        .condensed = condensed,
+                        .to_units = hs_scale_of(unit),
+                        .from_units = hs_scale_of(-unit),
+                        .far = far};
+    doing.changes_rows = rows_may_change(&doing, box, unit);
+    if (doing.changes_rows) {
+        condensed->is_scaled = unit < 0;
+        if (box != NULL) {
+            condensed->rows = *box;
+            condensed->box = &condensed->rows;
+        }
+    }
+    const hs_status status = allocate_keys(account, options, doing.n + 1, &doing.keys)
+                                 ? condense_columns(&doing, failure)
+                                 : HS_ERR_MEMORY;
+    free_keys(account, &doing.keys);
+    return status;
+}
+
+void
+hs_condensed_free(hs_account *account, hs_condensed *condensed)
+{
+    for (int set = 0; set < HS_CONDENSED_SETS; set++) {
+        for (int k = 0; k < HS_MAX_DIM; k++) {
+            hs_free(account, condensed->turns[set][k]);
+            condensed->turns[set][k] = NULL;
+        }
+    }
+}

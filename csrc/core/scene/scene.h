@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * scene.h: points, box and cutoff in the form that the search works on: scaled by a power of two so
+ * that the cutoff has an ordinary size, wrapped into the box, with a bound on every rounding.
+ */
+#ifndef HS_SCENE_H
+#define HS_SCENE_H
+
+#include "../exact/metric.h"
+#include "../box/fold.h"
+#include "../memory/account.h"
+#include "points.h"
+
+/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
+#define HS_SCALING_LOSS 0x1p-1000
+
+typedef struct hs_scene {
+    int        ndim;
+    int64_t    n;
+    hs_scale   scale;
+    hs_scale   unscale;       /* the way back */
+    hs_scale   pending;       /* scale, but for what condensing the points has done of it */
+    hs_lattice lattice;
+    double     sought;        /* the caller's cutoff, not scaled; less if no two points are so far
+                               * apart */
+    double     cutoff;        /* scaled; the true one, or an upper bound when `extreme` */
+    double     cutoff_low;    /* at most the true one */
+    double     radius;        /* candidates are sought up to here; cutoff, or a little more */
+    bool       extreme;       /* scaling lost digits: pairs are decided on the originals */
+    hs_metric  metric;        /* decides on X, or on the originals if there are any */
+    hs_cloud   cloud;         /* its columns are X, in the caller's order, once that is known */
+    bool       keeps_originals; /* X does not hold every digit */
+    double    *originals[HS_MAX_DIM]; /* n each: the points as given */
+    bool       x_is_beside;   /* the originals stayed in the cloud's block, X is in the other */
+    hs_turns   turns;         /* known if shifts or originals need them */
+    void      *beside;        /* owned; the columns of originals and turns, one behind another */
+    double     lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
+    double     upper[HS_MAX_DIM];
+    double     x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
+    double     x_error;       /* each component of X is within this of r - w B */
+    double     t_error[HS_MAX_DIM]; /* and each computed t_k of the true one, clamping included */
+    double     formula_error; /* precision="double": its |D| against the true one */
+    bool       is_asked;      /* by queries: the bounds above hold for these too */
+    bool       is_kept;       /* and for others that come later */
+    bool       is_heap;       /* kept, but no scale holds it: one cell with everything, which no
+                               * search can use: each makes a scene of its own */
+    bool       is_plain;      /* as hs_sets says */
+    bool       is_wide;       /* the same */
+    double     least_cutoff;  /* the same */
+    double     within;        /* the same */
+} hs_scene;
+
+/* Who looks for neighbours among whom; borrowed. */
+typedef struct hs_sets {
+    const hs_points *points;
+    const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
+    bool             is_kept; /* queries come later: bounds with room for them */
+    bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
+                                * and points are drawn together (close_gaps.h) only if need be */
+    bool             is_wide; /* nobody makes float32 of X: it may be larger than that holds */
+    const struct hs_search *built; /* NULL, or a search that has the points in cells already */
+    struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
+    bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
+    bool             is_full; /* each asking point meets all its neighbours, not the half list that
+                               * has each pair once; always so with queries */
+    double           least_cutoff; /* the smallest positive length that pairs are compared with,
+                                    * where there are several; 0: the cutoff alone */
+    double           within;  /* where is_wide: no pair further apart than this matters; 0: any */
+} hs_sets;
+
+/*
+ * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing
+ * and any status but HS_ERR_KERNEL and HS_ERR_INTERRUPTED is possible.
+ */
+hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *points,
+                        const hs_box *box, const hs_options *options, hs_scene *scene,
+                        hs_failure *failure);
+
+/*
+ * The same for two sets of points in one box: each becomes a scene of its own, with one scale, one
+ * lattice and bounds that hold for both. asking: that of the queries, NULL when there are none;
+ * only its arrays and what they are like are its own.
+ */
+hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
+                             const hs_box *box, const hs_options *options, hs_scene *scene,
+                             hs_scene *asking, hs_failure *failure);
+
+/* Steps of that; scene_scale.c. The cutoff that scale and condensing go by. */
+struct hs_box_size;
+double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size,
+                              double cutoff);
+
+/* Whether points and queries are drawn together where they are far. Others that come later may be
+ * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
+ * holds everything, cells of queries and of lists that last are those of the points as given. */
+bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
+                           const struct hs_box_size *size, int unit);
+
+/* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled: condensing has
+ * brought the points and this box to units. */
+void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
+                        const hs_scene *asking);
+
+/* More steps; scene_queries.c. Both clouds get the range of both. */
+void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
+
+/* What has been settled for the points is settled for the queries. */
+void hs_scene_share(const hs_scene *scene, hs_scene *asking);
+
+/* The scene's x_largest, lower and upper cover what wrapping found in both. */
+void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
+
+/* A scene that is kept for numbers that no scale holds: all points on one spot of open space. */
+void hs_scene_make_heap(hs_scene *scene);
+
+/* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
+ * its scale would round. */
+bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
+
+/* And whether its bounds hold for what wrapping has made of it. */
+bool hs_scene_covers(const hs_scene *kept, const hs_scene *asking);
+
+/* Bounds on what was wrapped, with room for queries that come later. Before and after they are
+ * settled. */
+void hs_scene_make_room(hs_scene *scene, double *magnitude);
+void hs_scene_widen_errors(hs_scene *scene);
+
+/*
+ * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
+ * HS_STATUS_END when its bounds do not hold for them: they need another one. On failure it holds
+ * nothing.
+ */
+hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept,
+                        const hs_points *queries, const hs_options *options, hs_scene *asking,
+                        hs_failure *failure);
+
+/* Points wrapped as those of a scene that was kept, however far away they are: for their cells
+ * alone. On failure it holds nothing. */
+hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept,
+                                const hs_points *points, const hs_options *options,
+                                hs_scene *scene, hs_failure *failure);
+
+/* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
+void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
+
+/* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
+ * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled;
+ * scene_wrap.c. */
+void hs_scene_fold_far(hs_scene *scene);
+
+/* Wraps the points into the box; scene_wrap.c. Sets x_largest, the range of t_k of the points in
+ * lower and upper, and *magnitude as hs_wrap_point says. */
+hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
+                        double *magnitude, hs_failure *failure);
+
+/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
+#define HS_SCALING_LOSS 0x1p-1000
+
+/* Steps of scene_bounds.c. x_error and t_error, from x_largest and what wrapping says. */
+void hs_scene_bound_errors(hs_scene *scene, double magnitude);
+
+/* Range of the grid coordinates: the points' own where open, one period where periodic. */
+void hs_scene_settle_ranges(hs_scene *scene);
+
+/* formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
+void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
+
+/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
+ * that it might call near are too many to try, and its answer is noise; and the point or query to
+ * blame for that. asking: NULL without queries. */
+bool hs_scene_is_drowned(const hs_scene *scene);
+void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
+
+/* What decides: X and B where they hold every digit, else the points and rows as given. */
+void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
+
+/* t_k of point i, as hs_lattice_coordinate. */
+HS_ALWAYS_INLINE double
+hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    if (lattice->aligned) {
+        return scene->cloud.x[k][i];
+    }
+    double t = 0.0;
+    for (int c = 0; c < lattice->ndim; c++) {
+        t += lattice->normal[k][c] * scene->cloud.x[c][i];
+    }
+    return t;
+}
+
+void hs_scene_free(hs_account *account, hs_scene *scene);
+
+#endif

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* unit.h: the power of two that a scene is scaled by, so that the search has ordinary numbers. */
+#ifndef HS_UNIT_H
+#define HS_UNIT_H
+
+#include "points.h"
+
+/* Sizes of the periodic box entries. */
+typedef struct hs_box_size {
+    double   largest;    /* 0 without rows */
+    double   smallest;   /* not counting zeros; infinity without rows */
+    double   short_row;  /* the least of the rows' largest entries; infinity without rows */
+    unsigned moved;      /* bit k: some row has an entry in column k */
+    bool     is_coupled; /* a row has several entries, or a column has */
+} hs_box_size;
+
+/* box: NULL for none. */
+hs_box_size hs_box_size_of(const hs_box *box);
+
+/* What moves a column of coordinates besides the points' own values. */
+#define HS_OPEN (-1)    /* nothing */
+#define HS_COUPLED (-2) /* rows that have entries in other columns as well */
+
+/* HS_OPEN, HS_COUPLED, or the row that alone has an entry in this column, and no other entry.
+ * box: NULL for none. */
+int hs_mover_of(const hs_box *box, int column);
+
+/* The cutoff, or a smaller one if that is beyond all distances as well. */
+double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
+
+/* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
+ * its points are. A very small number if all is 0. */
+int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
+
+/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
+ * in float32. What close_gaps.h takes care of does; what remains, coupled by a skewed box, is known
+ * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
+#define HS_LARGEST_EXPONENT 56
+/* Where no float32 is made of them they stay below 2^901, so that sums of a few are finite. */
+#define HS_LARGEST_WIDE_EXPONENT 900
+
+/* Whether all numbers are at most so many powers of two above a length of this exponent. */
+bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers);
+
+/* Whether coordinates along open axes are so large that a coupled box is lost in the rounding of
+ * what is wrapped into it. */
+bool hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
+
+/* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
+ * digits. unit: as hs_unit_exponent. */
+int hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
+                       int largest, bool *extreme);
+
+#endif

@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* decide.c: see decide.h. */
+#include "decide.h"
+
+#include "../exact/metric_float.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Of the square of the cutoff: far above what rounding can do to the sum of 8 squares. */
+#define SCALED_MARGIN 0x1p-47
+
+/* Takes the first n of scan->unsure from the hits of points [first, next). */
+static void
+remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
+{
+    int32_t t = first, removed = 0;
+    for (int32_t r = 0; r < n; r++) {
+        for (; t < scan->unsure[r].t; t++) {
+            scan->end[t] -= removed;
+        }
+        const int32_t from = scan->unsure[r].at + 1;
+        const int32_t to = r + 1 < n ? scan->unsure[r + 1].at : (int32_t)scan->n_hits;
+        memmove(scan->hits + from - removed - 1, scan->hits + from,
+                (size_t)(to - from) * sizeof *scan->hits);
+        removed++;
+    }
+    for (; t < next; t++) {
+        scan->end[t] -= removed;
+    }
+}
+
+/* The same when hits are only counted. */
+static void
+remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
+{
+    int32_t removed = 0;
+    for (int32_t t = first; t < next; t++) {
+        while (removed < n && scan->unsure[removed].t == t) {
+            removed++;
+        }
+        scan->end[t] -= removed;
+    }
+}
+
+/* One pair of the batch, by all stages or by the last alone. */
+static bool
+decide_pair(hs_walker *walker, const hs_metric *metric, int32_t e, bool others_failed)
+{
+    double         p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t        of_pair[HS_MAX_DIM];
+    const int64_t *shift = hs_trace_pair(&walker->trace, e, p, q, of_pair);
+    if (walker->options.precision == HS_DOUBLE) {
+        return hs_metric_within_double(metric, p, q, shift);
+    }
+    return others_failed ? hs_metric_settle(metric, p, q, shift, &walker->stages)
+                         : hs_metric_within(metric, p, q, shift, &walker->stages);
+}
+
+/*
+ * Where squares would leave float64's range: the same on differences that are scaled so that the
+ * cutoff is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is
+ * near r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
+ */
+static void
+judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, hs_stages *stages)
+{
+    const hs_scale scale = hs_scale_of(metric->cutoff > 0.0 ? ilogb(metric->cutoff) : 0);
+    const double   r = hs_scale_apply(scale, metric->cutoff);
+    const double   in = r * r * (1.0 - SCALED_MARGIN), out = r * r * (1.0 + SCALED_MARGIN);
+    double         square[HS_BATCH] = {0.0}, size[HS_BATCH] = {0.0};
+    for (int k = 0; k < metric->ndim; k++) {
+        for (int32_t e = 0; e < trace->n; e++) {
+            const double component = trace->q[k][e] - trace->p[k][e];
+            const double scaled = hs_scale_apply(scale, component);
+            square[e] += scaled * scaled;
+            size[e] += fabs(component); /* for cutoff 0: 0 only if all are */
+        }
+    }
+    for (int32_t e = 0; e < trace->n; e++) {
+        const bool within = r > 0.0 ? square[e] < in : size[e] == 0.0 && metric->inclusive;
+        const bool beyond = r > 0.0 ? square[e] > out : !within;
+        verdict[e] = within   ? (uint8_t)HS_WITHIN
+                     : beyond ? (uint8_t)HS_BEYOND
+                              : (uint8_t)HS_UNDECIDED;
+        stages->by_float64 += within || beyond;
+    }
+}
+
+void
+hs_decide_traced(hs_walker *walker, const hs_metric *metric, uint8_t *within)
+{
+    const hs_trace *trace = &walker->trace;
+    const bool      by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
+    uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
+    if (by_batch && !metric->floats_usable && !trace->is_shifted) {
+        judge_scaled(metric, trace, verdict, &walker->stages);
+    } else if (by_batch) {
+        const hs_batch batch = hs_trace_batch(trace);
+        walker->search->kernel->judge(metric, &batch, verdict, &walker->stages);
+    }
+    for (int32_t e = 0; e < trace->n; e++) {
+        within[e] = by_batch && verdict[e] != HS_UNDECIDED
+                        ? verdict[e] == HS_WITHIN
+                        : decide_pair(walker, metric, e, by_batch);
+    }
+}
+
+/* Traces unsure hits from `u` on, as many as fit a batch; *next: the first that did not. */
+static hs_status
+trace_unsure(hs_walker *walker, const hs_scan *scan, int32_t u, int32_t *next)
+{
+    hs_trace *trace = &walker->trace;
+    hs_trace_clear(trace);
+    while (u < scan->n_unsure && trace->n < HS_BATCH) {
+        int32_t       places[HS_BATCH], n = 0;
+        const int32_t t = scan->unsure[u].t, si = walker->group.first + t;
+        for (; u + n < scan->n_unsure && n < HS_BATCH && scan->unsure[u + n].t == t; n++) {
+            const int32_t place = scan->unsure[u + n].place;
+            places[n] = walker->is_ordered ? walker->block.origin[place] : place;
+        }
+        u += hs_trace_add(trace, si, places, n);
+    }
+    *next = u;
+    return hs_trace_look_up(trace, true, &walker->failed_point);
+}
+
+hs_status
+hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next)
+{
+    int32_t n_beyond = 0;
+    uint8_t within[HS_BATCH];
+    for (int32_t u = 0, end; u < scan->n_unsure; u = end) {
+        const hs_status status = trace_unsure(walker, scan, u, &end);
+        if (status != HS_OK) {
+            return status;
+        }
+        hs_decide_traced(walker, &walker->search->scene.metric, within);
+        for (int32_t e = 0; e < end - u; e++) {
+            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather at the front */
+            n_beyond += !within[e];
+        }
+    }
+    walker->n_ambiguous += scan->n_unsure;
+    if (n_beyond > 0 && walker->use == HS_BLOCK_COUNTS) {
+        remove_counts(scan, n_beyond, first, next);
+    } else if (n_beyond > 0) {
+        remove_hits(scan, n_beyond, first, next);
+    }
+    scan->n_hits -= n_beyond;
+    return HS_OK;
+}

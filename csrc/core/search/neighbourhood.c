@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* neighbourhood.c: see neighbourhood.h. */
+#include "neighbourhood.h"
+
+#include <string.h>
+
+/* Every array begins on a cache line. */
+#define FLOATS_PER_LINE (HS_ALIGNMENT / (int64_t)sizeof(float))
+
+int32_t
+hs_block_most_hits(int32_t capacity)
+{
+    return capacity < INT32_MAX / HS_HITS_PER_CANDIDATE ? HS_HITS_PER_CANDIDATE * capacity
+                                                        : capacity;
+}
+
+hs_status
+hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
+              hs_block *block)
+{
+    *block = (hs_block){.capacity = most, .most_runs = most_runs};
+    block->most_hits = hs_block_most_hits(most);
+    const int64_t capacity = (int64_t)most + HS_PADDING;
+    const int64_t room = (capacity + FLOATS_PER_LINE - 1) / FLOATS_PER_LINE * FLOATS_PER_LINE;
+    block->y[0] = hs_alloc(account, HS_FOR_CANDIDATES, room * (ndim + 1), sizeof(float));
+    bool complete = block->y[0] != NULL;
+    for (int k = 1; k < ndim && complete; k++) {
+        block->y[k] = block->y[0] + k * room;
+    }
+    block->norm = complete ? block->y[0] + ndim * room : NULL;
+    block->id = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
+    block->unsure = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(hs_unsure));
+    block->runs =
+        hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)most_runs + 1, sizeof(hs_run));
+    complete = complete && block->id != NULL && block->unsure != NULL && block->runs != NULL;
+    if (use != HS_BLOCK_COUNTS) {
+        block->hits = hs_alloc(account, HS_FOR_CANDIDATES,
+                               (int64_t)block->most_hits + HS_PADDING, sizeof(int32_t));
+        complete = complete && block->hits != NULL;
+    }
+    if (use == HS_BLOCK_LISTS_SQUARES) {
+        block->squares = hs_alloc(account, HS_FOR_CANDIDATES,
+                                  (int64_t)block->most_hits + HS_PADDING, sizeof(float));
+        complete = complete && block->squares != NULL;
+    }
+    if (use == HS_BLOCK_LISTS_PLACES || use == HS_BLOCK_LISTS_SQUARES) {
+        block->place = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
+        complete = complete && block->place != NULL;
+    }
+    if (!complete) {
+        hs_block_free(account, block);
+        return HS_ERR_MEMORY;
+    }
+    for (int32_t c = 0; block->place != NULL && c < capacity; c++) {
+        block->place[c] = c;
+    }
+    return HS_OK;
+}
+
+void
+hs_block_free(hs_account *account, hs_block *block)
+{
+    hs_free(account, block->y[0]);
+    hs_free(account, block->id);
+    hs_free(account, block->place);
+    hs_free(account, block->hits);
+    hs_free(account, block->squares);
+    hs_free(account, block->unsure);
+    hs_free(account, block->runs);
+    *block = (hs_block){0};
+}
+
+void
+hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group)
+{
+    group->first = first;
+    group->last = last;
+    group->largest = 0;
+    /* Any double will do as a centre; one of the points is near all of them. */
+    const int32_t middle = first + (last - first) / 2;
+    for (int k = 0; k < bins->ndim; k++) {
+        group->centre[k] = bins->x[k][middle];
+    }
+}
+
+void
+hs_group_load(const hs_bins *bins, hs_group *group)
+{
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *x = bins->x[k] + group->first;
+        for (int32_t t = 0; t < group->last - group->first; t++) {
+            const float q = (float)(x[t] - group->centre[k]);
+            const uint32_t bits = hs_bits_of_float(q) & UINT32_C(0x7fffffff);
+            group->q[k][t] = q;
+            group->largest = bits > group->largest ? bits : group->largest;
+        }
+    }
+}
+
+int32_t
+hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
+                const int32_t *image, const hs_group *group)
+{
+    const int32_t room = block->capacity - block->n;
+    const int32_t n = end - si < room ? end - si : room;
+    hs_run       *run = &block->runs[block->n_runs++];
+    run->at = block->n;
+    run->si = si;
+    memcpy(run->image, image, sizeof run->image);
+    for (int k = 0; k < ndim; k++) {
+        /* One rounding here and one for the sum: hs_grid.shift_error bounds the first, filter.h
+         * counts on the second. */
+        run->moved[k] = shift[k] - group->centre[k];
+    }
+    block->n += n;
+    return n;
+}
+
+void
+hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_block *block,
+                hs_group *group)
+{
+    hs_gather gather;
+    gather.ndim = bins->ndim;
+    for (int k = 0; k < bins->ndim; k++) {
+        gather.x[k] = bins->x[k];
+        gather.y[k] = block->y[k];
+    }
+    gather.order = bins->order;
+    gather.norm = block->norm;
+    gather.id = block->id;
+    gather.largest = group->largest;
+    block->runs[block->n_runs].at = block->n;
+    kernel->gather(&gather, block->runs, block->n_runs);
+    group->largest = gather.largest;
+    for (int k = 0; k < bins->ndim; k++) {
+        hs_pad_lanes(block->y[k], block->n);
+    }
+    hs_pad_lanes(block->norm, block->n);
+    if (is_first) {
+        HS_ASSERT(block->runs[0].si == group->first && block->n >= group->last - group->first);
+        const size_t bytes = (size_t)(group->last - group->first) * sizeof(float);
+        for (int k = 0; k < bins->ndim; k++) {
+            memcpy(group->q[k], block->y[k], bytes);
+        }
+    }
+}
+
+double
+hs_group_extent(const hs_group *group)
+{
+    /* The top five bits of the mantissa, rounded up: at most 1/32 more. */
+    const uint32_t low = (UINT32_C(1) << 18) - 1;
+    const uint32_t bits = group->largest < UINT32_C(0x7f800000) ? (group->largest + low) & ~low
+                                                                 : group->largest;
+    return 2.0 * (double)hs_float_of_bits(bits);
+}

@@ -1,0 +1,385 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* pair_batch.c: see pair_batch.h. */
+#include "pair_batch.h"
+
+#include "../base/poll.h"
+
+#include <string.h>
+
+/* Integers up to here are float64 numbers, and what the batch kernels take. */
+#define WIDEST_SHIFT (INT64_C(1) << 53)
+
+/* Loaded between two polls: some milliseconds. */
+#define POLL_CANDIDATES (1 << 18)
+
+/* Turns and images up to here are few: sums of four of them are int32. */
+#define MOST_FEW 0x1p28
+
+/* Whether shifts over B are those over the rows as given. */
+static bool
+is_plain(const hs_lattice *lattice)
+{
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            if (lattice->U[r][l] != (r == l)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
+static bool
+is_narrow(const hs_search *search)
+{
+    const hs_scene *scene = &search->scene;
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0 &&
+            search->grid.reach[k] / search->grid.shape[k] >= MOST_FEW) {
+            return false;
+        }
+    }
+    return is_plain(&scene->lattice) && !search->bins.keeps_originals &&
+           (!search->bins.turns.known ||
+            hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
+}
+
+/* n arrays of `length` entries. */
+static bool
+new_arrays(hs_account *account, int n, int64_t length, size_t size, void **arrays)
+{
+    for (int k = 0; k < n; k++) {
+        arrays[k] = hs_alloc(account, HS_FOR_CANDIDATES, length, size);
+        if (arrays[k] == NULL) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The same for batches of doubles, zero at first: batch kernels read a little beyond the last pair,
+ * where any finite number will do. */
+static bool
+new_batches(hs_account *account, int n, double **arrays)
+{
+    const int64_t length = HS_BATCH + HS_BATCH_PADDING;
+    const bool    done = new_arrays(account, n, length, sizeof(double), (void **)arrays);
+    for (int k = 0; done && k < n; k++) {
+        memset(arrays[k], 0, (size_t)length * sizeof(double));
+    }
+    return done;
+}
+
+static bool
+allocate(hs_account *account, hs_trace *trace)
+{
+    const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
+    const int     m_given = trace->needs_given && !trace->is_narrow ? m : 0;
+    const int     m_narrow = trace->needs_given && trace->is_narrow ? m : 0;
+    const int64_t block = trace->block->capacity;
+    const size_t  wide = sizeof(int64_t), narrow = sizeof(int32_t);
+    return new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->place) &&
+           new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->si) &&
+           new_batches(account, d, trace->p) && new_batches(account, d, trace->q) &&
+           new_batches(account, m, trace->times) &&
+           new_arrays(account, m, HS_BATCH, wide, (void **)trace->image) &&
+           new_arrays(account, m_given, HS_BATCH, wide, (void **)trace->given) &&
+           new_arrays(account, m_narrow, HS_BATCH, narrow, (void **)trace->shift) &&
+           new_arrays(account, d, block, sizeof(double), (void **)trace->of.q) &&
+           new_arrays(account, m, block, wide, (void **)trace->of.image) &&
+           new_arrays(account, m_given, block, wide, (void **)trace->of.turned) &&
+           new_arrays(account, m_narrow, block, narrow, (void **)trace->of.few);
+}
+
+hs_status
+hs_trace_init(hs_search *search, const hs_block *block, bool needs_given, hs_trace *trace)
+{
+    *trace = (hs_trace){.search = search, .block = block};
+    trace->is_plain = is_plain(&search->scene.lattice);
+    trace->needs_given = needs_given || search->bins.keeps_originals;
+    trace->is_narrow = is_narrow(search);
+    if (!allocate(&search->account, trace)) {
+        hs_trace_free(&search->account, trace);
+        return HS_ERR_MEMORY;
+    }
+    return HS_OK;
+}
+
+void
+hs_trace_free(hs_account *account, hs_trace *trace)
+{
+    for (int k = HS_MAX_DIM - 1; k >= 0; k--) {
+        hs_free(account, trace->of.few[k]);
+        hs_free(account, trace->of.turned[k]);
+        hs_free(account, trace->of.image[k]);
+        hs_free(account, trace->of.q[k]);
+        hs_free(account, trace->shift[k]);
+        hs_free(account, trace->given[k]);
+        hs_free(account, trace->image[k]);
+        hs_free(account, trace->times[k]);
+        hs_free(account, trace->q[k]);
+        hs_free(account, trace->p[k]);
+    }
+    hs_free(account, trace->si);
+    hs_free(account, trace->place);
+    *trace = (hs_trace){0};
+}
+
+/* Rows of B that point si was wrapped by; 0 where that is known to cancel or not needed. */
+HS_ALWAYS_INLINE int64_t
+turns_of(const hs_bins *bins, int r, int64_t si)
+{
+    return bins->turns.known ? hs_turns_get(&bins->turns, r, si) : 0;
+}
+
+/* The shifts of the candidates of one run, less their turns. */
+static void
+load_given(hs_trace *trace, const hs_run *run, int32_t n)
+{
+    const hs_bins *bins = &trace->search->bins;
+    for (int r = 0; r < bins->n_periodic; r++) {
+        const int64_t image = run->image[r];
+        if (trace->is_narrow) {
+            HS_ASSERT(!bins->turns.known || bins->turns.narrow[r] != NULL);
+            const int32_t *turns = bins->turns.known ? bins->turns.narrow[r] + run->si : NULL;
+            int32_t       *few = trace->of.few[r] + run->at;
+            for (int32_t c = 0; c < n; c++) {
+                few[c] = (int32_t)image - (turns != NULL ? turns[c] : 0);
+            }
+        } else {
+            int64_t *turned = trace->of.turned[r] + run->at;
+            for (int32_t c = 0; c < n; c++) {
+                turned[c] = image - turns_of(bins, r, run->si + c);
+            }
+        }
+    }
+}
+
+/* What the metric needs of the candidates of one run. */
+static void
+load_metric(hs_trace *trace, const hs_run *run, int32_t n)
+{
+    const hs_bins *bins = &trace->search->bins;
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
+        memcpy(trace->of.q[k] + run->at, from + run->si, (size_t)n * sizeof(double));
+    }
+    for (int r = 0; r < bins->n_periodic; r++) {
+        const int64_t image = run->image[r];
+        int64_t      *to = trace->of.image[r] + run->at;
+        for (int32_t c = 0; c < n; c++) {
+            to[c] = image;
+        }
+        trace->has_images = trace->has_images || image != 0;
+    }
+}
+
+/* Writes down all candidates of the block, as far as that is not done yet. */
+static hs_status
+load(hs_trace *trace, bool metric)
+{
+    int32_t unpolled = 0;
+    const bool given = trace->needs_given && !trace->has_given;
+    metric = metric && !trace->has_metric;
+    trace->has_images = trace->has_images && !metric;
+    if (!given && !metric) {
+        return HS_OK;
+    }
+    for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
+        const int32_t n = run[1].at - run->at;
+        if (metric) {
+            load_metric(trace, run, n);
+        }
+        if (given) {
+            load_given(trace, run, n);
+        }
+        unpolled += n;
+        if (unpolled > POLL_CANDIDATES && trace->polls != NULL) {
+            unpolled = 0;
+            if (hs_poll(trace->polls, 0.0) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
+        }
+    }
+    trace->has_given = trace->needs_given;
+    trace->has_metric = trace->has_metric || metric;
+    return HS_OK;
+}
+
+int32_t
+hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
+{
+    const int32_t room = HS_BATCH - trace->n;
+    int32_t      *place = trace->place + trace->n, *of = trace->si + trace->n;
+    n = n < room ? n : room;
+    for (int32_t e = 0; e < n; e++) {
+        place[e] = places[e];
+        of[e] = si;
+    }
+    trace->n += n;
+    return n;
+}
+
+static void
+look_up_points(hs_trace *trace)
+{
+    const hs_bins *bins = hs_search_asking(trace->search);
+    const int32_t *place = trace->place, *si = trace->si;
+    for (int k = 0; k < bins->ndim; k++) {
+        const double *of_p = bins->keeps_originals ? bins->originals[k] : bins->x[k];
+        const double *of_q = trace->of.q[k];
+        double       *p = trace->p[k], *q = trace->q[k];
+        for (int32_t e = 0; e < trace->n; e++) {
+            p[e] = of_p[si[e]];
+            q[e] = of_q[place[e]];
+        }
+    }
+}
+
+/* S = image + turns_i - turns_j. */
+static void
+look_up_narrow(hs_trace *trace)
+{
+    const hs_turns *turns = &hs_search_asking(trace->search)->turns;
+    const int32_t  *place = trace->place, *si = trace->si;
+    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
+        const int32_t *few = trace->of.few[r];
+        int32_t       *to = trace->shift[r];
+        for (int32_t e = 0; e < trace->n; e++) {
+            to[e] = few[place[e]];
+        }
+        for (int32_t e = 0; turns->known && e < trace->n; e++) {
+            to[e] += (int32_t)hs_turns_get(turns, r, si[e]);
+        }
+    }
+}
+
+/* S = image + turns_i - turns_j over B, then over the rows as given. Without turns they are all
+ * known to cancel or not to be needed. Returns the first pair whose S passes its range, or their
+ * number. */
+static int32_t
+look_up_given(hs_trace *trace)
+{
+    const hs_bins *asking = hs_search_asking(trace->search);
+    const int      m = trace->search->bins.n_periodic;
+    for (int r = 0; r < m; r++) {
+        const int64_t *turned = trace->of.turned[r];
+        int64_t       *to = trace->given[r];
+        for (int32_t e = 0; e < trace->n; e++) {
+            to[e] = turned[trace->place[e]] + turns_of(asking, r, trace->si[e]);
+        }
+    }
+    for (int32_t e = 0; !trace->is_plain && e < trace->n; e++) {
+        int64_t reduced[HS_MAX_DIM], given[HS_MAX_DIM];
+        for (int r = 0; r < m; r++) {
+            reduced[r] = trace->given[r][e];
+        }
+        if (!hs_lattice_shift(&trace->search->scene.lattice, reduced, given)) {
+            return e;
+        }
+        for (int r = 0; r < m; r++) {
+            trace->given[r][e] = given[r];
+        }
+    }
+    return trace->n;
+}
+
+/* Shifts over B. Where the block has none, the arrays are zeroed once and left alone. */
+static void
+look_up_images(hs_trace *trace)
+{
+    const bool zero = !trace->has_images;
+    if (zero && trace->has_zeros) {
+        return;
+    }
+    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
+        const int64_t *from = trace->of.image[r];
+        int64_t       *to = trace->image[r];
+        if (zero) {
+            memset(trace->image[r], 0, HS_BATCH * sizeof *to);
+            memset(trace->times[r], 0, HS_BATCH * sizeof(double));
+        }
+        for (int32_t e = 0; e < trace->n && !zero; e++) {
+            to[e] = from[trace->place[e]];
+        }
+    }
+    trace->has_zeros = zero;
+}
+
+/* The metric's shift: of X over B, or of the points as given over the rows as given. */
+static void
+look_up_times(hs_trace *trace)
+{
+    const bool as_given = trace->search->bins.keeps_originals;
+    for (int r = 0; r < trace->search->bins.n_periodic; r++) {
+        const int64_t *from = as_given ? trace->given[r] : trace->image[r];
+        double        *times = trace->times[r];
+        int64_t        any = 0, wide = 0;
+        for (int32_t e = 0; e < trace->n; e++) {
+            times[e] = (double)from[e];
+            any |= from[e];
+            wide |= from[e] > WIDEST_SHIFT || from[e] < -WIDEST_SHIFT;
+        }
+        trace->is_shifted = trace->is_shifted || any != 0;
+        trace->is_wide = trace->is_wide || wide != 0;
+    }
+}
+
+hs_status
+hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
+{
+    const hs_bins *bins = hs_search_asking(trace->search);
+    metric = metric || !trace->is_narrow; /* shifts of the points as given are the metric's too */
+    if (load(trace, metric) != HS_OK) {
+        return HS_ERR_INTERRUPTED;
+    }
+    if (metric) {
+        look_up_points(trace);
+        look_up_images(trace);
+    }
+    if (trace->needs_given && trace->is_narrow) {
+        look_up_narrow(trace);
+    } else if (trace->needs_given) {
+        const int32_t fitting = look_up_given(trace);
+        if (fitting < trace->n) {
+            *failed_point = bins->order[trace->si[fitting]];
+            return HS_ERR_SHIFT_RANGE;
+        }
+    }
+    if (metric && (trace->has_images || bins->keeps_originals)) {
+        look_up_times(trace);
+    }
+    return HS_OK;
+}
+
+hs_batch
+hs_trace_batch(const hs_trace *trace)
+{
+    hs_batch batch = {.n = trace->n};
+    for (int k = 0; k < trace->search->scene.ndim; k++) {
+        batch.p[k] = trace->p[k];
+        batch.q[k] = trace->q[k];
+    }
+    for (int r = 0; trace->is_shifted && r < trace->search->scene.lattice.n_periodic; r++) {
+        batch.shift[r] = trace->times[r];
+    }
+    return batch;
+}
+
+const int64_t *
+hs_trace_pair(const hs_trace *trace, int32_t e, double *p, double *q, int64_t *shift)
+{
+    const bool as_given = trace->search->bins.keeps_originals;
+    for (int k = 0; k < trace->search->scene.ndim; k++) {
+        p[k] = trace->p[k][e];
+        q[k] = trace->q[k][e];
+    }
+    if (!trace->is_shifted) {
+        return NULL;
+    }
+    for (int r = 0; r < trace->search->scene.lattice.n_periodic; r++) {
+        shift[r] = as_given ? trace->given[r][e] : trace->image[r][e];
+    }
+    return shift;
+}

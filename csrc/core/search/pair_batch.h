@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * pair_batch.h: from places in the gathered block back to the numbers that were given, a batch of
+ * pairs at a time, as the exact decision and the measuring want them.
+ */
+#ifndef HS_PAIR_BATCH_H
+#define HS_PAIR_BATCH_H
+
+#include "neighbourhood.h"
+#include "search.h"
+
+/* What is known of each candidate of a block. Owned, one entry for each place. */
+typedef struct hs_trace_block {
+    double  *q[HS_MAX_DIM];     /* what the metric measures to */
+    int64_t *image[HS_MAX_DIM]; /* shift over B, of X */
+    int64_t *turned[HS_MAX_DIM]; /* the same less the turns by which the candidate was wrapped; */
+    int32_t *few[HS_MAX_DIM];    /* the same as int32, when is_narrow */
+} hs_trace_block;
+
+/* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more of doubles;
+ * those of shifts are one for each row of B. */
+typedef struct hs_trace {
+    const hs_search *search; /* borrowed */
+    const hs_block  *block;  /* borrowed */
+    const hs_options *polls; /* borrowed; asked while a large block is loaded; NULL: never */
+    hs_trace_block   of;
+    bool     has_metric, has_given; /* `of` is the block's: q and image; turned or few */
+    bool     is_plain;       /* shifts over B are those over the rows as given */
+    bool     needs_given;
+    bool     is_narrow;      /* all S of the scene are few: `shift` has them, `given` is not set */
+    bool     has_images;     /* some candidate of the block is in another image */
+    int32_t  n;
+    int32_t *place, *si;     /* of the candidate, and of the point that asks */
+    double  *p[HS_MAX_DIM], *q[HS_MAX_DIM]; /* what the metric measures between */
+    double  *times[HS_MAX_DIM];   /* its shift */
+    int64_t *image[HS_MAX_DIM];   /* shift over B, of X */
+    int64_t *given[HS_MAX_DIM];   /* S over the periodic rows as given; when needs_given */
+    int32_t *shift[HS_MAX_DIM];   /* the same, when is_narrow */
+    bool     has_zeros;           /* image and times hold nothing but zeros */
+    bool     is_shifted;          /* some entry of times is not zero */
+    bool     is_wide;             /* some entry is too large for the batch kernels */
+} hs_trace;
+
+/* needs_given: whether S is wanted, or else only what the metric needs. */
+hs_status hs_trace_init(hs_search *search, const hs_block *block, bool needs_given,
+                        hs_trace *trace);
+void      hs_trace_free(hs_account *account, hs_trace *trace);
+
+/* Before the first pair of a batch. */
+HS_ALWAYS_INLINE void
+hs_trace_clear(hs_trace *trace)
+{
+    trace->n = 0;
+    trace->is_shifted = trace->is_wide = false;
+}
+
+/* When the block has new candidates. */
+HS_ALWAYS_INLINE void
+hs_trace_reset(hs_trace *trace)
+{
+    trace->has_metric = trace->has_given = false;
+}
+
+/* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
+ * many. They are looked up together, because the rows of one point are short. */
+int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n);
+
+/*
+ * Fills the arrays of the batch: S, when needs_given, and unless `metric` is false and S needs
+ * nothing else, what the metric measures between. HS_OK; HS_ERR_SHIFT_RANGE when a shift passes its
+ * range, with the number of the point; HS_ERR_INTERRUPTED.
+ */
+hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
+
+/* As the batch kernels take it. */
+hs_batch hs_trace_batch(const hs_trace *trace);
+
+/* Pair e as the functions of metric.h take it; returns shift, filled, or NULL for none. */
+const int64_t *hs_trace_pair(const hs_trace *trace, int32_t e, double *p, double *q,
+                             int64_t *shift);
+
+#endif

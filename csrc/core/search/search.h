@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * search.h: one scene made ready: points in cell order, the neighbouring rows of cells, and the
+ * account of what that took. Walkers (walk.h) read it and leave it as it is.
+ */
+#ifndef HS_SEARCH_H
+#define HS_SEARCH_H
+
+#include "../cells/sparse_rows.h"
+#include "../cells/stencil.h"
+#include "../threads/team.h"
+
+#include "../../kernels/kernel.h"
+
+typedef struct hs_search {
+    /* Large, and filled before they are read: not cleared at first. */
+    hs_scene         scene;   /* without its arrays: bins has them */
+    hs_grid          grid;
+    /* From here on all begins as zero. */
+    hs_account       account;
+    hs_options       options;
+    hs_stencil       stencil;
+    hs_bins          bins;
+    hs_sparse        sparse;  /* when is_sparse: the rows and cells that bins follows */
+    bool             is_full; /* every asking point meets all its neighbours, not the half list */
+    bool             keeps_none;  /* as in hs_sets */
+    bool             is_borrowed; /* the cells and all of the scene belong to another search */
+    bool             has_queries;  /* then these ask, in the cells of the same grid: */
+    hs_bins          query_bins;
+    hs_sparse        query_sparse;
+    bool             is_sparse;
+    const hs_kernel *kernel;
+    int32_t          first_point;  /* number of the first point */
+    int64_t          n_in_all;     /* points, of which these may be a part: for fractions done */
+    double           pairs_per_half; /* pairs to be found for each pair of the half list */
+    double           filter_error; /* bound on each component before rounding to float32 */
+    hs_poll_fn       callers_poll; /* behind options.poll, which counts the calls */
+    void            *callers_context;
+    hs_counters      walked;       /* what finished walkers did */
+    hs_team         *team;         /* owned; NULL: the caller's thread alone */
+} hs_search;
+
+/*
+ * Everything up to the first group: hs_search_begin, the team, hs_search_build; or what can be
+ * reused of sets->built. On failure nothing is held but the account, which the caller closes in any
+ * case. The options are copied; what they point to is borrowed until hs_search_close; the points
+ * are not needed any more.
+ */
+hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                         hs_search *search, hs_failure *failure);
+
+/* Whom to ask whether to go on, in place of the options' poll; NULL: nobody. The search must not
+ * move any more. */
+void hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search);
+
+/* An account and options, no scene yet. */
+void hs_search_begin(const hs_options *options, hs_search *search);
+
+/*
+ * The scene of these points, in place of one that hs_search_close has freed; options.cutoff may
+ * have changed. For points that are part of more: their numbers begin at first_point, of
+ * n_points_in_all.
+ */
+hs_status hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search,
+                          hs_failure *failure);
+void      hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
+
+/* The points that ask, in cell order. */
+HS_ALWAYS_INLINE const hs_bins *
+hs_search_asking(const hs_search *search)
+{
+    return search->has_queries ? &search->query_bins : &search->bins;
+}
+
+/*
+ * A search among the points of another one, which was made to be kept, stays as it is and must
+ * outlive this one; search_reuse.c. The queries of the sets ask, or the points. HS_STATUS_END when
+ * it cannot serve them: the cutoff is larger than its own, or its bounds do not hold for the
+ * queries. Else as hs_search_open.
+ */
+hs_status hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *search,
+                          hs_failure *failure);
+
+/* Steps that builds share: who asks; the queries into cells, their scene giving up its arrays; what
+ * follows from scene and grid. */
+void      hs_search_set_asking(const hs_sets *sets, hs_search *search);
+hs_status hs_search_bin_queries(hs_search *search, hs_scene *asking);
+void      hs_search_settle(hs_search *search);
+
+/* How many threads these options mean for so many points. */
+int hs_search_threads(int64_t n_points, const hs_options *options);
+
+/* Adds what a walker, or another search, did to search->walked. */
+void hs_search_note(hs_search *search, const hs_counters *walked);
+
+/* Copies the counts to options.counters, if wanted. */
+void hs_search_report(const hs_search *search, int64_t n_pairs);
+
+/* Frees all but what belongs to the account alone; harmless twice. */
+void hs_search_close(hs_search *search);
+
+#endif

@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * search_reuse.c: another search among points that are in cells already. Cells, points and their
+ * scale are those of the first search; cutoff, reach, stencil, queries, account and threads are its
+ * own. See search.h.
+ */
+#include "search.h"
+
+#include "estimate.h"
+
+/* Scaled cutoffs as small as this keep all their digits. */
+#define SMALLEST_CUTOFF 0x1p-500
+
+/* What is shared, as the new search's own; what it must not free is marked as borrowed. */
+static void
+borrow(const hs_search *built, hs_search *search)
+{
+    search->scene = built->scene;
+    search->grid = built->grid;
+    search->bins = built->bins;
+    search->sparse = built->sparse;
+    search->is_sparse = built->is_sparse;
+    search->is_borrowed = true;
+}
+
+/* Whether the scale of the cells keeps all digits of a length up to theirs. */
+static bool
+keeps_digits(const hs_search *built, double length)
+{
+    return length == 0.0 || hs_scale_apply(built->scene.scale, length) >= SMALLEST_CUTOFF;
+}
+
+/* Whether cells for one cutoff serve another, and a least one where there are several. What is kept
+ * of the points depends on the precision that they were meant for. */
+static bool
+serves(const hs_search *built, const hs_options *options, double least_cutoff)
+{
+    const double before = built->options.cutoff, cutoff = options->cutoff;
+    if (options->precision != built->options.precision || built->scene.is_heap) {
+        return false;
+    }
+    if (built->scene.extreme) { /* digits are lost, and kept beside */
+        return cutoff == before;
+    }
+    return keeps_digits(built, least_cutoff) &&
+           (cutoff == before || (cutoff >= 0.0 && cutoff < before && keeps_digits(built, cutoff)));
+}
+
+/* Cells for the cutoff of the options, and the queries in them. */
+static hs_status
+adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
+{
+    const hs_options *options = &search->options;
+    const double      before = search->scene.cutoff;
+    hs_status         status = HS_OK;
+    if (options->cutoff != sets->built->options.cutoff) {
+        hs_scene_set_cutoff(&search->scene, options);
+        status = hs_grid_narrow(&search->scene, search->is_sparse, before, &search->grid);
+    }
+    hs_scene_init_metric(&search->scene, options);
+    hs_search_set_asking(sets, search);
+    hs_search_settle(search);
+    if (status == HS_OK) {
+        status = hs_estimate_by_density(search, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_stencil_build(&search->account, options, &search->scene, &search->grid,
+                                  search->is_full, &search->stencil);
+    }
+    return status;
+}
+
+static hs_status
+take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
+{
+    hs_scene  asking;
+    hs_status status = hs_scene_like(&search->account, search->team, &search->scene, queries,
+                                     &search->options, &asking, failure);
+    if (status == HS_OK) {
+        status = hs_search_bin_queries(search, &asking);
+        hs_scene_free(&search->account, &asking);
+    }
+    return status;
+}
+
+hs_status
+hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *search,
+                hs_failure *failure)
+{
+    const hs_search *built = sets->built;
+    const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
+    if (!serves(built, options, sets->least_cutoff)) {
+        return HS_STATUS_END;
+    }
+    hs_search_begin(options, search);
+    borrow(built, search);
+    search->team = hs_team_create(hs_search_threads(sets->points->n + n_queries, options));
+    search->kernel = hs_kernel_select(options->kernel);
+    hs_status status = search->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
+    if (status == HS_OK && sets->queries != NULL) {
+        status = take_queries(sets->queries, search, failure);
+    }
+    if (status != HS_OK) {
+        hs_search_report(search, 0);
+        hs_search_close(search);
+        if (status == HS_STATUS_END) {
+            hs_account_close(&search->account);
+            failure->in_queries = false;
+        }
+    }
+    return status;
+}

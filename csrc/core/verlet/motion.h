@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * motion.h: how far points have moved since a list was built, and what that leaves of its skin.
+ * docs/verlet.md derives the inequality.
+ */
+#ifndef HS_MOTION_H
+#define HS_MOTION_H
+
+#include "../scene/snapshot.h"
+
+/* What is compared; all borrowed. */
+typedef struct hs_motion {
+    const hs_frame *built;  /* the step that the list was built for */
+    const hs_frame *now;    /* hs_frames_match */
+    double          radius; /* the list has every pair up to here */
+    double          cutoff;
+} hs_motion;
+
+/*
+ * *margin: by how much pairs may still come closer, in the unit of points, rounded down. At least
+ * 0: every pair within the cutoff now is in the list. Below 0: it may not be; -infinity where
+ * nothing is known. *jumped: some point has jumped by whole box vectors, and `jumps` says by how
+ * many of each that repeats, int64 (n, m); else it is of no meaning. HS_ERR_MEMORY,
+ * HS_ERR_INTERRUPTED.
+ */
+hs_status hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin,
+                           bool *jumped, hs_store *jumps);
+
+#endif

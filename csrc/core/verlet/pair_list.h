@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* pair_list.h: a list of pairs that is used for many steps: what it holds. */
+#ifndef HS_PAIR_LIST_H
+#define HS_PAIR_LIST_H
+
+#include "../scene/snapshot.h"
+#include "shift_table.h"
+#include "motion.h"
+
+/*
+ * The pairs within `radius` of one step, as places of points in the cell order of that step, and
+ * images:
+ *
+ *     S = image + count_i - count_j      over the box vectors that repeat, as given
+ *
+ * Points keep their image of each other while they move; their counts follow their jumps. The first
+ * n_plain pairs have the image 0.
+ */
+typedef struct hs_listing {
+    int64_t   n_pairs, n_plain;
+    int32_t  *i, *j;   /* the caller's numbers of them are i < j, or equal */
+    int32_t  *code;    /* of pairs from n_plain on: the number of their image */
+    hs_images images;
+    int32_t  *order;   /* the caller's number of each place */
+    int64_t  *counts;  /* m for each place, when it was built; NULL: all zero */
+    double    radius;
+    /* Where these are. Pairs are written when nothing can fail any more; the others are made beside
+     * those in use, and `turn` says which are. */
+    hs_store  for_i, for_j, for_code, for_order[2], for_counts[2];
+    int       turn;
+} hs_listing;
+
+struct hs_verlet {
+    bool       has_list;
+    hs_listing listing;
+    double     cutoff;
+    double     margin;
+    double     tried;        /* the margin of the last step before the list was built for it */
+    hs_frame   frames[3];    /* two are in use, one is for the next step */
+    int        built, now;   /* numbers of frames: the step it was built for, the last step */
+    hs_store   jumps[2];     /* since it was built: those of the last step and of the next */
+    int        jumps_now;    /* which of them; -1: nothing has jumped */
+};
+
+/* Pairs within `radius` of a frame. On failure *listing is as it was. */
+hs_status hs_listing_build(const hs_frame *frame, const hs_options *options, double radius,
+                           hs_listing *listing, hs_failure *failure);
+
+void hs_listing_free(hs_listing *listing);
+
+#endif

@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * recheck_measure.c: d and D of hits. They are measured in the scene of a search of these points,
+ * so that they have its bits: between the wrapped points with shifts over the reduced box, or
+ * between the points as given.
+ */
+#include "recheck.h"
+
+#include "../collect/restore.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Integers up to here are float64 numbers, and what the batch kernels take. */
+#define WIDEST_SHIFT (INT64_C(1) << 53)
+
+/* Points ahead whose numbers are fetched: they lie anywhere in memory. */
+#define AHEAD 16
+
+enum { IN_BATCH = HS_BATCH + HS_BATCH_PADDING };
+
+/* Some hits, as the batch kernels take them, and what they return. */
+typedef struct measured {
+    int32_t n;
+    bool    is_shifted, is_wide;
+    double  p[HS_MAX_DIM][IN_BATCH], q[HS_MAX_DIM][IN_BATCH], times[HS_MAX_DIM][IN_BATCH];
+    int64_t shift[HS_BATCH][HS_MAX_DIM];
+    double  distance[IN_BATCH], vector[HS_MAX_DIM][IN_BATCH];
+} measured;
+
+/* A double that is an integer, modulo 2^64. */
+static int64_t
+integer_of(double x)
+{
+    int           exponent;
+    const int64_t significand = (int64_t)ldexp(frexp(x, &exponent), 53);
+    exponent -= 53;
+    if (exponent < 0) { /* -53 at least: it is an integer */
+        return significand / (INT64_C(1) << -exponent);
+    }
+    return exponent < 64 ? (int64_t)((uint64_t)significand << exponent) : 0;
+}
+
+/*
+ * over[l][r]: the given row l has row r of B so many times. B is diagonal here, so that is a given
+ * entry over a period: a quotient of doubles that is an integer, hence a double.
+ */
+static void
+divide_rows(const hs_lattice *lattice, int64_t over[][HS_MAX_DIM])
+{
+    for (int k = 0; k < lattice->ndim; k++) {
+        const int r = lattice->row_of_axis[k];
+        for (int l = 0; r >= 0 && l < lattice->n_periodic; l++) {
+            over[l][r] = integer_of(lattice->scaled[l][k] / lattice->rows[r][k]);
+        }
+    }
+}
+
+/* shift over the given rows to one over B, modulo 2^64. */
+HS_ALWAYS_INLINE void
+reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int64_t *reduced)
+{
+    for (int r = 0; r < m; r++) {
+        uint64_t sum = 0;
+        for (int l = 0; l < m; l++) {
+            sum += (uint64_t)shift[l] * (uint64_t)over[l][r];
+        }
+        reduced[r] = (int64_t)sum;
+    }
+}
+
+static bool
+allocate(hs_refilter *refilter)
+{
+    hs_account   *account = &refilter->search->account;
+    const int64_t n = refilter->now->points.n, m = refilter->m;
+    const int64_t n_images = refilter->list->listing.images.n;
+    refilter->x = hs_alloc(account, HS_FOR_POINTS, n * refilter->d, sizeof *refilter->x);
+    refilter->image = hs_alloc(account, HS_FOR_WRAPS, n_images * m, sizeof *refilter->image);
+    refilter->lag = hs_alloc(account, HS_FOR_WRAPS, n * m, sizeof *refilter->lag);
+    refilter->lagging = hs_alloc(account, HS_FOR_WRAPS, n, sizeof *refilter->lagging);
+    return refilter->x != NULL && refilter->image != NULL && refilter->lag != NULL &&
+           refilter->lagging != NULL;
+}
+
+/*
+ * Lags. The scene's X = r - w B; images are for z = r - count A. So S = image + count_i - count_j
+ * over A is, for X, image + lag_j - lag_i over B with lag = w - count. For points as given, w is 0.
+ */
+static void
+set_lags(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_DIM])
+{
+    const hs_scene *scene = &refilter->search->scene;
+    const int       m = refilter->m;
+    for (int64_t a = 0; m > 0 && a < refilter->now->points.n; a++) {
+        const int64_t i = refilter->list->listing.order[a];
+        int64_t       count[HS_MAX_DIM] = {0}, reduced[HS_MAX_DIM], any = 0;
+        if (refilter->counts != NULL) {
+            memcpy(count, refilter->counts + a * m, (size_t)m * sizeof *count);
+        }
+        if (!over_given) {
+            reduce_shift(m, over, count, reduced);
+        }
+        for (int r = 0; r < m; r++) {
+            refilter->lag[a * m + r] =
+                over_given ? -count[r]
+                           : (int64_t)((uint64_t)hs_turns_get(&scene->turns, r, i) -
+                                       (uint64_t)reduced[r]);
+            any |= refilter->lag[a * m + r];
+        }
+        refilter->lagging[a] = any != 0;
+    }
+}
+
+static void
+set_images(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_DIM])
+{
+    const hs_images *images = &refilter->list->listing.images;
+    const int        m = refilter->m;
+    for (int64_t number = 0; number < images->n; number++) {
+        int64_t shift[HS_MAX_DIM], *to = refilter->image + number * m;
+        for (int r = 0; r < m; r++) {
+            shift[r] = images->of[number * m + r];
+        }
+        if (over_given) {
+            memcpy(to, shift, (size_t)m * sizeof *to);
+        } else {
+            reduce_shift(m, over, shift, to);
+        }
+    }
+}
+
+static void
+set_coordinates(hs_refilter *refilter)
+{
+    const hs_scene *scene = &refilter->search->scene;
+    double *const  *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
+    const int       d = refilter->d;
+    const int32_t *order = refilter->list->listing.order;
+    const int64_t  n = refilter->now->points.n;
+    for (int64_t a = 0; a < n; a++) {
+        for (int k = 0; k < d; k++) {
+            if (a + AHEAD < n) {
+                HS_PREFETCH(x[k] + order[a + AHEAD]);
+            }
+            refilter->x[a * d + k] = x[k][order[a]];
+        }
+    }
+}
+
+hs_status
+hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure)
+{
+    hs_search *search = refilter->search;
+    hs_options options = search->options;
+    int64_t    over[HS_MAX_DIM][HS_MAX_DIM] = {{0}};
+    options.want |= HS_WANT_SHIFT; /* the turns by which points were wrapped are needed */
+    const hs_status status =
+        hs_scene_init(&search->account, search->team, &refilter->now->points,
+                      hs_frame_box(refilter->now), &options, &search->scene, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    if (!allocate(refilter)) {
+        return HS_ERR_MEMORY;
+    }
+    const bool over_given = search->scene.keeps_originals;
+    if (!over_given && refilter->m > 0) {
+        divide_rows(&search->scene.lattice, over);
+    }
+    set_lags(refilter, over_given, (const int64_t(*)[HS_MAX_DIM])over);
+    set_images(refilter, over_given, (const int64_t(*)[HS_MAX_DIM])over);
+    set_coordinates(refilter);
+    return HS_OK;
+}
+
+/* The shifts of the batch, for the scene's metric. */
+static void
+fill_shifts(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *hits,
+            measured *batch)
+{
+    const hs_listing *listing = &refilter->list->listing;
+    const int         m = refilter->m;
+    const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
+    const int32_t    *code = slab->first < listing->n_plain
+                                 ? NULL
+                                 : listing->code + (slab->first - listing->n_plain);
+    int64_t           any = 0;
+    for (int32_t b = 0; b < batch->n; b++) {
+        const int32_t  e = hits[b];
+        const int64_t *lag_i = refilter->lag + (int64_t)i[e] * m;
+        const int64_t *lag_j = refilter->lag + (int64_t)j[e] * m;
+        for (int r = 0; r < m; r++) {
+            const int64_t image = code != NULL ? refilter->image[(int64_t)code[e] * m + r] : 0;
+            const int64_t shift =
+                (int64_t)((uint64_t)image + (uint64_t)lag_j[r] - (uint64_t)lag_i[r]);
+            batch->shift[b][r] = shift;
+            batch->times[r][b] = (double)shift;
+            any |= shift;
+            batch->is_wide = batch->is_wide || shift > WIDEST_SHIFT || shift < -WIDEST_SHIFT;
+        }
+    }
+    batch->is_shifted = any != 0;
+}
+
+HS_ALWAYS_INLINE void
+fill_points(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *hits, const int d,
+            measured *batch)
+{
+    const int32_t *i = refilter->list->listing.i + slab->first;
+    const int32_t *j = refilter->list->listing.j + slab->first;
+    unsigned       lagging = 0;
+    for (int32_t b = 0; b < batch->n; b++) {
+        const int64_t p = i[hits[b]], q = j[hits[b]];
+        for (int k = 0; k < d; k++) {
+            batch->p[k][b] = refilter->x[p * d + k];
+            batch->q[k][b] = refilter->x[q * d + k];
+        }
+        lagging |= refilter->m > 0 ? refilter->lagging[p] | refilter->lagging[q] : 0;
+    }
+    batch->is_shifted = batch->is_wide = false;
+    if (refilter->m > 0 && (lagging != 0 || slab->first >= refilter->list->listing.n_plain)) {
+        fill_shifts(refilter, slab, hits, batch);
+    }
+}
+
+static void
+fill(const hs_refilter *refilter, const hs_sifted *slab, int32_t first, measured *batch)
+{
+    const uint16_t *hits = slab->hits + first;
+    switch (refilter->d) {
+    case 2: fill_points(refilter, slab, hits, 2, batch); break;
+    case 3: fill_points(refilter, slab, hits, 3, batch); break;
+    default: fill_points(refilter, slab, hits, refilter->d, batch);
+    }
+}
+
+/* d and D of the batch, in the unit of the metric. */
+static void
+measure(const hs_refilter *refilter, double *const *vector, measured *batch)
+{
+    const hs_metric *metric = &refilter->search->scene.metric;
+    uint8_t          done[IN_BATCH] = {0};
+    hs_batch         given = {.n = batch->n};
+    for (int k = 0; k < refilter->d; k++) {
+        given.p[k] = batch->p[k];
+        given.q[k] = batch->q[k];
+    }
+    for (int r = 0; batch->is_shifted && r < refilter->m; r++) {
+        given.shift[r] = batch->times[r];
+    }
+    if (!batch->is_wide) {
+        refilter->search->kernel->measure(metric, &given, batch->distance, vector, done);
+    }
+    for (int32_t b = 0; b < batch->n; b++) {
+        double p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
+        for (int k = 0; !done[b] && k < refilter->d; k++) {
+            p[k] = batch->p[k][b];
+            q[k] = batch->q[k][b];
+        }
+        if (HS_UNLIKELY(!done[b])) {
+            batch->distance[b] = hs_metric_measure(
+                metric, p, q, batch->is_shifted ? batch->shift[b] : NULL, along);
+            for (int k = 0; vector != NULL && k < refilter->d; k++) {
+                vector[k][b] = along[k];
+            }
+        }
+    }
+}
+
+void
+hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab)
+{
+    const hs_scene   *scene = &refilter->search->scene;
+    const hs_options *options = &refilter->search->options;
+    const hs_scale    same = {.exponent = 0, .first = 1.0, .second = 1.0};
+    const hs_scale    unscale = scene->extreme ? same : scene->unscale;
+    const int         d = refilter->d;
+    double           *distance = hs_refilter_column(refilter, HS_WANT_DISTANCE, slab->at);
+    double           *vectors = hs_refilter_column(refilter, HS_WANT_VECTOR, slab->at);
+    double           *vector[HS_MAX_DIM], sign[HS_BATCH];
+    measured          batch;
+    memset(&batch, 0, sizeof batch); /* kernels read a little beyond the last pair */
+    for (int k = 0; k < d; k++) {
+        vector[k] = batch.vector[k];
+    }
+    for (int b = 0; b < HS_BATCH; b++) {
+        sign[b] = 1.0; /* listed pairs are the right way round */
+    }
+    for (int32_t first = 0; first < slab->n_hits; first += HS_BATCH) {
+        const int32_t left = slab->n_hits - first;
+        batch.n = left < HS_BATCH ? left : HS_BATCH;
+        fill(refilter, slab, first, &batch);
+        measure(refilter, vectors != NULL ? vector : NULL, &batch);
+        if (distance != NULL) {
+            if (unscale.exponent != 0) {
+                hs_restore_distances(batch.distance, batch.n, unscale);
+            }
+            hs_keep_all_within(batch.distance, batch.n, options->cutoff, options->inclusive);
+            memcpy(distance + first, batch.distance, (size_t)batch.n * sizeof *distance);
+        }
+        if (vectors != NULL) {
+            hs_restore_vectors(vectors + (int64_t)first * d, vector, sign, batch.n, d, unscale);
+        }
+    }
+}

@@ -1,0 +1,388 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * test_bad_arguments.c: one argument after the other is spoilt, for every function of halfshell.h:
+ * those that look at it refuse it before anything happens, with a failure that is filled; the
+ * others do not mind.
+ */
+#include "../../../csrc/core/search/search.h"
+#include "../support/call_scene.h"
+
+#include <limits.h>
+
+void test_bad_arguments(void);
+
+typedef struct fault {
+    const char *name;
+    void (*spoil)(call_scene *s);
+    unsigned  needs; /* which functions notice: those that use all of this */
+    hs_status status;
+} fault;
+
+/* name, what a function must use to notice, what it says then, how to spoil scene s */
+#define FAULTS(F)                                                                                 \
+    F(points_null, USES_POINTS, HS_ERR_ARGUMENT, s->c.points = NULL)                              \
+    F(points_no_data, USES_POINTS, HS_ERR_ARGUMENT, s->points.data = NULL)                        \
+    F(points_n_below, USES_POINTS, HS_ERR_ARGUMENT, s->points.n = -1)                             \
+    F(points_n_lowest, USES_POINTS, HS_ERR_ARGUMENT, s->points.n = INT64_MIN)                     \
+    F(points_n_above, USES_POINTS, HS_ERR_TOO_MANY, s->points.n = INT64_C(1) << 31)               \
+    F(points_n_half, USES_POINTS, HS_ERR_TOO_MANY, s->points.n = INT64_MAX / 2)                   \
+    F(points_n_highest, USES_POINTS, HS_ERR_TOO_MANY, s->points.n = INT64_MAX)                    \
+    F(points_ndim_0, USES_POINTS, HS_ERR_ARGUMENT, s->points.ndim = 0)                            \
+    F(points_ndim_below, USES_POINTS, HS_ERR_ARGUMENT, s->points.ndim = INT_MIN)                  \
+    F(points_ndim_above, USES_POINTS, HS_ERR_ARGUMENT, s->points.ndim = HS_MAX_DIM + 1)           \
+    F(points_ndim_highest, USES_POINTS, HS_ERR_ARGUMENT, s->points.ndim = INT_MAX)                \
+    F(points_flat, USES_POINTS | USES_BOX, HS_ERR_ARGUMENT, s->points.ndim = 2)                   \
+    F(points_real, USES_POINTS, HS_ERR_ARGUMENT, s->points.real = (hs_real)2)                     \
+    F(points_real_below, USES_POINTS, HS_ERR_ARGUMENT, s->points.real = (hs_real)-1)              \
+    F(points_rows_away, USES_POINTS, HS_ERR_ARGUMENT, s->points.row_stride = PTRDIFF_MAX)         \
+    F(points_rows_back, USES_POINTS, HS_ERR_ARGUMENT, s->points.row_stride = PTRDIFF_MIN)         \
+    F(points_columns_away, USES_POINTS, HS_ERR_ARGUMENT, s->points.column_stride = PTRDIFF_MAX)   \
+    F(points_columns_back, USES_POINTS, HS_ERR_ARGUMENT, s->points.column_stride = PTRDIFF_MIN)   \
+    F(points_nan, USES_POINTS, HS_ERR_NOT_FINITE, s->x[4] = NAN)                                  \
+    F(points_infinite, USES_POINTS, HS_ERR_NOT_FINITE, s->x[N_OF_CALL * 3 - 1] = -INFINITY)       \
+    F(queries_null, NEEDS_QUERIES, HS_ERR_ARGUMENT, s->c.queries = NULL)                          \
+    F(queries_no_data, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.data = NULL)                     \
+    F(queries_n_below, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.n = INT64_MIN)                   \
+    F(queries_n_above, USES_QUERIES, HS_ERR_TOO_MANY, s->queries.n = INT64_C(1) << 31)            \
+    F(queries_n_highest, USES_QUERIES, HS_ERR_TOO_MANY, s->queries.n = INT64_MAX)                 \
+    F(queries_flat, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.ndim = 2)                           \
+    F(queries_ndim_above, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.ndim = INT_MAX)               \
+    F(queries_real, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.real = (hs_real)INT_MAX)            \
+    F(queries_rows_away, USES_QUERIES, HS_ERR_ARGUMENT, s->queries.row_stride = PTRDIFF_MIN)      \
+    F(queries_nan, USES_QUERIES, HS_ERR_NOT_FINITE, s->q[3] = NAN)                                \
+    F(box_null, NEEDS_BOX, HS_ERR_ARGUMENT, s->c.box = s->systems.box = NULL)                     \
+    F(box_ndim_0, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = 0)                                     \
+    F(box_ndim_below, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = INT_MIN)                           \
+    F(box_ndim_above, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = HS_MAX_DIM + 1)                    \
+    F(box_ndim_highest, USES_BOX, HS_ERR_ARGUMENT, s->box.ndim = INT_MAX)                         \
+    F(box_flat, USES_BOX | USES_POINTS, HS_ERR_ARGUMENT, s->box.ndim = 2)                         \
+    F(box_nan, USES_BOX, HS_ERR_BOX_FINITE, s->box.rows[1][2] = NAN)                              \
+    F(box_infinite, USES_BOX, HS_ERR_BOX_FINITE, s->box.rows[0][0] = INFINITY)                    \
+    F(box_open_infinite, USES_BOX, HS_ERR_BOX_FINITE, s->box.rows[2][1] = -INFINITY)              \
+    F(box_dependent, USES_BOX, HS_ERR_BOX_DEPENDENT, memset(s->box.rows[0], 0, 24))               \
+    F(options_null, USES_OPTIONS, HS_ERR_ARGUMENT, s->c.options = NULL)                           \
+    F(threads_lowest, USES_OPTIONS, HS_ERR_ARGUMENT, s->options.threads = INT_MIN)                \
+    F(limit_nan, USES_OPTIONS, HS_ERR_ARGUMENT, s->options.memory_limit = NAN)                    \
+    F(limit_below, USES_OPTIONS, HS_ERR_ARGUMENT, s->options.memory_limit = -1.0)                 \
+    F(limit_0, USES_OPTIONS, HS_ERR_MEMORY, s->options.memory_limit = 0.0)                        \
+    F(cutoff_nan, USES_CUTOFF, HS_ERR_CUTOFF, s->options.cutoff = NAN)                            \
+    F(cutoff_below, USES_CUTOFF, HS_ERR_CUTOFF, s->options.cutoff = -5e-324)                      \
+    F(cutoff_infinite, USES_CUTOFF | NEEDS_FINITE, HS_ERR_CUTOFF, s->options.cutoff = INFINITY)   \
+    F(cell_size_nan, USES_CELL_SIZE, HS_ERR_ARGUMENT, s->options.cell_size = NAN)                 \
+    F(cell_size_below, USES_CELL_SIZE, HS_ERR_ARGUMENT, s->options.cell_size = -1.0)              \
+    F(precision_none, USES_PRECISION, HS_ERR_ARGUMENT, s->options.precision = (hs_precision)3)    \
+    F(precision_below, USES_PRECISION, HS_ERR_ARGUMENT, s->options.precision = (hs_precision)-1)  \
+    F(want_more, USES_WANT, HS_ERR_ARGUMENT, s->options.want |= 64)                               \
+    F(want_all_bits, USES_WANT, HS_ERR_ARGUMENT, s->options.want = UINT_MAX)                      \
+    F(index_bytes_0, USES_INDEX_BYTES, HS_ERR_ARGUMENT, s->options.index_bytes = 0)               \
+    F(index_bytes_2, USES_INDEX_BYTES, HS_ERR_ARGUMENT, s->options.index_bytes = 2)               \
+    F(index_bytes_below, USES_INDEX_BYTES, HS_ERR_ARGUMENT, s->options.index_bytes = -8)          \
+    F(index_bytes_more, USES_INDEX_BYTES, HS_ERR_ARGUMENT, s->options.index_bytes = INT_MAX)      \
+    F(out_without_j, USES_OUT, HS_ERR_ARGUMENT, s->options.out = &s->out; s->out.j = NULL)        \
+    F(out_capacity, USES_OUT, HS_ERR_ARGUMENT, s->options.out = &s->out; s->out.capacity = -1)    \
+    F(out_lowest, USES_OUT, HS_ERR_ARGUMENT, s->options.out = &s->out;                            \
+      s->out.capacity = INT64_MIN; s->options.want = 0)                                           \
+    F(out_index_bytes, USES_OUT, HS_ERR_ARGUMENT, s->options.out = &s->out;                       \
+      s->out.index_bytes = 16)                                                                    \
+    F(kernel_none, USES_KERNEL, HS_ERR_KERNEL, s->options.kernel = "none")                        \
+    F(kernel_empty, USES_KERNEL, HS_ERR_KERNEL, s->options.kernel = "")                           \
+    F(histogram_null, USES_HISTOGRAM, HS_ERR_ARGUMENT, s->c.histogram = NULL)                     \
+    F(edges_null, USES_HISTOGRAM, HS_ERR_ARGUMENT, s->histogram.edges = NULL)                     \
+    F(edges_none, USES_HISTOGRAM, HS_ERR_EDGES, s->histogram.n_edges = 0)                         \
+    F(edges_below, USES_HISTOGRAM, HS_ERR_EDGES, s->histogram.n_edges = INT64_MIN)                \
+    F(edges_above, USES_HISTOGRAM, HS_ERR_EDGES, s->histogram.n_edges = INT64_C(1) << 30)         \
+    F(edges_highest, USES_HISTOGRAM, HS_ERR_EDGES, s->histogram.n_edges = INT64_MAX)              \
+    F(edges_descend, USES_HISTOGRAM, HS_ERR_EDGES, s->edges[1] = 0.25)                            \
+    F(edges_negative, USES_HISTOGRAM, HS_ERR_EDGES, s->edges[0] = -1.0)                           \
+    F(edges_nan, USES_HISTOGRAM, HS_ERR_EDGES, s->edges[0] = NAN)                                 \
+    F(edges_infinite, USES_HISTOGRAM, HS_ERR_EDGES, s->edges[2] = INFINITY)                       \
+    F(n_types_0, USES_HISTOGRAM, HS_ERR_ARGUMENT, s->histogram.n_types = 0)                       \
+    F(n_types_below, USES_HISTOGRAM, HS_ERR_ARGUMENT, s->histogram.n_types = INT32_MIN)           \
+    F(n_types_highest, USES_HISTOGRAM, HS_ERR_MEMORY, s->histogram.n_types = INT32_MAX)           \
+    F(types_null, USES_HISTOGRAM, HS_ERR_TYPES, s->histogram.of_points.types = NULL)              \
+    F(types_below, USES_HISTOGRAM, HS_ERR_TYPES, s->types[3] = -1)                                \
+    F(types_above, USES_HISTOGRAM, HS_ERR_TYPES, s->types[3] = INT32_MAX)                         \
+    F(query_types_null, USES_HISTOGRAM, HS_ERR_TYPES, s->histogram.of_queries.types = NULL)       \
+    F(query_types, USES_HISTOGRAM, HS_ERR_TYPES, s->query_types[2] = INT32_MIN)                   \
+    F(weights_nan, USES_HISTOGRAM, HS_ERR_WEIGHTS, s->weights[3] = NAN)                           \
+    F(query_weights_nan, USES_HISTOGRAM, HS_ERR_WEIGHTS, s->query_weights[1] = INFINITY)          \
+    F(visit_null, USES_VISIT, HS_ERR_ARGUMENT, s->c.visit = NULL)                                 \
+    F(visit_none, USES_VISIT, HS_ERR_ARGUMENT, s->visit.pair = NULL)                              \
+    F(systems_null, USES_SYSTEMS, HS_ERR_ARGUMENT, s->c.systems = NULL)                           \
+    F(systems_below, USES_SYSTEMS, HS_ERR_ARGUMENT, s->systems.n = INT64_MIN)                     \
+    F(systems_above, USES_SYSTEMS, HS_ERR_TOO_MANY, s->systems.n = INT64_C(1) << 31)              \
+    F(systems_highest, USES_SYSTEMS, HS_ERR_TOO_MANY, s->systems.n = INT64_MAX)                   \
+    F(first_null, USES_SYSTEMS, HS_ERR_ARGUMENT, s->systems.first = NULL)                         \
+    F(first_late, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[0] = 1)                                 \
+    F(first_negative, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[0] = INT64_MIN)                     \
+    F(first_descends, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[1] = s->first[2] + 1)               \
+    F(first_away, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[2] = INT64_MAX)                         \
+    F(first_long, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[3]++)                                   \
+    F(first_longest, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[3] = INT64_MAX)                      \
+    F(first_short, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[3]--)                                  \
+    F(rows_nan, USES_SYSTEMS, HS_ERR_BOX_FINITE, s->systems.rows = s->rows; s->rows[13] = NAN)    \
+    F(cutoffs_nan, USES_SYSTEMS, HS_ERR_CUTOFF, s->systems.cutoffs = s->cutoffs;                  \
+      s->cutoffs[2] = NAN)                                                                        \
+    F(cells_null, USES_CELLS, HS_ERR_ARGUMENT, hs_cells_free(s->c.cells); s->c.cells = NULL)      \
+    F(list_null, USES_LIST, HS_ERR_ARGUMENT, hs_verlet_free(s->c.list); s->c.list = NULL)         \
+    F(stream_null, USES_STREAM, HS_ERR_ARGUMENT, hs_stream_free(s->c.stream); s->c.stream = NULL) \
+    F(skin_nan, USES_SKIN, HS_ERR_CUTOFF, s->c.skin = NAN)                                        \
+    F(skin_below, USES_SKIN, HS_ERR_CUTOFF, s->c.skin = -1.0)                                     \
+    F(skin_infinite, USES_SKIN, HS_ERR_CUTOFF, s->c.skin = INFINITY)                              \
+    F(k_0, USES_K, HS_ERR_ARGUMENT, s->c.k = 0)                                                   \
+    F(k_below, USES_K, HS_ERR_ARGUMENT, s->c.k = INT64_MIN)                                       \
+    F(k_half, USES_K, HS_ERR_MEMORY, s->c.k = INT64_MAX / 2)                                      \
+    F(k_highest, USES_K, HS_ERR_MEMORY, s->c.k = INT64_MAX)                                       \
+    F(max_pairs_0, USES_MAX_PAIRS, HS_ERR_ARGUMENT, s->c.max_pairs = 0)                           \
+    F(max_pairs_below, USES_MAX_PAIRS, HS_ERR_ARGUMENT, s->c.max_pairs = INT64_MIN)               \
+    F(max_pairs_highest, USES_MAX_PAIRS, HS_OK, s->c.max_pairs = INT64_MAX)                       \
+    F(cell_size_infinite, USES_CELL_SIZE, HS_OK, s->options.cell_size = INFINITY)                 \
+    F(cell_size_smallest, USES_CELL_SIZE, HS_OK, s->options.cell_size = 5e-324)                   \
+    F(limit_infinite, USES_OPTIONS, HS_OK, s->options.memory_limit = INFINITY)                    \
+    F(result_null, USES_RESULT, HS_ERR_ARGUMENT, s->c.has_result = false)
+
+#define SPOIL(name, needs, status, statement) \
+    static void spoil_##name(call_scene *s)   \
+    {                                         \
+        statement;                            \
+    }
+FAULTS(SPOIL)
+
+#define ENTRY(name, needs, status, statement) {#name, spoil_##name, needs, status},
+static const fault faults[] = {FAULTS(ENTRY)};
+
+enum { N_FAULTS = sizeof faults / sizeof faults[0], POISON = 0xa5 };
+
+static bool
+is_poison(const void *bytes, size_t n)
+{
+    const unsigned char *byte = bytes;
+    bool                 is = n > 0;
+    for (size_t b = 0; b < n; b++)
+        is = is && byte[b] == POISON;
+    return is;
+}
+
+#define POISONED(failure, member) is_poison(&(failure)->member, sizeof(failure)->member)
+
+/* Every field says something, and nothing that does not apply. */
+static bool
+is_filled(hs_status status, const hs_failure *failure)
+{
+    if (POISONED(failure, row) || POISONED(failure, column) || POISONED(failure, in_queries) ||
+        POISONED(failure, system) || POISONED(failure, value) ||
+        POISONED(failure, expected_pairs) || POISONED(failure, expected_bytes) ||
+        POISONED(failure, search_bytes) || POISONED(failure, limit_bytes))
+        return false;
+    if (status != HS_ERR_MEMORY && (failure->expected_pairs != 0.0 || failure->limit_bytes != 0.0))
+        return false;
+    if (status == HS_ERR_ARGUMENT)
+        return failure->row == -1 && failure->column == -1 && failure->value == 0.0;
+    if (status == HS_ERR_NOT_FINITE || status == HS_ERR_BOX_FINITE)
+        return failure->row >= 0 && failure->column >= 0 && !isfinite(failure->value);
+    if (status == HS_ERR_TOO_MANY)
+        return failure->value >= 0x1p30;
+    return failure->row >= -1 && failure->system >= -1;
+}
+
+static void
+complain(const call_kind *kind, const char *spoilt, const char *what)
+{
+    fprintf(stderr, "hs_%s, %s: %s\n", kind->name, spoilt, what);
+    harness_failures++;
+}
+
+/* One function, one fault, with a failure to fill or without. */
+static void
+call_spoilt(const call_kind *kind, const fault *spoilt, bool has_failure)
+{
+    static call_scene s;
+    hs_failure        failure;
+    const bool        notices = (kind->uses & spoilt->needs) == spoilt->needs;
+    const hs_status   expected = notices ? spoilt->status : HS_OK;
+    call_fill_scene(&s);
+    call_make_objects(&s.c, kind->uses);
+    spoilt->spoil(&s);
+    memset(&failure, POISON, sizeof failure);
+    memset(&s.counters, POISON, sizeof s.counters);
+    const hs_status status = kind->run(&s.c, has_failure ? &failure : NULL);
+    if (status != expected)
+        complain(kind, spoilt->name, hs_status_text(status));
+    if (has_failure && status != HS_OK && !is_filled(status, &failure))
+        complain(kind, spoilt->name, "failure is not filled");
+    if ((kind->uses & USES_COUNTERS) && s.c.options != NULL &&
+        (s.counters.pairs < 0 || s.counters.bytes[0] < 0 || s.counters.polls < 0))
+        complain(kind, spoilt->name, "counters are not filled");
+    call_free_objects(&s.c);
+}
+
+static void
+each_spoilt_argument_is_refused(void)
+{
+    for (int k = 0; k < CALL_KINDS; k++) {
+        for (int f = 0; f < N_FAULTS; f++) {
+            call_spoilt(&call_kinds[k], &faults[f], true);
+            call_spoilt(&call_kinds[k], &faults[f], false);
+        }
+    }
+}
+
+/* Where no array would be as long as it is said to be: the limits themselves. */
+static void
+numbers_that_are_only_large_are_fine(void)
+{
+    static call_scene s;
+    for (int k = 0; k < CALL_KINDS; k++) {
+        const ptrdiff_t strides[] = {PTRDIFF_MAX, PTRDIFF_MIN, 0, 1, -1};
+        for (int t = 0; t < 5; t++) { /* one row has no next one */
+            call_fill_scene(&s);
+            s.points.n = s.queries.n = s.c.n_points = 1;
+            s.points.row_stride = s.queries.row_stride = strides[t];
+            s.first[0] = 0;
+            s.first[1] = s.first[2] = s.first[3] = 1;
+            call_make_objects(&s.c, call_kinds[k].uses);
+            if (call_kinds[k].run(&s.c, NULL) != HS_OK)
+                complain(&call_kinds[k], "one point", "stride");
+            call_free_objects(&s.c);
+        }
+        call_fill_scene(&s);
+        s.options.out = &s.out;
+        s.out.capacity = INT64_MAX;
+        call_make_objects(&s.c, call_kinds[k].uses);
+        if (call_kinds[k].run(&s.c, NULL) != HS_OK)
+            complain(&call_kinds[k], "out", "capacity");
+        call_free_objects(&s.c);
+    }
+    hs_options options = hs_options_default();
+    for (int n = 1; n < INT_MAX / 3; n *= 3) {
+        options.threads = n;
+        CHECK(hs_search_threads(1, &options) == (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
+        options.threads = -n;
+        CHECK(hs_search_threads(1, &options) == 1);
+        CHECK(hs_search_threads(INT64_MAX, &options) ==
+              (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
+    }
+}
+
+static void
+arrays_without_entries_may_be_missing(void)
+{
+    static call_scene s;
+    hs_pairs         *pairs;
+    call_fill_scene(&s);
+    call_make_objects(&s.c, USES_CELLS);
+    const hs_points  none = {.ndim = 3};
+    const hs_systems empty = {.n = 0};
+    CHECK(hs_neighbors_count(&none, NULL, &s.box, &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(&s.points, &none, &s.box, &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(&none, &s.points, &s.box, &s.options, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_cells_neighbors_count(s.c.cells, &none, &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_cells_find(s.c.cells, &none, NULL, NULL) == HS_OK);
+    CHECK(hs_box_wrap(&s.box, &none, NULL, NULL, NULL) == HS_OK);
+    CHECK(hs_systems_count(&none, &empty, &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_systems_find(&none, &empty, &s.options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_length(pairs) == 0);
+    hs_pairs_free(pairs);
+    s.histogram.counts = NULL;
+    s.histogram.sums = NULL;
+    CHECK(call_histogram(&s.c, NULL) == HS_OK);
+    call_free_objects(&s.c);
+}
+
+/* The failure says which. */
+static void
+systems_that_descend_are_named(void)
+{
+    static call_scene s;
+    hs_failure        failure;
+    for (int n = 0; n < N_SYSTEMS_OF_CALL; n++) {
+        call_fill_scene(&s);
+        s.first[n + 1] = s.first[n] - 1;
+        CHECK(call_systems_find(&s.c, &failure) == HS_ERR_ARGUMENT && failure.system == n);
+    }
+}
+
+static void
+objects_that_are_null_hold_nothing(void)
+{
+    static call_scene s;
+    hs_points         points;
+    hs_layout         layout;
+    memset(&points, POISON, sizeof points);
+    memset(&layout, POISON, sizeof layout);
+    hs_cells_points(NULL, &points);
+    hs_cells_layout(NULL, &layout);
+    hs_cells_indices(NULL, NULL);
+    CHECK(points.n == 0 && points.data == NULL && points.ndim == 0);
+    CHECK(layout.n_points == 0 && layout.n_cells == 0 && layout.order == NULL);
+    CHECK(hs_cells_box(NULL) == NULL);
+    CHECK(!hs_verlet_look(NULL).has_list && hs_verlet_look(NULL).n_points == 0);
+    CHECK(hs_pairs_length(NULL) == 0 && hs_pairs_rows(NULL) == 0);
+    CHECK(hs_pairs_offsets(NULL) == NULL && hs_pairs_take_offsets(NULL) == NULL);
+    CHECK(hs_pairs_array(NULL, HS_WANT_I) == NULL && hs_pairs_take(NULL, HS_WANT_I) == NULL);
+    hs_array_free(NULL);
+    hs_pairs_free(NULL);
+    hs_stream_free(NULL);
+    hs_cells_free(NULL);
+    hs_verlet_free(NULL);
+    call_fill_scene(&s);
+    call_make_objects(&s.c, USES_CELLS);
+    hs_cells_points(s.c.cells, NULL);
+    hs_cells_layout(s.c.cells, NULL);
+    hs_cells_indices(s.c.cells, NULL);
+    call_free_objects(&s.c);
+}
+
+static void
+only_one_bit_names_an_array(void)
+{
+    static call_scene s;
+    const unsigned    bad[] = {0, 3, 63, 64, 65, HS_WANT_I | 1u << 31, 1u << 31, UINT_MAX};
+    hs_pairs         *pairs;
+    call_fill_scene(&s);
+    s.options.want = 63;
+    CHECK(hs_pairs_find(&s.points, &s.box, &s.options, &pairs, NULL) == HS_OK);
+    for (int b = 0; b < 8; b++) {
+        CHECK(hs_pairs_array(pairs, bad[b]) == NULL);
+        CHECK(hs_pairs_take(pairs, bad[b]) == NULL);
+    }
+    for (unsigned bit = 1; bit < 64; bit *= 2) {
+        const void *array = hs_pairs_array(pairs, bit);
+        void       *taken = hs_pairs_take(pairs, bit);
+        CHECK(array != NULL && taken != NULL);
+        CHECK(hs_pairs_array(pairs, bit) == NULL && hs_pairs_take(pairs, bit) == NULL);
+        hs_array_free(taken);
+    }
+    hs_pairs_free(pairs);
+}
+
+static void
+numbers_of_other_functions_may_be_any(void)
+{
+    const int    numbers[] = {INT_MIN, -1, 0, 1, HS_STATUS_END, INT_MAX};
+    const char  *names[8] = {NULL};
+    const int    n = hs_kernel_names(NULL, 0);
+    const size_t limit = hs_pool_limit();
+    CHECK(n >= 1 && n <= 8);
+    for (int t = 0; t < 6; t++) {
+        CHECK(hs_status_text((hs_status)numbers[t])[0] != '\0');
+        CHECK(hs_kernel_names(NULL, numbers[t]) == n);
+        CHECK(hs_kernel_names(names, numbers[t] < 8 ? numbers[t] : 8) == n);
+    }
+    CHECK(names[n - 1] != NULL);
+    hs_pool_set_limit(SIZE_MAX);
+    CHECK(hs_pool_limit() == SIZE_MAX);
+    hs_pool_set_limit(limit);
+}
+
+void
+test_bad_arguments(void)
+{
+    RUN(each_spoilt_argument_is_refused);
+    RUN(numbers_that_are_only_large_are_fine);
+    RUN(arrays_without_entries_may_be_missing);
+    RUN(systems_that_descend_are_named);
+    RUN(objects_that_are_null_hold_nothing);
+    RUN(only_one_bit_names_an_array);
+    RUN(numbers_of_other_functions_may_be_any);
+}

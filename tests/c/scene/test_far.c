@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * test_far.c: coordinates, boxes and cutoffs from the smallest to the largest numbers in one scene:
+ * every search gives the number of pairs that the half list has, or refuses. (Python's tests
+ * compare with rational arithmetic; the sanitizers watch here.)
+ */
+#include "../support/harness.h"
+#include "../support/pair_checks.h"
+#include "../support/random_scenes.h"
+
+void test_far(void);
+
+enum { N_FAR = 7 };
+
+typedef struct far_scene {
+    double    x[3 * N_FAR];
+    hs_points points;
+    hs_box    box;
+    double    cutoff;
+} far_scene;
+
+/* A number of any exponent from `lowest` on. */
+static double
+any_size(harness_random *random, int lowest)
+{
+    const int range = 1023 - lowest;
+    return ldexp(1.0 + random_unit(random), lowest + random_below(random, range));
+}
+
+static void
+make_far_scene(harness_random *random, int trial, far_scene *s)
+{
+    const int ndim = 1 + trial % 3, exponent = -1074 + random_below(random, 2000);
+    s->cutoff = ldexp(1.0, exponent);
+    s->box = (hs_box){.ndim = ndim};
+    for (int k = 0; k < ndim; k++) {
+        const int    lowest = exponent + 1 > -1074 ? exponent + 1 : -1074;
+        const double length = any_size(random, lowest);
+        const double places[] = {0.0, any_size(random, lowest), 0.5 * length, -0.5 * length};
+        s->box.periodic[k] = random_below(random, 2);
+        s->box.rows[k][k] = length;
+        for (int i = 0; i < N_FAR; i++) {
+            const double step = s->cutoff * 0.75 * random_below(random, 3);
+            s->x[i * ndim + k] = places[random_below(random, 4)] + step;
+        }
+    }
+    if (trial % 5 == 0 && ndim > 1 && s->box.periodic[0] && s->box.periodic[1]) {
+        s->box.rows[1][0] = 0.25 * s->box.rows[0][0]; /* skewed */
+    }
+    s->points = (hs_points){s->x, N_FAR, ndim, HS_FLOAT64, ndim * (ptrdiff_t)sizeof(double),
+                            sizeof(double)};
+}
+
+/* What scenes may be refused for. */
+static bool
+is_refusal(hs_status status)
+{
+    return status == HS_ERR_SHIFT_RANGE || status == HS_ERR_BOX_SKEWED ||
+           status == HS_ERR_MEMORY || status == HS_ERR_ROUNDING;
+}
+
+static void
+check_rows(const far_scene *s, hs_options options, int64_t half)
+{
+    int64_t   count = -1, counts[N_FAR], bins[2] = {-1, -1}, sum = 0;
+    hs_status status =
+        hs_between_count(&s->points, &s->points, &s->box, &options, &count, NULL);
+    CHECK(status == HS_OK ? count == 2 * half + N_FAR : is_refusal(status));
+    status = hs_neighbors_count(&s->points, NULL, &s->box, &options, counts, NULL);
+    for (int i = 0; i < N_FAR && status == HS_OK; i++)
+        sum += counts[i];
+    CHECK(status == HS_OK ? sum == 2 * half : is_refusal(status));
+    const double       edges[] = {0.0, s->cutoff};
+    const hs_histogram histogram = {.edges = edges, .n_edges = 2, .last_inclusive = true,
+                                    .n_types = 1, .counts = bins};
+    status = hs_pairs_histogram(&s->points, NULL, &s->box, &options, &histogram, NULL);
+    CHECK(status == HS_OK ? bins[0] + bins[1] == half : is_refusal(status));
+}
+
+static void
+check_kept(const far_scene *s, hs_options options, int64_t half)
+{
+    hs_cells *cells = NULL;
+    hs_pairs *rows = NULL;
+    int64_t   count = -1, cell[N_FAR];
+    hs_status status = hs_cells_build(&s->points, &s->box, &options, &cells, NULL);
+    if (status != HS_OK) {
+        CHECK(is_refusal(status));
+        return;
+    }
+    status = hs_cells_count(cells, NULL, &options, &count, NULL);
+    CHECK(status == HS_OK ? count == half : is_refusal(status));
+    status = hs_cells_count(cells, &s->points, &options, &count, NULL);
+    CHECK(status == HS_OK ? count == 2 * half + N_FAR : is_refusal(status));
+    status = hs_cells_find(cells, &s->points, cell, NULL);
+    CHECK(status == HS_OK || is_refusal(status));
+    status = hs_cells_candidates(cells, &s->points, &options, &rows, NULL);
+    CHECK(status == HS_OK || status == HS_ERR_FAR || is_refusal(status));
+    hs_pairs_free(rows);
+    status = hs_cells_nearest(cells, &s->points, 2, &options, &rows, NULL);
+    CHECK(status == HS_OK || is_refusal(status));
+    hs_pairs_free(rows);
+    hs_cells_free(cells);
+}
+
+static void
+check_list(const far_scene *s, hs_options options, int64_t half)
+{
+    hs_verlet *list = hs_verlet_new();
+    hs_pairs  *pairs = NULL;
+    bool       rebuilt;
+    hs_status  status =
+        hs_verlet_update(list, &s->points, &s->box, &options, 0.0, false, &rebuilt, NULL);
+    if (status == HS_OK)
+        status = hs_verlet_find(list, &options, &pairs, NULL);
+    CHECK(status == HS_OK ? hs_pairs_length(pairs) == half : is_refusal(status));
+    hs_pairs_free(pairs);
+    hs_verlet_free(list);
+}
+
+static void
+every_search_counts_the_same(void)
+{
+    harness_random random = {20261122};
+    int            answered = 0;
+    for (int trial = 0; trial < 600; trial += IS_SLOW ? 10 : 1) {
+        far_scene s;
+        int64_t   half = -1;
+        make_far_scene(&random, trial, &s);
+        hs_options options = hs_options_default();
+        options.cutoff = s.cutoff;
+        options.threads = 1;
+        options.precision = trial % 7 == 0 ? HS_DOUBLE : HS_EXACT;
+        options.want = trial % 2 ? HS_WANT_I | HS_WANT_J : WANT_ALL;
+        const hs_status status = hs_pairs_count(&s.points, &s.box, &options, &half, NULL);
+        if (status != HS_OK) {
+            CHECK(is_refusal(status));
+            continue;
+        }
+        answered++;
+        if (options.precision == HS_EXACT) {
+            check_rows(&s, options, half);
+            check_kept(&s, options, half);
+            check_list(&s, options, half);
+        }
+    }
+    CHECK(answered > (IS_SLOW ? 20 : 200));
+}
+
+void
+test_far(void)
+{
+    RUN(every_search_counts_the_same);
+}

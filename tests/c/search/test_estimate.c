@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_estimate.c: what cannot fit is refused before it is searched, with a number near the truth;
+ * what fits is never refused. */
+#include "../../../csrc/core/search/estimate.h"
+#include "../support/harness.h"
+#include "../support/pair_checks.h"
+#include "../support/random_scenes.h"
+
+void test_estimate(void);
+
+/* Points in a box, or in a clump that is a tenth of it along each axis. */
+static void
+scatter(harness_random *random, double size, int64_t n, double *x)
+{
+    for (int64_t e = 0; e < 3 * n; e++) {
+        x[e] = size * random_unit(random);
+    }
+}
+
+/* Every limit: a refusal expects about as many pairs as there are, and what is found is all. */
+static void
+expectations_are_near_the_truth(void)
+{
+    enum { N = 6000 };
+    static double  x[3 * N];
+    harness_random random = {20};
+    for (int kind = 0; kind < 4; kind++) {
+        hs_box          box = {.ndim = 3};
+        brute_scene     scene = {.ndim = 3, .n = N, .x = x, .inclusive = true, .cutoff = 2.0};
+        const hs_points points = points_of(&scene);
+        hs_options      options = options_of(&scene);
+        hs_status       status = HS_ERR_MEMORY;
+        int64_t         count;
+        for (int k = 0; k < 3; k++) {
+            box.periodic[k] = true;
+            box.rows[k][k] = 10.0;
+        }
+        scatter(&random, 10.0, N, x);
+        if (kind >= 2) {
+            scatter(&random, 1.0, N / 3, x);
+        }
+        scene.box = kind % 2 ? &box : NULL;
+        CHECK(hs_pairs_count(&points, scene.box, &options, &count, NULL) == HS_OK);
+        for (double limit = 1e5; status != HS_OK && limit < 1e9; limit *= 1.3) {
+            hs_pairs  *pairs = NULL;
+            hs_failure failure;
+            options.memory_limit = limit;
+            status = hs_pairs_find(&points, scene.box, &options, &pairs, &failure);
+            CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+            CHECK(status == HS_OK || limit < 16.0 * (double)count + 4e6);
+            if (status != HS_OK) {
+                CHECK(failure.limit_bytes == limit && failure.expected_pairs > 0.1 * (double)count);
+                CHECK(failure.expected_pairs < 2.0 * (double)count);
+                CHECK(failure.expected_bytes == 16.0 * failure.expected_pairs);
+            } else {
+                CHECK(hs_pairs_length(pairs) == count && limit > 16.0 * (double)count);
+            }
+            hs_pairs_free(pairs);
+        }
+        CHECK(status == HS_OK);
+    }
+}
+
+/* More work than a sample may cost: all points are candidates of each other. */
+static void
+samples_end_early_in_a_crowd(void)
+{
+    enum { N = 100000 };
+    static double    x[3 * N];
+    harness_random   random = {4};
+    const hs_points  points = {x, N, 3, HS_FLOAT64, 24, 8};
+    hs_options       options = hs_options_default();
+    hs_pairs        *pairs = NULL;
+    hs_failure       failure;
+    const double     all = 0.5 * N * (N - 1.0);
+    scatter(&random, 1.0, N, x);
+    options.cutoff = 2.0;
+    options.memory_limit = 1e8;
+    CHECK(hs_pairs_find(&points, NULL, &options, &pairs, &failure) == HS_ERR_MEMORY);
+    CHECK(pairs == NULL && failure.expected_pairs > 0.01 * all);
+    CHECK(failure.expected_pairs < 1.01 * all);
+}
+
+/* Pairs beyond int64 are refused before they are counted; no points have none, in any box. */
+static void
+endless_pairs_are_not_counted(void)
+{
+    double       x[9] = {0.0};
+    hs_box       box = {.ndim = 3, .periodic = {true, true, true}};
+    brute_scene  scene = {.ndim = 3, .n = 3, .x = x, .box = &box, .cutoff = 1.0};
+    hs_options   options = options_of(&scene);
+    hs_points    points = points_of(&scene);
+    hs_failure   failure;
+    hs_pairs    *pairs;
+    int64_t      count = -5;
+    for (int k = 0; k < 3; k++) {
+        box.rows[k][k] = 1e-7;
+    }
+    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_ERR_TOO_MANY);
+    CHECK(count == -5 && failure.value > 0x1p62);
+    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_MEMORY ||
+          hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_TOO_MANY);
+    points.n = 0;
+    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_OK && count == 0);
+}
+
+/* A shortage is that of the systems that can be searched at all. */
+static void
+shortages_leave_out_what_cannot_be_searched(void)
+{
+    const double    x[6] = {0.0, 0.0, 1.0, 0.0, 0.0, 1.0};
+    const hs_points points = {x, 3, 2, HS_FLOAT64, 16, 8}, none = {x, 0, 2, HS_FLOAT64, 16, 8};
+    hs_box          box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0, 0.0}, {0.0, 2.0}}};
+    hs_box          flat = box;
+    hs_shortage     shortage = {0.0, 0.0};
+    flat.rows[1][1] = 0.0;
+    hs_shortage_add(&none, &box, 1.0, &shortage);
+    hs_shortage_add(&points, &box, NAN, &shortage);
+    hs_shortage_add(&points, &box, -1.0, &shortage);
+    hs_shortage_add(&points, &flat, 1.0, &shortage);
+    CHECK(shortage.pairs == 0.0 && shortage.bytes == 0.0);
+    hs_shortage_add(&points, &box, 1.0, &shortage); /* half of 9 points in a disk, of 8 */
+    CHECK(fabs(shortage.pairs - 4.5 * 3.14159265358979 / 8.0) < 1e-9 && shortage.bytes > 0.0);
+    const double before = shortage.pairs;
+    hs_shortage_add(&points, NULL, 100.0, &shortage); /* all three */
+    CHECK(shortage.pairs == before + 3.0);
+}
+
+void
+test_estimate(void)
+{
+    RUN(expectations_are_near_the_truth);
+    RUN(samples_end_early_in_a_crowd);
+    RUN(endless_pairs_are_not_counted);
+    RUN(shortages_leave_out_what_cannot_be_searched);
+}

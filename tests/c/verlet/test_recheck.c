@@ -1,0 +1,278 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_recheck.c: listed pairs are decided, measured and written as a search does it: in every
+ * type, number of dimensions and range of numbers. */
+#include "../support/harness.h"
+#include "../support/list_checks.h"
+#include "../support/random_scenes.h"
+
+void test_recheck(void);
+
+enum { STEPS = 4, FLOATS = SCENE_POINTS * HS_MAX_DIM };
+
+static random_scene shared;
+
+/* The points of a scene, as float32 in `narrow` unless that is NULL. */
+static hs_points
+typed_points(const brute_scene *scene, float *narrow)
+{
+    hs_points points = points_of(scene);
+    for (int64_t e = 0; narrow != NULL && e < scene->n * scene->ndim; e++) {
+        narrow[e] = (float)scene->x[e];
+    }
+    if (narrow != NULL) {
+        points.data = narrow;
+        points.real = HS_FLOAT32;
+        points.row_stride = scene->ndim * (ptrdiff_t)sizeof(float);
+        points.column_stride = sizeof(float);
+    }
+    return points;
+}
+
+/* A step: all points move by up to half of `size` along each axis, some by whole box vectors. */
+static void
+move(harness_random *random, random_scene *scene, double size, bool jumps)
+{
+    const int d = scene->scene.ndim;
+    for (int64_t i = 0; i < scene->scene.n; i++) {
+        for (int k = 0; k < d; k++) {
+            scene->x[i * d + k] += size * (random_unit(random) - 0.5);
+        }
+        for (int l = 0; jumps && scene->scene.box != NULL && l < d; l++) {
+            const int times = scene->box.periodic[l] ? random_below(random, 7) - 3 : 0;
+            for (int k = 0; k < d; k++) {
+                scene->x[i * d + k] += times * scene->box.rows[l][k];
+            }
+        }
+    }
+}
+
+/* float32 and float64, in up to eight dimensions, of any size, with i and j of 4 and 8 bytes. */
+static void
+every_type_and_dimension_gives_the_pairs_of_a_search(void)
+{
+    static float     narrow[FLOATS];
+    static const int exponents[] = {0, 0, 0, 0, 40, -100, 400, -1000, 900};
+    harness_random   random = {1999};
+    int64_t          n_pairs = 0, n_kept = 0;
+    for (int trial = 0; trial < 250; trial++) {
+        const bool is_narrow = trial % 2;
+        const int  d = 1 + trial / 2 % HS_MAX_DIM, exponent = exponents[random_below(&random, 9)];
+        make_scene(&random, trial % SCENE_KINDS, d, 1 + random_below(&random, d > 4 ? 12 : 40), 4.0,
+                   is_narrow ? exponent / 20 : exponent, &shared);
+        hs_verlet   *list = hs_verlet_new();
+        hs_options   options = options_of(&shared.scene);
+        const double skin = 0.3 * options.cutoff;
+        options.index_bytes = trial % 3 ? 4 : 8;
+        options.threads = trial % 5 == 0 ? 9 : 1;
+        for (int step = 0; step < STEPS; step++) {
+            const hs_points points = typed_points(&shared.scene, is_narrow ? narrow : NULL);
+            bool            rebuilt;
+            CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, skin, false,
+                                   &rebuilt, NULL) == HS_OK);
+            CHECK(list_difference(list, &points, shared.scene.box, options, &n_pairs) == NULL);
+            n_kept += !rebuilt;
+            move(&random, &shared, 0.05 * options.cutoff, step == 1 || trial % 4 == 0);
+        }
+        hs_verlet_free(list);
+    }
+    CHECK(n_pairs > 50000 && n_kept > 250);
+}
+
+/* Coordinates at both ends of the numbers: no scale keeps the digits of all. */
+static void
+digits_that_scaling_would_lose_are_kept(void)
+{
+    harness_random random = {1010};
+    int64_t        n_pairs = 0;
+    for (int kind = 0; kind < 2 * SCENE_KINDS; kind++) {
+        make_scene(&random, kind % SCENE_KINDS, 3, 60, 4.0, 1010, &shared);
+        shared.scene.cutoff = kind < SCENE_KINDS ? 0x1p1010 : 0x1.8p-1060;
+        for (int e = 0; e < 30; e++) {
+            shared.x[e] = ldexp(random_below(&random, 4), -1061);
+        }
+        const hs_points  points = points_of(&shared.scene);
+        const hs_options options = options_of(&shared.scene);
+        hs_verlet       *list = hs_verlet_new();
+        bool             rebuilt;
+        CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.0, false, &rebuilt,
+                               NULL) == HS_OK);
+        CHECK(list_difference(list, &points, shared.scene.box, options, &n_pairs) == NULL);
+        hs_verlet_free(list);
+    }
+    CHECK(n_pairs > 1000);
+}
+
+/* A pair at the cutoff, and a point of it that jumps by so many heights of a box that an upright
+ * one is equivalent to. */
+static void
+jump_by(int64_t periods, double tilt, double height, const char *kernel, hs_status shift_status)
+{
+    double       x[6] = {0.25, 0.25, 0.25, 0.5, 0.75, 0.5};
+    hs_box       box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {tilt, height}}};
+    hs_points    points = {x, 3, 2, HS_FLOAT64, 16, 8};
+    hs_options   options = hs_options_default();
+    hs_verlet   *list = hs_verlet_new();
+    hs_pairs    *pairs = NULL;
+    hs_failure   failure;
+    bool         rebuilt;
+    int64_t      n_pairs = 0;
+    options.cutoff = 0.25;
+    options.kernel = kernel;
+    CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) == HS_OK);
+    CHECK(list_difference(list, &points, &box, options, &n_pairs) == NULL && n_pairs == 1);
+    x[3] += (double)periods * height;
+    CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) == HS_OK);
+    CHECK(!rebuilt);
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    for (int sorted = 0; sorted < 2; sorted++) {
+        options.sorted = sorted;
+        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_length(pairs) == 1);
+        CHECK(*(const int64_t *)hs_pairs_array(pairs, HS_WANT_I) == 0);
+        CHECK(*(const int64_t *)hs_pairs_array(pairs, HS_WANT_J) == 1);
+        CHECK(*(const double *)hs_pairs_array(pairs, HS_WANT_DISTANCE) == 0.25);
+        hs_pairs_free(pairs);
+    }
+    options.want = HS_WANT_SHIFT;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == shift_status);
+    CHECK((pairs == NULL) == (shift_status != HS_OK));
+    if (pairs != NULL) {
+        const int32_t *shift = hs_pairs_array(pairs, HS_WANT_SHIFT);
+        CHECK(shift[1] == -periods && shift[0] == (int64_t)tilt * periods);
+    } else {
+        CHECK(failure.row == 0);
+    }
+    hs_pairs_free(pairs);
+    hs_verlet_free(list);
+}
+
+/* Shifts need not fit into int32, nor into a double, as long as they are not asked for. */
+static void
+shifts_may_be_as_large_as_jumps_are(void)
+{
+    const char *names[16];
+    const int   n_names = hs_kernel_names(names, 16);
+    for (int k = 0; k < n_names; k++) {
+        jump_by(3, 4.0, 1.0, names[k], HS_OK);
+        jump_by(-3, 0x1p20, 1.0, names[k], HS_OK);
+        jump_by(INT64_C(1) << 33, 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
+        jump_by(-(INT64_C(1) << 33), 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
+        jump_by(INT64_C(1) << 34, 0x1p20, 128.0, names[k], HS_ERR_SHIFT_RANGE);
+        jump_by(-(INT64_C(1) << 34), 0x1p20, 128.0, names[k], HS_ERR_SHIFT_RANGE);
+    }
+}
+
+/* Box vectors along the axes but for so many times the one before: shifts over the upright box are
+ * found modulo 2^64. */
+static void
+box_vectors_may_be_any_sum_of_shorter_ones(void)
+{
+    enum { N = 400 };
+    static const int    tilts[] = {0, 24, 48, 54, 60}; /* the largest: so many bits */
+    static double       x[4 * N];
+    harness_random      random = {52};
+    int64_t             n_pairs = 0;
+    for (int trial = 0; trial < 15; trial++) {
+        const int  d = 2 + trial / 5;
+        hs_box     box = {.ndim = d};
+        hs_points  points = {x, N, d, HS_FLOAT64, 8 * d, 8};
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        hs_pairs  *found = NULL, *expected = NULL;
+        bool       rebuilt;
+        options.cutoff = 0.2 * d;
+        options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR;
+        options.sorted = true;
+        for (int e = 0; e < d * N; e++) {
+            x[e] = 4.0 * random_unit(&random) - 2.0; /* far from all faces */
+        }
+        for (int k = 0; k < d; k++) {
+            box.periodic[k] = true;
+            box.rows[k][k] = 16.0;
+        }
+        CHECK(hs_pairs_find(&points, &box, &options, &expected, NULL) == HS_OK);
+        for (int l = 1; l < d; l++) {
+            for (int k = 0; k < l; k++) {
+                box.rows[l][k] = ldexp(16.0, tilts[trial % 5] / (d - 1) * (l - k));
+            }
+        }
+        CHECK(hs_verlet_update(list, &points, &box, &options, 0.05, false, &rebuilt, NULL) ==
+              HS_OK);
+        CHECK(hs_verlet_find(list, &options, &found, NULL) == HS_OK);
+        CHECK(found != NULL && same_columns(found, expected, options.want, d, 8));
+        n_pairs += hs_pairs_length(expected);
+        hs_pairs_free(found);
+        hs_pairs_free(expected);
+        hs_verlet_free(list);
+    }
+    CHECK(n_pairs > 10000);
+}
+
+static double
+small_limit(void *context)
+{
+    return *(double *)context;
+}
+
+/* Arrays of the caller that are too small say how many pairs there are; refusals name the limit. */
+static void
+what_does_not_fit_is_told(void)
+{
+    harness_random random = {7};
+    make_scene(&random, SCENE_TRICLINIC, 3, 300, 4.0, 0, &shared);
+    shared.scene.cutoff = 1.5;
+    const hs_points points = points_of(&shared.scene);
+    hs_options      options = options_of(&shared.scene);
+    hs_verlet      *list = hs_verlet_new();
+    hs_pairs       *pairs = NULL;
+    hs_failure      failure;
+    bool            rebuilt;
+    caller_arrays   c;
+    int64_t         count;
+    hs_status       status = HS_ERR_MEMORY;
+    int             n_told = 0;
+    double          limit;
+    CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.2, false, &rebuilt,
+                           NULL) == HS_OK);
+    CHECK(hs_pairs_count(&points, shared.scene.box, &options, &count, NULL) == HS_OK);
+    CHECK(count > 5000);
+    make_arrays(options.want, 3, 8, 100, &c);
+    options.out = &c.arrays;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_CAPACITY && pairs == NULL);
+    CHECK(failure.expected_pairs == (double)count && untouched_from(&c, 100));
+    free_arrays(&c);
+    options.out = NULL;
+    for (limit = 10000.0; status != HS_OK && limit < 1e9; limit *= 1.25) {
+        options.memory_limit = limit;
+        status = hs_verlet_find(list, &options, &pairs, &failure);
+        CHECK((status == HS_OK) == (pairs != NULL));
+        CHECK(pairs == NULL || hs_pairs_length(pairs) == count);
+        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && failure.limit_bytes == limit));
+        n_told += status != HS_OK && failure.expected_pairs > 0.0;
+        hs_pairs_free(pairs);
+    }
+    CHECK(status == HS_OK && n_told > 0);
+    options.memory_limit = INFINITY;
+    options.find_limit = small_limit; /* not heard below HS_LIMIT_FREE */
+    options.find_context = &limit;
+    limit = 10000.0;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_OK);
+    CHECK(hs_pairs_length(pairs) == count);
+    hs_pairs_free(pairs);
+    options.kernel = "none of that name";
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_KERNEL && pairs == NULL);
+    options.kernel = NULL;
+    options.index_bytes = 5;
+    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_ARGUMENT && pairs == NULL);
+    hs_verlet_free(list);
+}
+
+void
+test_recheck(void)
+{
+    RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
+    RUN(digits_that_scaling_would_lose_are_kept);
+    RUN(shifts_may_be_as_large_as_jumps_are);
+    RUN(box_vectors_may_be_any_sum_of_shorter_ones);
+    RUN(what_does_not_fit_is_told);
+}
