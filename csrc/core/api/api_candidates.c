@@ -3,7 +3,7 @@
  * api_candidates.c: what cells say without a distance test: where points are, which points the
  * cells around a query hold. See halfshell.h.
  */
-#include "arguments.h"
+#include "call.h"
 #include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
-#include "arguments.h"
+#include "call.h"
 #include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_histogram.c: the public histogram of all pairs, which stores none of them. */
-#include "arguments.h"
+#include "call.h"
 #include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
-#include "call.h"
 #include "../histogram/tally.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_nearest.c: the public searches for the k nearest points: trees, then groups
  * (nearest_search.h). */
-#include "arguments.h"
+#include "call.h"
 #include "../base/fpenv.h"
 #include "../nearest/nearest_prepare.h"
 #include "../nearest/nearest_search.h"

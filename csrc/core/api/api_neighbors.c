@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_neighbors.c: the public searches for all neighbours of each point, or of each query. */
-#include "arguments.h"
+#include "call.h"
 #include "../search/estimate.h"
 #include "../rows/once.h"
-#include "call.h"
 #include "../rows/table.h"
-#include "../collect/columns_touch.h"
+#include "../collect/columns.h"
 
 /* Rows have an order of their own. */
 static hs_options

@@ -2,11 +2,10 @@
 /* api_pairs.c: the public searches: find and count. */
 #include "../../halfshell.h"
 
-#include "arguments.h"
+#include "call.h"
 #include "../search/estimate.h"
 #include "../collect/crew.h"
 #include "../collect/record.h"
-#include "call.h"
 #include "../collect/sort_pairs.h"
 
 #include <math.h>

@@ -2,7 +2,6 @@
 /* api_plan.c: what a search of a scene would do, read off the same structures that would do it. */
 #include "../../halfshell.h"
 
-#include "arguments.h"
 #include "call.h"
 
 static void

@@ -2,7 +2,7 @@
 /* api_stream.c: see api_stream.h. */
 #include "api_stream.h"
 
-#include "arguments.h"
+#include "call.h"
 #include "../base/fpenv.h"
 #include "../collect/result.h"
 #include "../collect/crew.h"

@@ -2,14 +2,13 @@
 /* api_verlet.c: the public functions of a list that is used for many steps; docs/verlet.md. */
 #include "../verlet/pair_list.h"
 
-#include "arguments.h"
+#include "call.h"
 #include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../memory/account.h"
 #include "../base/poll.h"
-#include "../exact/rounding.h"
-
 #include "../exact/doubleword.h"
+
 
 #include <math.h>
 #include <string.h>

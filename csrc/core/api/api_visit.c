@@ -2,12 +2,11 @@
 /* api_visit.c: see api_visit.h. */
 #include "api_visit.h"
 
-#include "arguments.h"
+#include "call.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
 #include "../collect/record.h"
-#include "call.h"
 
 #define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 

@@ -6,6 +6,8 @@
 #ifndef HS_CALL_H
 #define HS_CALL_H
 
+#include "../../halfshell.h"
+#include "../base/base.h"
 #include "../collect/result.h"
 
 /* All borrowed. */
@@ -30,5 +32,45 @@ typedef hs_status (*hs_fill_fn)(hs_pairs *pairs, hs_failure *failure);
 /* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
 hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
                           hs_failure *failure);
+
+/*
+ * What a program of C may get wrong about the arguments of halfshell.h and what would
+ * then be read or written out of bounds; Python's are checked before. Values are not looked at
+ * here: scene.h does that. Pointers may be NULL, but for the options of hs_check_* and the failure.
+ */
+
+/* The counters, if any, of a call that ends before its search begins. */
+void hs_clear_counters(const hs_options *options);
+
+/* Ends such a call: returns the status. *failure, unless NULL, has no details. */
+hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *failure);
+
+/* Whether a call that returns an object has these two, without which it cannot begin. *result,
+ * unless NULL, is NULL afterwards. */
+bool hs_can_return(hs_pairs **result, const hs_options *options);
+
+/* Whether an array is there that has one entry for each of these points, if there are any. */
+bool hs_has_entries(const void *array, const hs_points *points);
+
+/* Whether it is exactly one HS_WANT_ bit. */
+bool hs_is_quantity(unsigned which);
+
+/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_TOO_MANY for points and systems from 2^31 on. */
+hs_status hs_check_points(const hs_points *points, hs_failure *failure);
+
+/* first and n of systems that share out so many points; what it reads is first alone. */
+hs_status hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failure *failure);
+
+/* HS_OK or HS_ERR_ARGUMENT. The box may be NULL; ndim is that of the points. */
+hs_status hs_check_box(const hs_box *box, int ndim);
+
+/* Those of the options that every function heeds: threads and limits. */
+hs_status hs_check_limits(const hs_options *options);
+
+hs_status hs_check_options(const hs_options *options);
+
+/* All of these but systems; the failure says whether it is of the queries, if there are any. */
+hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
+                             const hs_options *options, hs_failure *failure);
 
 #endif

@@ -6,7 +6,7 @@
 #ifndef HS_SYSTEMS_THREAD_H
 #define HS_SYSTEMS_THREAD_H
 
-#include "../collect/backlog.h"
+#include "../collect/crew.h"
 #include "../search/search.h"
 
 typedef struct hs_systems_crew hs_systems_crew;

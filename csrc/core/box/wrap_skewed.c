@@ -8,7 +8,6 @@
  * -0, takes away again. A tile with a point that may need a second pass goes through hs_wrap_point.
  */
 #include "../exact/doubleword.h"
-#include "fold.h"
 #include "wrap.h"
 
 #include <math.h>

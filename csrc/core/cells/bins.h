@@ -6,6 +6,7 @@
 #ifndef HS_BINS_H
 #define HS_BINS_H
 
+#include "../threads/team.h"
 #include "grid.h"
 
 typedef struct hs_bins {
@@ -39,5 +40,22 @@ hs_status hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *
                           const hs_scene *scene, hs_bins *bins);
 
 void hs_bins_free(hs_account *account, hs_bins *bins);
+
+/*
+ * The columns of the points, from the caller's order to cell order. Each is gathered
+ * into the column that is free, and leaves its own place free for the next:
+ *
+ *     order | spare | x[0] | x[1] | ...   ->   order | x[0] | x[1] | ... | free
+ *
+ * so that this takes room for one column and no more.
+ */
+
+/*
+ * Columns of x, originals and turns, as bins->order says, in the order in which they lie behind the
+ * free column: the wide ones go before the narrow ones. x_is_beside: as in hs_scene. *end: where
+ * the last column ends that is still needed. HS_OK or HS_ERR_INTERRUPTED.
+ */
+hs_status hs_columns_gather(hs_team *team, const hs_options *options, bool x_is_beside,
+                            hs_bins *bins, void *free_column, char **end);
 
 #endif

@@ -8,7 +8,6 @@
 #include "grid.h"
 
 #include "../exact/doubleword.h"
-#include "../exact/rounding.h"
 
 /* Is every cell along axis k at least `least` wide, in the real numbers that its faces are? */
 static bool

@@ -20,6 +20,7 @@
 #include "sparse_grid.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* More than the 1e-5 cells by which stencil.c widens windows, so that these end at the reach. */
 #define LEAST_MARGIN 0x1p-16
@@ -80,3 +81,128 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
     return HS_OK;
 }
 
+/*
+ * Dense or sparse, and how wide the cells. Both grids are judged by how many
+ * other points the cell of an average point holds, which a sample tells: samples are compared with
+ * each other, so their number grows with the square root of n, and a cell that holds enough of the
+ * points to matter holds a few dozen of the samples, for any n.
+ */
+
+/* How much larger than wanted a dense cell must be before anything is counted. */
+#define WORTH_A_LOOK 4.0
+/* Other points in a point's dense cell, below which nothing better is looked for. */
+#define CROWDED 600.0
+/* Tests that take as long as gathering one neighbourhood, and as sorting one point sparsely rather
+ * than densely: a test takes about 0.3 ns, the others some 300 and 40. */
+#define TESTS_PER_GROUP 1000.0
+#define TESTS_PER_POINT 130.0
+/* In cells so much larger than the cutoff float32 does not tell neighbours from others, and pairs
+ * are decided one by one: some 12 ns each. */
+#define FILTER_FAILS 0x1p18
+#define TESTS_PER_DECISION 40.0
+#define WIDEST 256.0 /* ranges */
+#define MOST_SAMPLES 4096 /* 32 kB of stack */
+
+/* A bijection of 64 bits that spreads every bit over all others (the finaliser of MurmurHash3). */
+static uint64_t
+mix(uint64_t bits)
+{
+    bits = (bits ^ bits >> 33) * UINT64_C(0xff51afd7ed558ccd);
+    bits = (bits ^ bits >> 33) * UINT64_C(0xc4ceb9fe1a85ec53);
+    return bits ^ bits >> 33;
+}
+
+static int
+compare_names(const void *a, const void *b)
+{
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Other points in the cell of an average point, from how often samples share a cell. The short
+ * cells of a sparse grid count together, as cubes. */
+static double
+mean_company(const hs_scene *scene, const hs_grid *grid, bool sparse)
+{
+    uint64_t      names[MOST_SAMPLES];
+    const double  wanted = fmin(2.0 * sqrt((double)scene->n), MOST_SAMPLES);
+    const int64_t samples = (int64_t)fmin(wanted, (double)scene->n), stride = scene->n / samples;
+    double        shared = 0.0;
+    for (int64_t s = 0; s < samples; s++) {
+        /* One point of each stretch, not always at the same place in it: inputs have patterns. */
+        const int64_t i = s * stride + (int64_t)(mix((uint64_t)s) % (uint64_t)stride);
+        names[s] = 0;
+        for (int k = 0; k < scene->ndim; k++) {
+            const double t = hs_scene_coordinate(scene, i, k);
+            int64_t      index = sparse ? hs_sparse_index(grid, k, t) : hs_grid_index(grid, k, t);
+            index /= sparse && k == 0 ? HS_SPARSE_SPLIT : 1;
+            names[s] = mix(names[s] ^ (uint64_t)index);
+        }
+    }
+    qsort(names, (size_t)samples, sizeof *names, compare_names);
+    for (int64_t s = 1, run = 0; s < samples; s++) {
+        run = names[s] == names[s - 1] ? run + 1 : 0;
+        shared += 2.0 * (double)run;
+    }
+    return shared / ((double)samples * (double)(samples - 1)) * (double)scene->n;
+}
+
+/* Tests per point, all costs counted as tests, for cells that hold `company` others. */
+static double
+cost_of(double company, int ndim)
+{
+    /* Of the 3^d neighbours half are visited, and points in clumps have fewer full ones. */
+    return ldexp(company, ndim) + TESTS_PER_GROUP / (1.0 + company);
+}
+
+/* The cheapest width of cells; *cost: what it costs. */
+static double
+choose_width(const hs_scene *scene, const hs_grid *dense, double *cost)
+{
+    double best = 1.0;
+    *cost = INFINITY;
+    for (double width = 1.0; width <= WIDEST; width *= 2.0) {
+        hs_grid grid;
+        if (hs_sparse_grid(scene, dense, width, &grid) != HS_OK) {
+            return best;
+        }
+        const double company = mean_company(scene, &grid, true);
+        const double found = cost_of(company, scene->ndim);
+        if (found < *cost) {
+            *cost = found;
+            best = width;
+        } else if (company > 1.0) { /* wider only gets worse */
+            break;
+        }
+    }
+    return best;
+}
+
+double
+hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
+{
+    double larger = 1.0, cost;
+    if ((double)scene->n < CROWDED) {
+        return 0.0;
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        /* Along the first axis grid.c makes cells of up to four ranges, where points are few. */
+        const double wanted = (k == 0 ? 4.0 : 1.0) * dense->range[k];
+        if (dense->cell_size[k] > wanted) {
+            larger *= fmin(dense->cell_size[k] / wanted, 0x1p100);
+        }
+    }
+    if (!(larger > WORTH_A_LOOK)) {
+        return 0.0;
+    }
+    /* At least half of a point's company is tested, whatever its neighbours hold. */
+    double crowd = mean_company(scene, dense, false);
+    if (larger > FILTER_FAILS) {
+        crowd *= TESTS_PER_DECISION;
+    }
+    if (!(crowd > CROWDED)) {
+        return 0.0;
+    }
+    const double width = choose_width(scene, dense, &cost);
+    return 0.5 * crowd > cost + TESTS_PER_POINT ? width : 0.0;
+}

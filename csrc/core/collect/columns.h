@@ -6,10 +6,10 @@
 #ifndef HS_COLUMNS_H
 #define HS_COLUMNS_H
 
+#include "../../kernels/kernel.h"
 #include "../memory/account.h"
 #include "../memory/region.h"
-
-#include "../../kernels/kernel.h"
+#include "../threads/team.h"
 
 #define HS_COLUMNS 6 /* one for each HS_WANT_ bit, in their order */
 
@@ -67,5 +67,22 @@ void *hs_output_take(hs_output *output, unsigned bit);
 
 /* Harmless twice. A fixed output is let go of. */
 void hs_output_free(hs_output *output);
+
+/*
+ * Asks the system for memory before it is written to in no particular order. Each
+ * page of new memory is cleared by the system at the first write to it, a huge one in a millisecond
+ * or more. Where the first thousand writes go to a thousand pages, the caller could not be asked
+ * for seconds.
+ */
+
+/* Writes to every page of the columns' first n_pairs pairs, if they are so large that it matters:
+ * what they hold is lost. HS_ERR_INTERRUPTED when the caller says so. */
+hs_status hs_touch_output(hs_team *team, const hs_options *options, hs_output *output);
+
+#ifdef HS_TESTING
+/* Bytes that one thread touches at a time; columns of less than eight times as many are left alone.
+ * Returns what it was before. */
+size_t hs_test_touch_parts(size_t bytes);
+#endif
 
 #endif

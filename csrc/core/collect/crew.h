@@ -7,8 +7,10 @@
 #ifndef HS_CREW_H
 #define HS_CREW_H
 
-#include "columns.h"
 #include "../search/walk.h"
+#include "columns.h"
+#include "in_turn.h"
+#include "record.h"
 
 /* What each thread's walker shall do with its hits, in place of recording them. */
 typedef struct hs_visitors {
@@ -36,5 +38,25 @@ hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors,
 
 /* Counts them. */
 hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure);
+
+/*
+ * Pairs on their way to a result that they cannot be written to at once, because it is
+ * the caller's and has no room to spare, or because several threads fill it in a fixed order.
+ */
+
+typedef struct hs_backlog {
+    hs_output     pairs; /* owned; counted by nobody: it is small and does not stay */
+    hs_recorder   recorder;
+    hs_committer *committer; /* borrowed; takes the pairs when they are many */
+} hs_backlog;
+
+/* Columns as those of `target`; no recorder yet. */
+void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlog *backlog);
+
+/* Its pairs and recorder; harmless twice. */
+void hs_backlog_free(hs_account *account, hs_backlog *backlog);
+
+/* A hs_visit_fn. */
+hs_status hs_backlog_hits(void *backlog, hs_walker *walker, int32_t first, const hs_hits *hits);
 
 #endif

@@ -13,6 +13,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "../base/base.h"
 
@@ -139,6 +140,30 @@ hs_dw_sqrt(hs_dw x)
     const double root = sqrt(x.hi);
     const hs_dw  square = hs_two_square(root);
     return root + (((x.hi - square.hi) - square.lo) + x.lo) / (root + root);
+}
+
+/* The floats next to a float, for bounds that must not be rounded the wrong way. */
+
+/* The next double above x >= 0; infinity stays. Not below what x was rounded from. */
+HS_ALWAYS_INLINE double
+hs_next_up(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits += x <= 0x1.fffffffffffffp1023; /* not for infinity and NaN */
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* The next double below x > 0; 0 and infinity stay. Not above what x was rounded from. */
+HS_ALWAYS_INLINE double
+hs_next_down(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits -= x > 0.0 && x <= 0x1.fffffffffffffp1023;
+    memcpy(&x, &bits, sizeof x);
+    return x;
 }
 
 #endif

@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "bounds.h"
-#include "rounding.h"
+#include "doubleword.h"
 
 /* Sums and products of numbers >= 0, rounded up and down. */
 static double

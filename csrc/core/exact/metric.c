@@ -4,7 +4,7 @@
 
 #include "metric_float.h"
 #include "metric_integer.h"
-#include "rounding.h"
+#include "doubleword.h"
 
 /* Whether the float stages may use this number: squares of it neither overflow nor underflow. */
 static bool

@@ -8,7 +8,7 @@
 #define HS_TALLY_H
 
 #include "edges.h"
-#include "marks.h"
+#include "weights.h"
 #include "../search/walk.h"
 
 /* What all threads count by; only read. */

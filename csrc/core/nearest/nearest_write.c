@@ -2,7 +2,7 @@
 /* nearest_write.c: see nearest_write.h. */
 #include "nearest_write.h"
 
-#include "../collect/restore.h"
+#include "../collect/record_measures.h"
 
 #include <math.h>
 #include <string.h>

@@ -7,7 +7,7 @@
 #define HS_SCENE_H
 
 #include "../exact/metric.h"
-#include "../box/fold.h"
+#include "../box/wrap.h"
 #include "../memory/account.h"
 #include "points.h"
 

@@ -2,7 +2,7 @@
 /* search.c: see search.h. */
 #include "search.h"
 
-#include "../api/arguments.h"
+#include "../api/call.h"
 #include "estimate.h"
 
 #include <stddef.h>

@@ -8,7 +8,7 @@
 #include "motion.h"
 
 #include "../base/poll.h"
-#include "../exact/rounding.h"
+#include "../exact/doubleword.h"
 #include "../box/strain.h"
 #include "../box/wrap.h"
 

@@ -2,7 +2,10 @@
 /* recheck.c: see recheck.h. The list in slabs, rounds of them, and who works on them. */
 #include "recheck.h"
 
+#include <string.h>
+
 #include "../base/poll.h"
+#include "../exact/metric_float.h"
 
 /* Slabs of a round for each thread: enough that none waits long for the others, and their pairs
  * still lie in the second-level cache when they are written. */
@@ -165,4 +168,176 @@ hs_refilter_run(hs_refilter *refilter, hs_failure *failure)
     free_refilter(refilter);
     hs_free(account, slabs);
     return status;
+}
+
+/* The hits of a slab as pairs: i, j and S. See recheck.h. */
+
+/* S over all box vectors, zero on open ones; where only sorting needs it the images alone, which
+ * are in the same order and always fit. */
+static void
+put_shifts(const hs_refilter *refilter, hs_sifted *slab)
+{
+    const hs_listing *listing = &refilter->list->listing;
+    const bool        keys_only = !(refilter->search->options.want & HS_WANT_SHIFT);
+    const int         d = refilter->d, m = refilter->m;
+    int32_t          *to = hs_refilter_column(refilter, HS_WANT_SHIFT, slab->at);
+    const bool        plain = slab->first < listing->n_plain;
+    memset(to, 0, (size_t)slab->n_hits * (size_t)d * sizeof *to);
+    if (plain && (keys_only || refilter->counts == NULL)) {
+        return;
+    }
+    for (int32_t h = 0; h < slab->n_hits; h++) {
+        const int64_t  e = slab->first + slab->hits[h];
+        const int32_t *image =
+            plain ? NULL : listing->images.of + (int64_t)listing->code[e - listing->n_plain] * m;
+        int64_t shift[HS_MAX_DIM];
+        if (!keys_only) {
+            hs_refilter_shift(refilter, e, shift);
+        }
+        for (int r = 0; r < m; r++) {
+            const int64_t value = keys_only ? image[r] : shift[r];
+            if (value < INT32_MIN || value > INT32_MAX) {
+                slab->status = HS_ERR_SHIFT_RANGE;
+                slab->failed_point = listing->order[listing->i[e]];
+                return;
+            }
+            to[(int64_t)h * d + refilter->vector_of_row[r]] = (int32_t)value;
+        }
+    }
+}
+
+/* The caller's number of each hit's point, to every `step`-th index. */
+HS_ALWAYS_INLINE void
+put_numbers(const int32_t *places, const int32_t *order, const hs_sifted *slab, int index_bytes,
+            const int step, void *to)
+{
+    const uint16_t *hits = slab->hits;
+    if (to == NULL) {
+        return;
+    }
+    if (index_bytes == 8) {
+        int64_t *wide = to;
+        for (int32_t h = 0; h < slab->n_hits; h++) {
+            wide[(int64_t)h * step] = order[places[hits[h]]];
+        }
+    } else {
+        int32_t *narrow = to;
+        for (int32_t h = 0; h < slab->n_hits; h++) {
+            narrow[(int64_t)h * step] = order[places[hits[h]]];
+        }
+    }
+}
+
+void
+hs_refilter_put(const hs_refilter *refilter, hs_sifted *slab)
+{
+    const hs_listing *listing = &refilter->list->listing;
+    const int         bytes = refilter->output->index_bytes;
+    const int32_t    *order = listing->order;
+    const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
+    char             *both = hs_refilter_column(refilter, HS_WANT_BOTH, slab->at);
+    put_numbers(i, order, slab, bytes, 1, hs_refilter_column(refilter, HS_WANT_I, slab->at));
+    put_numbers(j, order, slab, bytes, 1, hs_refilter_column(refilter, HS_WANT_J, slab->at));
+    put_numbers(i, order, slab, bytes, 2, both);
+    put_numbers(j, order, slab, bytes, 2, both == NULL ? NULL : both + bytes);
+    if (refilter->output->columns & HS_WANT_SHIFT) {
+        put_shifts(refilter, slab);
+    }
+    if (refilter->measures && slab->n_hits > 0) {
+        hs_refilter_measure(refilter, slab);
+    }
+}
+
+/* The exact decision of the listed pairs that float32 cannot tell. */
+
+/* Pairs of a batch that are to be decided, as the kernels take them. */
+typedef struct open_batch {
+    double  p[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    double  q[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    double  times[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    int64_t shift[HS_BATCH][HS_MAX_DIM];
+    bool    is_shifted, is_wide;
+} open_batch;
+
+static void
+fill_open(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *unsure, int32_t n,
+          open_batch *open)
+{
+    const hs_listing *listing = &refilter->list->listing;
+    const hs_frame   *now = refilter->now;
+    open->is_shifted = open->is_wide = false;
+    for (int32_t b = 0; b < n; b++) {
+        const int64_t e = slab->first + slab->hits[unsure[b]];
+        hs_refilter_shift(refilter, e, open->shift[b]);
+        for (int k = 0; k < refilter->d; k++) {
+            const int64_t i = listing->order[listing->i[e]], j = listing->order[listing->j[e]];
+            open->p[k][b] = hs_frame_entry(now->rows, now->points.real, i * refilter->d + k);
+            open->q[k][b] = hs_frame_entry(now->rows, now->points.real, j * refilter->d + k);
+        }
+        for (int r = 0; r < refilter->m; r++) {
+            const int64_t shift = open->shift[b][r];
+            open->times[r][b] = (double)shift;
+            open->is_shifted = open->is_shifted || shift != 0;
+            open->is_wide = open->is_wide || shift > INT64_C(1) << 53 ||
+                            shift < -(INT64_C(1) << 53);
+        }
+    }
+}
+
+/* Whether each of n pairs is within the cutoff: by the kernel, and what that leaves one by one. */
+static void
+decide_open(const hs_refilter *refilter, const open_batch *open, int32_t n, hs_stages *stages,
+            uint8_t *within)
+{
+    const hs_metric *metric = &refilter->given;
+    uint8_t          verdict[HS_BATCH + HS_BATCH_PADDING] = {0};
+    hs_batch         batch = {.n = n};
+    for (int k = 0; k < refilter->d; k++) {
+        batch.p[k] = open->p[k];
+        batch.q[k] = open->q[k];
+    }
+    for (int r = 0; open->is_shifted && r < refilter->m; r++) {
+        batch.shift[r] = open->times[r];
+    }
+    if (!open->is_wide) {
+        refilter->search->kernel->judge(metric, &batch, verdict, stages);
+    }
+    for (int32_t b = 0; b < n; b++) {
+        double p[HS_MAX_DIM], q[HS_MAX_DIM];
+        if (verdict[b] != HS_UNDECIDED) {
+            within[b] = verdict[b] == HS_WITHIN;
+            continue;
+        }
+        for (int k = 0; k < refilter->d; k++) {
+            p[k] = open->p[k][b];
+            q[k] = open->q[k][b];
+        }
+        within[b] = open->is_wide ? hs_metric_within(metric, p, q, open->shift[b], stages)
+                                  : hs_metric_settle(metric, p, q, open->shift[b], stages);
+    }
+}
+
+void
+hs_refilter_settle(const hs_refilter *refilter, int32_t n_unsure, hs_sifted *slab)
+{
+    open_batch open;
+    int32_t    to = slab->unsure[0], from = to; /* hits before `from` have been moved to `to` */
+    memset(&open, 0, sizeof open);              /* kernels read a little beyond the last pair */
+    for (int32_t u = 0; u < n_unsure; u += HS_BATCH) {
+        const int32_t n = n_unsure - u < HS_BATCH ? n_unsure - u : HS_BATCH;
+        uint8_t       within[HS_BATCH];
+        fill_open(refilter, slab, slab->unsure + u, n, &open);
+        decide_open(refilter, &open, n, &slab->stages, within);
+        for (int32_t b = 0; b < n; b++) {
+            const int32_t at = slab->unsure[u + b];
+            memmove(slab->hits + to, slab->hits + from, (size_t)(at - from) * sizeof *slab->hits);
+            to += at - from;
+            slab->hits[to] = slab->hits[at];
+            to += within[b];
+            from = at + 1;
+        }
+    }
+    memmove(slab->hits + to, slab->hits + from,
+            (size_t)(slab->n_hits - from) * sizeof *slab->hits);
+    slab->n_hits -= from - to;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* recheck_find.c: the pairs of the last step from a list that is used for many. */
-#include "../api/arguments.h"
+#include "../api/call.h"
 #include "../base/fpenv.h"
 #include "../collect/result.h"
 #include "../base/poll.h"

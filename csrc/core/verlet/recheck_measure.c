@@ -6,7 +6,7 @@
  */
 #include "recheck.h"
 
-#include "../collect/restore.h"
+#include "../collect/record_measures.h"
 
 #include <math.h>
 #include <string.h>

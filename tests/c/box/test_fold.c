@@ -2,7 +2,6 @@
 /* test_fold.c: wrapping many points at once gives the bits of wrapping them one by one. */
 #include <math.h>
 
-#include "../../../csrc/core/box/fold.h"
 #include "../../../csrc/core/box/wrap.h"
 #include "../support/harness.h"
 #include "../support/random_scenes.h"

@@ -2,7 +2,7 @@
 /* test_columns_touch.c: every page of a large column is written to, by parts, and small ones are
  * left alone. */
 #include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/collect/columns_touch.h"
+#include "../../../csrc/core/collect/columns.h"
 #include "../support/harness.h"
 
 void test_columns_touch(void);
