@@ -18,9 +18,6 @@
 /* Of one column: half the address space. */
 #define MOST_BYTES (0.5 * (double)SIZE_MAX)
 
-static const hs_purpose purposes[HS_COLUMNS] = {HS_FOR_INDICES, HS_FOR_INDICES, HS_FOR_DISTANCES,
-                                                HS_FOR_VECTORS, HS_FOR_SHIFTS,  HS_FOR_INDICES};
-
 void
 hs_output_init(hs_account *account, int ndim, unsigned columns, int index_bytes, hs_output *output)
 {
@@ -34,32 +31,15 @@ hs_output_init(hs_account *account, int ndim, unsigned columns, int index_bytes,
 size_t
 hs_output_width(const hs_output *output, unsigned bit)
 {
-    const size_t index = (size_t)output->index_bytes, d = (size_t)output->ndim;
-    switch (bit) {
-    case HS_WANT_DISTANCE: return sizeof(double);
-    case HS_WANT_VECTOR: return d * sizeof(double);
-    case HS_WANT_SHIFT: return d * sizeof(int32_t);
-    case HS_WANT_BOTH: return 2 * index;
-    default: return index;
-    }
-}
-
-static int
-column_of(unsigned bit)
-{
-    int k = 0;
-    while (bit >> k != 1u) {
-        k++;
-    }
-    return k;
+    return hs_want_width(bit, output->ndim, output->index_bytes);
 }
 
 void
 hs_output_fix(hs_output *output, const hs_pair_arrays *arrays)
 {
-    void *const data[HS_COLUMNS] = {arrays->i,      arrays->j,     arrays->distance,
+    void *const data[HS_QUANTITIES] = {arrays->i,      arrays->j,     arrays->distance,
                                     arrays->vector, arrays->shift, arrays->both};
-    for (int k = 0; k < HS_COLUMNS; k++) {
+    for (int k = 0; k < HS_QUANTITIES; k++) {
         output->column[k] = (hs_region){.data = data[k]};
     }
     output->fixed = true;
@@ -70,7 +50,7 @@ hs_output_fix(hs_output *output, const hs_pair_arrays *arrays)
 void *
 hs_output_column(const hs_output *output, unsigned bit)
 {
-    return output->columns & bit ? output->column[column_of(bit)].data : NULL;
+    return output->columns & bit ? output->column[hs_want_number(bit)].data : NULL;
 }
 
 void *
@@ -86,7 +66,7 @@ hs_output_next(const hs_output *output, unsigned bit)
 static void
 undo_resize(hs_output *output)
 {
-    for (int k = 0; k < HS_COLUMNS; k++) {
+    for (int k = 0; k < HS_QUANTITIES; k++) {
         hs_region *column = &output->column[k];
         if (output->capacity == 0) {
             hs_region_release(column);
@@ -101,7 +81,7 @@ undo_resize(hs_output *output)
 static bool
 resize(hs_output *output, double pairs)
 {
-    for (int k = 0; k < HS_COLUMNS; k++) {
+    for (int k = 0; k < HS_QUANTITIES; k++) {
         hs_region *column = &output->column[k];
         if (!(output->columns >> k & 1u)) {
             continue;
@@ -128,11 +108,7 @@ resize(hs_output *output, double pairs)
 int64_t
 hs_output_bytes_per_pair(const hs_output *output)
 {
-    size_t bytes = 0;
-    for (int k = 0; k < HS_COLUMNS; k++) {
-        bytes += output->columns >> k & 1u ? hs_output_width(output, 1u << k) : 0;
-    }
-    return (int64_t)bytes;
+    return hs_want_bytes(output->columns, output->ndim, output->index_bytes);
 }
 
 /* The account knows of as many pairs as are about to be written, not of what is only reserved:
@@ -148,9 +124,9 @@ charge(hs_output *output, int64_t n)
     if (!hs_account_allows(account, (double)more * (double)hs_output_bytes_per_pair(output))) {
         return false;
     }
-    for (int k = 0; k < HS_COLUMNS; k++) {
+    for (int k = 0; k < HS_QUANTITIES; k++) {
         if (output->columns >> k & 1u) {
-            hs_account_take(account, purposes[k],
+            hs_account_take(account, hs_want_purpose(k),
                             more * (int64_t)hs_output_width(output, 1u << k));
         }
     }
@@ -207,7 +183,7 @@ hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t fir
     if (output->fixed && n > output->capacity - at) {
         n = output->capacity - at;
     }
-    for (int k = 0; n > 0 && k < HS_COLUMNS; k++) {
+    for (int k = 0; n > 0 && k < HS_QUANTITIES; k++) {
         if (output->columns >> k & 1u) {
             const size_t width = hs_output_width(output, 1u << k);
             memcpy(output->column[k].data + (size_t)at * width,
@@ -222,7 +198,7 @@ hs_output_take(hs_output *output, unsigned bit)
     if (!(output->columns & bit)) {
         return NULL;
     }
-    const int k = column_of(bit);
+    const int k = hs_want_number(bit);
     output->columns &= ~bit;
     hs_region *column = &output->column[k];
     column->used = (size_t)output->n_pairs * hs_output_width(output, bit);
@@ -235,7 +211,7 @@ hs_output_free(hs_output *output)
     if (output->account != NULL) {
         hs_account_give(output->account, output->charged * hs_output_bytes_per_pair(output));
     }
-    for (int k = 0; k < HS_COLUMNS && !output->fixed; k++) {
+    for (int k = 0; k < HS_QUANTITIES && !output->fixed; k++) {
         hs_region *column = &output->column[k];
         if (output->columns >> k & 1u) {
             column->used = (size_t)output->n_pairs * hs_output_width(output, 1u << k);
@@ -305,7 +281,7 @@ hs_status
 hs_touch_output(hs_team *team, const hs_options *options, hs_output *output)
 {
     hs_status status = HS_OK;
-    for (int k = 0; k < HS_COLUMNS && status == HS_OK; k++) {
+    for (int k = 0; k < HS_QUANTITIES && status == HS_OK; k++) {
         const unsigned bit = 1u << k;
         void          *column = hs_output_column(output, bit);
         const size_t   n_bytes = (size_t)output->n_pairs * hs_output_width(output, bit);

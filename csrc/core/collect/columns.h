@@ -7,11 +7,10 @@
 #define HS_COLUMNS_H
 
 #include "../../kernels/kernel.h"
+#include "../base/want.h"
 #include "../memory/account.h"
 #include "../memory/region.h"
 #include "../threads/team.h"
-
-#define HS_COLUMNS 6 /* one for each HS_WANT_ bit, in their order */
 
 typedef struct hs_output {
     hs_account *account;     /* borrowed; NULL: neither counted nor limited */
@@ -22,7 +21,7 @@ typedef struct hs_output {
     int64_t     n_pairs;     /* found; when fixed, also those that had no room */
     int64_t     capacity;    /* pairs that fit, HS_PADDING more beside them unless fixed */
     int64_t     charged;     /* pairs that the account has been charged for */
-    hs_region   column[HS_COLUMNS];
+    hs_region   column[HS_QUANTITIES]; /* in the order of the HS_WANT_ bits */
 } hs_output;
 
 /* An empty output. */

@@ -2,7 +2,7 @@
 /* estimate.c: see estimate.h. */
 #include "estimate.h"
 
-#include "../collect/columns.h"
+#include "../base/want.h"
 #include "walk.h"
 
 #include <math.h>
@@ -54,16 +54,13 @@ bound_pairs(const hs_search *search)
 static double
 bytes_per_pair_of(const hs_options *options, int ndim)
 {
-    int64_t   bytes = 0;
-    hs_output columns;
+    int64_t bytes = 0;
     if (options->out == NULL) {
-        hs_output_init(NULL, ndim, options->want, options->index_bytes, &columns);
-        bytes += hs_output_bytes_per_pair(&columns);
+        bytes += hs_want_bytes(options->want, ndim, options->index_bytes);
     }
     if (options->sorted) { /* it holds the pairs as found, and their order, while it writes */
-        hs_output_init(NULL, ndim, options->want & ~(unsigned)HS_WANT_BOTH, sizeof(int32_t),
-                       &columns);
-        bytes += hs_output_bytes_per_pair(&columns) + (int64_t)sizeof(int64_t);
+        bytes += hs_want_bytes(options->want & ~(unsigned)HS_WANT_BOTH, ndim, sizeof(int32_t)) +
+                 (int64_t)sizeof(int64_t);
     }
     return (double)bytes;
 }
