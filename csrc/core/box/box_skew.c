@@ -35,16 +35,3 @@ hs_skew_or_memory(const hs_lattice *lattice)
 {
     return hs_skew_is_left(lattice) ? HS_ERR_BOX_SKEWED : HS_ERR_MEMORY;
 }
-
-bool
-hs_skew_blurs(const hs_scene *scene, const double *drift)
-{
-    for (int k = 0; k < scene->ndim; k++) {
-        const double blur = drift[k] + 2.0 * scene->t_error[k];
-        if (scene->lattice.row_of_axis[k] >= 0 && blur > scene->radius &&
-            !(blur <= 0.5 * scene->lattice.period[k])) {
-            return true;
-        }
-    }
-    return false;
-}

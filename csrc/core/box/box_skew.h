@@ -3,7 +3,7 @@
 #ifndef HS_BOX_SKEW_H
 #define HS_BOX_SKEW_H
 
-#include "../scene/scene.h"
+#include "lattice.h"
 
 /* Whether reduction has failed: rows of B nearly depend on each other, or take more of the rows as
  * given than a shift may have. */
@@ -12,12 +12,5 @@ bool hs_skew_is_left(const hs_lattice *lattice);
 /* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or
  * HS_ERR_MEMORY, because the cutoff spans them. */
 hs_status hs_skew_or_memory(const hs_lattice *lattice);
-
-/*
- * Whether rounding moves points across half a period and more than the cutoff: a box vector is so
- * long that along the short ones every point would meet many images of every other. drift: how far
- * images can move t_k beyond whole periods, as grid.c measures it.
- */
-bool hs_skew_blurs(const hs_scene *scene, const double *drift);
 
 #endif

@@ -6,7 +6,7 @@
 #ifndef HS_STRAIN_H
 #define HS_STRAIN_H
 
-#include "../scene/snapshot.h"
+#include "../../halfshell.h"
 
 /*
  * F, any matrix near the one that takes the old box vectors h0 to the new ones h. That it is not

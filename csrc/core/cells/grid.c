@@ -280,6 +280,24 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     return status == HS_OK ? HS_OK : hs_skew_or_memory(&scene->lattice);
 }
 
+/*
+ * Whether rounding moves points across half a period and more than the cutoff: a box vector is so
+ * long that along the short ones every point would meet many images of every other. drift: how far
+ * images can move t_k beyond whole periods.
+ */
+static bool
+is_blurred(const hs_scene *scene, const double *drift)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        const double blur = drift[k] + 2.0 * scene->t_error[k];
+        if (scene->lattice.row_of_axis[k] >= 0 && blur > scene->radius &&
+            !(blur <= 0.5 * scene->lattice.period[k])) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* How far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more images
  * than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
 static hs_status
@@ -287,7 +305,7 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
 {
     double images[HS_MAX_DIM], drift[HS_MAX_DIM];
     bound_drift(scene, images, drift);
-    if (hs_skew_blurs(scene, drift)) {
+    if (is_blurred(scene, drift)) {
         return HS_ERR_BOX_SKEWED;
     }
     for (int k = 0; k < scene->ndim; k++) {
