@@ -2,6 +2,7 @@
 /* api_neighbors.c: the public searches for all neighbours of each point, or of each query. */
 #include "call.h"
 #include "../search/estimate.h"
+#include "../search/walk.h"
 #include "../rows/once.h"
 #include "../rows/table.h"
 #include "../collect/columns.h"

@@ -30,7 +30,8 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
     hs_status   status = hs_walker_init(search, hs_record_use(output->columns), hs_record_hits,
                                         &recorder, &walker);
     if (status == HS_OK) {
-        status = hs_recorder_init(&search->account, output, walker.block.most_hits, &recorder);
+        status = hs_recorder_init(&search->account, output, walker.scanner.block.most_hits,
+                                  &recorder);
     }
     if (status == HS_OK) {
         status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);

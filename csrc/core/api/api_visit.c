@@ -42,13 +42,13 @@ call_each(const hs_visit *visit, const hs_pair_arrays *pairs, int ndim, int64_t 
 
 /* A hs_visit_fn. */
 static hs_status
-visit_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     visitor        *doing = context;
     const hs_visit *visit = doing->visit;
     hs_output      *part = &doing->part;
     part->n_pairs = 0;
-    const hs_status status = hs_record_hits(&doing->recorder, walker, first, hits);
+    const hs_status status = hs_record_hits(&doing->recorder, scanner, first, hits);
     if (status != HS_OK) {
         return status;
     }
@@ -65,7 +65,7 @@ visit_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
                           : call_each(visit, &pairs, part->ndim, &n_taken);
     (void)hs_fpenv_enter(); /* whatever the function has done to it */
     doing->n_visited += n_taken;
-    walker->work_since_poll += CALL_WORK * part->n_pairs;
+    scanner->work_since_poll += CALL_WORK * part->n_pairs;
     return stops != 0 ? STOPPED : HS_OK;
 }
 

@@ -61,9 +61,9 @@ build_system(hs_systems_worker *worker, int64_t s)
 static void
 note_walk(hs_systems_worker *worker, const hs_walker *walker, hs_status status)
 {
-    worker->work += walker->n_candidates;
+    worker->work += walker->scanner.n_candidates;
     if (status == HS_ERR_SHIFT_RANGE) {
-        worker->failure.row = walker->failed_point;
+        worker->failure.row = walker->scanner.failed_point;
     }
 }
 
@@ -75,7 +75,7 @@ count_system(hs_systems_worker *worker, int64_t s)
     hs_status  status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
     if (status == HS_OK) {
         status = hs_walk(&walker, 0, (int32_t)search->bins.n);
-        worker->crew->counts[s] = walker.n_found;
+        worker->crew->counts[s] = walker.scanner.n_found;
         note_walk(worker, &walker, status);
         hs_walker_close(search, &walker);
     }
@@ -94,7 +94,7 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
     if (status != HS_OK) {
         return status;
     }
-    status = hs_recorder_init(&search->account, output, walker.block.most_hits, recorder);
+    status = hs_recorder_init(&search->account, output, walker.scanner.block.most_hits, recorder);
     if (status == HS_OK) {
         status = hs_walk(&walker, 0, (int32_t)search->bins.n);
     }

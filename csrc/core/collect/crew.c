@@ -40,13 +40,13 @@ struct hs_crew {
 static hs_status
 leave_range(hs_worker *worker)
 {
-    hs_crew         *crew = worker->crew;
-    const hs_walker *walker = &worker->walker;
-    const hs_status  status = hs_commit(&worker->committer, hs_walk_fraction(walker), false);
+    hs_crew          *crew = worker->crew;
+    const hs_scanner *scanner = &worker->walker.scanner;
+    const hs_status   status = hs_commit(&worker->committer, hs_scanner_fraction(scanner), false);
     if (status != HS_OK) {
         return status;
     }
-    crew->left = (hs_bookmark){.point = walker->group.first, .blocks = walker->blocks};
+    crew->left = (hs_bookmark){.point = scanner->group.first, .blocks = scanner->blocks};
     crew->is_left = true;
     return HS_STATUS_END;
 }
@@ -60,10 +60,10 @@ search_range(void *context, int64_t range)
     const int64_t  n = hs_search_asking(crew->search)->n;
     const int64_t  first = crew->start.point + range * RANGE_POINTS;
     const int64_t  end = first + (n - first < RANGE_POINTS ? n - first : RANGE_POINTS);
-    worker->walker.blocks_to_skip = range == 0 ? crew->start.blocks : 0;
+    worker->walker.scanner.blocks_to_skip = range == 0 ? crew->start.blocks : 0;
     hs_status status =
         hs_walk_or_tell(&worker->walker, (int32_t)first, (int32_t)end, &worker->failure);
-    if (status == HS_STATUS_END && worker->walker.leaves) {
+    if (status == HS_STATUS_END && worker->walker.scanner.leaves) {
         return leave_range(worker);
     }
     if (status == HS_OK && crew->output != NULL) {
@@ -78,7 +78,7 @@ work(void *context, int64_t task)
 {
     hs_crew   *crew = context;
     hs_worker *worker = &crew->workers[task];
-    hs_commits_join(crew->commits, &worker->walker.options, &worker->backlog.pairs,
+    hs_commits_join(crew->commits, &worker->walker.scanner.options, &worker->backlog.pairs,
                     &worker->committer);
     hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
 }
@@ -113,7 +113,8 @@ open_worker(hs_crew *crew, int w)
                                       hs_backlog_hits, &worker->backlog, &worker->walker);
     if (status == HS_OK) {
         status = hs_recorder_init(&search->account, &worker->backlog.pairs,
-                                  worker->walker.block.most_hits, &worker->backlog.recorder);
+                                  worker->walker.scanner.block.most_hits,
+                                  &worker->backlog.recorder);
     }
     return status;
 }
@@ -155,8 +156,8 @@ run_crew(hs_crew *crew, hs_failure *failure)
 static void
 close_worker(hs_crew *crew, hs_worker *worker)
 {
-    const hs_neighbourhood *most = &worker->walker.most;
-    crew->n_found += worker->walker.n_found;
+    const hs_neighbourhood *most = &worker->walker.scanner.most;
+    crew->n_found += worker->walker.scanner.n_found;
     crew->most.runs = most->runs > crew->most.runs ? most->runs : crew->most.runs;
     if (most->candidates > crew->most.candidates) {
         crew->most.candidates = most->candidates;
@@ -248,16 +249,16 @@ hs_backlog_free(hs_account *account, hs_backlog *backlog)
 }
 
 hs_status
-hs_backlog_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+hs_backlog_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_backlog      *backlog = context;
     const hs_output *pairs = &backlog->pairs;
-    const hs_status  status = hs_record_hits(&backlog->recorder, walker, first, hits);
+    const hs_status  status = hs_record_hits(&backlog->recorder, scanner, first, hits);
     if (status == HS_OK &&
         pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
         const hs_status committed =
-            hs_commit(backlog->committer, hs_walk_fraction(walker), false);
-        walker->leaves = backlog->committer->is_full;
+            hs_commit(backlog->committer, hs_scanner_fraction(scanner), false);
+        scanner->leaves = backlog->committer->is_full;
         return committed;
     }
     return status;

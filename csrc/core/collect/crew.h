@@ -57,6 +57,7 @@ void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlo
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
 /* A hs_visit_fn. */
-hs_status hs_backlog_hits(void *backlog, hs_walker *walker, int32_t first, const hs_hits *hits);
+hs_status hs_backlog_hits(void *backlog, hs_scanner *scanner, int32_t first,
+                          const hs_hits *hits);
 
 #endif

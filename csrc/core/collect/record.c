@@ -90,30 +90,30 @@ put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits 
 }
 
 static hs_status
-record_places(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_hits *hits)
+record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     const int32_t  n = hits->end[hits->n - 1];
-    const int32_t *id = walker->block.id;
+    const int32_t *id = scanner->block.id;
     hs_hits        by_id = *hits;
     for (int32_t h = 0; h < n; h++) {
         recorder->ids[h] = id[hits->label[h]];
     }
     by_id.label = recorder->ids;
-    put_indices(recorder, walker->search->kernel, &by_id);
-    return hs_put_measures(recorder, walker, first, hits);
+    put_indices(recorder, scanner->search->kernel, &by_id);
+    return hs_put_measures(recorder, scanner, first, hits);
 }
 
 hs_status
-hs_record_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+hs_record_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_recorder  *recorder = context;
     hs_output    *output = recorder->output;
     const int32_t n = hits->end[hits->n - 1];
-    hs_status     status = hs_output_reserve(output, n, hs_walk_fraction(walker));
-    if (status == HS_OK && walker->use == HS_BLOCK_LISTS_PLACES) {
-        status = record_places(recorder, walker, first, hits);
+    hs_status     status = hs_output_reserve(output, n, hs_scanner_fraction(scanner));
+    if (status == HS_OK && scanner->use == HS_BLOCK_LISTS_PLACES) {
+        status = record_places(recorder, scanner, first, hits);
     } else if (status == HS_OK) {
-        put_indices(recorder, walker->search->kernel, hits);
+        put_indices(recorder, scanner->search->kernel, hits);
     }
     output->n_pairs += status == HS_OK ? n : 0;
     return status;

@@ -28,6 +28,6 @@ hs_status hs_recorder_init(hs_account *account, hs_output *output, int32_t most_
 void      hs_recorder_free(hs_account *account, hs_recorder *recorder);
 
 /* A hs_visit_fn. */
-hs_status hs_record_hits(void *recorder, hs_walker *walker, int32_t first, const hs_hits *hits);
+hs_status hs_record_hits(void *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 #endif

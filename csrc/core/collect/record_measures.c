@@ -177,13 +177,13 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
 
 /* Writes the batch. */
 static hs_status
-put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
+put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 {
-    const hs_trace  *trace = &walker->trace;
-    const hs_search *search = walker->search;
+    const hs_trace  *trace = &scanner->trace;
+    const hs_search *search = scanner->search;
     const bool       measured = recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
     double           sign[HS_BATCH];
-    const hs_status  status = hs_trace_look_up(&walker->trace, measured, &walker->failed_point);
+    const hs_status  status = hs_trace_look_up(&scanner->trace, measured, &scanner->failed_point);
     if (status != HS_OK) {
         return status;
     }
@@ -206,7 +206,7 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
     if (recorder->columns & HS_WANT_SHIFT) {
         const int32_t fitting = put_shifts(recorder, trace, sign, part->first);
         if (fitting < trace->n) {
-            walker->failed_point = part->point[fitting];
+            scanner->failed_point = part->point[fitting];
             return HS_ERR_SHIFT_RANGE;
         }
     }
@@ -214,9 +214,9 @@ put_batch(hs_recorder *recorder, hs_walker *walker, const batch_part *part)
 }
 
 hs_status
-hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first, const hs_hits *hits)
+hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_trace *trace = &walker->trace;
+    hs_trace *trace = &scanner->trace;
     batch_part part = {.first = 0};
     hs_trace_clear(trace);
     for (int32_t t = 0, h = 0; t < hits->n; t++) {
@@ -228,7 +228,7 @@ hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first, const h
             }
             h += taken;
             if (trace->n == HS_BATCH) {
-                const hs_status status = put_batch(recorder, walker, &part);
+                const hs_status status = put_batch(recorder, scanner, &part);
                 if (status != HS_OK) {
                     return status;
                 }
@@ -237,7 +237,7 @@ hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first, const h
             }
         }
     }
-    return trace->n > 0 ? put_batch(recorder, walker, &part) : HS_OK;
+    return trace->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
 }
 
 /* See restore.h. Loops without branches, which compilers turn into vectors. */

@@ -8,8 +8,8 @@
 #include "record.h"
 
 /* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
- * the output; recorder->ids holds their numbers. HS_ERR_SHIFT_RANGE sets walker->failed_point. */
-hs_status hs_put_measures(hs_recorder *recorder, hs_walker *walker, int32_t first,
+ * the output; recorder->ids holds their numbers. HS_ERR_SHIFT_RANGE sets scanner->failed_point. */
+hs_status hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first,
                           const hs_hits *hits);
 
 /* The measures of a batch (kernels/batch.h) as the caller of the library gets them. */

@@ -109,14 +109,14 @@ table_for(hs_tally *tally, double extent)
 
 /* Types and weights of the candidates, once for each block. */
 static void
-load_block(hs_tally *tally, const hs_walker *walker)
+load_block(hs_tally *tally, const hs_scanner *scanner)
 {
-    const hs_block   *block = &walker->block;
+    const hs_block   *block = &scanner->block;
     const hs_weights *weights = &tally->plan->points.weights;
-    if (tally->block == walker->n_blocks || (tally->type == NULL && tally->value == NULL)) {
+    if (tally->block == scanner->n_blocks || (tally->type == NULL && tally->value == NULL)) {
         return;
     }
-    tally->block = walker->n_blocks;
+    tally->block = scanner->n_blocks;
     for (const hs_run *run = block->runs; run < block->runs + block->n_runs; run++) {
         const int32_t n = run[1].at - run->at;
         for (int32_t c = 0; tally->value != NULL && c < n; c++) {
@@ -245,9 +245,9 @@ settle_or_wait(hs_tally *tally, int32_t u)
 
 /* Traces pairs that wait for an edge, from u on; *next: the first that did not fit the batch. */
 static hs_status
-trace_waiting(hs_tally *tally, hs_walker *walker, int32_t u, int32_t *next)
+trace_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
 {
-    hs_trace *trace = &walker->trace;
+    hs_trace *trace = &scanner->trace;
     hs_trace_clear(trace);
     while (u >= 0 && trace->n < HS_BATCH) {
         const int32_t si = tally->open[u].si;
@@ -259,14 +259,14 @@ trace_waiting(hs_tally *tally, hs_walker *walker, int32_t u, int32_t *next)
         (void)hs_trace_add(trace, si, places, n); /* there is room for them */
     }
     *next = u;
-    return hs_trace_look_up(trace, true, &walker->failed_point);
+    return hs_trace_look_up(trace, true, &scanner->failed_point);
 }
 
 /* Decides all pairs that wait for one edge. */
 static hs_status
-decide_edge(hs_tally *tally, hs_walker *walker, int32_t edge)
+decide_edge(hs_tally *tally, hs_scanner *scanner, int32_t edge)
 {
-    const hs_metric *given = &walker->search->scene.metric;
+    const hs_metric *given = &scanner->search->scene.metric;
     const hs_edges  *edges = &tally->plan->edges;
     hs_metric        metric;
     uint8_t          within[HS_BATCH];
@@ -275,11 +275,11 @@ decide_edge(hs_tally *tally, hs_walker *walker, int32_t edge)
     hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
                    edges->at[edge], hs_edge_is_inclusive(edges, edge));
     while (u >= 0) {
-        const hs_status status = trace_waiting(tally, walker, u, &end);
+        const hs_status status = trace_waiting(tally, scanner, u, &end);
         if (status != HS_OK) {
             return status;
         }
-        hs_decide_traced(walker, &metric, within);
+        hs_decide_traced(scanner, &metric, within);
         for (int32_t e = 0; u != end; e++) {
             hs_tally_open *pair = &tally->open[u];
             const int32_t  next = pair->next;
@@ -297,15 +297,15 @@ decide_edge(hs_tally *tally, hs_walker *walker, int32_t edge)
 
 /* Decides all open pairs. */
 static hs_status
-decide_open(hs_tally *tally, hs_walker *walker)
+decide_open(hs_tally *tally, hs_scanner *scanner)
 {
     hs_status status = HS_OK;
-    walker->n_ambiguous += tally->n_open;
+    scanner->n_ambiguous += tally->n_open;
     for (int32_t u = 0; u < tally->n_open; u++) {
         settle_or_wait(tally, u);
     }
     while (status == HS_OK && tally->n_asked > 0) {
-        status = decide_edge(tally, walker, tally->asked[--tally->n_asked]);
+        status = decide_edge(tally, scanner, tally->asked[--tally->n_asked]);
     }
     tally->n_open = 0;
     return status;
@@ -313,7 +313,7 @@ decide_open(hs_tally *tally, hs_walker *walker)
 
 /* Looks again at hits with odd slots. */
 static hs_status
-look_again(hs_tally *tally, hs_walker *walker, const hs_edge_table *table, int32_t first,
+look_again(hs_tally *tally, hs_scanner *scanner, const hs_edge_table *table, int32_t first,
            const hs_hits *hits)
 {
     hs_status status = HS_OK;
@@ -324,34 +324,34 @@ look_again(hs_tally *tally, hs_walker *walker, const hs_edge_table *table, int32
             }
             hs_tally_open *pair = &tally->open[tally->n_open];
             *pair = (hs_tally_open){.si = first + t, .place = hits->label[h]};
-            hs_edge_range(table, &tally->plan->edges, walker->block.squares[h], &pair->low,
+            hs_edge_range(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
                           &pair->high);
             if (pair->low == pair->high) { /* of a cell with several bands, but in none of these */
                 settle_or_wait(tally, tally->n_open);
             } else if (++tally->n_open == HS_TALLY_OPEN) {
-                status = decide_open(tally, walker);
+                status = decide_open(tally, scanner);
             }
             if (status != HS_OK) {
                 return status;
             }
         }
     }
-    return decide_open(tally, walker);
+    return decide_open(tally, scanner);
 }
 
 hs_status
-hs_tally_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+hs_tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_tally            *tally = context;
-    const hs_edge_table *table = table_for(tally, walker->extent);
+    const hs_edge_table *table = table_for(tally, scanner->extent);
     const int32_t        n = hits->end[hits->n - 1];
     if (table == NULL) {
         return HS_ERR_MEMORY;
     }
-    load_block(tally, walker);
+    load_block(tally, scanner);
     const bool has_places = tally->plan->points.weights.place != NULL ||
                             tally->plan->asking->weights.place != NULL;
-    const bool is_open = hs_edge_slots(table, walker->block.squares, n, tally->slots);
+    const bool is_open = hs_edge_slots(table, scanner->block.squares, n, tally->slots);
     if (!tally->plan->has_types) {
         count_plain(tally, n);
     }
@@ -367,5 +367,5 @@ hs_tally_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hi
         }
         begin = end;
     }
-    return is_open ? look_again(tally, walker, table, first, hits) : HS_OK;
+    return is_open ? look_again(tally, scanner, table, first, hits) : HS_OK;
 }

@@ -61,7 +61,7 @@ hs_status hs_tally_init(const hs_tally_plan *plan, int32_t block_capacity, int32
 void      hs_tally_free(hs_tally *tally);
 
 /* A hs_visit_fn for HS_BLOCK_LISTS_SQUARES; context: hs_tally. */
-hs_status hs_tally_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits);
+hs_status hs_tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* How many pairs of a group reach exactly so many edges. */
 int64_t hs_tally_count(const hs_tally *tally, int64_t group, int64_t n_reached);

@@ -33,18 +33,18 @@ hs_once_applies(const hs_table *table)
 
 /* A hs_visit_fn. */
 static hs_status
-keep_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+keep_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     once           *doing = context;
     hs_output      *entries = doing->table->entries;
     const int32_t   n = hits->end[hits->n - 1];
     (void)first;
-    const hs_status status = hs_output_reserve(entries, n, hs_walk_fraction(walker));
+    const hs_status status = hs_output_reserve(entries, n, hs_scanner_fraction(scanner));
     if (status != HS_OK) {
         return status;
     }
     doing->kept.column[1].data = hs_output_column(entries, HS_WANT_I); /* it may have moved */
-    hs_keep_numbers(&doing->fill, walker, hits, doing->where);
+    hs_keep_numbers(&doing->fill, scanner, hits, doing->where);
     entries->n_pairs = doing->kept.n_pairs;
     return HS_OK;
 }

@@ -11,10 +11,10 @@
 
 /* A hs_visit_fn; each point belongs to one thread. */
 static hs_status
-count_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+count_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     int64_t *counts = context;
-    (void)walker;
+    (void)scanner;
     (void)first;
     for (int32_t t = 0, begin = 0; t < hits->n; t++) {
         counts[hits->point[t]] += hits->end[t] - begin;

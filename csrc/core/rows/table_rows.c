@@ -80,16 +80,16 @@ put_measures(const hs_filler *fill, int64_t at, int64_t hit, int32_t n)
 /* Where the group's first point itself is among the candidates, in the places they were gathered
  * to; the others follow it. */
 static int32_t
-own_place(const hs_walker *walker)
+own_place(const hs_scanner *scanner)
 {
-    const hs_block *block = &walker->block;
-    const int       m = walker->search->bins.n_periodic;
+    const hs_block *block = &scanner->block;
+    const int       m = scanner->search->bins.n_periodic;
     for (const hs_run *run = block->runs; run < block->runs + block->n_runs; run++) {
         bool is_home = true;
         for (int r = 0; r < m; r++) {
             is_home = is_home && run->image[r] == 0;
         }
-        const int32_t place = run->at + walker->group.first - run->si;
+        const int32_t place = run->at + scanner->group.first - run->si;
         if (is_home && place >= run->at && place < run[1].at) {
             return place;
         }
@@ -99,11 +99,11 @@ own_place(const hs_walker *walker)
 
 /* Measures of all hits of a visit, as the part. */
 static hs_status
-fill_part(hs_filler *fill, hs_walker *walker, int32_t first, const hs_hits *hits)
+fill_part(hs_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     fill->part.n_pairs = 0;
     const hs_status status = hs_output_reserve(&fill->part, hits->end[hits->n - 1], 0.0);
-    return status == HS_OK ? hs_put_measures(&fill->recorder, walker, first, hits) : status;
+    return status == HS_OK ? hs_put_measures(&fill->recorder, scanner, first, hits) : status;
 }
 
 /* How many of n numbers are below this one. Not by halving, though they ascend: its branches cost
@@ -120,10 +120,10 @@ count_below(const int32_t *numbers, int32_t n, int32_t number)
 
 /* Which of a point's hits is the point itself, or n. place: its own. */
 static int32_t
-find_self(const hs_filler *fill, const hs_walker *walker, const int32_t *hits, int32_t n,
+find_self(const hs_filler *fill, const hs_scanner *scanner, const int32_t *hits, int32_t n,
           int32_t point, int32_t place)
 {
-    int32_t self = walker->search->has_queries ? n : count_below(fill->numbers, n, point);
+    int32_t self = scanner->search->has_queries ? n : count_below(fill->numbers, n, point);
     while (self < n && hits[self] != place) { /* images of the point come before it */
         self++;
     }
@@ -132,14 +132,14 @@ find_self(const hs_filler *fill, const hs_walker *walker, const int32_t *hits, i
 
 /* The row of a point whose n hits, from number `hit` of the visit on, are places. */
 static void
-put_places(const hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t hit,
+put_places(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
            int32_t n, int32_t place, table_row *of)
 {
     const int32_t *places = hits->label + hit;
     for (int32_t h = 0; h < n; h++) {
-        fill->numbers[h] = walker->block.id[places[h]];
+        fill->numbers[h] = scanner->block.id[places[h]];
     }
-    const int32_t self = find_self(fill, walker, places, n, of->point, place);
+    const int32_t self = find_self(fill, scanner, places, n, of->point, place);
     of->numbers = fill->numbers;
     put_ends(fill->to, of);
     put_measures(fill, of->at, hit, self);
@@ -171,45 +171,45 @@ expect_rows(const hs_filler *fill, const hs_bins *asking, int64_t si)
 
 /* What is needed before the rows of a visit: measures, and the place of the group's first point. */
 static hs_status
-begin_visit(hs_filler *fill, hs_walker *walker, int32_t first, const hs_hits *hits, int32_t *own)
+begin_visit(hs_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits, int32_t *own)
 {
     *own = 0;
-    if (walker->use != HS_BLOCK_LISTS_PLACES) {
+    if (scanner->use != HS_BLOCK_LISTS_PLACES) {
         return HS_OK;
     }
-    *own = walker->search->has_queries ? 0 : own_place(walker);
-    *own += first - walker->group.first;
-    return fill_part(fill, walker, first, hits);
+    *own = scanner->search->has_queries ? 0 : own_place(scanner);
+    *own += first - scanner->group.first;
+    return fill_part(fill, scanner, first, hits);
 }
 
 /* The row of point t of a visit, whose n hits begin at number `hit`. */
 HS_ALWAYS_INLINE void
-put_row(const hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t hit, int32_t n,
-        int32_t place, table_row *of)
+put_row(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t hit,
+        int32_t n, int32_t place, table_row *of)
 {
-    const bool has_self = !walker->search->has_queries;
+    const bool has_self = !scanner->search->has_queries;
     of->n = n - (has_self && n > 0);
     of->itself = has_self ? of->point : NO_POINT;
     of->numbers = hits->label + hit;
-    if (walker->use == HS_BLOCK_LISTS_PLACES) {
-        put_places(fill, walker, hits, hit, n, place, of);
+    if (scanner->use == HS_BLOCK_LISTS_PLACES) {
+        put_places(fill, scanner, hits, hit, n, place, of);
     } else {
         put_ends(fill->to, of);
     }
 }
 
 hs_status
-hs_fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+hs_fill_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_filler      *fill = context;
-    const hs_bins  *asking = hs_search_asking(walker->search);
+    const hs_bins  *asking = hs_search_asking(scanner->search);
     int32_t         own;
-    const hs_status status = begin_visit(fill, walker, first, hits, &own);
+    const hs_status status = begin_visit(fill, scanner, first, hits, &own);
     for (int32_t t = 0, hit = 0; t < hits->n && status == HS_OK; t++) {
         const int32_t point = hits->point[t];
         table_row     of = {.at = fill->table->offsets[point], .point = point};
         expect_rows(fill, asking, (int64_t)first + t);
-        put_row(fill, walker, hits, hit, hits->end[t] - hit, own + t, &of);
+        put_row(fill, scanner, hits, hit, hits->end[t] - hit, own + t, &of);
         hit = hits->end[t];
     }
     return status;
@@ -217,13 +217,13 @@ hs_fill_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hit
 
 /* The rows of a visit, behind those that `fill->to` has already. */
 HS_ALWAYS_INLINE void
-keep_visit(hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int32_t own,
+keep_visit(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int32_t own,
            int64_t *where)
 {
     hs_output *kept = fill->to;
     for (int32_t t = 0, hit = 0; t < hits->n; t++) {
         table_row of = {.at = kept->n_pairs, .point = hits->point[t]};
-        put_row(fill, walker, hits, hit, hits->end[t] - hit, own + t, &of);
+        put_row(fill, scanner, hits, hit, hits->end[t] - hit, own + t, &of);
         fill->table->offsets[of.point] = of.n;
         if (where != NULL) {
             where[of.point] = of.at;
@@ -234,14 +234,14 @@ keep_visit(hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int32_
 }
 
 void
-hs_keep_numbers(hs_filler *fill, const hs_walker *walker, const hs_hits *hits, int64_t *where)
+hs_keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, int64_t *where)
 {
-    HS_ASSERT(walker->use == HS_BLOCK_LISTS_IDS);
-    keep_visit(fill, walker, hits, 0, where);
+    HS_ASSERT(scanner->use == HS_BLOCK_LISTS_IDS);
+    keep_visit(fill, scanner, hits, 0, where);
 }
 
 hs_status
-hs_keep_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+hs_keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_filler    *fill = context;
     hs_output    *kept = fill->to;
@@ -249,12 +249,12 @@ hs_keep_rows(void *context, hs_walker *walker, int32_t first, const hs_hits *hit
     int32_t       own;
     hs_status     status = hs_output_reserve(kept, n, 0.0);
     if (status == HS_OK) {
-        status = begin_visit(fill, walker, first, hits, &own);
+        status = begin_visit(fill, scanner, first, hits, &own);
     }
     if (status != HS_OK) {
         return status;
     }
-    keep_visit(fill, walker, hits, own, NULL);
+    keep_visit(fill, scanner, hits, own, NULL);
     const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > HS_MOST_KEPT;
     return is_much ? HS_STATUS_END : HS_OK;
 }

@@ -29,15 +29,15 @@ hs_status hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill);
 void      hs_filler_close(hs_filler *fill);
 
 /* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
-hs_status hs_fill_rows(void *filler, hs_walker *walker, int32_t first, const hs_hits *hits);
+hs_status hs_fill_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* The same: whole rows, one behind another, and their lengths as offsets. HS_STATUS_END when they
  * are more than HS_MOST_KEPT. */
-hs_status hs_keep_rows(void *filler, hs_walker *walker, int32_t first, const hs_hits *hits);
+hs_status hs_keep_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
  * them: to table->offsets the lengths, and to `where` the entry that each begins with. */
-void hs_keep_numbers(hs_filler *fill, const hs_walker *walker, const hs_hits *hits,
+void hs_keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits,
                      int64_t *where);
 
 /* The rows that were kept, to their places. */

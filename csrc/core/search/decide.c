@@ -45,16 +45,16 @@ remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
 
 /* One pair of the batch, by all stages or by the last alone. */
 static bool
-decide_pair(hs_walker *walker, const hs_metric *metric, int32_t e, bool others_failed)
+decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others_failed)
 {
     double         p[HS_MAX_DIM], q[HS_MAX_DIM];
     int64_t        of_pair[HS_MAX_DIM];
-    const int64_t *shift = hs_trace_pair(&walker->trace, e, p, q, of_pair);
-    if (walker->options.precision == HS_DOUBLE) {
+    const int64_t *shift = hs_trace_pair(&scanner->trace, e, p, q, of_pair);
+    if (scanner->options.precision == HS_DOUBLE) {
         return hs_metric_within_double(metric, p, q, shift);
     }
-    return others_failed ? hs_metric_settle(metric, p, q, shift, &walker->stages)
-                         : hs_metric_within(metric, p, q, shift, &walker->stages);
+    return others_failed ? hs_metric_settle(metric, p, q, shift, &scanner->stages)
+                         : hs_metric_within(metric, p, q, shift, &scanner->stages);
 }
 
 /*
@@ -88,61 +88,61 @@ judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, h
 }
 
 void
-hs_decide_traced(hs_walker *walker, const hs_metric *metric, uint8_t *within)
+hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
 {
-    const hs_trace *trace = &walker->trace;
-    const bool      by_batch = walker->options.precision != HS_DOUBLE && !trace->is_wide;
+    const hs_trace *trace = &scanner->trace;
+    const bool      by_batch = scanner->options.precision != HS_DOUBLE && !trace->is_wide;
     uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
     if (by_batch && !metric->floats_usable && !trace->is_shifted) {
-        judge_scaled(metric, trace, verdict, &walker->stages);
+        judge_scaled(metric, trace, verdict, &scanner->stages);
     } else if (by_batch) {
         const hs_batch batch = hs_trace_batch(trace);
-        walker->search->kernel->judge(metric, &batch, verdict, &walker->stages);
+        scanner->search->kernel->judge(metric, &batch, verdict, &scanner->stages);
     }
     for (int32_t e = 0; e < trace->n; e++) {
         within[e] = by_batch && verdict[e] != HS_UNDECIDED
                         ? verdict[e] == HS_WITHIN
-                        : decide_pair(walker, metric, e, by_batch);
+                        : decide_pair(scanner, metric, e, by_batch);
     }
 }
 
 /* Traces unsure hits from `u` on, as many as fit a batch; *next: the first that did not. */
 static hs_status
-trace_unsure(hs_walker *walker, const hs_scan *scan, int32_t u, int32_t *next)
+trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
 {
-    hs_trace *trace = &walker->trace;
+    hs_trace *trace = &scanner->trace;
     hs_trace_clear(trace);
     while (u < scan->n_unsure && trace->n < HS_BATCH) {
         int32_t       places[HS_BATCH], n = 0;
-        const int32_t t = scan->unsure[u].t, si = walker->group.first + t;
+        const int32_t t = scan->unsure[u].t, si = scanner->group.first + t;
         for (; u + n < scan->n_unsure && n < HS_BATCH && scan->unsure[u + n].t == t; n++) {
             const int32_t place = scan->unsure[u + n].place;
-            places[n] = walker->is_ordered ? walker->block.origin[place] : place;
+            places[n] = scanner->is_ordered ? scanner->block.origin[place] : place;
         }
         u += hs_trace_add(trace, si, places, n);
     }
     *next = u;
-    return hs_trace_look_up(trace, true, &walker->failed_point);
+    return hs_trace_look_up(trace, true, &scanner->failed_point);
 }
 
 hs_status
-hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next)
+hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
 {
     int32_t n_beyond = 0;
     uint8_t within[HS_BATCH];
     for (int32_t u = 0, end; u < scan->n_unsure; u = end) {
-        const hs_status status = trace_unsure(walker, scan, u, &end);
+        const hs_status status = trace_unsure(scanner, scan, u, &end);
         if (status != HS_OK) {
             return status;
         }
-        hs_decide_traced(walker, &walker->search->scene.metric, within);
+        hs_decide_traced(scanner, &scanner->search->scene.metric, within);
         for (int32_t e = 0; e < end - u; e++) {
             scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather at the front */
             n_beyond += !within[e];
         }
     }
-    walker->n_ambiguous += scan->n_unsure;
-    if (n_beyond > 0 && walker->use == HS_BLOCK_COUNTS) {
+    scanner->n_ambiguous += scan->n_unsure;
+    if (n_beyond > 0 && scanner->use == HS_BLOCK_COUNTS) {
         remove_counts(scan, n_beyond, first, next);
     } else if (n_beyond > 0) {
         remove_hits(scan, n_beyond, first, next);

@@ -3,14 +3,14 @@
 #ifndef HS_DECIDE_H
 #define HS_DECIDE_H
 
-#include "walk.h"
+#include "scanner.h"
 
 /* Decides scan->unsure, of the points [first, next) of the group, and takes those that are beyond
  * the cutoff from the hits; the order stays. */
-hs_status hs_decide(hs_walker *walker, hs_scan *scan, int32_t first, int32_t next);
+hs_status hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next);
 
-/* Whether each pair of walker->trace is within the metric's cutoff, which need not be the scene's.
+/* Whether each pair of scanner->trace is within the metric's cutoff, which need not be the scene's.
  * within: HS_BATCH of them. */
-void hs_decide_traced(hs_walker *walker, const hs_metric *metric, uint8_t *within);
+void hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within);
 
 #endif

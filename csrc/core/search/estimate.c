@@ -213,16 +213,16 @@ take_sample(hs_walker *walker, int64_t n, sample *taken)
     *taken = (sample){0.0, 0.0, 0};
     for (; taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
         const int64_t si = (2 * taken->taken + 1) * n / (2 * samples);
-        const int64_t before = walker->n_candidates;
-        walker->n_found = 0;
-        walker->candidate_limit = before + (int64_t)SAMPLE_WORK;
+        const int64_t before = walker->scanner.n_candidates;
+        walker->scanner.n_found = 0;
+        walker->scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
         const hs_status status = hs_walk_point(walker, (int32_t)si);
         if (status != HS_OK && status != HS_STATUS_END) {
             return status;
         }
-        taken->sum += (double)walker->n_found;
-        taken->squares += (double)walker->n_found * (double)walker->n_found;
-        work += (double)(walker->n_candidates - before) + row_work;
+        taken->sum += (double)walker->scanner.n_found;
+        taken->squares += (double)walker->scanner.n_found * (double)walker->scanner.n_found;
+        work += (double)(walker->scanner.n_candidates - before) + row_work;
     }
     return HS_OK;
 }
@@ -242,7 +242,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     if (status == HS_OK) {
         status = take_sample(&walker, n, &taken);
         if (status == HS_ERR_SHIFT_RANGE) {
-            failure->row = walker.failed_point;
+            failure->row = walker.scanner.failed_point;
             failure->in_queries = search->has_queries;
         }
         hs_walker_close(search, &walker);

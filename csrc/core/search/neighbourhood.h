@@ -25,8 +25,8 @@ typedef struct hs_block {
     float     *norm;   /* sum of y_k^2 */
     int32_t   *id;     /* point numbers of the candidates */
     int32_t   *place;  /* 0, 1, 2, ...; NULL unless asked for */
-    int32_t   *origin; /* where candidates were before they were put in order (neighbourhood_sort.h); NULL when
-                        * they are not */
+    int32_t   *origin; /* where candidates were before neighbourhood_sort.h put them in order; NULL
+                        * when it did not */
     int32_t   *hits;   /* most_hits + HS_PADDING; NULL when only counting */
     float     *squares; /* of the hits, the same; NULL unless asked for */
     hs_unsure *unsure; /* capacity */

@@ -7,6 +7,7 @@
 #include "../base/poll.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK (INT64_C(1) << 21)
@@ -27,75 +28,75 @@
 
 /* By one float32 comparison: nothing is decided again. */
 static void
-set_single(hs_walker *walker)
+set_single(hs_scanner *scanner)
 {
-    const double cutoff = walker->search->scene.cutoff;
+    const double cutoff = scanner->search->scene.cutoff;
     const float  square = (float)(cutoff * cutoff);
-    walker->direct.out = walker->options.inclusive ? square : nextafterf(square, -1.0f);
-    walker->direct.in = INFINITY;
+    scanner->direct.out = scanner->options.inclusive ? square : nextafterf(square, -1.0f);
+    scanner->direct.in = INFINITY;
 }
 
 /* Thresholds for the present extent. A scaled cutoff may be known between bounds only. */
 static void
-set_thresholds(hs_walker *walker)
+set_thresholds(hs_scanner *scanner)
 {
-    const hs_scene *scene = &walker->search->scene;
-    const double    extent = walker->extent, error = walker->search->filter_error;
-    walker->direct = hs_thresholds_of(scene->ndim, scene->cutoff, extent, error);
-    walker->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
+    const hs_scene *scene = &scanner->search->scene;
+    const double    extent = scanner->extent, error = scanner->search->filter_error;
+    scanner->direct = hs_thresholds_of(scene->ndim, scene->cutoff, extent, error);
+    scanner->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
     if (scene->extreme) {
         const double low = scene->cutoff_low;
-        walker->direct.in =
+        scanner->direct.in =
             low > 0.0 ? hs_thresholds_of(scene->ndim, low, extent, error).in : -1.0f;
-        walker->expanded.in =
+        scanner->expanded.in =
             low > 0.0 ? hs_expanded_of(scene->ndim, low, extent, error).in : -INFINITY;
     }
 }
 
 /* Thresholds and form of the scan, by the size of the present group and block. */
 static void
-set_form(hs_walker *walker)
+set_form(hs_scanner *scanner)
 {
-    const hs_kernel *kernel = walker->search->kernel;
-    const bool       counts = walker->use == HS_BLOCK_COUNTS;
-    const double     extent = hs_group_extent(&walker->group);
-    if (extent == walker->extent) {
+    const hs_kernel *kernel = scanner->search->kernel;
+    const bool       counts = scanner->use == HS_BLOCK_COUNTS;
+    const double     extent = hs_group_extent(&scanner->group);
+    if (extent == scanner->extent) {
         return;
     }
-    walker->extent = extent;
-    walker->scan = counts ? kernel->count_direct : kernel->list_direct;
-    if (walker->options.precision == HS_SINGLE) {
-        set_single(walker);
+    scanner->extent = extent;
+    scanner->scan = counts ? kernel->count_direct : kernel->list_direct;
+    if (scanner->options.precision == HS_SINGLE) {
+        set_single(scanner);
         return;
     }
-    set_thresholds(walker);
-    if (walker->use == HS_BLOCK_LISTS_SQUARES) {
-        walker->scan = kernel->squares;
-    } else if (hs_expanded_pays(walker->search->scene.cutoff, extent)) {
-        walker->scan = counts ? kernel->count : kernel->list;
+    set_thresholds(scanner);
+    if (scanner->use == HS_BLOCK_LISTS_SQUARES) {
+        scanner->scan = kernel->squares;
+    } else if (hs_expanded_pays(scanner->search->scene.cutoff, extent)) {
+        scanner->scan = counts ? kernel->count : kernel->list;
     }
 }
 
 /* The present block and group as a kernel sees them. */
 static void
-set_scan(const hs_walker *walker, hs_scan *scan)
+set_scan(const hs_scanner *scanner, hs_scan *scan)
 {
-    const hs_block *block = &walker->block;
-    const bool      lists_places = walker->use == HS_BLOCK_LISTS_PLACES;
-    scan->ndim = walker->search->scene.ndim;
+    const hs_block *block = &scanner->block;
+    const bool      lists_places = scanner->use == HS_BLOCK_LISTS_PLACES;
+    scan->ndim = scanner->search->scene.ndim;
     for (int k = 0; k < scan->ndim; k++) {
         scan->y[k] = block->y[k];
-        scan->q[k] = walker->group.q[k];
+        scan->q[k] = scanner->group.q[k];
     }
     scan->label = block->place == NULL ? block->id
-                  : walker->is_ordered ? block->origin
+                  : scanner->is_ordered ? block->origin
                                        : block->place;
     scan->n = block->n;
-    scan->n_points = walker->group.last - walker->group.first;
-    scan->triangular = walker->block_is_first;
+    scan->n_points = scanner->group.last - scanner->group.first;
+    scan->triangular = scanner->block_is_first;
     scan->norm = block->norm;
-    scan->direct = walker->direct;
-    scan->expanded = walker->expanded;
+    scan->direct = scanner->direct;
+    scan->expanded = scanner->expanded;
     scan->hits = block->hits;
     scan->squares = block->squares;
     scan->unsure = block->unsure;
@@ -108,157 +109,248 @@ set_scan(const hs_walker *walker, hs_scan *scan)
 }
 
 static void
-set_flushing(const hs_walker *walker, bool on)
+set_flushing(const hs_scanner *scanner, bool on)
 {
-    if (walker->flushes) {
+    if (scanner->flushes) {
         hs_fpenv_flush(on);
     }
 }
 
 static int32_t
-run_scan(const hs_walker *walker, hs_scan *scan, int32_t first)
+run_scan(const hs_scanner *scanner, hs_scan *scan, int32_t first)
 {
-    set_flushing(walker, true);
-    const int32_t next = walker->scan(scan, first);
-    set_flushing(walker, false);
+    set_flushing(scanner, true);
+    const int32_t next = scanner->scan(scan, first);
+    set_flushing(scanner, false);
     return next;
 }
 
 /* precision="single" is decided by the filter: it must not flush. */
 static void
-note_subnormals(hs_walker *walker)
+note_subnormals(hs_scanner *scanner)
 {
-    if (!walker->flushes && hs_fpenv_met_subnormal()) {
+    if (!scanner->flushes && hs_fpenv_met_subnormal()) {
         hs_fpenv_flush(false); /* forgets it */
-        walker->flushes = walker->options.precision != HS_SINGLE &&
-                          ++walker->n_subnormal > FEW_SUBNORMAL;
+        scanner->flushes = scanner->options.precision != HS_SINGLE &&
+                          ++scanner->n_subnormal > FEW_SUBNORMAL;
     }
 }
 
 /* Hands the hits of points [first, next) of the group to the visitor. */
 static hs_status
-visit_hits(hs_walker *walker, const hs_scan *scan, int32_t first, int32_t next)
+visit_hits(hs_scanner *scanner, const hs_scan *scan, int32_t first, int32_t next)
 {
-    const int32_t si = walker->group.first + first;
+    const int32_t si = scanner->group.first + first;
     const hs_hits hits = {.n = next - first,
-                          .point = hs_search_asking(walker->search)->order + si,
+                          .point = hs_search_asking(scanner->search)->order + si,
                           .end = scan->end + first,
                           .label = scan->hits};
-    return walker->visit(walker->visit_context, walker, si, &hits);
+    return scanner->visit(scanner->visit_context, scanner, si, &hits);
 }
 
 /* The block as it was appended, ready to be scanned. */
 static hs_status
-fill_block(hs_walker *walker)
+fill_block(hs_scanner *scanner)
 {
-    hs_block *block = &walker->block;
-    walker->n_blocks++;
-    set_flushing(walker, true);
-    hs_block_gather(&walker->search->bins, walker->search->kernel, walker->block_is_first, block,
-                    &walker->group);
-    set_flushing(walker, false);
-    hs_trace_reset(&walker->trace);
-    set_form(walker);
-    if (!walker->is_ordered) {
+    hs_block *block = &scanner->block;
+    scanner->n_blocks++;
+    set_flushing(scanner, true);
+    hs_block_gather(&scanner->search->bins, scanner->search->kernel, scanner->block_is_first, block,
+                    &scanner->group);
+    set_flushing(scanner, false);
+    hs_trace_reset(&scanner->trace);
+    set_form(scanner);
+    if (!scanner->is_ordered) {
         return HS_OK;
     }
-    const hs_status status = hs_order_block(&walker->search->scene.lattice, &walker->options,
-                                            walker->use, block, &walker->order);
+    const hs_status status = hs_order_block(&scanner->search->scene.lattice, &scanner->options,
+                                            scanner->use, block, &scanner->order);
     if (status == HS_ERR_SHIFT_RANGE) {
-        walker->failed_point = hs_search_asking(walker->search)->order[walker->group.first];
+        scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
     }
     return status;
 }
 
 static hs_status
-poll_sometimes(hs_walker *walker)
+poll_sometimes(hs_scanner *scanner)
 {
-    if (walker->work_since_poll > POLL_WORK) {
-        walker->work_since_poll = 0;
-        return hs_poll(&walker->options, hs_walk_fraction(walker));
+    if (scanner->work_since_poll > POLL_WORK) {
+        scanner->work_since_poll = 0;
+        return hs_poll(&scanner->options, hs_scanner_fraction(scanner));
     }
     return HS_OK;
 }
 
 static void
-empty_block(hs_walker *walker)
+empty_block(hs_scanner *scanner)
 {
-    walker->block.n = 0;
-    walker->block.n_runs = 0;
-    walker->block_is_first = false;
-    walker->blocks++;
+    scanner->block.n = 0;
+    scanner->block.n_runs = 0;
+    scanner->block_is_first = false;
+    scanner->blocks++;
 }
 
 /* Of the block alone. */
 static hs_status
-note_size(hs_walker *walker)
+note_size(hs_scanner *scanner)
 {
-    walker->of_group.candidates += walker->block.n;
-    walker->of_group.runs += walker->block.n_runs;
-    walker->work_since_poll += WORK_OF_RUN * (int64_t)walker->block.n_runs;
-    empty_block(walker);
-    return poll_sometimes(walker);
+    scanner->of_group.candidates += scanner->block.n;
+    scanner->of_group.runs += scanner->block.n_runs;
+    scanner->work_since_poll += WORK_OF_RUN * (int64_t)scanner->block.n_runs;
+    empty_block(scanner);
+    return poll_sometimes(scanner);
 }
 
 /* Whether to go on. */
 static hs_status
-end_block(hs_walker *walker)
+end_block(hs_scanner *scanner)
 {
-    if (walker->n_candidates > walker->candidate_limit || walker->leaves) {
+    if (scanner->n_candidates > scanner->candidate_limit || scanner->leaves) {
         return HS_STATUS_END;
     }
-    return poll_sometimes(walker);
+    return poll_sometimes(scanner);
 }
 
 /* What was tested. */
 static hs_status
-finish_block(hs_walker *walker, int64_t n_points)
+finish_block(hs_scanner *scanner, int64_t n_points)
 {
-    const hs_block *block = &walker->block;
-    const int64_t   skipped = walker->block_is_first ? n_points * (n_points + 1) / 2 : 0;
-    walker->n_candidates += n_points * block->n - skipped;
-    walker->work_since_poll += n_points * block->n;
-    empty_block(walker);
-    note_subnormals(walker);
-    return end_block(walker);
+    const hs_block *block = &scanner->block;
+    const int64_t   skipped = scanner->block_is_first ? n_points * (n_points + 1) / 2 : 0;
+    scanner->n_candidates += n_points * block->n - skipped;
+    scanner->work_since_poll += n_points * block->n;
+    empty_block(scanner);
+    note_subnormals(scanner);
+    return end_block(scanner);
 }
 
 /* Nobody has been appended but the one point of the group itself, if that. */
 static bool
-is_lone(const hs_walker *walker)
+is_lone(const hs_scanner *scanner)
 {
-    return walker->block.n == (walker->block_is_first ? 1 : 0);
+    return scanner->block.n == (scanner->block_is_first ? 1 : 0);
 }
 
 hs_status
-hs_scan_block(hs_walker *walker)
+hs_scan_block(hs_scanner *scanner)
 {
     int32_t   end[HS_GROUP_POINTS];
     hs_scan   scan;
-    if (walker->blocks < walker->blocks_to_skip) {
-        empty_block(walker);
+    if (scanner->blocks < scanner->blocks_to_skip) {
+        empty_block(scanner);
         return HS_OK;
     }
-    if (walker->use == HS_BLOCK_SIZES) {
-        return note_size(walker);
+    if (scanner->use == HS_BLOCK_SIZES) {
+        return note_size(scanner);
     }
-    if (is_lone(walker)) {
-        empty_block(walker);
-        walker->work_since_poll += LONE_GROUP;
-        return end_block(walker);
+    if (is_lone(scanner)) {
+        empty_block(scanner);
+        scanner->work_since_poll += LONE_GROUP;
+        return end_block(scanner);
     }
-    hs_status status = fill_block(walker);
-    set_scan(walker, &scan);
+    hs_status status = fill_block(scanner);
+    set_scan(scanner, &scan);
     scan.end = end;
     for (int32_t first = 0, next; status == HS_OK && first < scan.n_points; first = next) {
-        next = run_scan(walker, &scan, first);
-        if (scan.n_unsure > 0 && walker->options.precision != HS_SINGLE) {
-            status = hs_decide(walker, &scan, first, next);
+        next = run_scan(scanner, &scan, first);
+        if (scan.n_unsure > 0 && scanner->options.precision != HS_SINGLE) {
+            status = hs_decide(scanner, &scan, first, next);
         }
-        walker->n_found += scan.n_hits;
-        if (status == HS_OK && walker->visit != NULL && scan.n_hits > 0) {
-            status = visit_hits(walker, &scan, first, next);
+        scanner->n_found += scan.n_hits;
+        if (status == HS_OK && scanner->visit != NULL && scan.n_hits > 0) {
+            status = visit_hits(scanner, &scan, first, next);
         }
     }
-    return status == HS_OK ? finish_block(walker, scan.n_points) : status;
+    return status == HS_OK ? finish_block(scanner, scan.n_points) : status;
+}
+
+void
+hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last)
+{
+    const hs_search *search = scanner->search;
+    scanner->n_groups += scanner->use != HS_BLOCK_SIZES;
+    scanner->blocks = 0;
+    scanner->block.n = 0;
+    scanner->block.n_runs = 0;
+    scanner->block_is_first = !search->is_full;
+    scanner->of_group = (hs_neighbourhood){0, 0};
+    hs_group_start(hs_search_asking(search), first, last, &scanner->group);
+    if ((search->is_full || scanner->blocks_to_skip > 0) && scanner->use != HS_BLOCK_SIZES) {
+        hs_group_load(hs_search_asking(search), &scanner->group);
+    }
+}
+
+hs_status
+hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *shift,
+                  const int32_t *image)
+{
+    while (si < end) {
+        if (hs_block_is_full(&scanner->block)) {
+            const hs_status status = hs_scan_block(scanner);
+            if (status != HS_OK) {
+                return status;
+            }
+        }
+        si += hs_block_append(&scanner->block, si, end, scanner->search->scene.ndim, shift, image,
+                              &scanner->group);
+    }
+    return HS_OK;
+}
+
+static void
+keep_largest(int64_t found, int64_t *largest)
+{
+    *largest = found > *largest ? found : *largest;
+}
+
+hs_status
+hs_scanner_finish(hs_scanner *scanner)
+{
+    const hs_status status = hs_scan_block(scanner);
+    scanner->blocks_to_skip = 0;
+    keep_largest(scanner->of_group.candidates, &scanner->most.candidates);
+    keep_largest(scanner->of_group.runs, &scanner->most.runs);
+    return status;
+}
+
+hs_status
+hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
+                bool is_ordered, hs_scanner *scanner)
+{
+    hs_account *account = &search->account;
+    memset(scanner, 0, sizeof *scanner);
+    scanner->search = search;
+    scanner->options = search->options;
+    scanner->use = use;
+    scanner->is_ordered = is_ordered;
+    scanner->extent = -1.0;
+    scanner->candidate_limit = INT64_MAX;
+    hs_status status = hs_block_init(account, search->scene.ndim, use, capacity, most_runs,
+                                     &scanner->block);
+    if (status == HS_OK) {
+        status = hs_trace_init(search, &scanner->block, use == HS_BLOCK_LISTS_PLACES,
+                               &scanner->trace);
+        scanner->trace.polls = &scanner->options;
+    }
+    if (status == HS_OK && is_ordered) {
+        status = hs_order_init(account, &scanner->block, &scanner->order);
+    }
+    return status;
+}
+
+void
+hs_scanner_close(hs_search *search, hs_scanner *scanner)
+{
+    const hs_counters walked = {.groups = scanner->n_groups,
+                                .candidates = scanner->n_candidates,
+                                .ambiguous = scanner->n_ambiguous,
+                                .by_float64 = scanner->stages.by_float64,
+                                .by_double_word = scanner->stages.by_double_word,
+                                .by_integers = scanner->stages.by_integers};
+    hs_search_note(search, &walked);
+    scanner->n_groups = scanner->n_candidates = scanner->n_ambiguous = 0;
+    scanner->stages = (hs_stages){0};
+    hs_order_free(&search->account, &scanner->block, &scanner->order);
+    hs_block_free(&search->account, &scanner->block);
+    hs_trace_free(&search->account, &scanner->trace);
 }

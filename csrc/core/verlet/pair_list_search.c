@@ -122,19 +122,19 @@ is_negative(const int32_t *shift, int m)
 static bool
 look_at_block(worker *me)
 {
-    const hs_walker *walker = &me->walker;
-    const hs_block  *block = &walker->block;
-    const int        m = walker->search->bins.n_periodic;
-    if (me->block == walker->n_candidates) {
+    const hs_scanner *scanner = &me->walker.scanner;
+    const hs_block   *block = &scanner->block;
+    const int         m = scanner->search->bins.n_periodic;
+    if (me->block == scanner->n_candidates) {
         return true;
     }
-    me->block = walker->n_candidates;
+    me->block = scanner->n_candidates;
     me->has_images = false;
     for (int32_t r = 0; m > 0 && block->runs[r].at < block->n; r++) {
         me->is_shifted[r] = has_shift(&block->runs[r], m);
         me->has_images = me->has_images || me->is_shifted[r];
         if (me->is_shifted[r] &&
-            !shift_of_run(walker->search, &block->runs[r], me->shift + (int64_t)r * m)) {
+            !shift_of_run(scanner->search, &block->runs[r], me->shift + (int64_t)r * m)) {
             return false;
         }
     }
@@ -145,8 +145,8 @@ look_at_block(worker *me)
 static bool
 note_row(worker *me, int32_t si, int32_t first, int32_t end, const hs_hits *hits)
 {
-    const int     m = me->walker.search->bins.n_periodic;
-    const hs_run *runs = me->walker.block.runs;
+    const int     m = me->walker.scanner.search->bins.n_periodic;
+    const hs_run *runs = me->walker.scanner.block.runs;
     int32_t       r = 0;
     for (int32_t h = first; h < end; h++) {
         while (runs[r + 1].at <= hits->label[h]) {
@@ -168,7 +168,7 @@ static hs_status
 note_shifts(worker *me, int32_t first, const hs_hits *hits)
 {
     if (!look_at_block(me)) {
-        me->walker.failed_point = first;
+        me->walker.scanner.failed_point = first;
         return HS_ERR_SHIFT_RANGE;
     }
     for (int32_t row = 0; me->has_images && row < hits->n; row++) {
@@ -182,7 +182,7 @@ note_shifts(worker *me, int32_t first, const hs_hits *hits)
 
 /* A hs_visit_fn. */
 static hs_status
-take_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
+take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     worker       *me = context;
     hs_output    *pairs = &me->piece->pairs;
@@ -193,10 +193,10 @@ take_hits(void *context, hs_walker *walker, int32_t first, const hs_hits *hits)
         return status;
     }
     for (int32_t h = 0; h < n; h++) {
-        me->ids[h] = walker->block.id[hits->label[h]];
+        me->ids[h] = scanner->block.id[hits->label[h]];
     }
     by_id.label = me->ids;
-    walker->search->kernel->emit_int32(&by_id, hs_output_next(pairs, HS_WANT_I),
+    scanner->search->kernel->emit_int32(&by_id, hs_output_next(pairs, HS_WANT_I),
                                        hs_output_next(pairs, HS_WANT_J));
     status = note_shifts(me, first, hits);
     pairs->n_pairs += n;
@@ -222,7 +222,7 @@ work(void *context, int64_t task)
 {
     crew   *all = context;
     worker *me = &all->workers[task];
-    hs_commits_join(all->commits, &me->walker.options, NULL, &me->committer);
+    hs_commits_join(all->commits, &me->walker.scanner.options, NULL, &me->committer);
     hs_commits_work(&me->committer, search_piece, me, &me->failure);
 }
 
@@ -236,7 +236,7 @@ open_worker(crew *all, worker *me)
         hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
     if (status == HS_OK) {
         hs_account     *account = &search->account;
-        const hs_block *block = &me->walker.block;
+        const hs_block *block = &me->walker.scanner.block;
         const int64_t   n_runs = block->most_runs + 1;
         me->ids = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING,
                            sizeof *me->ids);

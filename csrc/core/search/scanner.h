@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * scanner.h: what tests one group of points after the other against its neighbourhood: the block of
+ * gathered candidates, the group, the batch of pairs to decide, thresholds, and counts of what was
+ * done. The walk (walk.h) feeds it, scan.h and decide.h work on it, a visitor gets its hits.
+ */
+#ifndef HS_SCANNER_H
+#define HS_SCANNER_H
+
+#include "neighbourhood.h"
+#include "neighbourhood_sort.h"
+#include "pair_batch.h"
+
+typedef struct hs_scanner hs_scanner;
+
+/*
+ * The decided hits of points [first, first + hits->n) in cell order against the present block, as
+ * entries of scanner->block: point numbers, or places when scanner->use says so; with
+ * HS_BLOCK_COUNTS only where they would end. With HS_BLOCK_LISTS_SQUARES they are not decided, and
+ * scanner->block.squares are theirs. Anything but HS_OK ends the walk with that status.
+ */
+typedef hs_status (*hs_visit_fn)(void *context, hs_scanner *scanner, int32_t first,
+                                 const hs_hits *hits);
+
+/* How large the neighbourhood of a group is. */
+typedef struct hs_neighbourhood {
+    int64_t candidates, runs;
+} hs_neighbourhood;
+
+/* One at a time belongs to a thread. */
+struct hs_scanner {
+    const hs_search *search;  /* borrowed, read only */
+    hs_options       options; /* the search's, with a poll only for the caller's own thread */
+    hs_block         block;
+    hs_block_use     use;
+    bool             is_ordered; /* candidates are put in order before they are tested */
+    hs_order         order;
+    hs_group         group;
+    hs_trace         trace;
+    hs_visit_fn      visit;   /* NULL when counting */
+    void            *visit_context;
+    hs_scan_fn       scan;     /* these for groups of this extent: */
+    hs_thresholds    direct;
+    hs_expanded      expanded;
+    double           extent;
+    int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
+    bool             flushes;  /* too many: gathering and scanning, nothing else, go on without */
+    bool             block_is_first; /* of its group: candidate t is group point t; half lists */
+    hs_neighbourhood of_group, most; /* of the present group, of any so far */
+    int64_t          n_found;
+    bool             leaves;         /* set by a visitor: HS_STATUS_END once the block is done */
+    int32_t          blocks;         /* of the present group, scanned or skipped so far */
+    int32_t          blocks_to_skip; /* of the next group; they were scanned before */
+    int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
+    int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
+    hs_stages        stages;
+    int64_t          n_groups, n_blocks, n_candidates, n_ambiguous;
+    int64_t          work_since_poll;
+};
+
+/* How much of all points lies behind, those before the search's own included: for progress and
+ * guesses. */
+HS_ALWAYS_INLINE double
+hs_scanner_fraction(const hs_scanner *scanner)
+{
+    const hs_search *search = scanner->search;
+    return ((double)search->first_point + scanner->group.first) / (double)search->n_in_all;
+}
+
+#endif
