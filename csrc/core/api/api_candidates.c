@@ -8,6 +8,7 @@
 #include "../base/fpenv.h"
 #include "../base/poll.h"
 #include "../search/cell_rows.h"
+#include "../search/search_reuse.h"
 
 #include <string.h>
 

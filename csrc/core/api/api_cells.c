@@ -6,6 +6,7 @@
 #include "../base/poll.h"
 #include "api_stream.h"
 #include "api_visit.h"
+#include "../search/search_build.h"
 
 #include <string.h>
 

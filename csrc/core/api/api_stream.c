@@ -7,6 +7,7 @@
 #include "../collect/result.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
+#include "../search/search_open.h"
 
 #include <math.h>
 #include <string.h>

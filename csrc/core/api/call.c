@@ -8,6 +8,7 @@
 #include "../base/fpenv.h"
 #include "../base/poll.h"
 #include "../search/estimate.h"
+#include "../search/search_open.h"
 
 /* What the caller is told when memory is short. Where no pairs are kept their number is not why. */
 static void

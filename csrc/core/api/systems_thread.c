@@ -5,6 +5,7 @@
 #include "../search/estimate.h"
 #include "../base/poll.h"
 #include "../collect/sort_pairs.h"
+#include "../search/search_build.h"
 
 #include <string.h>
 

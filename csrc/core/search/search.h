@@ -40,15 +40,6 @@ typedef struct hs_search {
     hs_team         *team;         /* owned; NULL: the caller's thread alone */
 } hs_search;
 
-/*
- * Everything up to the first group: hs_search_begin, the team, hs_search_build; or what can be
- * reused of sets->built. On failure nothing is held but the account, which the caller closes in any
- * case. The options are copied; what they point to is borrowed until hs_search_close; the points
- * are not needed any more.
- */
-hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                         hs_search *search, hs_failure *failure);
-
 /* Whom to ask whether to go on, in place of the options' poll; NULL: nobody. The search must not
  * move any more. */
 void hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search);
@@ -56,14 +47,8 @@ void hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search);
 /* An account and options, no scene yet. */
 void hs_search_begin(const hs_options *options, hs_search *search);
 
-/*
- * The scene of these points, in place of one that hs_search_close has freed; options.cutoff may
- * have changed. For points that are part of more: their numbers begin at first_point, of
- * n_points_in_all.
- */
-hs_status hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search,
-                          hs_failure *failure);
-void      hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
+/* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
+void hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
 
 /* The points that ask, in cell order. */
 HS_ALWAYS_INLINE const hs_bins *
@@ -72,20 +57,11 @@ hs_search_asking(const hs_search *search)
     return search->has_queries ? &search->query_bins : &search->bins;
 }
 
-/*
- * A search among the points of another one, which was made to be kept, stays as it is and must
- * outlive this one; search_reuse.c. The queries of the sets ask, or the points. HS_STATUS_END when
- * it cannot serve them: the cutoff is larger than its own, or its bounds do not hold for the
- * queries. Else as hs_search_open.
- */
-hs_status hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *search,
-                          hs_failure *failure);
+/* Who asks, as the sets say. */
+void hs_search_set_asking(const hs_sets *sets, hs_search *search);
 
-/* Steps that builds share: who asks; the queries into cells, their scene giving up its arrays; what
- * follows from scene and grid. */
-void      hs_search_set_asking(const hs_sets *sets, hs_search *search);
-hs_status hs_search_bin_queries(hs_search *search, hs_scene *asking);
-void      hs_search_settle(hs_search *search);
+/* What follows from scene and grid. */
+void hs_search_settle(hs_search *search);
 
 /* How many threads these options mean for so many points. */
 int hs_search_threads(int64_t n_points, const hs_options *options);

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * search_reuse.c: another search among points that are in cells already. Cells, points and their
- * scale are those of the first search; cutoff, reach, stencil, queries, account and threads are its
- * own. See search.h.
- */
-#include "search.h"
+/* search_reuse.c: see search_reuse.h. */
+#include "search_reuse.h"
 
 #include "estimate.h"
+#include "search_build.h"
 
 /* Scaled cutoffs as small as this keep all their digits. */
 #define SMALLEST_CUTOFF 0x1p-500

@@ -9,6 +9,7 @@
 #include "../search/estimate.h"
 #include "../box/lattice.h"
 #include "pair_list_search.h"
+#include "../search/search_open.h"
 
 #include <math.h>
 

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* search_build.c: see search_build.h. */
+#include "search_build.h"
+
+#include "estimate.h"
+
+/* The dense grid, with cells as wide as the caller wants them or as is best. Where points crowd in
+ * few of its cells one that stores occupied cells only, unless the caller has what he wants. */
+static hs_status
+choose_grid(hs_search *search, hs_failure *failure)
+{
+    const double wanted = search->options.cell_size;
+    hs_status    status = HS_STATUS_END;
+    bool         may_be_sparse = true;
+    if (wanted > 0.0) {
+        status = hs_grid_init_wide(&search->scene, hs_scale_apply(search->scene.scale, wanted),
+                                   &search->grid, &may_be_sparse, failure);
+    }
+    if (status == HS_STATUS_END) {
+        status = hs_grid_init(&search->scene, &search->grid, failure);
+    }
+    if (status == HS_OK && may_be_sparse) {
+        const double width = hs_sparse_choose(&search->scene, &search->grid);
+        const hs_grid dense = search->grid;
+        search->is_sparse =
+            width > 0.0 &&
+            hs_sparse_grid(&search->scene, &dense, width, &search->grid) == HS_OK;
+        if (!search->is_sparse) {
+            search->grid = dense;
+        }
+    }
+    return status;
+}
+
+/* Points into the cells of the grid. */
+static hs_status
+build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
+{
+    hs_account *account = &search->account;
+    return search->is_sparse
+               ? hs_sparse_build(account, search->team, &search->options, scene, grid, sparse, bins)
+               : hs_bins_build(account, search->team, &search->options, scene, grid, bins);
+}
+
+hs_status
+hs_search_bin_queries(hs_search *search, hs_scene *asking)
+{
+    hs_grid grid = search->grid; /* of which occupied cells are counted anew */
+    return build_bins(search, asking, &grid, &search->query_sparse, &search->query_bins);
+}
+
+/* Grid, stencil and bins. */
+static hs_status
+build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
+{
+    hs_scene *scene = &search->scene;
+    hs_status status = choose_grid(search, failure);
+    if (status == HS_OK) {
+        status = hs_estimate_by_density(search, failure);
+    }
+    if (status == HS_OK) {
+        status = hs_stencil_build(&search->account, &search->options, scene, &search->grid,
+                                  search->is_full, &search->stencil);
+        if (status == HS_ERR_MEMORY) {
+            failure->search_bytes = hs_stencil_bytes(&search->grid, search->is_full);
+        }
+    }
+    if (status == HS_OK) {
+        status = build_bins(search, scene, &search->grid, &search->sparse, &search->bins);
+    }
+    if (status == HS_OK && asking != NULL) {
+        status = hs_search_bin_queries(search, asking);
+    }
+    return status;
+}
+
+hs_status
+hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
+{
+    const hs_options *options = &search->options;
+    hs_scene          queries, *asking = sets->queries != NULL ? &queries : NULL;
+    search->kernel = hs_kernel_select(options->kernel);
+    if (search->kernel == NULL) {
+        return HS_ERR_KERNEL;
+    }
+    hs_search_set_asking(sets, search);
+    hs_status status = hs_scene_init_sets(&search->account, search->team, sets, box, options,
+                                          &search->scene, asking, failure);
+    if (status == HS_OK) {
+        status = build_cells(search, asking, failure);
+        if (asking != NULL) {
+            hs_scene_free(&search->account, asking);
+        }
+    }
+    if (status == HS_OK) {
+        hs_search_settle(search);
+    }
+    return status;
+}
