@@ -5,7 +5,7 @@
 
 #include "../base/base.h"
 #include "../box/lattice.h"
-#include "record.h"
+#include "recorder.h"
 
 /* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
  * the output; recorder->ids holds their numbers. HS_ERR_SHIFT_RANGE sets scanner->failed_point. */

@@ -29,6 +29,12 @@ typedef struct hs_metric {
     double sure_in, sure_out;            /* float64 thresholds on |D|^2 when there is no shift */
 } hs_metric;
 
+/* One vector D = q - p + shift * rows; all borrowed. shift: n_rows integers, or NULL for zeros. */
+typedef struct hs_span {
+    const double  *p, *q;
+    const int64_t *shift;
+} hs_span;
+
 /* Which stage decided; added to, never reset. */
 typedef struct hs_stages {
     int64_t by_float64;

@@ -8,12 +8,6 @@
 
 #include "metric.h"
 
-/* One vector D = q - p + shift * rows; all borrowed. shift: n_rows integers, or NULL for zeros. */
-typedef struct hs_span {
-    const double  *p, *q;
-    const int64_t *shift;
-} hs_span;
-
 /* -1, 0 or 1. Callers must have set round to nearest without flushing. */
 int hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span *other,
                       hs_stages *stages);

@@ -9,7 +9,6 @@
 
 #include "doubleword.h"
 #include "metric.h"
-#include "metric_compare.h"
 
 /* Sign of |D|^2 - cutoff^2: -1, 0 or 1. shift may be NULL. */
 int hs_integer_compare(const hs_metric *metric, const double *p, const double *q,

@@ -4,6 +4,7 @@
 
 #include "table_rows.h"
 #include "../base/poll.h"
+#include "../search/walk.h"
 #include "put_column.h"
 
 #include <string.h>

@@ -2,7 +2,6 @@
 /* table.c: see table.h. */
 #include "table.h"
 
-#include "table_rows.h"
 #include "../collect/crew.h"
 
 #include <string.h>

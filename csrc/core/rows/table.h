@@ -7,18 +7,7 @@
 #ifndef HS_TABLE_H
 #define HS_TABLE_H
 
-#include "../collect/columns.h"
-#include "../search/search.h"
-#include "../search/walk.h"
-
-/* A table that is being made, of a full search. */
-typedef struct hs_table {
-    hs_search       *search;  /* borrowed */
-    int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
-    hs_output       *entries; /* borrowed; columns for what is wanted */
-    hs_neighbourhood most;    /* set by hs_table_prepare */
-    hs_output        kept;    /* owned; rows in cell order, int32, until they have places */
-} hs_table;
+#include "table_rows.h"
 
 /* Neighbours of each asking point, not counting itself, to counts[0 ... n - 1]. HS_ERR_SHIFT_RANGE
  * sets failure->row. */

@@ -7,13 +7,21 @@
 #define HS_TABLE_ROWS_H
 
 #include "../collect/record.h"
-#include "table.h"
 
 /* Columns of a table that are measured, not numbers. */
 #define HS_MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
 /* Bytes of rows that wait for their places. */
 #define HS_MOST_KEPT (6 << 20)
+
+/* A table that is being made, of a full search. */
+typedef struct hs_table {
+    hs_search       *search;  /* borrowed */
+    int64_t         *offsets; /* borrowed; where each row begins, rows + 1 */
+    hs_output       *entries; /* borrowed; columns for what is wanted */
+    hs_neighbourhood most;    /* set by hs_table_prepare */
+    hs_output        kept;    /* owned; rows in cell order, int32, until they have places */
+} hs_table;
 
 /* What one thread fills rows with; the context of the visits below. */
 typedef struct hs_filler {

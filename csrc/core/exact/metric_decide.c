@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* metric.c: whether a pair is within the cutoff, by the cheapest stage that can tell. */
+/* metric_decide.c: whether a pair is within the cutoff, by the cheapest stage that can tell. */
 #include "metric.h"
 
 #include "metric_float.h"
