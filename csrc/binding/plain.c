@@ -2,7 +2,7 @@
 /* plain.c: see plain.h. Nothing here raises but for a wrong number of arguments. */
 #include "plain.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "py_functions.h"
 
 #include <string.h>
@@ -119,7 +119,7 @@ index_bytes_of(PyObject *object)
     return type == NPY_INT64 ? 8 : type == NPY_INT32 ? 4 : IS_NOT_PLAIN;
 }
 
-/* One of the core's functions, and where its arguments beyond those of call.h are; 0: nowhere. */
+/* One of the core's functions, and where its arguments beyond those of py_call.h are; 0: nowhere. */
 typedef struct plain_form {
     const char *name;
     PyObject *(*function)(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);

@@ -2,9 +2,9 @@
 /* py_batch.c: _core.batch_pairs and _core.batch_count: many systems in one call. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "errors.h"
-#include "result.h"
+#include "py_result.h"
 
 #define FIRST_CAPACITY 1024             /* systems; doubled as needed */
 #define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */

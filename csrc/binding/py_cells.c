@@ -3,7 +3,7 @@
  * points. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "convert.h"
 #include "errors.h"
 #include "outputs.h"

@@ -2,7 +2,7 @@
 /* py_explain.c: _core.explain: what would be done, and what was done. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "convert.h"
 #include "errors.h"
 #include "tuples.h"

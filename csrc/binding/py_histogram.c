@@ -2,7 +2,7 @@
 /* py_histogram.c: _core.histogram: pairs by distance, counted or weighted. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "convert.h"
 #include "errors.h"
 

@@ -2,7 +2,7 @@
 /* py_nearest.c: _core.nearest. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "convert.h"
 #include "errors.h"
 #include "outputs.h"

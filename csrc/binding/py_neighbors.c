@@ -3,11 +3,11 @@
  * each point or query, _core.neighbors and coordination. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "convert.h"
 #include "errors.h"
 #include "outputs.h"
-#include "result.h"
+#include "py_result.h"
 
 /* Where two sets are asked for, None is none of them. */
 static bool

@@ -2,9 +2,9 @@
 /* py_pairs.c: _core.pairs and _core.count_pairs. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "errors.h"
-#include "result.h"
+#include "py_result.h"
 
 PyObject *
 hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)

@@ -2,7 +2,7 @@
 /* py_stream.c: _core.iter_pairs and the type of the iterators that it returns. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "convert.h"
 #include "errors.h"
 #include "outputs.h"

@@ -2,9 +2,9 @@
 /* py_verlet.c: _core.verlet_*: a list of pairs that is used for many steps, in a capsule. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "errors.h"
-#include "result.h"
+#include "py_result.h"
 #include "threads.h"
 
 #define CAPSULE "halfshell._core.verlet"

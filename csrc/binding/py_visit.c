@@ -2,7 +2,7 @@
 /* py_visit.c: _core.for_each_pair: pairs handed to a function, of C or of Python. */
 #include "py_functions.h"
 
-#include "call.h"
+#include "py_call.h"
 #include "errors.h"
 #include "tuples.h"
 

@@ -2,6 +2,7 @@
 """The structure that csrc/README.md promises: which folder stands on which, and every file on the map."""
 
 import re
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,27 @@ def layer(path):
     return "public" if len(parts) == 1 else parts[1] if parts[0] == "core" else parts[0]
 
 
+def quoted_includes(path):
+    for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE):
+        yield (path.parent / name).resolve()
+
+
+def may_include(path, target):
+    here, there = layer(path), layer(target)
+    if there == "public":
+        return here == "binding" or target.name == "halfshell.h"
+    if here == "public" or "binding" in (here, there):
+        return here == there == "binding"
+    return here == there or PLACE[there] < PLACE[here]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_includes_follow_the_layers(path):
+    for target in quoted_includes(path):
+        assert target.exists(), f"{path.name} includes {target.name}"
+        assert may_include(path, target), f"{path.name} includes {target.relative_to(CSRC)}"
+
+
 def test_every_folder_of_the_core_has_a_place():
     assert {path.name for path in (CSRC / "core").iterdir()} == PLACE.keys() - {"kernels"}
 
@@ -32,6 +54,25 @@ def test_every_folder_of_the_core_has_a_place():
 def test_file_names_are_unique():
     names = [path.name for path in FILES]
     assert sorted(set(names)) == sorted(names)
+
+
+def test_no_two_modules_include_each_other():
+    """A module is name.h and name.c; what it includes, and what that includes, never leads back."""
+    uses = defaultdict(set)
+    for path in FILES:
+        uses[path.stem] |= {target.stem for target in quoted_includes(path)} - {path.stem}
+    done, open_now = set(), []
+
+    def visit(module):
+        assert module not in open_now, " -> ".join([*open_now, module])
+        if module not in done:
+            open_now.append(module)
+            for used in sorted(uses.get(module, ())):
+                visit(used)
+            done.add(open_now.pop())
+
+    for module in sorted(uses):
+        visit(module)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)

@@ -147,21 +147,3 @@ hs_between_count(const hs_points *points, const hs_points *queries, const hs_box
     }
     return hs_pairs_count_in(&sets, box, options, count, failure);
 }
-
-int64_t
-hs_pairs_rows(const hs_pairs *pairs)
-{
-    return pairs != NULL && pairs->offsets.columns != 0 ? pairs->offsets.n_pairs - 1 : 0;
-}
-
-const int64_t *
-hs_pairs_offsets(const hs_pairs *pairs)
-{
-    return pairs != NULL ? hs_output_column(&pairs->offsets, HS_WANT_I) : NULL;
-}
-
-int64_t *
-hs_pairs_take_offsets(hs_pairs *pairs)
-{
-    return pairs != NULL ? hs_output_take(&pairs->offsets, HS_WANT_I) : NULL;
-}

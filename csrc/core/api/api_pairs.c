@@ -92,33 +92,6 @@ fill_pairs(hs_pairs *pairs, hs_failure *failure)
 }
 
 hs_status
-hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure)
-{
-    if (status != HS_OK) {
-        return status;
-    }
-    if (!output->fixed) {
-        return hs_output_reserve(output, 0, 1.0);
-    }
-    if (output->n_pairs > output->capacity) {
-        failure->expected_pairs = (double)output->n_pairs;
-        return HS_ERR_CAPACITY;
-    }
-    return HS_OK;
-}
-
-hs_pairs *
-hs_pairs_new(void)
-{
-    hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
-    if (pairs != NULL) {
-        memset(&pairs->output, 0, sizeof pairs->output);
-        memset(&pairs->offsets, 0, sizeof pairs->offsets);
-    }
-    return pairs;
-}
-
-hs_status
 hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
               hs_pairs **result, hs_failure *failure)
 {
@@ -169,44 +142,4 @@ hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     counting.sorted = false;
     counting.out = NULL;
     return hs_request_use(&request, count_pairs, count, failure);
-}
-
-int64_t
-hs_pairs_length(const hs_pairs *pairs)
-{
-    return pairs != NULL ? pairs->output.n_pairs : 0;
-}
-
-const void *
-hs_pairs_array(const hs_pairs *pairs, unsigned which)
-{
-    return pairs == NULL || pairs->output.fixed || !hs_is_quantity(which)
-               ? NULL
-               : hs_output_column(&pairs->output, which);
-}
-
-void *
-hs_pairs_take(hs_pairs *pairs, unsigned which)
-{
-    return pairs == NULL || pairs->output.fixed || !hs_is_quantity(which)
-               ? NULL
-               : hs_output_take(&pairs->output, which);
-}
-
-void
-hs_array_free(void *array)
-{
-    hs_buffer_free(array);
-}
-
-void
-hs_pairs_free(hs_pairs *pairs)
-{
-    if (pairs == NULL) {
-        return;
-    }
-    hs_output_free(&pairs->output);
-    hs_output_free(&pairs->offsets);
-    hs_account_close(&pairs->search.account);
-    hs_free(NULL, pairs);
 }

@@ -7,7 +7,6 @@
 #include "../collect/result.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
-#include "../search/search_open.h"
 
 #include <math.h>
 #include <string.h>
@@ -232,13 +231,14 @@ hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     *failure = HS_NO_FAILURE;
     of_pairs.keeps_none = true;
     const hs_options of_stream = options_of_stream(options);
+    const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_stream};
     hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return HS_ERR_MEMORY;
     }
     hs_search      *search = &stream->search;
     const hs_fpenv  saved = hs_fpenv_enter();
-    const hs_status status = hs_search_open(&of_pairs, box, &of_stream, search, failure);
+    const hs_status status = hs_request_open(&request, search, failure);
     hs_fpenv_leave(saved);
     if (status != HS_OK) {
         hs_account_close(&search->account);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_verlet.c: the public functions of a list that is used for many steps; docs/verlet.md. */
 #include "../verlet/pair_list.h"
+#include "../verlet/recheck.h"
 
 #include "call.h"
 #include "../base/fpenv.h"
@@ -171,4 +172,34 @@ hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
         update(list, points, box, options, skin, rebuild, rebuilt, failure);
     hs_fpenv_leave(saved);
     return status;
+}
+
+hs_status
+hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **result,
+               hs_failure *failure)
+{
+    hs_failure ignored;
+    if (!hs_can_return(result, options) || list == NULL) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
+    }
+    failure = failure != NULL ? failure : &ignored;
+    *failure = HS_NO_FAILURE;
+    const hs_fpenv saved = hs_fpenv_enter();
+    hs_options     of_list = *options;
+    of_list.cutoff = list->cutoff;
+    of_list.precision = HS_EXACT;
+    hs_status status = hs_check_options(&of_list);
+    hs_pairs *pairs = status == HS_OK ? hs_pairs_new() : NULL;
+    if (pairs == NULL) {
+        status = hs_end_early(status == HS_OK ? HS_ERR_MEMORY : status, options, failure);
+    } else {
+        status = hs_recheck_find(list, &of_list, pairs, failure);
+    }
+    hs_fpenv_leave(saved);
+    if (status != HS_OK) {
+        hs_pairs_free(pairs);
+        return status;
+    }
+    *result = pairs;
+    return HS_OK;
 }

@@ -7,6 +7,7 @@
 
 #include "../base/fpenv.h"
 #include "../base/poll.h"
+#include "../base/want.h"
 #include "../search/estimate.h"
 #include "../search/search_open.h"
 
@@ -22,6 +23,20 @@ tell_shortage(const hs_request *request, const hs_search *search, hs_failure *fa
 }
 
 hs_status
+hs_request_open(const hs_request *request, hs_search *search, hs_failure *failure)
+{
+    const hs_sets  *sets = request->sets;
+    const hs_status sound = hs_check_arguments(sets->points, sets->queries, request->box,
+                                               request->options, failure);
+    if (sound != HS_OK) {
+        hs_search_begin(request->options, search);
+        hs_search_report(search, 0);
+        return sound;
+    }
+    return hs_search_open(sets, request->box, request->options, search, failure);
+}
+
+hs_status
 hs_request_use(const hs_request *request, hs_use_fn use, void *context, hs_failure *failure)
 {
     hs_failure ignored;
@@ -30,8 +45,7 @@ hs_request_use(const hs_request *request, hs_use_fn use, void *context, hs_failu
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status =
-        hs_search_open(request->sets, request->box, request->options, &search, failure);
+    hs_status      status = hs_request_open(request, &search, failure);
     if (status == HS_OK) {
         status = use(context, &search, &n_pairs, failure);
         hs_search_report(&search, n_pairs);
@@ -58,7 +72,7 @@ hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, h
     }
     hs_search     *search = &pairs->search;
     const hs_fpenv saved = hs_fpenv_enter();
-    hs_status status = hs_search_open(request->sets, request->box, options, search, failure);
+    hs_status      status = hs_request_open(request, search, failure);
     if (status == HS_OK) {
         hs_output_init(&search->account, request->sets->points->ndim, options->want,
                        options->index_bytes, &pairs->output);
@@ -122,12 +136,6 @@ bool
 hs_has_entries(const void *array, const hs_points *points)
 {
     return array != NULL || (points != NULL && points->n == 0);
-}
-
-bool
-hs_is_quantity(unsigned which)
-{
-    return which != 0 && (which & ~ALL_WANTS) == 0 && (which & (which - 1)) == 0;
 }
 
 static bool
@@ -224,7 +232,7 @@ hs_check_options(const hs_options *options)
     if (hs_check_limits(options) != HS_OK) {
         return HS_ERR_ARGUMENT;
     }
-    return status_of((want & ~ALL_WANTS) == 0 &&
+    return status_of((want & ~HS_WANT_ALL) == 0 &&
                      (want == 0 || is_index_size(options->index_bytes)) &&
                      (out == NULL || can_hold(out, want)) &&
                      options->cell_size >= 0.0 &&

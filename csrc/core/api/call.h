@@ -17,6 +17,10 @@ typedef struct hs_request {
     const hs_options *options;
 } hs_request;
 
+/* Checks the arguments, and opens a search of them. On failure nothing is held but its account,
+ * which the caller closes in any case. */
+hs_status hs_request_open(const hs_request *request, hs_search *search, hs_failure *failure);
+
 /* Uses an open search; *n_pairs, zero before, is how many it found. */
 typedef hs_status (*hs_use_fn)(void *context, hs_search *search, int64_t *n_pairs,
                                hs_failure *failure);
@@ -52,9 +56,6 @@ bool hs_can_return(hs_pairs **result, const hs_options *options);
 /* Whether an array is there that has one entry for each of these points, if there are any. */
 bool hs_has_entries(const void *array, const hs_points *points);
 
-/* Whether it is exactly one HS_WANT_ bit. */
-bool hs_is_quantity(unsigned which);
-
 /* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_TOO_MANY for points and systems from 2^31 on. */
 hs_status hs_check_points(const hs_points *points, hs_failure *failure);
 
@@ -72,5 +73,17 @@ hs_status hs_check_options(const hs_options *options);
 /* All of these but systems; the failure says whether it is of the queries, if there are any. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
                              const hs_options *options, hs_failure *failure);
+
+/* The functions of halfshell.h of these names, for sets of points. */
+hs_status hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                           hs_pairs **pairs, hs_failure *failure);
+hs_status hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                            int64_t *count, hs_failure *failure);
+hs_status hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                               hs_pairs **rows, hs_failure *failure);
+hs_status hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                                int64_t *counts, hs_failure *failure);
+hs_status hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k,
+                             const hs_options *options, hs_pairs **rows, hs_failure *failure);
 
 #endif

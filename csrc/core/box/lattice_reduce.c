@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * lattice_reduce.c: lattice reduction that decides in floating point and computes in exact
- * integers.
+ * lattice_reduce.c: reduction that decides in floating point and computes in exact integers.
  *
  * Every step subtracts an integer multiple of one row from another, so U stays unimodular
  * whatever rounding does to the decision to take it. The changed row of B is then formed anew

@@ -19,16 +19,4 @@ hs_pairs *hs_pairs_new(void);
  * those of the caller had no room for all. */
 hs_status hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure);
 
-/* The functions of halfshell.h of these names, for sets of points. */
-hs_status hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                           hs_pairs **pairs, hs_failure *failure);
-hs_status hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                            int64_t *count, hs_failure *failure);
-hs_status hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                               hs_pairs **rows, hs_failure *failure);
-hs_status hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                                int64_t *counts, hs_failure *failure);
-hs_status hs_nearest_find_in(const hs_sets *sets, const hs_box *box, int64_t k,
-                             const hs_options *options, hs_pairs **rows, hs_failure *failure);
-
 #endif

@@ -4,7 +4,6 @@
 
 #include "search_build.h"
 #include "search_reuse.h"
-#include "../api/call.h"
 
 /* For the words on a search that was refused memory. */
 static hs_status
@@ -20,12 +19,6 @@ hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
                hs_search *search, hs_failure *failure)
 {
-    const hs_status sound = hs_check_arguments(sets->points, sets->queries, box, options, failure);
-    if (sound != HS_OK) {
-        hs_search_begin(options, search);
-        hs_search_report(search, 0);
-        return sound;
-    }
     if (sets->built != NULL) {
         const hs_status status = hs_search_reuse(sets, options, search, failure);
         if (status != HS_STATUS_END) {

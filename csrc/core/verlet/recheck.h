@@ -8,6 +8,7 @@
 #define HS_RECHECK_H
 
 #include "../collect/columns.h"
+#include "../collect/result.h"
 #include "../search/search.h"
 #include "sift.h"
 #include "pair_list.h"
@@ -92,5 +93,10 @@ hs_refilter_shift(const hs_refilter *refilter, int64_t e, int64_t *shift)
         }
     }
 }
+
+/* The pairs of the last step, into a result that holds nothing yet; recheck_find.c. options:
+ * checked, with the cutoff of the list. Fails as hs_verlet_find. */
+hs_status hs_recheck_find(const hs_verlet *list, const hs_options *options, hs_pairs *pairs,
+                          hs_failure *failure);
 
 #endif

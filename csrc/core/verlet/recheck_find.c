@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* recheck_find.c: the pairs of the last step from a list that is used for many. */
-#include "../api/call.h"
-#include "../base/fpenv.h"
-#include "../collect/result.h"
-#include "../base/poll.h"
-#include "recheck.h"
 #include "../collect/sort_pairs.h"
+#include "recheck.h"
 
 #include <math.h>
 #include <string.h>
@@ -62,12 +58,6 @@ open_search(const hs_verlet *list, const hs_options *options, hs_search *search)
 {
     const hs_points *points = &list->frames[list->now].points;
     hs_search_begin(options, search);
-    search->options.cutoff = list->cutoff;
-    search->options.precision = HS_EXACT;
-    const hs_status status = hs_check_options(&search->options);
-    if (status != HS_OK) {
-        return status;
-    }
     search->kernel = hs_kernel_select(options->kernel);
     if (search->kernel == NULL) {
         return HS_ERR_KERNEL;
@@ -96,24 +86,13 @@ set_refilter(const hs_verlet *list, hs_search *search, hs_refilter *refilter)
 }
 
 hs_status
-hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **result,
-               hs_failure *failure)
+hs_recheck_find(const hs_verlet *list, const hs_options *options, hs_pairs *pairs,
+                hs_failure *failure)
 {
-    hs_failure  ignored;
     hs_refilter refilter;
-    if (!hs_can_return(result, options) || list == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    hs_pairs *pairs = hs_pairs_new();
-    if (pairs == NULL) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure);
-    }
-    hs_search     *search = &pairs->search;
-    hs_output     *output = &pairs->output;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = open_search(list, options, search);
+    hs_search  *search = &pairs->search;
+    hs_output  *output = &pairs->output;
+    hs_status   status = open_search(list, options, search);
     hs_output_init(&search->account, list->frames[list->now].points.ndim, options->want,
                    options->index_bytes, output);
     if (status == HS_OK) {
@@ -125,11 +104,5 @@ hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **resu
     }
     hs_search_report(search, output->n_pairs);
     hs_search_close(search);
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(pairs);
-        return status;
-    }
-    *result = pairs;
-    return HS_OK;
+    return status;
 }

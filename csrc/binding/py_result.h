@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* result.h: what functions that return pairs share: which quantities, and in which arrays. */
-#ifndef HS_RESULT_H
-#define HS_RESULT_H
+/* py_result.h: what functions that return pairs share: which quantities, and in which arrays. */
+#ifndef HS_PY_RESULT_H
+#define HS_PY_RESULT_H
 
-#include "call.h"
+#include "py_call.h"
 
 typedef struct hs_result {
     const char    *letters; /* borrowed */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* result.c: see result.h. */
-#include "result.h"
+/* py_result.c: see py_result.h. */
+#include "py_result.h"
 
 #include "convert.h"
 #include "outputs.h"

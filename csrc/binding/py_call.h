@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* call.h: what the searching functions share: one set of arguments, and polling for Ctrl-C. */
-#ifndef HS_CALL_H
-#define HS_CALL_H
+/* py_call.h: what the searching functions share: one set of arguments, and polling for Ctrl-C. */
+#ifndef HS_PY_CALL_H
+#define HS_PY_CALL_H
 
 #include "numpy_api.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* call.c: see call.h. */
-#include "call.h"
+/* py_call.c: see py_call.h. */
+#include "py_call.h"
 
 #include "available.h"
 #include "convert.h"
