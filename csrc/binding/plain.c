@@ -119,7 +119,7 @@ index_bytes_of(PyObject *object)
     return type == NPY_INT64 ? 8 : type == NPY_INT32 ? 4 : IS_NOT_PLAIN;
 }
 
-/* One of the core's functions, and where its arguments beyond those of py_call.h are; 0: nowhere. */
+/* A function of the core, and where its arguments beyond those of py_call.h are; 0: nowhere. */
 typedef struct plain_form {
     const char *name;
     PyObject *(*function)(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);

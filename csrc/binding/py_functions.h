@@ -22,7 +22,7 @@ PyObject *hs_py_pairs_between(PyObject *module, PyObject *const *arguments,
 /* The arguments of py_call.h, queries. */
 PyObject *hs_py_count_between(PyObject *module, PyObject *const *arguments,
                               Py_ssize_t n_arguments);
-/* The arguments of py_call.h, then quantities of j d D S, index_bytes; queries or None -> offsets and
+/* Those of py_call.h, then quantities of j d D S, index_bytes; queries or None -> offsets and
  * arrays, read-only. */
 PyObject *hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* The arguments of py_call.h, queries or None. */
@@ -39,7 +39,7 @@ PyObject *hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssiz
 PyObject *hs_py_cells_candidates(PyObject *module, PyObject *const *arguments,
                                  Py_ssize_t n_arguments);
 
-/* py_stream.c. The arguments of py_call.h, then quantities, index_bytes, max_pairs -> an iterator. */
+/* py_stream.c. Those of py_call.h, then quantities, index_bytes, max_pairs -> an iterator. */
 PyObject *hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* The type of these, a new reference or NULL; the module keeps it as its state. */
 PyObject *hs_py_stream_type(PyObject *module);
@@ -55,7 +55,7 @@ PyObject *hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssi
 /* The arguments of py_call.h, batch, cutoffs, boxes. */
 PyObject *hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
-/* py_nearest.c. The arguments of py_call.h (cutoff: the largest distance), then quantities of j d D S,
+/* py_nearest.c. Those of py_call.h (cutoff: the largest distance), then quantities of j d D S,
  * index_bytes; queries or None, k -> arrays of k entries a query, one query after another. */
 PyObject *hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 

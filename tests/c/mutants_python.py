@@ -22,10 +22,10 @@ NAME = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
 # Themes of each file of the binding, as names of tests say them, besides its own name.
 THEMES = {
     "convert": "core_arguments boundary_cases dtypes array_forms",
-    "call": "core_arguments interrupt threads boundary_cases",
+    "py_call": "core_arguments interrupt threads boundary_cases",
     "plain": "plain array_forms",
     "outputs": "quantities table array_forms",
-    "result": "quantities boundary_cases",
+    "py_result": "quantities boundary_cases",
     "foreign": "boundary",
     "tuples": "for_each_pair explain cell_list",
     "py_pairs": "quantities pairs_small count",
