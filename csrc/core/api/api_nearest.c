@@ -5,6 +5,7 @@
 #include "../base/fpenv.h"
 #include "../nearest/nearest_prepare.h"
 #include "../nearest/nearest_search.h"
+#include "../collect/columns.h"
 #include "../collect/result.h"
 #include "../base/poll.h"
 
@@ -32,6 +33,9 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
     hs_status     status = make_room(near, n_asking, failure);
     if (status == HS_OK) {
         status = hs_near_prepare(near, sets, box, limit, failure);
+    }
+    if (status == HS_OK) { /* rows are written in the order of the tree */
+        status = hs_touch_output(search->team, &search->options, near->rows);
     }
     if (status == HS_OK) {
         status = hs_near_search(near, failure);

@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 
+#include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
 
 void test_nearest_stops(void);
@@ -119,6 +120,30 @@ many_images_can_be_stopped(void)
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
 }
 
+/* Rows are written in the order of the tree, to pages all over the result: these are cleared before,
+ * by parts, between which there is a poll. */
+static void
+clearing_the_result_polls(void)
+{
+    enum { N = 5000, K = 20, PART = 4096 };
+    static double  x[3 * N];
+    harness_random random = {23};
+    brute_scene    scene = {.ndim = 3, .n = N, .x = x, .cutoff = INFINITY};
+    hs_counters    large_parts, small_parts;
+    hs_pairs      *rows = NULL;
+    for (int e = 0; e < 3 * N; e++)
+        x[e] = random_unit(&random);
+    CHECK(find_until(&scene, NULL, K, INT64_MAX, &large_parts, &rows) == HS_OK);
+    hs_pairs_free(rows);
+    const size_t before = hs_test_touch_parts(PART);
+    CHECK(find_until(&scene, NULL, K, INT64_MAX, &small_parts, &rows) == HS_OK);
+    hs_pairs_free(rows);
+    /* j and d: eight bytes each. */
+    CHECK(small_parts.polls - large_parts.polls >= 2 * (N * K * 8 / PART));
+    CHECK(stop_everywhere(&scene, NULL, K, 12) == small_parts.polls);
+    CHECK(hs_test_touch_parts(before) == PART);
+}
+
 /* Of a search that needs more leaves, runs and images than there is room for at first. */
 static void
 whichever_allocation_fails_nothing_is_left(void)
@@ -152,5 +177,6 @@ test_nearest_stops(void)
 {
     RUN(many_points_can_be_stopped);
     RUN(many_images_can_be_stopped);
+    RUN(clearing_the_result_polls);
     RUN(whichever_allocation_fails_nothing_is_left);
 }
