@@ -7,10 +7,13 @@
 #ifndef HS_TARGET_H
 #define HS_TARGET_H
 
+/* -DHS_X86_64=0: no kernels but plain C, for tools that do not follow vectors. */
+#if !defined(HS_X86_64)
 #if defined(__x86_64__) || defined(_M_X64)
 #define HS_X86_64 1
 #else
 #define HS_X86_64 0
+#endif
 #endif
 
 /* Little-endian only: simd_neon.h numbers bytes within lanes. */
