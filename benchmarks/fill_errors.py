@@ -14,9 +14,9 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from halfshell._report.rows import ReportRow, read_csv
-from halfshell._report.table import SUMMARY, method_label, summary_cells
-from halfshell._report.words import duration, findings, methods_of, number, ratios
+from halfshell._report.page.rows import ReportRow, read_csv
+from halfshell._report.page.table import SUMMARY, method_label, summary_cells
+from halfshell._report.page.words import duration, findings, methods_of, number, ratios
 from marks import Lines, fill, table
 
 __all__ = ["SECTIONS", "fill_page", "main"]

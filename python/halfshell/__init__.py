@@ -4,29 +4,29 @@
 import importlib
 from typing import TYPE_CHECKING
 
-from halfshell._between import pairs_between
-from halfshell._box import Box
-from halfshell._cache import clear_cache, set_cache_limit
-from halfshell._count import count_pairs
+from halfshell._convert.cache import clear_cache, set_cache_limit
+from halfshell._convert.options import kernels
 from halfshell._errors import CapacityError
-from halfshell._graph import Graph
-from halfshell._neighbors import coordination, neighbors
-from halfshell._options import kernels
-from halfshell._pairs import pairs
-from halfshell._table import NeighborTable
+from halfshell._functions.between import pairs_between
+from halfshell._functions.counts import count_pairs
+from halfshell._functions.neighbors import coordination, neighbors
+from halfshell._functions.pairs import pairs
+from halfshell._objects.box import Box
+from halfshell._objects.graph import Graph
+from halfshell._objects.neighbor_table import NeighborTable
 
 if TYPE_CHECKING:
-    from halfshell._cells import CellList
-    from halfshell._explain import Explanation, explain
-    from halfshell._histogram import pair_histogram
+    from halfshell._check.verify import Verdict, verify
+    from halfshell._functions.explain import Explanation, explain
+    from halfshell._functions.histogram import pair_histogram
+    from halfshell._functions.nearest import nearest
+    from halfshell._functions.rdf import RadialDistribution, rdf
+    from halfshell._functions.report import report
+    from halfshell._functions.stream import iter_pairs
+    from halfshell._functions.visit import for_each_pair
     from halfshell._include import get_include
-    from halfshell._nearest import nearest
-    from halfshell._rdf import RadialDistribution, rdf
-    from halfshell._report import report
-    from halfshell._stream import iter_pairs
-    from halfshell._verify import Verdict, verify
-    from halfshell._verlet import VerletList
-    from halfshell._visit import for_each_pair
+    from halfshell._objects.cell_list import CellList
+    from halfshell._objects.verlet_list import VerletList
 
 __version__ = "0.1.0"
 
@@ -61,20 +61,20 @@ __all__ = [
 
 #: Where names are that are imported when they are first used, for a quick start.
 _LATER = {
-    "CellList": "_cells",
-    "Explanation": "_explain",
-    "RadialDistribution": "_rdf",
-    "Verdict": "_verify",
-    "VerletList": "_verlet",
-    "explain": "_explain",
-    "for_each_pair": "_visit",
+    "CellList": "_objects.cell_list",
+    "Explanation": "_functions.explain",
+    "RadialDistribution": "_functions.rdf",
+    "Verdict": "_check.verify",
+    "VerletList": "_objects.verlet_list",
+    "explain": "_functions.explain",
+    "for_each_pair": "_functions.visit",
     "get_include": "_include",
-    "iter_pairs": "_stream",
-    "nearest": "_nearest",
-    "pair_histogram": "_histogram",
-    "rdf": "_rdf",
-    "report": "_report",
-    "verify": "_verify",
+    "iter_pairs": "_functions.stream",
+    "nearest": "_functions.nearest",
+    "pair_histogram": "_functions.histogram",
+    "rdf": "_functions.rdf",
+    "report": "_functions.report",
+    "verify": "_check.verify",
 }
 
 if not TYPE_CHECKING:  # for type checkers they are there

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Check every kernel of this CPU against integers: ``halfshell selftest``.
 
-The answers come from `halfshell._reference`, which uses Python integers and nothing of the
+The answers come from `halfshell._check.reference`, which uses Python integers and nothing of the
 compiled code. The scenes are those where rounding, wrapping or overflow would show: ties at
 the cutoff, skewed boxes, points far away, subnormal numbers.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._reference import exact_square, reference_pairs, ulp_error
+from halfshell._check.reference import exact_square, reference_pairs, ulp_error
 
 __all__ = ["Case", "cases", "main", "run"]
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from halfshell._reference import exact_square, exact_vector, reference_pairs, ulp_error
+from halfshell._check.reference import exact_square, exact_vector, reference_pairs, ulp_error
 from oracles import exact_pairs, remembered
 
 

@@ -3,7 +3,7 @@
 
 Two oracles, independent of the compiled core and of each other:
 
-* `halfshell._reference.reference_pairs`: the definition, all pairs in rational arithmetic;
+* `halfshell._check.reference.reference_pairs`: the definition, all pairs in rational arithmetic;
 * `exact_pairs`: for larger scenes. SciPy's cKDTree over explicit copies finds candidates with
   a margin that covers every rounding on the way; float64 decides only outside a band around
   the cutoff that is wider than its own error, Python integers decide inside it.
@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import halfshell as hs
-from halfshell._reference import exact_square, reference_pairs
+from halfshell._check.reference import exact_square, reference_pairs
 
 EPS = 2.0**-53
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from halfshell._report.rows import ReportRow
-from halfshell._report.timing import Patience
+from halfshell._report.measure.timing import Patience
+from halfshell._report.page.rows import ReportRow
 
 
 def row(method, kind="halfshell", **other):
@@ -41,7 +41,7 @@ def fake(prepare, module="json"):
         import importlib, os, time
         import numpy as np
         from halfshell._peers import LIBRARIES, Library
-        from halfshell._report.worker import main
+        from halfshell._report.measure.worker import main
 
         class Fake(Library):
             name = "fake"

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._reference import exact_square
+from halfshell._check.reference import exact_square
 from oracles import as_integers
 
 DECISIONS = int(float(os.environ.get("HALFSHELL_ADVERSARIAL", "500000")))

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 import boundary
 import halfshell as hs
 from boundary import POINTS, anything, calls, dressed, laid_out, outcome
-from halfshell._reference import reference_pairs
+from halfshell._check.reference import reference_pairs
 
 FUZZ_ROUNDS = int(os.environ.get("HALFSHELL_FUZZ_ROUNDS", "0"))
 FUZZ_SECONDS = float(os.environ.get("HALFSHELL_FUZZ_SECONDS", "0"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._reference import exact_vector
+from halfshell._check.reference import exact_vector
 from oracles import BOX_KINDS, random_box, random_scene, same_arrays
 
 

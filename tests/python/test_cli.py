@@ -14,8 +14,13 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _cli_pairs, _cli_peers, _cli_scene, _cli_verify, _pairs, cli, selftest
-from halfshell._files import InputError, Scene, read_scene, replacing
+from halfshell import cli, selftest
+from halfshell._cli import pairs as _cli_pairs
+from halfshell._cli import peers as _cli_peers
+from halfshell._cli import scene as _cli_scene
+from halfshell._cli import verify as _cli_verify
+from halfshell._cli.files import InputError, Scene, read_scene, replacing
+from halfshell._functions import pairs as _pairs
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])

@@ -15,7 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from halfshell import _numpy_files, cli
+from halfshell import cli
+from halfshell._cli import numpy_files as _numpy_files
 
 POINTS = np.arange(30.0).reshape(10, 3) % 7.0
 

@@ -8,8 +8,9 @@ import zipfile
 import numpy as np
 import pytest
 
-from halfshell import _available, _files
-from halfshell._files import InputError, read_scene
+from halfshell._cli import files as _files
+from halfshell._cli.files import InputError, read_scene
+from halfshell._convert import available as _available
 
 POINTS = np.random.default_rng(5).random((60, 3))
 

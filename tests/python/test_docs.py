@@ -15,7 +15,7 @@ import pytest
 import halfshell as hs
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = ["halfshell", *(f"halfshell.{m.name}" for m in pkgutil.iter_modules(hs.__path__))]
+MODULES = ["halfshell", *(m.name for m in pkgutil.walk_packages(hs.__path__, "halfshell."))]
 
 
 @pytest.mark.parametrize("name", [m for m in MODULES if m != "halfshell.__main__"])

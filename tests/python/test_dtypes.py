@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._reference import reference_pairs
+from halfshell._check.reference import reference_pairs
 from oracles import as_set, check, same_arrays
 
 BOX = np.array([[1.5, 0.0, 0.0], [0.25, 1.75, 0.0], [-0.5, 0.125, 2.0]])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _exact_order
+from halfshell._objects import exact_order as _exact_order
 from oracles import BOX_KINDS, random_scene, same_arrays
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._reference import reference_pairs
+from halfshell._check.reference import reference_pairs
 from oracles import check, check_large
 
 LARGEST = 1.7e308

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._reference import reference_pairs
+from halfshell._check.reference import reference_pairs
 from oracles import check, check_large, random_box
 
 LENGTHS = [1.0, 0.1, 1 / 3, math.pi, 0.7, 3.0, 1e-3]

@@ -15,7 +15,7 @@ import pytest
 
 import halfshell as hs
 from full_lists import assert_last_place, entries, full_list, joined, list_between
-from halfshell._reference import exact_square, reference_pairs
+from halfshell._check.reference import exact_square, reference_pairs
 from oracles import as_set, remembered
 
 TOO_FAR = "lies too many box vectors away"

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import halfshell as hs
-from halfshell._reference import exact_square, reference_pairs
+from halfshell._check.reference import exact_square, reference_pairs
 from oracles import BOX_KINDS, lattice, random_scene, rotation, same_arrays
 
 

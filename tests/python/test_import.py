@@ -11,9 +11,13 @@ import halfshell as hs
 
 #: What `import halfshell` may load of its own.
 OWN = {
-    "_available", "_batch", "_between", "_box", "_cache", "_core", "_count", "_cutoffs",
-    "_errors", "_exact_order", "_extras", "_foreign", "_graph", "_inputs", "_neighbors",
-    "_options", "_origin", "_pairs", "_table", "_table_forms", "_table_rows",
+    "_core", "_errors", "_extras",
+    "_convert", "_convert.available", "_convert.batch", "_convert.cache", "_convert.foreign",
+    "_convert.inputs", "_convert.options",
+    "_functions", "_functions.between", "_functions.counts", "_functions.cutoffs",
+    "_functions.neighbors", "_functions.pairs",
+    "_objects", "_objects.box", "_objects.exact_order", "_objects.graph",
+    "_objects.neighbor_table", "_objects.origin", "_objects.table_forms", "_objects.table_rows",
 }  # fmt: skip
 
 

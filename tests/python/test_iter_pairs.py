@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _pairs
+from halfshell._functions import pairs as _pairs
 from subprocesses import RESIDENT, run
 
 BOX = np.array([[1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.4, 0.2, 1.1]])
@@ -294,7 +294,7 @@ def test_abandoning_it_leaves_nothing_behind():
 import gc, json
 import numpy as np
 import halfshell as hs
-from halfshell import _pairs
+from halfshell._functions import pairs as _pairs
 points = np.random.default_rng(1).random((20_000, 3))
 
 def close():
@@ -342,7 +342,7 @@ def test_memory_does_not_grow_with_the_result():
 import json
 import numpy as np
 import halfshell as hs
-from halfshell import _pairs
+from halfshell._functions import pairs as _pairs
 points = np.random.default_rng(1).random((20_000, 2))
 list(hs.iter_pairs(points[:100], 2.0))
 before = peak = resident()
@@ -363,7 +363,7 @@ def test_ctrl_c_within_a_block_and_between_blocks():
 import json, signal, threading, time
 import numpy as np
 import halfshell as hs
-from halfshell import _pairs
+from halfshell._functions import pairs as _pairs
 points = np.random.default_rng(1).random((30_000, 3))
 sent = []
 

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import halfshell as hs
-from halfshell._reference import exact_square, reference_pairs
+from halfshell._check.reference import exact_square, reference_pairs
 from oracles import as_set, full_box, same_arrays
 
 # ---- scenes --------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from halfshell._reference import exact_square, exact_vector, reference_pairs, ulp_error
+from halfshell._check.reference import exact_square, exact_vector, reference_pairs, ulp_error
 from oracles import (
     BOX_KINDS,
     EXACT_ROTATION,

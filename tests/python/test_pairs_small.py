@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._reference import reference_pairs
+from halfshell._check.reference import reference_pairs
 from oracles import BOX_KINDS, as_set, check, random_box, random_scene
 
 

@@ -14,7 +14,7 @@ from ase.neighborlist import neighbor_list
 from scipy.spatial import cKDTree
 
 import halfshell as hs
-from halfshell._reference import exact_square
+from halfshell._check.reference import exact_square
 from oracles import BOX_KINDS, as_set, lattice, random_box, random_scene, rotation
 
 

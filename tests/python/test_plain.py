@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _core, _pairs
+from halfshell import _core
+from halfshell._functions import pairs as _pairs
 
 POINTS = np.random.default_rng(31).random((40, 3)) * 4.0
 LENGTHS = np.array([4.0, 4.5, 5.0])

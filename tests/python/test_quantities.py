@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 
 import halfshell as hs
-from halfshell._reference import exact_square, exact_vector, ulp_error
+from halfshell._check.reference import exact_square, exact_vector, ulp_error
 from oracles import BOX_KINDS, as_set, lattice, random_scene, rotation, same_arrays
 from test_laws import scenes
 

@@ -2,41 +2,27 @@
 """The report as a whole: right on every scene, rows that say so, CSV, times."""
 
 import csv
-import doctest
-import importlib
 import io
 import math
-import pkgutil
 import re
 from dataclasses import replace
 
 import pytest
 
 import halfshell as hs
-from halfshell import _peers, _report, scenes
-from halfshell._reference import reference_pairs
-from halfshell._report.facts import machine_facts
-from halfshell._report.rows import STATUSES, ReportRow, read_csv, write_csv
-from halfshell._report.timing import Patience, take_turns
-from halfshell._report.truth import true_pairs
+from halfshell import scenes
+from halfshell._check.reference import reference_pairs
+from halfshell._report.measure.facts import machine_facts
+from halfshell._report.measure.timing import Patience, take_turns
+from halfshell._report.page.rows import STATUSES, ReportRow, read_csv, write_csv
+from halfshell._report.truth.pairs import true_pairs
 from oracles import remembered
-
-MODULES = [
-    f"{package.__name__}.{module.name}"
-    for package in (_report, _peers)
-    for module in pkgutil.iter_modules(package.__path__)
-]
 
 
 @pytest.fixture(scope="module")
 def rows():
     """Two scenes, one of which moves, by every method of ours and SciPy's tree."""
     return hs.report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
-
-
-@pytest.mark.parametrize("name", MODULES)
-def test_examples_in_docstrings_run(name):
-    assert doctest.testmod(importlib.import_module(name)).failed == 0
 
 
 # ---- the truth and our own search on every scene -------------------------------------------

@@ -7,11 +7,12 @@ import sys
 import pytest
 
 import halfshell as hs
-from halfshell import _cli_report, cli, scenes
+from halfshell import cli, scenes
+from halfshell._cli import report as _cli_report
 from halfshell._peers import LIBRARIES
-from halfshell._report import run
-from halfshell._report.peers import PeerProcess
-from halfshell._report.rows import read_csv
+from halfshell._report.measure import run
+from halfshell._report.measure.peers import PeerProcess
+from halfshell._report.page.rows import read_csv
 from report_helpers import fake, parse, row
 
 

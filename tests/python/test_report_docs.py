@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 from benchmark_modules import BENCHMARKS, bench, only_in_a_checkout  # noqa: F401
 from halfshell import scenes
-from halfshell._report.rows import ReportRow, read_csv, write_csv
+from halfshell._report.page.rows import ReportRow, read_csv, write_csv
 
 pytestmark = only_in_a_checkout
 DOCS = BENCHMARKS.parent / "docs"

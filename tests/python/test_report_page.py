@@ -12,9 +12,9 @@ import pytest
 
 import halfshell as hs
 from halfshell._peers import LIBRARIES
-from halfshell._report import figures, html, table, words
-from halfshell._report.facts import machine_facts
-from halfshell._report.rows import read_csv
+from halfshell._report.measure.facts import machine_facts
+from halfshell._report.page import figures, html, table, words
+from halfshell._report.page.rows import read_csv
 from report_helpers import bare, parse, row
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ import pytest
 
 import halfshell as hs
 from halfshell._peers import LIBRARIES, Library, Question, wrapped
-from halfshell._report.peers import PeerProcess
+from halfshell._report.measure.peers import PeerProcess
 from report_helpers import fake, question
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from scipy.spatial import cKDTree
 
 import halfshell as hs
-from halfshell._reference import reference_pairs
+from halfshell._check.reference import reference_pairs
 from oracles import lattice, random_scene, rotation
 from test_laws import scenes
 

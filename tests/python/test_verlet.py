@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._skin import MOST_CHANGES, AutoSkin
+from halfshell._objects.skin import MOST_CHANGES, AutoSkin
 from oracles import BOX_KINDS, random_box, same_arrays
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check anybody's list of pairs: what it misses, what it invents, what it has twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._convert import inputs as _inputs
+from halfshell._functions.pairs import pairs as find_pairs
+
+IntArray = npt.NDArray[np.int64]
+_CONFIRMED = 1000  # differences of each kind that are confirmed by rational arithmetic
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What `verify` found; true when the list is right.
+
+    Attributes
+    ----------
+    n_expected, n_given : int
+        Pairs that there are, and rows that the list has.
+    missed, spurious, duplicate : ndarray of int64, shape (k, 2) or (k, 2 + d)
+        Pairs as rows (i, j, \\*S), or (i, j) when no shifts were given: not in the list, in the
+        list but beyond the cutoff, and listed more often than they should be (once for each
+        surplus row).
+    """
+
+    n_expected: int
+    n_given: int
+    missed: IntArray
+    spurious: IntArray
+    duplicate: IntArray
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is missed, spurious or duplicate."""
+        return not (len(self.missed) or len(self.spurious) or len(self.duplicate))
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    def __str__(self) -> str:
+        if self.ok:
+            return f"correct: {self.n_expected} pairs"
+        lines = [f"wrong: {self.n_given} rows for {self.n_expected} pairs"]
+        for name in ("missed", "spurious", "duplicate"):
+            rows = getattr(self, name)
+            if len(rows):
+                shown = ", ".join(str(tuple(row)) for row in rows[:5].tolist())
+                more = ", ..." if len(rows) > 5 else ""
+                lines.append(f"  {name:9} {len(rows)}: {shown}{more}")
+        return "\n".join(lines)
+
+
+def verify(
+    points: Any,
+    cutoff: float,
+    i: Any,
+    j: Any,
+    S: Any = None,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    full: bool = False,
+) -> Verdict:
+    """Check a list of pairs, from any library, by exact arithmetic.
+
+    Parameters
+    ----------
+    points, cutoff, box, periodic, inclusive
+        The scene, as in `pairs`. `inclusive` must be the rule of the list.
+    i, j : array_like of int, shape (m,)
+        The pairs, in any order and orientation.
+    S : array_like of int, shape (m, d), optional
+        Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, several images
+        of one pair of points are told apart by their number only.
+    full : bool, default False
+        Whether the list should have both (i, j, S) and (j, i, -S).
+
+    Returns
+    -------
+    Verdict
+        True when right; otherwise says what is missed, spurious and duplicate.
+
+    Raises
+    ------
+    TypeError
+        If `i`, `j` or `S` does not hold whole numbers, `inclusive` or `full` is not a bool, or a
+        part of the scene is of the wrong kind.
+    ValueError
+        If `i`, `j` and `S` do not fit each other or the points, or the scene is refused by
+        `pairs`.
+    OverflowError, MemoryError
+        As `pairs`, for the right list.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> print(hs.verify(points, 2.0, [0, 1], [1, 2]))
+    correct: 2 pairs
+    >>> verdict = hs.verify(points, 2.0, [0], [2])
+    >>> verdict.missed.tolist(), verdict.spurious.tolist()
+    ([[0, 1], [1, 2]], [[0, 2]])
+    """
+    full = _inputs.as_flag(full, "full")
+    inclusive = _inputs.as_flag(inclusive, "inclusive")
+    cutoff = _inputs.as_cutoff(cutoff)
+    array, vectors, bits = _inputs.scene(points, box, periodic)
+    ndim = array.shape[1]
+    given = _rows(i, j, S, len(array), ndim)
+    flags = [bool(bits >> axis & 1) for axis in range(ndim)]
+    found = find_pairs(
+        array,
+        cutoff,
+        box=vectors,
+        periodic=flags if vectors is not None else None,
+        quantities="ij" if S is None else "ijS",
+        inclusive=inclusive,
+    )
+    expected = np.column_stack(tuple(found)).astype(np.int64)
+    if full:
+        expected = np.concatenate([expected, _reversed(expected)])
+    else:
+        given = _as_half(given)
+        expected = _as_half(expected)
+    missed, surplus = _differences(expected, given)
+    known = {tuple(row) for row in expected.tolist()} if len(surplus) else set()
+    twice = np.array([tuple(row) in known for row in surplus.tolist()], dtype=bool)
+    verdict = Verdict(
+        n_expected=len(expected),
+        n_given=len(given),
+        missed=missed,
+        spurious=surplus[~twice],
+        duplicate=surplus[twice],
+    )
+    if S is not None:
+        _confirm(verdict, array, cutoff, vectors, flags, inclusive)
+    return verdict
+
+
+def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
+    """The list as rows (i, j) or (i, j, *S), checked."""
+    columns = []
+    for name, values in (("i", i), ("j", j)):
+        column = _inputs.as_array(values, name)
+        if column.size and column.dtype.kind not in "iu":
+            raise TypeError(f"{name} must hold integers, got dtype {column.dtype}")
+        if column.ndim != 1:
+            raise ValueError(f"{name} must have shape (m,), got {column.shape}")
+        if column.size and n == 0:
+            raise ValueError(f"{name} must be empty: there are no points")
+        if column.size and (int(column.min()) < 0 or int(column.max()) >= n):
+            raise ValueError(f"{name} must be point numbers from 0 to {n - 1}")
+        columns.append(column.astype(np.int64))
+    if columns[0].shape != columns[1].shape:
+        raise ValueError(
+            f"i and j must have the same length, got {len(columns[0])} and {len(columns[1])}"
+        )
+    if S is None:
+        return np.column_stack(columns)
+    shifts = _inputs.as_array(S, "S")
+    if shifts.shape != (len(columns[0]), ndim):
+        raise ValueError(f"S must have shape ({len(columns[0])}, {ndim}), got {shifts.shape}")
+    if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):
+        raise TypeError("S must hold whole numbers")
+    if shifts.size and not (np.abs(shifts.astype(np.float64)) < 2.0**62).all():
+        raise OverflowError("S must hold whole numbers below 2**62")
+    return np.column_stack([*columns, shifts.astype(np.int64)])
+
+
+def _reversed(rows: IntArray) -> IntArray:
+    """(j, i, -S) for each (i, j, S)."""
+    turned = rows.copy()
+    turned[:, 0], turned[:, 1] = rows[:, 1], rows[:, 0]
+    turned[:, 2:] *= -1
+    return turned
+
+
+def _as_half(rows: IntArray) -> IntArray:
+    """Each row turned so that i < j, or i == j with the first nonzero component of S positive."""
+    backward = rows[:, 0] > rows[:, 1]
+    same = rows[:, 0] == rows[:, 1]
+    undecided = same
+    for column in range(2, rows.shape[1]):
+        backward |= undecided & (rows[:, column] < 0)
+        undecided = undecided & (rows[:, column] == 0)
+    return np.where(backward[:, None], _reversed(rows), rows)
+
+
+def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArray]:
+    """Rows that are expected more often than given, and given more often than expected."""
+    every = np.concatenate([expected, given])
+    if not len(every):
+        return every, every
+    unique, inverse = np.unique(every, axis=0, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    wanted = np.bincount(inverse[: len(expected)], minlength=len(unique))
+    present = np.bincount(inverse[len(expected) :], minlength=len(unique))
+    missed = np.repeat(unique, np.maximum(wanted - present, 0), axis=0)
+    surplus = np.repeat(unique, np.maximum(present - wanted, 0), axis=0)
+    return missed, surplus
+
+
+def _confirm(
+    verdict: Verdict, points: Any, cutoff: float, box: Any, periodic: list[bool], inclusive: bool
+) -> None:
+    """Recompute the differences in rational arithmetic, which shares nothing with the search."""
+    from fractions import Fraction  # here, because importing it takes longer than the rest
+
+    square = Fraction(float(cutoff)) ** 2
+    for rows, should_be_within in ((verdict.missed, True), (verdict.spurious, False)):
+        for i, j, *shift in rows[:_CONFIRMED].tolist():
+            if i == j and not any(shift):
+                continue  # a point with itself is never a pair
+            if any(s and not repeats for s, repeats in zip(shift, periodic)):
+                continue  # nor is anything across an axis that does not repeat
+            distance = sum(
+                (
+                    Fraction(float(points[j, k]))
+                    - Fraction(float(points[i, k]))
+                    + sum(s * Fraction(float(box[axis, k])) for axis, s in enumerate(shift) if s)
+                )
+                ** 2
+                for k in range(points.shape[1])
+            )
+            within = distance <= square if inclusive else distance < square
+            if within != should_be_within:
+                raise AssertionError(
+                    f"the search and rational arithmetic disagree on pair {(i, j, *shift)}"
+                )

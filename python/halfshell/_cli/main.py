@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line: ``halfshell pairs``, ``verify``, ``report``, ``info`` and ``selftest``.
+
+Exit status: 0 done; 1 a check failed (``verify``, ``report``, ``selftest``); 2 the input or an
+option is wrong, said in one line on standard error; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+import halfshell as hs
+from halfshell._cli.files import InputError, one_line
+from halfshell._terminal import printable
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program's name. Default: those of the process.
+
+    Returns
+    -------
+    int
+        The exit status.
+    """
+    if argv is None and hasattr(sys.stdout, "reconfigure"):
+        # A name of a file may hold what the terminal cannot show, as on standard error.
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        args = _parser().parse_args(argv)
+        status = int(args.run(args))
+        sys.stdout.flush()
+        return status
+    except (InputError, MemoryError) as error:
+        print(f"halfshell: error: {one_line(error)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("halfshell: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader of our output went away, as in `halfshell ... | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+# Options -----------------------------------------------------------------------------------
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose complaints are one line, and which guesses no option."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+
+def _parser() -> _Parser:
+    parser = _Parser(
+        prog="halfshell",
+        description="Every pair of points within a cutoff, each decided exactly.",
+    )
+    parser.add_argument("--version", action="version", version=f"halfshell {hs.__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_pairs(commands)
+    _add_verify(commands)
+    _add_report(commands)
+    info = commands.add_parser("info", help="what this installation consists of")
+    info.add_argument("--json", action="store_true", help="the same for machines")
+    info.set_defaults(run=_run_info)
+    selftest = commands.add_parser(
+        "selftest", help="check every kernel of this CPU against integers (under 5 s)"
+    )
+    selftest.set_defaults(run=_run_selftest)
+    return parser
+
+
+def _add_scene_options(command: argparse.ArgumentParser) -> None:
+    """Add what says which points are meant, in which box."""
+    command.add_argument(
+        "file",
+        nargs="?",
+        metavar="FILE",
+        help=".npy, .npz, or anything that ase.io.read reads; without it, alpha-quartz",
+    )
+    command.add_argument(
+        "--cutoff",
+        type=_cutoff,
+        metavar="R",
+        help="largest distance of a pair; without it, one with about 50 neighbours",
+    )
+    command.add_argument(
+        "--box",
+        type=_box,
+        metavar="LX,LY,LZ",
+        help="edge lengths, or all components of the edge vectors, in place of the file's",
+    )
+    command.add_argument(
+        "--periodic",
+        type=_periodic,
+        metavar="TTF",
+        help="which axes repeat, T or F for each, or one letter for all",
+    )
+    command.add_argument("--format", metavar="NAME", help="ase format, where it is not guessed")
+    command.add_argument("--index", type=int, metavar="N", help="frame; default: the last")
+    command.add_argument("--strict", action="store_true", help="d < cutoff; default: d <= cutoff")
+    command.add_argument("--kernel", type=_kernel, metavar="NAME", help="one of `halfshell info`")
+    command.add_argument("--json", action="store_true", help="print JSON for machines")
+
+
+def _add_pairs(commands: Any) -> None:
+    command = commands.add_parser(
+        "pairs", help="find the pairs of a file, sum them up, save them, plot g(r)"
+    )
+    _add_scene_options(command)
+    command.add_argument("-o", "--output", metavar="OUT", help="write the pairs: .npz or .csv")
+    command.add_argument(
+        "--quantities",
+        type=_quantities,
+        metavar="LETTERS",
+        help="columns of OUT, any of i j d D S P; default: ijdS, or ijd without a box",
+    )
+    command.add_argument("--sort", action="store_true", help="OUT ascending by (i, j, S)")
+    command.add_argument("--plot", metavar="PNG", help="draw g(r): .png, .pdf or .svg")
+    command.add_argument(
+        "--precision",
+        choices=("exact", "double", "single"),
+        default="exact",
+        help="how a pair near the cutoff is decided; default: exact",
+    )
+    command.add_argument(
+        "--no-progress", dest="progress", action="store_false", help="no progress bar"
+    )
+    command.set_defaults(run=_run_pairs)
+
+
+def _add_verify(commands: Any) -> None:
+    command = commands.add_parser(
+        "verify", help="check a list of pairs, ours or another library's, by exact arithmetic"
+    )
+    _add_scene_options(command)
+    command.add_argument(
+        "--against",
+        metavar="LIBRARY",
+        help="whose list to check: ase, matscipy, matscipy-neighbours, scipy or vesin; "
+        "default: our own",
+    )
+    command.add_argument(
+        "--sample",
+        type=_sample,
+        metavar="N",
+        help="points to check by integers at most, 0 for all; default: 400, or what takes seconds",
+    )
+    command.set_defaults(run=_run_verify)
+
+
+def _add_report(commands: Any) -> None:
+    from halfshell._cli import report as _cli_report
+
+    command = commands.add_parser(
+        "report", help="error against run time, ours and other libraries', on hard scenes"
+    )
+    _cli_report.add_options(command)
+    command.set_defaults(run=_run_report)
+
+
+def _cutoff(text: str) -> float:
+    value = _number(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is negative")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def _box(text: str) -> NDArray[np.float64]:
+    return np.array([_number(part) for part in text.replace(",", " ").split()])
+
+
+def _periodic(text: str) -> tuple[bool, ...]:
+    if not text or set(text.upper()) - set("TF"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not made of the letters T and F")
+    return tuple(letter == "T" for letter in text.upper())
+
+
+def _quantities(text: str) -> str:
+    if not text or set(text) - set("ijdDSP") or len(set(text)) < len(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not made of the letters i j d D S P")
+    return text
+
+
+def _kernel(text: str) -> str:
+    if text not in hs.kernels():
+        known = ", ".join(hs.kernels())
+        raise argparse.ArgumentTypeError(f"{text!r} is not a kernel of this CPU ({known})")
+    return text
+
+
+def _sample(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+# Commands ----------------------------------------------------------------------------------
+
+
+def _run_pairs(args: argparse.Namespace) -> int:
+    from halfshell._cli import pairs as _cli_pairs
+
+    return _cli_pairs.run(args)
+
+
+def _run_verify(args: argparse.Namespace) -> int:
+    from halfshell._cli import verify as _cli_verify
+
+    return _cli_verify.run(args)
+
+
+def _run_report(args: argparse.Namespace) -> int:
+    from halfshell._cli import report as _cli_report
+
+    return _cli_report.run(args)
+
+
+def _run_selftest(args: argparse.Namespace) -> int:
+    from halfshell import selftest
+
+    return selftest.main()
+
+
+def _run_info(args: argparse.Namespace) -> int:
+    from halfshell import _core
+
+    build = dict(_core.build_info())
+    named = _core.default_kernel()  # by HALFSHELL_KERNEL, which is not checked before a search
+    is_known = named in hs.kernels()
+    facts: dict[str, Any] = {
+        "halfshell": hs.__version__,
+        "kernels": list(hs.kernels()),
+        "kernel used": named if is_known else None,
+        "python": f"{platform.python_version()} ({platform.python_implementation()})",
+        "numpy": np.__version__,
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu": _cpu_name(),
+        "cpus usable": _usable_cpus(),
+    }
+    facts.update({name: value for name, value in build.items() if name != "kernels"})
+    if args.json:
+        print(json.dumps(facts, indent=2))
+    else:
+        for name, value in facts.items():
+            text = ", ".join(value) if isinstance(value, (list, tuple)) else value
+            print(printable(f"{name:<14}{'none' if value is None else text}"))
+    if not is_known:
+        raise InputError(
+            f"HALFSHELL_KERNEL={named}: is not a kernel of this CPU ({', '.join(hs.kernels())}); "
+            "searches that name none are refused"
+        )
+    return 0
+
+
+def _cpu_name() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _usable_cpus() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``.npy`` and ``.npz`` files: what they hold is known, and refused, before it is unpacked.
+
+A few megabytes can unpack to more than the memory that there is, and a header can promise more than
+the file has.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import warnings
+import zipfile
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from halfshell._convert.available import refuse_unavailable
+
+__all__ = ["Unreadable", "read_arrays"]
+
+_MAGIC = np.lib.format.MAGIC_PREFIX
+MOST_HEADER = 10_000  # bytes, as np.load has it
+MOST_POINTS = 2**31 - 1
+MOST_DIM = 8
+_COPIES = 2  # of the points: what is read, and the search's own
+
+class Unreadable(Exception):
+    """A file that is not read, with the reason."""
+
+
+def read_arrays(file: str) -> tuple[dict[str, NDArray[Any]], list[str]]:
+    """Read `points`, `box` and `periodic`, as far as they are there.
+
+    Returns
+    -------
+    arrays : dict
+        The arrays by name; that of a ``.npy`` file is `points`.
+    names : list of str
+        All that the file holds.
+
+    Raises
+    ------
+    Unreadable
+        If an array is refused for its header.
+    MemoryError
+        If it would not fit.
+    Exception
+        What `zipfile` and NumPy raise for broken files.
+    """
+    with open(file, "rb") as stream, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of headers that Python 2 wrote
+        if stream.peek(len(_MAGIC)).startswith(_MAGIC):
+            _check_header("points", stream, os.fstat(stream.fileno()).st_size)
+            stream.seek(0)
+        loaded = np.load(stream, allow_pickle=False, max_header_size=MOST_HEADER)
+        if isinstance(loaded, np.ndarray):
+            return {"points": loaded}, ["points"]
+        names = list(loaded.files)
+        wanted = [name for name in ("points", "box", "periodic") if name in names]
+        return {name: loaded[name] for name in wanted if _is_array(name, loaded.zip)}, names
+
+
+def _is_array(name: str, archive: zipfile.ZipFile) -> bool:
+    """Whether a member is a NumPy file: then with `_check_header`, else it is not read."""
+    member = name if name in archive.namelist() else f"{name}.npy"
+    with archive.open(member) as part:
+        if part.read(len(_MAGIC)) != _MAGIC:
+            return False
+    with archive.open(member) as part:
+        _check_header(name, part, archive.getinfo(member).file_size)
+    return True
+
+
+def _check_header(name: str, stream: IO[bytes], n_bytes: int) -> None:
+    """Refuse an array that cannot be used, or of which its `n_bytes` do not hold all."""
+    header = _read_header(stream)
+    if header is None or header[1].hasobject:
+        return  # NumPy refuses it
+    shape, dtype, n_header = header
+    n_bytes -= n_header
+    needed = math.prod(shape) * dtype.itemsize
+    what = f"{name!r} of shape {shape} and dtype {dtype}"
+    if name != "points":
+        if math.prod(shape) > MOST_DIM**2:
+            raise Unreadable(f"{name!r} has shape {shape}, more than a box has")
+    elif len(shape) != 2:
+        raise Unreadable(f"points have shape {shape}; they must be (n, d)")
+    elif shape[1] > MOST_DIM:
+        raise Unreadable(f"points have shape {shape}; they must be (n, d) with d <= {MOST_DIM}")
+    elif shape[0] > MOST_POINTS:
+        raise Unreadable(f"points have shape {shape}; fewer than 2**31 points can be searched")
+    if needed > n_bytes:
+        raise Unreadable(f"{what} is cut off: that is {needed:,} bytes, there are {n_bytes:,}")
+    refuse_unavailable(_COPIES * needed, f"{what}, read and searched,")
+
+
+def _read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any], int] | None:
+    """Shape and type of an array, and the bytes before its data; None if the header is none."""
+    start = stream.read(12)
+    if len(start) < 12 or not start.startswith(_MAGIC):
+        return None
+    is_old = start[6] == 1
+    length = int.from_bytes(start[8:10] if is_old else start[8:12], "little")
+    if length > MOST_HEADER:
+        raise Unreadable(f"its header of {length:,} bytes is too long")
+    whole = io.BytesIO(start + stream.read(length))
+    try:
+        np.lib.format.read_magic(whole)
+        read = (np.lib.format.read_array_header_1_0 if is_old
+                else np.lib.format.read_array_header_2_0)  # fmt: skip
+        shape, _, dtype = read(whole)
+    except ValueError:
+        return None
+    if min(shape, default=0) < 0:
+        return None
+    return shape, dtype, length + (10 if is_old else 12)

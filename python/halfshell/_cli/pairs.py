@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``halfshell pairs``: find the pairs of a file, sum them up, save them, plot g(r)."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import halfshell as hs
+from halfshell import _core
+from halfshell._cli.files import InputError, Scene, one_line, replacing
+from halfshell._cli.scene import (
+    describe_box,
+    load_scene,
+    plot_distribution,
+    require_matplotlib,
+    unit_suffix,
+)
+from halfshell._functions import pairs as _pairs
+from halfshell._terminal import printable
+
+__all__ = ["run", "write_csv"]
+
+BAR_AFTER = 0.5  # seconds without a progress bar
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the command found out; written as text or as JSON."""
+
+    file: str
+    points: int
+    dimensions: int
+    species: dict[str, int]
+    unit: str
+    box: list[list[float]] | None
+    periodic: list[bool]
+    cutoff: float
+    cutoff_chosen: bool
+    inclusive: bool
+    pairs: int
+    mean_coordination: float
+    nearest_distance: float | None
+    seconds: float
+    kernel: str
+    precision: str
+    output: str | None
+    plot: str | None
+
+
+def run(args: Namespace) -> int:
+    """Carry out ``halfshell pairs``."""
+    scene, cutoff, reason = load_scene(args)
+    wanted = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
+    letters = wanted if args.output else ""
+    letters += "" if "d" in letters else "d"
+    if args.plot and cutoff == 0:
+        raise InputError("--plot needs a cutoff above 0")
+
+    with ExitStack() as stack:
+        output = _open_output(args.output, args.file, (".npz", ".csv"), stack)
+        plot = _open_output(args.plot, args.file, (".png", ".pdf", ".svg"), stack)
+        if plot:
+            require_matplotlib()
+        start = time.perf_counter()
+        columns = _search(scene, cutoff, letters, args)
+        seconds = time.perf_counter() - start
+        d = columns["d"]
+        if output:
+            chosen = {letter: columns[letter] for letter in wanted}
+            if args.output.lower().endswith(".csv"):
+                write_csv(output, chosen)
+            else:
+                extra: dict[str, Any] = {"n": len(scene.points), "cutoff": cutoff}
+                np.savez(output, **chosen, **extra, inclusive=not args.strict)  # type: ignore[arg-type]
+        if plot:
+            plot_distribution(plot, Path(args.plot).suffix[1:], d, scene, cutoff)
+
+    box = scene.box_rows
+    names, counts = np.unique([] if scene.species is None else scene.species, return_counts=True)
+    summary = Summary(
+        file=scene.source,
+        points=len(scene.points),
+        dimensions=scene.points.shape[1],
+        species=dict(zip(names.tolist(), counts.tolist(), strict=True)),
+        unit=scene.unit,
+        box=box.tolist() if box is not None else None,
+        periodic=list(scene.periodic),
+        cutoff=cutoff,
+        cutoff_chosen=args.cutoff is None,
+        inclusive=not args.strict,
+        pairs=len(d),
+        mean_coordination=2 * len(d) / len(scene.points),
+        nearest_distance=float(d.min()) if len(d) else None,
+        seconds=seconds,
+        kernel=args.kernel or _core.default_kernel(),
+        precision=args.precision,
+        output=args.output,
+        plot=args.plot,
+    )
+    print(json.dumps(vars(summary), indent=2) if args.json else _text(summary, scene, reason))
+    return 0
+
+
+# The search --------------------------------------------------------------------------------
+
+
+def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[str, NDArray[Any]]:
+    """Find the pairs; return one array for each letter."""
+    options: dict[str, Any] = {
+        "box": scene.box,
+        "periodic": scene.periodic if scene.box is not None else None,
+        "quantities": letters,
+        "inclusive": not args.strict,
+        "sort": args.sort,
+        "precision": args.precision,
+        "kernel": args.kernel,
+    }
+    try:
+        with _progress_bar(args.progress and not args.json) as advance:
+            if advance is None:
+                found = hs.pairs(scene.points, cutoff, **options)
+            else:
+                search = _pairs._pairs_with_progress
+                found = search(scene.points, cutoff, progress=advance, **options)
+    except (ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise InputError(f"{scene.source}: {one_line(error)}") from None
+    return dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))
+
+
+@contextmanager
+def _progress_bar(wanted: bool) -> Iterator[Callable[[float], None] | None]:
+    """Yield a function to tell the work done, or None where no bar could be shown.
+
+    The bar appears on a terminal only, and only once the work has taken `BAR_AFTER` seconds.
+    """
+    if not (wanted and sys.stderr.isatty() and find_spec("rich")):
+        yield None
+        return
+    start = time.monotonic()
+    bar: Any = None
+    task: Any = None
+    drawn = start
+
+    def advance(fraction: float) -> None:
+        nonlocal bar, task, drawn
+        now = time.monotonic()
+        if now - start < BAR_AFTER or (bar is not None and now - drawn < 0.1):
+            return
+        if bar is None:
+            from rich.console import Console
+            from rich.progress import Progress
+
+            bar = Progress(console=Console(stderr=True), transient=True, auto_refresh=False)
+            task = bar.add_task("searching", total=1.0)
+            bar.start()
+        bar.update(task, completed=fraction, refresh=True)
+        drawn = now
+
+    try:
+        yield advance
+    finally:
+        if bar is not None:
+            bar.stop()
+
+
+# Output ------------------------------------------------------------------------------------
+
+
+def _open_output(
+    target: str | None, source: str | None, suffixes: tuple[str, ...], stack: ExitStack
+) -> IO[bytes] | None:
+    """Open the file that will replace `target`, before the search."""
+    if target is None:
+        return None
+    if not target.lower().endswith(suffixes):
+        raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
+    if source is not None and os.path.exists(target) and os.path.samefile(target, source):
+        raise InputError(f"{target}: is the input; it is not overwritten")
+    return stack.enter_context(replacing(target))
+
+
+def write_csv(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
+    """Write one line a pair; vectors take a column for each component: ``S0,S1,S2``.
+
+    Floats are written with the fewest digits that read back as the same number.
+    """
+    names: list[str] = []
+    series: list[NDArray[Any]] = []
+    for letter, column in columns.items():
+        if column.ndim == 1:
+            names.append(letter)
+            series.append(column)
+        else:
+            names += [f"{letter}{k}" for k in range(column.shape[1])]
+            series += list(column.T)
+    stream.write((",".join(names) + "\n").encode())
+    line = ",".join(["%r"] * len(names))
+    block = 1 << 16  # pairs turned into text at a time: some megabytes
+    for start in range(0, len(series[0]), block):
+        parts = [values[start : start + block].tolist() for values in series]
+        rows = zip(*parts, strict=True)
+        stream.writelines((line % row + "\n").encode() for row in rows)
+
+
+# The summary -------------------------------------------------------------------------------
+
+
+def _text(summary: Summary, scene: Scene, reason: str) -> str:
+    """Return the summary for a person: one aligned line an item."""
+    unit = unit_suffix(scene)
+    rule = "d <= cutoff" if summary.inclusive else "d < cutoff"
+    species = "  ".join(f"{name} {count:,}" for name, count in summary.species.items())
+    chosen = f"   (chosen: {reason}; --cutoff sets it)" if reason else ""
+    nearest = summary.nearest_distance
+    speed = summary.pairs / summary.seconds / 1e6 if summary.seconds else 0.0
+    lines = [
+        ("points", f"{summary.points:,}" + (f"   {species}" if species else "")),
+        ("box", describe_box(scene)),
+        ("cutoff", f"{summary.cutoff:.6g}{unit}{chosen}"),
+        ("pairs", f"{summary.pairs:,}   ({rule}, each pair once)"),
+        ("mean coordination", f"{summary.mean_coordination:.6g}"),
+        ("nearest distance", "no pair" if nearest is None else f"{nearest:.6g}{unit}"),
+        ("time", f"{_duration(summary.seconds)}   ({speed:.3g} million pairs a second)"),
+        ("kernel", f"{summary.kernel}, precision {summary.precision}"),
+    ]
+    if summary.output:
+        lines.append(("pairs written to", summary.output))
+    if summary.plot:
+        lines.append(("plot written to", summary.plot))
+    text = [summary.file, *(f"  {name:<18}{value}" for name, value in lines)]
+    return "\n".join(map(printable, text))
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.3g} s" if seconds >= 1 else f"{seconds * 1e3:.3g} ms"

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Other libraries that make lists of pairs, asked for the same scene."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._extras import how_to_install
+from halfshell._peers import LIBRARIES, Library, Question, wrapped
+
+__all__ = ["PEERS", "PairList", "Peer", "ask_peer", "find_peer"]
+
+
+@dataclass(frozen=True)
+class PairList:
+    """Somebody's list of pairs.
+
+    Attributes
+    ----------
+    i, j : ndarray of int64, shape (m,)
+    S : ndarray of int64, shape (m, d)
+    inclusive : bool
+        The rule of its author: ``d <= cutoff``, or ``d < cutoff``.
+    full : bool
+        Whether it has both directions of every pair.
+    """
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    S: NDArray[np.int64]
+    inclusive: bool
+    full: bool
+
+    def among(self, rows: NDArray[np.intp] | None, n: int) -> PairList:
+        """Return the pairs among some of n points, numbered by their place among these."""
+        if rows is None:
+            return self
+        place = np.full(n, -1, dtype=np.int64)
+        place[rows] = np.arange(len(rows))
+        i, j = place[self.i], place[self.j]
+        kept = (i >= 0) & (j >= 0)
+        return PairList(i[kept], j[kept], self.S[kept], self.inclusive, self.full)
+
+
+def _ask(library: Library, scene: Scene, cutoff: float) -> PairList:
+    """Return the list of a library that tells shifts."""
+    question = _question(scene, cutoff, "ijS")
+    if question.dim > 3:
+        raise InputError(f"{scene.source}: has {question.dim} coordinates; this library knows 3")
+    result = library.prepare(question)()
+    i, j = (np.asarray(part).astype(np.int64) for part in library.indices(result))
+    shifts = np.asarray(library.shifts(result), dtype=np.int64)[:, : question.dim]
+    return PairList(i, j, shifts, library.inclusive, library.full)
+
+
+def _ask_scipy(library: Library, scene: Scene, cutoff: float) -> PairList:
+    """Return its list, with the shifts of the nearest images, which are those it means."""
+    question = _question(scene, cutoff, "ij")
+    lengths = np.zeros(question.dim)  # 0: the axis does not repeat
+    if question.rows is not None:
+        if not question.orthorhombic or (np.diag(question.rows)[list(scene.periodic)] < 0).any():
+            raise InputError(f"{scene.source}: scipy has no boxes with other than right angles")
+        lengths = np.where(scene.periodic, np.diag(question.rows), 0.0)
+        if wrapped(question)[1]:
+            raise InputError(f"{scene.source}: scipy wants all points in the box [0, L)")
+    i, j = (part.astype(np.int64) for part in library.indices(library.prepare(question)()))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns = np.rint((question.points[i] - question.points[j]) / lengths)
+    shifts = np.where(lengths > 0, turns, 0.0)
+    return PairList(i, j, shifts.astype(np.int64), library.inclusive, library.full)
+
+
+def _question(scene: Scene, cutoff: float, quantities: str) -> Question:
+    points = np.asarray(scene.points, dtype=np.float64)
+    rows = scene.box_rows
+    return Question(points, cutoff, rows, tuple(scene.periodic) if rows is not None else (),
+                    quantities)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another library: what to import, what to install, how to ask it."""
+
+    modules: tuple[str, ...]
+    package: str
+    ask: Callable[[Scene, float], PairList]
+
+    def name_and_version(self) -> str:
+        """Return the name of the package with its version, if it has one."""
+        try:
+            return f"{self.package} {importlib.metadata.version(self.package)}"
+        except importlib.metadata.PackageNotFoundError:
+            return self.package
+
+
+def _peer(name: str, ask: Callable[[Library, Scene, float], PairList]) -> Peer:
+    library = LIBRARIES[name]
+    return Peer((library.module,), library.distribution, partial(ask, library))
+
+
+PEERS = {
+    "ase": _peer("ase", _ask),
+    "matscipy": _peer("matscipy", _ask),
+    "matscipy-neighbours": _peer("matscipy-neighbours", _ask),
+    "scipy": _peer("cKDTree", _ask_scipy),
+    "vesin": _peer("vesin", _ask),
+}
+
+
+def find_peer(name: str) -> Peer:
+    """Return a library by its name, or say how to install it."""
+    if name not in PEERS:
+        raise InputError(f"--against {name}: is not one of {', '.join(PEERS)}")
+    peer = PEERS[name]
+    try:
+        for module in peer.modules:
+            importlib.import_module(module)
+    except ImportError:
+        raise InputError(
+            f"--against {name}: is not installed: {how_to_install(peer.package)}"
+        ) from None
+    return peer
+
+
+def ask_peer(peer: Peer, scene: Scene, cutoff: float) -> PairList:
+    """Return the list of a library for a scene."""
+    try:
+        return peer.ask(scene, cutoff)
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # a library may refuse a scene in any way
+        raise InputError(
+            f"{scene.source}: {peer.package} gives no list: "
+            f"{type(error).__name__}: {one_line(error)}"
+        ) from None

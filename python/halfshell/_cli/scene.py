@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the command line works out from a scene itself: a cutoff, a description, g(r)."""
+
+from __future__ import annotations
+
+import math
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from halfshell._cli.files import InputError, Scene, missing_extra, read_scene
+from halfshell._convert.available import refuse_unavailable
+from halfshell._terminal import printable
+
+__all__ = [
+    "choose_cutoff",
+    "describe_box",
+    "load_scene",
+    "plot_distribution",
+    "radial_distribution",
+    "require_matplotlib",
+    "unit_suffix",
+]
+
+NEIGHBORS_WANTED = 50  # what a chosen cutoff aims at: two or three shells of a dense system
+_COPIES = 5  # of the points, while a cutoff is chosen
+BINS = 200  # of g(r): a percent of the cutoff is two bins
+
+
+def load_scene(args: Namespace) -> tuple[Scene, float, str]:
+    """Return the scene that the options name, the cutoff, and how it was chosen if it was."""
+    scene = read_scene(
+        args.file,
+        file_format=args.format,
+        index=args.index,
+        box=args.box,
+        periodic=args.periodic,
+    )
+    for remark in scene.remarks:
+        print(printable(f"halfshell: warning: {scene.source}: {remark}"), file=sys.stderr)
+    if args.cutoff is not None:
+        return scene, args.cutoff, ""
+    return scene, *choose_cutoff(scene)
+
+
+def choose_cutoff(scene: Scene) -> tuple[float, str]:
+    """Return a cutoff at which a point has about fifty neighbours, and how it was chosen.
+
+    The density is that of the box along periodic axes and of the points' extent along the
+    others, which is left out where it is zero (points in a plane or on a line). Of few points
+    in open space all are neighbours.
+
+    Raises
+    ------
+    InputError
+        If the scene has no length to choose by: a single point in open space, or points that
+        coincide.
+    """
+    n, ndim = scene.points.shape
+    refuse_unavailable(_COPIES * 8 * n * ndim, f"choosing a cutoff for {n:,} points")
+    points = np.asarray(scene.points, dtype=np.float64)
+    rows = scene.box_rows
+    repeating = rows[list(scene.periodic)] if rows is not None else np.empty((0, ndim))
+    n_repeating = len(repeating)
+    with np.errstate(all="ignore"):
+        basis, triangle = np.linalg.qr(repeating.T, mode="complete")
+        sides = [abs(float(triangle[k, k])) for k in range(n_repeating)]
+        sides += _extents(points @ basis[:, n_repeating:], max(sides, default=0.0))
+    k = len(sides)
+    if not n_repeating and n <= NEIGHBORS_WANTED + 1:
+        cutoff = 1.01 * math.hypot(*sides)  # more than any distance, once rounded
+        reason = "all points are neighbours"
+    else:
+        with np.errstate(all="ignore"):
+            logs = np.log(np.array([NEIGHBORS_WANTED, 1 / n, 1 / _ball(k), *sides]))
+            cutoff = float(np.exp(logs.sum() / max(k, 1)))
+        reason = f"about {NEIGHBORS_WANTED} neighbours at this density"
+    if not sides or not 0 < cutoff < math.inf:
+        raise InputError(f"{scene.source}: has no density to choose a cutoff by; give --cutoff")
+    return float(f"{cutoff:.3g}"), reason
+
+
+def _extents(points: NDArray[np.float64], longest: float) -> list[float]:
+    """Return the sides of a box round points, along the axes or the principal axes.
+
+    The box with fewer sides other than zero is taken, or else that of the smaller volume.
+    """
+    points = points - points.mean(axis=0)
+    size = np.abs(points).max(initial=0.0) or 1.0
+    unit = np.nan_to_num(points / size)  # so that squares neither overflow nor vanish
+    _, axes = np.linalg.eigh(unit.T @ unit)
+    boxes = []
+    for turned in (points, points @ axes):
+        sides = np.ptp(turned, axis=0).tolist()
+        floor = 1e-9 * max([longest, *sides])
+        boxes.append([side for side in sides if side > floor])
+    return min(boxes, key=lambda sides: (len(sides), math.prod(sides)))
+
+
+def _ball(ndim: int) -> float:
+    """Return the volume of a ball of radius 1."""
+    return float(math.pi ** (ndim / 2) / math.gamma(ndim / 2 + 1))
+
+
+def unit_suffix(scene: Scene) -> str:
+    """Return what follows a length on standard output: `` Å``, or nothing where unknown."""
+    if not scene.unit:
+        return ""
+    try:
+        "Å".encode(sys.stdout.encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return " A"
+    return " Å"
+
+
+def describe_box(scene: Scene) -> str:
+    """Return the edge lengths, the angles unless they are right, and what repeats."""
+    rows = scene.box_rows
+    if rows is None or not any(scene.periodic):
+        return "none (open in every direction)"
+    lengths = np.sqrt((rows * rows).sum(axis=1))
+    sizes = [
+        f"{length:.6g}" if flag else "open"
+        for length, flag in zip(lengths, scene.periodic, strict=True)
+    ]
+    text = f"{' x '.join(sizes)}{unit_suffix(scene)}"
+    pairs = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}.get(len(rows), ())
+    if all(scene.periodic) and pairs:
+        cosines = [rows[a] @ rows[b] / (lengths[a] * lengths[b]) for a, b in pairs]
+        angles = [math.degrees(math.acos(min(1.0, max(-1.0, c)))) for c in cosines]
+        if any(abs(angle - 90) > 1e-9 for angle in angles):
+            text += f", angles {' '.join(f'{angle:.6g}' for angle in angles)}"
+    flags = "".join("T" if flag else "F" for flag in scene.periodic)
+    return f"{text}, periodic {flags}"
+
+
+def require_matplotlib() -> None:
+    """Import what --plot needs, before any work is done for it."""
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError:
+        raise missing_extra("--plot", "matplotlib") from None
+
+
+def radial_distribution(
+    d: NDArray[np.float64], scene: Scene, cutoff: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
+    """Return the middle of each bin, g(r) or the raw distribution, and which of the two.
+
+    g(r) is the number of neighbours over that of an ideal gas of the same density. It needs a
+    volume: where an axis does not repeat there is none, and the number of neighbours of a
+    point per unit of distance is returned.
+    """
+    n, ndim = scene.points.shape
+    counts, edges = np.histogram(d, bins=BINS, range=(0.0, cutoff))
+    neighbors = 2.0 * counts / n
+    middle = (edges[1:] + edges[:-1]) / 2
+    rows = scene.box_rows
+    volume = abs(float(np.linalg.det(rows))) if rows is not None and all(scene.periodic) else 0.0
+    if not 0 < volume < math.inf:
+        return middle, neighbors / np.diff(edges), False
+    shells = _ball(ndim) * np.diff(edges**ndim)
+    return middle, neighbors / (shells * (n / volume)), True
+
+
+def plot_distribution(
+    stream: IO[bytes], file_format: str, d: NDArray[np.float64], scene: Scene, cutoff: float
+) -> None:
+    """Draw the distribution of distances."""
+    from matplotlib.figure import Figure
+
+    r, values, normalised = radial_distribution(d, scene, cutoff)
+    unit = " (Å)" if scene.unit else ""
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    axes.step(r, values, where="mid", linewidth=1.2)
+    axes.set_xlim(0, cutoff)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel(f"distance r{unit}")
+    if normalised:
+        axes.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
+        axes.set_ylabel("g(r)")
+    else:
+        axes.set_ylabel(f"neighbours of a point per unit of r{unit}\n(raw: no volume to divide by)")
+    title = f"{printable(Path(scene.source).name)}: {len(scene.points):,} points, {len(d):,} pairs"
+    axes.set_title(title, fontsize=10, parse_math=False)
+    figure.savefig(stream, format=file_format, dpi=150)

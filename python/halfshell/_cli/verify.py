@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``halfshell verify``: check a list of pairs, ours or another library's, exactly."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from collections import Counter
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import halfshell as hs
+from halfshell._check.reference import exact_square, reference_pairs
+from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.peers import PairList, ask_peer, find_peer
+from halfshell._cli.scene import load_scene, unit_suffix
+from halfshell._terminal import printable
+
+__all__ = ["Check", "check_by_integers", "check_by_search", "run", "sample_points"]
+
+BLOCKS = 4  # neighbourhoods that a sample is made of
+EXAMPLES = 5  # wrong pairs that are shown
+POINTS_BY_INTEGERS = 400  # some 80,000 pairs of points: a few seconds in Python
+SEARCH_ROWS = 2_000_000  # rows that are compared with the search: some seconds
+
+
+_Row = tuple[int, int, tuple[int, ...]]
+
+
+# Two checks --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Check:
+    """What one way of checking found; rows are (i, j, *S), numbered as in the file."""
+
+    by: str
+    points: int
+    missed: NDArray[np.int64]
+    spurious: NDArray[np.int64]
+    duplicate: NDArray[np.int64]
+
+    @property
+    def faults(self) -> dict[str, NDArray[np.int64]]:
+        """The three kinds of wrong rows by name."""
+        return {"missed": self.missed, "spurious": self.spurious, "duplicate": self.duplicate}
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is wrong."""
+        return not any(map(len, self.faults.values()))
+
+
+def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> Check:
+    """Compare with the exact search; what differs is confirmed in rational arithmetic."""
+    n = len(scene.points)
+    rows = sample_points(scene, max(1, n * SEARCH_ROWS // max(SEARCH_ROWS, len(pairs.i))))
+    part = pairs.among(rows, n)
+    points = scene.points if rows is None else scene.points[rows]
+    verdict = hs.verify(
+        points,
+        cutoff,
+        part.i,
+        part.j,
+        part.S,
+        box=scene.box,
+        periodic=scene.periodic if scene.box is not None else None,
+        inclusive=pairs.inclusive,
+        full=pairs.full,
+    )
+    found = (verdict.missed, verdict.spurious, verdict.duplicate)
+    return Check("search", len(points), *(_as_given(wrong, rows) for wrong in found))
+
+
+def check_by_integers(
+    pairs: PairList, scene: Scene, cutoff: float, limit: int | None = None
+) -> Check:
+    """Compare with Python integers, every point with every other, at most `limit` points.
+
+    Without a limit there are `POINTS_BY_INTEGERS`, or fewer where two points make many pairs
+    because the cutoff is larger than the box.
+    """
+    n, ndim = scene.points.shape
+    if limit is None:
+        images = len(pairs.i) / (1 if pairs.full else 0.5) / n**2
+        limit = max(BLOCKS, round(POINTS_BY_INTEGERS / max(1.0, images) ** 0.5))
+    rows = sample_points(scene, limit)
+    part = pairs.among(rows, n)
+    points = scene.points if rows is None else scene.points[rows]
+    periodic = scene.periodic if scene.box is not None else None
+    truth = reference_pairs(points, cutoff, scene.box, periodic, pairs.inclusive)
+    given = list(zip(part.i.tolist(), part.j.tolist(), map(tuple, part.S.tolist()), strict=True))
+    expected = Counter(truth)
+    if pairs.full:
+        expected.update(_reversed(row) for row in truth)
+        present = Counter(given)
+    else:  # a half list may have its pairs either way round
+        present = Counter(min(row, _reversed(row), key=_is_backward) for row in given)
+    surplus = present - expected
+    wrong = (
+        list((expected - present).elements()),
+        [row for row in surplus.elements() if row not in expected],
+        [row for row in surplus.elements() if row in expected],
+    )
+    tables = (
+        np.array([(i, j, *shift) for i, j, shift in kind], dtype=np.int64).reshape(-1, 2 + ndim)
+        for kind in wrong
+    )
+    return Check("integers", len(points), *(_as_given(table, rows) for table in tables))
+
+
+def _reversed(row: _Row) -> _Row:
+    i, j, shift = row
+    return j, i, tuple(-s for s in shift)
+
+
+def _is_backward(row: _Row) -> bool:
+    i, j, shift = row
+    return i > j or (i == j and shift < (0,) * len(shift))
+
+
+def sample_points(scene: Scene, limit: int) -> NDArray[np.intp] | None:
+    """Choose at most `limit` points, or None to check them all.
+
+    Whether two points are a pair depends on no third one. So the pairs among some points are
+    the whole list of a smaller scene, and it can be checked for missed pairs as well. To have
+    many pairs the sample is made of `BLOCKS` neighbourhoods, each round a random point.
+    The choice is the same in every run.
+    """
+    n, ndim = scene.points.shape
+    if limit == 0 or n <= limit:
+        return None
+    points = np.asarray(scene.points, dtype=np.float64)
+    rows = scene.box_rows
+    repeating = rows[list(scene.periodic)] if rows is not None else np.empty((0, ndim))
+    random = np.random.default_rng(0)
+    chosen: set[int] = set()
+    for center in random.choice(n, size=min(BLOCKS, limit), replace=False):
+        with np.errstate(all="ignore"):  # near enough to choose by, whatever overflows
+            between = points - points[center]
+            between -= np.rint(between @ np.linalg.pinv(repeating)) @ repeating
+            nearest = np.argpartition((between**2).sum(axis=1), limit // BLOCKS)
+        chosen.update(nearest[: max(1, limit // BLOCKS)].tolist())
+    return np.array(sorted(chosen), dtype=np.intp)
+
+
+def _as_given(found: NDArray[np.int64], rows: NDArray[np.intp] | None) -> NDArray[np.int64]:
+    """Number the points of rows (i, j, *S) as in the file again."""
+    if rows is None or not len(found):
+        return found
+    return np.concatenate([rows[found[:, :2]], found[:, 2:]], axis=1)
+
+
+# The command -------------------------------------------------------------------------------
+
+
+def run(args: Namespace) -> int:
+    """Carry out ``halfshell verify``: 0 when the list is right, 1 when it is not."""
+    if args.against and (args.strict or args.kernel):
+        raise InputError("--strict and --kernel are for our own list, not with --against")
+    peer = find_peer(args.against) if args.against else None
+    scene, cutoff, _ = load_scene(args)
+    checks = []
+    try:
+        if peer is None:
+            author = f"halfshell {hs.__version__}"
+            pairs = _own_list(scene, cutoff, args)
+        else:
+            author = peer.name_and_version()
+            pairs = ask_peer(peer, scene, cutoff)
+            checks.append(check_by_search(pairs, scene, cutoff))
+        checks.append(check_by_integers(pairs, scene, cutoff, args.sample))
+    except (ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise InputError(f"{scene.source}: {one_line(error)}") from None
+    if args.json:
+        print(_json(author, pairs, scene, cutoff, checks))
+    else:
+        print(_text(author, pairs, scene, cutoff, checks))
+    return 0 if all(check.ok for check in checks) else 1
+
+
+def _own_list(scene: Scene, cutoff: float, args: Namespace) -> PairList:
+    i, j, S = hs.pairs(
+        scene.points,
+        cutoff,
+        box=scene.box,
+        periodic=scene.periodic if scene.box is not None else None,
+        quantities="ijS",
+        inclusive=not args.strict,
+        kernel=args.kernel,
+    )
+    return PairList(i, j, S.astype(np.int64), inclusive=not args.strict, full=False)
+
+
+# The report --------------------------------------------------------------------------------
+
+
+def _json(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: list[Check]) -> str:
+    report: dict[str, Any] = {
+        "file": scene.source,
+        "list": author,
+        "points": len(scene.points),
+        "cutoff": cutoff,
+        "inclusive": pairs.inclusive,
+        "full": pairs.full,
+        "rows": len(pairs.i),
+        "ok": all(check.ok for check in checks),
+        "checks": [
+            {
+                "by": check.by,
+                "points": check.points,
+                **{name: len(found) for name, found in check.faults.items()},
+                "examples": {
+                    name: found[:EXAMPLES].tolist() for name, found in check.faults.items()
+                },
+            }
+            for check in checks
+        ],
+    }
+    return json.dumps(report, indent=2)
+
+
+def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: list[Check]) -> str:
+    rule = "d <= cutoff" if pairs.inclusive else "d < cutoff"
+    kind = "both directions of each pair" if pairs.full else "each pair once"
+    n = len(scene.points)
+    lines = [
+        ("list of", author),
+        ("cutoff", f"{cutoff:.6g}{unit_suffix(scene)}   ({rule})"),
+        ("rows", f"{len(pairs.i):,}   ({kind})"),
+    ]
+    for check in checks:
+        part = "all" if check.points == n else f"{check.points:,} of the"
+        counts = ", ".join(f"{len(found):,} {name}" for name, found in check.faults.items())
+        lines.append((f"by {check.by}", f"{counts}   (every pair among {part} {n:,} points)"))
+    lines.append(("verdict", "right" if all(check.ok for check in checks) else "WRONG"))
+    text = [scene.source, *(f"  {name:<18}{value}" for name, value in lines)]
+    wrong = next((check.faults for check in checks if not check.ok), {})
+    for name, found in wrong.items():
+        for i, j, *shift in found[:EXAMPLES].tolist():
+            excess = _excess(scene, cutoff, i, j, shift)
+            text.append(f"  {name}: i={i} j={j} S={shift}   distance - cutoff = {excess:+.3e}")
+        if len(found) > EXAMPLES:
+            text.append(f"  {name}: and {len(found) - EXAMPLES:,} more")
+    return "\n".join(map(printable, text))
+
+
+def _excess(scene: Scene, cutoff: float, i: int, j: int, shift: list[int]) -> Decimal:
+    """Return distance - cutoff of a pair, from exact arithmetic, never 0 unless it is 0."""
+    square = exact_square(scene.points, i, j, shift, scene.box)
+    above = square - Fraction(cutoff) ** 2
+    with localcontext() as context:
+        context.prec = 30
+        distance = (Decimal(square.numerator) / Decimal(square.denominator)).sqrt()
+        both = distance + Decimal(cutoff)
+        return Decimal(above.numerator) / Decimal(above.denominator) / both if both else both

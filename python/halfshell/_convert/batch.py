@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batches: what users pass for many systems, brought to the forms that the core takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._convert import inputs as _inputs
+from halfshell._convert.available import refuse_large
+from halfshell._convert.foreign import is_a
+
+# What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
+# shape; periodic bits.
+Scene = tuple[_inputs.PointArray, float, _inputs.FloatArray | None, int]
+
+# What each system has of its own: numbers, one a point; cutoffs and boxes, one a system.
+Systems = tuple[npt.NDArray[np.int64], _inputs.FloatArray | None, _inputs.FloatArray | None]
+
+
+def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
+    """System numbers as int64; whether they ascend is checked in the core."""
+    array = _inputs.as_array(values, "batch", "hold integers")
+    if array.shape != (n,):
+        raise ValueError(f"batch must have shape ({n},), one number a point, got {array.shape}")
+    if array.dtype.kind not in "iu" and n > 0:
+        raise TypeError(f"batch must hold integers, got dtype {array.dtype}")
+    if array.dtype == np.uint64:
+        for k in np.flatnonzero(array >= np.uint64(2**62)):
+            raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
+    return _inputs.in_order(array, np.int64)
+
+
+def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
+    if array.shape[1:] != (ndim, ndim):
+        raise ValueError(
+            f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one a system "
+            f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
+        )
+    refuse_large(8 * array.size, array, "box")
+    return _inputs.in_order(array, np.float64)
+
+
+def _scene(
+    points: Any, box: Any, periodic: Any
+) -> tuple[_inputs.PointArray, _inputs.FloatArray | None, int, _inputs.FloatArray | None]:
+    """As `scene` of one system, and boxes of each system."""
+    if box is not None:
+        array = _inputs.as_real_array(_inputs.vectors_of(box), "box")
+        if array.ndim == 3:
+            rows = np.eye(_inputs.MAX_DIM)
+            if not _inputs.brings_its_box(points):
+                points = _inputs.as_points(points)
+                rows = rows[: points.shape[1], : points.shape[1]]
+            # Any box will do for the axes that repeat; objects with a box of their own refuse it.
+            points, box, bits = _inputs.scene(points, rows, periodic)
+            return points, box, bits, _as_boxes(array, points.shape[1])
+        box = array
+        if array.ndim == 2 and array.shape[0] != array.shape[1]:
+            raise ValueError(
+                f"box must have shape (d,) or (d, d), or one a system (s, d, d), got {array.shape}"
+            )
+    points, box, bits = _inputs.scene(points, box, periodic)
+    return points, box, bits, None
+
+
+def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
+    """One cutoff, or one a system."""
+    if is_a(value, float):
+        return float.__float__(value), None
+    array = _inputs.as_real_array(value, "cutoff", "be a number")
+    if array.ndim == 0:
+        return float(array), None
+    if array.ndim != 1:
+        raise ValueError(
+            f"cutoff must be a number or, one a system, have shape (s,), got {array.shape}"
+        )
+    refuse_large(8 * array.size, array, "cutoff")
+    return 0.0, _inputs.in_order(array, np.float64)
+
+
+def of(
+    points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any
+) -> tuple[Scene, Systems]:
+    """Everything that makes up the systems, in the order of the core's arguments."""
+    array, vectors, bits, boxes = _scene(points, box, periodic)
+    numbers = as_numbers(batch, array.shape[0])
+    one, cutoffs = _as_cutoffs(cutoff)
+    if boxes is not None and cutoffs is not None and len(boxes) != len(cutoffs):
+        raise ValueError(
+            "box and cutoff must be given for the same number of systems, got "
+            f"{len(boxes)} and {len(cutoffs)}"
+        )
+    return (array, one, vectors, bits), (numbers, cutoffs, boxes)

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`count_pairs`: signature, defaults and documentation; the work is done in C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Unpack, cast, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import batch as _batch
+from halfshell._convert import inputs as _inputs
+from halfshell._convert.options import Precision, SearchOptions
+from halfshell._functions import between as _between
+from halfshell._functions.cutoffs import count_within
+from halfshell._objects.box import Box
+
+
+class _CountOptions(SearchOptions, total=False):
+    """The keywords of `count_pairs`, as far as its type does not depend on them."""
+
+    queries: Any
+    batch: None
+
+
+@overload
+def count_pairs(
+    points: Any,
+    cutoff: float | np.floating[Any] | np.integer[Any],
+    **options: Unpack[_CountOptions],
+) -> int: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
+) -> npt.NDArray[np.int64]: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Any, *, batch: npt.ArrayLike, **options: Unpack[SearchOptions]
+) -> npt.NDArray[np.int64]: ...
+@overload
+def count_pairs(
+    points: Any, cutoff: Any, **options: Unpack[_CountOptions]
+) -> int | npt.NDArray[np.int64]: ...
+def count_pairs(
+    points: Any,
+    cutoff: Any,
+    *,
+    queries: Any = None,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
+) -> int | npt.NDArray[np.int64]:
+    """Count the pairs of points within one or several cutoffs.
+
+    Parameters
+    ----------
+    points, box, periodic, inclusive, precision, kernel, threads
+        As in `pairs`.
+    cutoff : float or array_like of float, shape (k,)
+        One cutoff, or several in ascending order, for which there is one search up to the largest
+        (k searches where `precision` is not "exact"). With `batch`: one for all systems, or one
+        for each.
+    queries : array_like of float, shape (q, d), optional
+        Count pairs of a query and a point instead, as `pairs_between` finds them.
+    memory_limit : float, optional
+        Bytes that the search may take.
+    batch : array_like of int, shape (n,), optional
+        Count many systems in one call, as in `pairs`; not with `queries`.
+
+    Returns
+    -------
+    int or ndarray of int64, shape (k,)
+        The number of pairs of the half list, or of `queries` and `points`, for each cutoff; with
+        `batch`, for each system: those that `box` or `cutoff` is given for, or up to the largest
+        number in `batch`.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pairs` and `pairs_between`; ValueError also if several cutoffs are not ascending, or
+        for `queries` with `batch`. MemoryError only if the search itself would not fit: no pair
+        is stored.
+
+    See Also
+    --------
+    pairs : the pairs themselves.
+    pair_histogram : the number of pairs between one distance and the next, by type or weighted.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> hs.count_pairs(points, 1.5)
+    1
+    >>> hs.count_pairs(points, [0.5, 1.0, 2.0]).tolist()
+    [0, 1, 2]
+    >>> hs.count_pairs(points, 1.5, batch=[0, 0, 2]).tolist()
+    [1, 0, 0]
+    >>> hs.count_pairs(points, 1.5, queries=[[2.0, 0.0]])
+    2
+    """
+    if type(box) is Box:
+        box = box.vectors
+    if batch is None:
+        plain = (
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
+        )
+        result: Any = (
+            _core.plain_count(*plain)
+            if queries is None
+            else _core.plain_count_between(*plain, queries)
+        )
+        if result is not NotImplemented:
+            return cast(int, result)
+    rest = (
+        _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None, threads,
+    )
+    if queries is not None:
+        if batch is not None:
+            raise ValueError("batch and queries cannot be given together")
+        return _between.count_between(queries, points, cutoff, box, periodic, rest)
+    if batch is not None:
+        scene, own = _batch.of(points, cutoff, box, periodic, batch)
+        return _core.batch_count(*(*scene, *rest, *own))
+    array, vectors, bits = _inputs.scene(points, box, periodic)
+    cutoffs = _inputs.as_cutoffs(cutoff)
+    if isinstance(cutoffs, float):
+        return _core.count_pairs(array, cutoffs, vectors, bits, *rest)
+    return count_within(cutoffs, array, vectors, bits, rest)

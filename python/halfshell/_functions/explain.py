@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a search would do with a scene, what it leaves out, and, measured, what it did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import inputs as _inputs
+from halfshell._convert.options import Precision
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """How a scene is searched; ``print`` it, or read the fields.
+
+    Attributes
+    ----------
+    algorithm : {"all-pairs", "grid"}
+        Whether there is one cell or a grid of cells.
+    reason : str
+        Why.
+    n, ndim : int
+        Number of points and dimensions.
+    shape : tuple of int
+        Cells along each grid axis.
+    cell_sizes : tuple of float
+        Their extents, in the unit of the points.
+    images : tuple of int
+        How many periods a pair can be apart along each grid axis; 0 where none are needed.
+    expected_pairs : float
+        From the density; points that are not spread evenly have more.
+    expected_bytes : float
+        What these pairs take in the returned arrays.
+    kernel : str
+        The kernel that is used.
+    threads : int
+        How many threads share the search.
+    leaves_out : tuple of str
+        What this scene does not need and does not pay for.
+    measured : dict
+        With ``measure=True``, counts made by the search itself: ``bytes`` by purpose,
+        ``bytes_peak``, ``groups``, ``candidates``, ``pairs``, ``ambiguous``, ``by_float64``,
+        ``by_double_word``, ``by_integers``. Otherwise empty.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> plan = hs.explain([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5)
+    >>> plan.n, plan.ndim, plan.reason
+    (3, 2, 'testing every pair costs less than sorting into cells')
+    """
+
+    algorithm: str
+    reason: str
+    n: int
+    ndim: int
+    shape: tuple[int, ...]
+    cell_sizes: tuple[float, ...]
+    images: tuple[int, ...]
+    expected_pairs: float
+    expected_bytes: float
+    kernel: str
+    threads: int
+    leaves_out: tuple[str, ...]
+    measured: dict[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        cells = " x ".join(str(k) for k in self.shape)
+        sizes = " x ".join(f"{k:.4g}" for k in self.cell_sizes)
+        lines = [
+            f"{self.n} points in {self.ndim} dimension{'s' if self.ndim > 1 else ''}",
+            f"algorithm       {self.algorithm}: {self.reason}",
+            f"cells           {cells}, each {sizes}",
+            f"images          {self.images}",
+            f"expected        {self.expected_pairs:.4g} pairs, {self.expected_bytes:.4g} bytes",
+            f"kernel          {self.kernel}",
+            f"threads         {self.threads}",
+            *(f"leaves out      {what}" for what in self.leaves_out),
+        ]
+        for key, value in self.measured.items():
+            if isinstance(value, dict):
+                lines += [f"bytes for       {k}: {v}" for k, v in value.items() if v]
+            else:
+                lines.append(f"measured        {key}: {value}")
+        return "\n".join(lines)
+
+
+def explain(
+    points: Any,
+    cutoff: float,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    sort: bool = False,
+    index_dtype: npt.DTypeLike = np.int64,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    measure: bool = False,
+) -> Explanation:
+    """Say how `pairs` would search a scene, and what it leaves out.
+
+    Parameters
+    ----------
+    points, cutoff, box, periodic, quantities, inclusive, sort
+        As in `pairs`.
+    index_dtype, precision, kernel, threads, memory_limit
+        As in `pairs`.
+    measure : bool, default False
+        Run the search too, and report its own counters: bytes allocated by purpose, candidates
+        tested, and how many decisions each stage took.
+
+    Returns
+    -------
+    Explanation
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pairs`.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> plan = hs.explain([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5, measure=True)
+    >>> plan.algorithm, plan.shape, plan.measured["pairs"]
+    ('all-pairs', (1, 1), 1)
+    """
+    inclusive = _inputs.as_flag(inclusive, "inclusive")
+    sort = _inputs.as_flag(sort, "sort")
+    measure = _inputs.as_flag(measure, "measure")
+    array, vectors, bits = _inputs.scene(points, box, periodic)
+    index_bytes = _inputs.as_index_bytes(index_dtype)
+    plan = _core.explain(
+        array,
+        _inputs.as_cutoff(cutoff),
+        vectors,
+        bits,
+        inclusive,
+        precision,
+        kernel,
+        memory_limit,
+        None,
+        threads,
+        quantities,
+        sort,
+        index_bytes,
+        measure,
+    )
+    ndim = plan["ndim"]
+    return Explanation(
+        algorithm="all-pairs" if plan["all_pairs"] else "grid",
+        reason=_reason(plan),
+        n=len(array),
+        ndim=ndim,
+        shape=plan["shape"],
+        cell_sizes=plan["cell_sizes"],
+        images=plan["images"],
+        expected_pairs=plan["expected_pairs"],
+        expected_bytes=plan["expected_pairs"] * _bytes_per_pair(quantities, ndim, index_bytes),
+        kernel=plan["kernel"],
+        threads=plan["threads"],
+        leaves_out=_left_out(plan, quantities, sort),
+        measured={key: plan[key] for key in _MEASURED if key in plan},
+    )
+
+
+_MEASURED = (
+    "bytes",
+    "bytes_peak",
+    "groups",
+    "candidates",
+    "pairs",
+    "ambiguous",
+    "by_float64",
+    "by_double_word",
+    "by_integers",
+)
+
+
+def _reason(plan: dict[str, Any]) -> str:
+    if plan["all_pairs"]:
+        return "testing every pair costs less than sorting into cells"
+    n_rows = plan["stencil_rows"]
+    rows = "row" if n_rows == 1 else "rows"
+    return f"each point is compared with {n_rows} {rows} of cells (forward half)"
+
+
+def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
+    sizes = {
+        "i": index_bytes,
+        "j": index_bytes,
+        "P": 2 * index_bytes,
+        "d": 8,
+        "D": 8 * ndim,
+        "S": 4 * ndim,
+    }
+    return sum(sizes[letter] for letter in quantities)
+
+
+def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, ...]:
+    names = {"d": "distances", "D": "vectors", "S": "shifts"}
+    left = [f"{name}: not asked for" for letter, name in names.items() if letter not in quantities]
+    if plan["ndim"] < 3:
+        axes = "y and z" if plan["ndim"] == 1 else "z"
+        left.append(f"coordinates {axes}: the scene has {plan['ndim']} dimension(s)")
+    if plan["n_periodic"] == 0:
+        left.append("images and wrapping: open space")
+    elif not any(plan["images"]):
+        left.append("images: no neighbour is across a face")
+    if plan["n_periodic"] and plan["aligned"]:
+        left.append("box algebra: every periodic vector lies along a coordinate axis")
+    if not plan["keeps_originals"]:
+        left.append("a second copy of the points: the wrapped ones hold every digit")
+    if plan["threads"] == 1:
+        left.append("further threads: the scene is small, or one was asked for")
+    if plan["all_pairs"]:
+        left.append("cells and sorting into them")
+    if not sort:
+        left.append("sorting of pairs")
+    return tuple(left)

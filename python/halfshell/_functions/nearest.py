@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`nearest`: signature, defaults and documentation; the work is done in C."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, TypedDict, Unpack, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import inputs as _inputs
+from halfshell._functions.pairs import Arrays
+
+_MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
+
+
+class _NearestOptions(TypedDict, total=False):
+    """The keywords of `nearest`, without `quantities`, on which the type of the result depends."""
+
+    queries: Any
+    max_distance: float
+    box: Any
+    periodic: Any
+    index_dtype: npt.DTypeLike
+    kernel: str | None
+    threads: int | None
+    memory_limit: float | None
+
+
+@overload
+def nearest(
+    points: Any, k: int, *, quantities: Literal["jd"] = "jd", **options: Unpack[_NearestOptions]
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
+@overload
+def nearest(
+    points: Any,
+    k: int,
+    *,
+    quantities: Literal["j", "d", "D", "S"],
+    **options: Unpack[_NearestOptions],
+) -> npt.NDArray[Any]: ...
+@overload
+def nearest(
+    points: Any, k: int, *, quantities: str, **options: Unpack[_NearestOptions]
+) -> Arrays: ...
+def nearest(
+    points: Any,
+    k: int,
+    *,
+    queries: Any = None,
+    max_distance: float = np.inf,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "jd",
+    index_dtype: npt.DTypeLike = np.int64,
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+) -> Arrays:
+    """Find the k nearest points of each point or query, in order of their exact distances.
+
+    Parameters
+    ----------
+    points, box, periodic, index_dtype, kernel, threads
+        As in `pairs`.
+    k : int
+        How many; 1 or more. In a periodic box each image of a point counts for itself, so that k
+        may be larger than n.
+    queries : array_like of float, shape (q, d), optional
+        Who asks, in the unit of `points`; anywhere, also outside the box. Default: each point
+        asks, and is left out of its own row where S = 0; its own images are not. A query that is
+        equal to a point has it as a neighbour at distance 0.
+    max_distance : float, default infinity
+        Largest distance that counts, this one included; not negative.
+    quantities : str, default "jd"
+        Any of the letters ``j d D S``, each at most once: number of the point, distance, vector,
+        shift. What is not asked for is not computed.
+    memory_limit : float, optional
+        Bytes that search and result may take. Default: what the machine and its control group
+        have available.
+
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        One array per letter of `quantities`, in that order; a bare array for one letter. With q
+        rows, one for each query or point: ``j`` of `index_dtype`, shape (q, k); ``d`` float64
+        (q, k); ``D`` float64 (q, k, d); ``S`` int32 (q, k, d). In real arithmetic
+        ``D = points[j] - queries[i] + S @ box``.
+
+        Rows ascend by the exact distance of the real numbers that the inputs are; where that is
+        the same, by (j, S). Where fewer than k points are there, or within `max_distance`, the
+        rest of the row is j = -1, d = infinity, D = NaN and S = 0. d is within 1 ulp, ascends along
+        the row and is never above `max_distance`; each component of D is within 1 ulp of d.
+
+    Raises
+    ------
+    TypeError
+        If `k` is not an integer, or an argument of another wrong kind, as in `pairs`.
+    ValueError
+        If `k` is less than 1, `max_distance` is negative or NaN, `queries` are not of the dimension
+        of the points, or a letter is none of ``j d D S``; otherwise as `pairs`.
+    OverflowError
+        As `pairs`.
+    MemoryError
+        If the result would not fit `memory_limit`; or if a query is so far away from points that
+        repeat, well beyond 10**8 periods, that more of their images are about as near than memory
+        holds.
+
+    See Also
+    --------
+    pairs : all pairs within a cutoff.
+
+    Notes
+    -----
+    Points are sorted into cells that each hold a few of them, whatever their density. A group of
+    neighbouring queries looks at the cells within a radius guessed from the local density;
+    float32 with a proven error bound sorts out what is far, float64 puts the rest in order, and
+    what is too close to tell is compared in double-word arithmetic and at last in integers. A
+    query that found too few is searched again with a radius that surely suffices. So the time
+    follows n and k, also where points crowd in clusters.
+
+    If you come from SciPy: missing neighbours have j = -1 here, not n, and each point's own row
+    does not begin with the point itself.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> j, d = hs.nearest(points, 2)
+    >>> j.tolist(), d.tolist()
+    ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+
+    In a periodic box, and for queries:
+
+    >>> j, d, S = hs.nearest(points, 2, queries=[[3.5, 0.0]], box=[4.0, 4.0], quantities="jdS")
+    >>> j.tolist(), d.tolist(), S.tolist()
+    ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
+    """
+    asking = None
+    if queries is None:
+        array, vectors, bits = _inputs.scene(points, box, periodic)
+    else:
+        asking, array, vectors, bits = _inputs.two_sets(queries, points, box, periodic)
+    k = as_k(k)
+    result = _core.nearest(
+        array, as_max_distance(max_distance), vectors, bits, True, "exact", kernel, memory_limit,
+        None, threads, quantities, _inputs.as_index_bytes(index_dtype), asking, k,
+    )
+    return in_rows(result, len(array if asking is None else asking), k)
+
+
+def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:
+    """The arrays of the core, each with its entries as (rows, k)."""
+    if isinstance(arrays, tuple):
+        return tuple(column.reshape(n_rows, k, *column.shape[1:]) for column in arrays)
+    return arrays.reshape(n_rows, k, *arrays.shape[1:])
+
+
+def as_k(k: Any) -> int:
+    """How many are wanted: a whole number from 1 on."""
+    number = _inputs.as_count(k, "k")
+    if number > _MOST:
+        raise MemoryError(f"k = {k} is more than any memory holds")
+    return number
+
+
+def as_max_distance(value: Any) -> float:
+    """A number that is not negative; infinity is one."""
+    array = _inputs.as_real_array(value, "max_distance", "be a number")
+    if array.ndim != 0:
+        raise TypeError(f"max_distance must be a number, got shape {array.shape}")
+    if not array >= 0.0:
+        raise ValueError(f"max_distance must not be negative or NaN, got {float(array)}")
+    return float(array)

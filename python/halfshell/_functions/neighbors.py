@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`neighbors` and `coordination`: full lists; the work is done in C."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import inputs as _inputs
+from halfshell._convert.options import Precision
+from halfshell._objects.box import Box
+from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._objects.origin import Origin, shifts_of_search
+
+
+def neighbors(
+    points: Any,
+    cutoff: Any,
+    *,
+    queries: Any = None,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "j",
+    inclusive: bool = True,
+    index_dtype: npt.DTypeLike = np.int64,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+) -> NeighborTable:
+    """Find all neighbours of each point, or of each query, as a table of rows.
+
+    Parameters
+    ----------
+    points : array_like of float, shape (n, d)
+        Coordinates, as in `pairs`; an object such as ``ase.Atoms`` brings its own box.
+    cutoff : float
+        Largest distance of a neighbour, in the unit of `points`; finite, not negative.
+    queries : array_like of float, shape (q, d), optional
+        Who asks: the table then has a row for each query, as `pairs_between` finds them. Default:
+        the points themselves.
+    quantities : str, default "j"
+        Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
+        vectors, shifts. What is not asked for is not computed and the table does not have it.
+    box, periodic, inclusive, index_dtype, precision, kernel, threads, memory_limit
+        As in `pairs`.
+
+    Returns
+    -------
+    NeighborTable
+        Row i holds the neighbours j of point i, ascending by (j, S), with
+        ``D = points[j] - points[i] + S @ box`` in real arithmetic. This is the full list: with
+        (i, j, S) there is (j, i, -S), with the same d and the opposite D. Without `queries` a
+        point is no neighbour of itself, though its images within the cutoff are; with them
+        nothing is left out.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pairs`, which see; ValueError also if `queries` have another number of columns than
+        `points`, or a box that is not theirs.
+
+    See Also
+    --------
+    pairs : each pair once, found in less time.
+    coordination : the lengths of the rows alone.
+    pairs_between : two sets, as arrays of pairs.
+
+    Notes
+    -----
+    The scene is searched twice, once to count and once to write each row to its place, so that
+    nothing is held beside the result. The table is the same for any number of threads.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> table = hs.neighbors(points, 2.0, quantities="jd")
+    >>> table
+    NeighborTable(3 rows, 4 entries, quantities 'jd')
+    >>> j, d = table[1]
+    >>> j.tolist(), d.tolist()
+    ([0, 2], [1.0, 2.0])
+    >>> table.offsets.tolist(), table.indices.tolist()
+    ([0, 1, 3, 4], [1, 0, 2, 1])
+
+    Rows of queries:
+
+    >>> [row.tolist() for row in hs.neighbors(points, 1.5, queries=[[2.0, 0.0], [9.0, 9.0]])]
+    [[1, 2], []]
+    """
+    if type(box) is Box:
+        box = box.vectors
+    vectors, periods, asking = box, periodic, queries
+    arrays: Any = _core.plain_neighbors(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
+        quantities, index_dtype, queries,
+    )
+    if arrays is NotImplemented:
+        scene, points, asking = _scene(points, cutoff, queries, box, periodic)
+        vectors, periods = scene[2:]
+        arrays = _core.neighbors(
+            *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
+            threads, quantities, _inputs.as_index_bytes(index_dtype), asking,
+        )
+    origin = None
+    if "d" in quantities:
+        find_shifts = shifts_of_search(cutoff, inclusive, precision, threads)
+        origin = Origin(points, asking, vectors, periods, find_shifts)
+    return NeighborTable(arrays, quantities, len(points), queries is None, origin=origin)
+
+
+def coordination(
+    points: Any,
+    cutoff: Any,
+    *,
+    queries: Any = None,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+) -> npt.NDArray[np.int64]:
+    """Count the neighbours of each point, or of each query, without listing them.
+
+    Parameters
+    ----------
+    points, cutoff, queries, box, periodic, inclusive, precision, kernel, threads
+        As in `neighbors`.
+    memory_limit : float, optional
+        Bytes that the search may take.
+
+    Returns
+    -------
+    ndarray of int64, shape (n,) or (q,)
+        Length of each row of the full list; images count one by one. The sum is twice
+        `count_pairs`, or with `queries` just that.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `neighbors`; MemoryError only if the search itself would not fit.
+
+    See Also
+    --------
+    neighbors : the neighbours themselves.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> hs.coordination([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 2.0).tolist()
+    [1, 2, 1]
+    """
+    if type(box) is Box:
+        box = box.vectors
+    counts: Any = _core.plain_coordination(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
+        queries,
+    )
+    if counts is not NotImplemented:
+        return cast("npt.NDArray[np.int64]", counts)
+    scene, _, asking = _scene(points, cutoff, queries, box, periodic)
+    return _core.coordination(
+        *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
+        threads, asking,
+    )
+
+
+def _scene(
+    points: Any, cutoff: Any, queries: Any, box: Any, periodic: Any
+) -> tuple[
+    tuple[_inputs.PointArray, float, _inputs.FloatArray | None, int],
+    _inputs.PointArray,
+    _inputs.PointArray | None,
+]:
+    """The first arguments of the core, the points among them, and the queries or None."""
+    asking = None
+    if queries is None:
+        array, vectors, bits = _inputs.scene(points, box, periodic)
+    else:
+        asking, array, vectors, bits = _inputs.two_sets(queries, points, box, periodic)
+    return (array, _inputs.as_cutoff(cutoff), vectors, bits), array, asking

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`pairs`: signature, defaults and documentation; the work is done in C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, Unpack, cast, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import batch as _batch
+from halfshell._convert import inputs as _inputs
+from halfshell._convert.options import ArrayOptions, Precision
+from halfshell._objects.box import Box
+
+Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+Letter = Literal["i", "j", "d", "D", "S", "P"]
+
+
+class _PairOptions(ArrayOptions, total=False):
+    """The keywords of `pairs`, without `quantities`, on which the type of the result depends."""
+
+    batch: npt.ArrayLike | None
+
+
+@overload
+def pairs(
+    points: Any, cutoff: Any, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
+@overload
+def pairs(
+    points: Any, cutoff: Any, *, quantities: Letter, **options: Unpack[_PairOptions]
+) -> npt.NDArray[Any]: ...
+@overload
+def pairs(
+    points: Any, cutoff: Any, *, quantities: str, **options: Unpack[_PairOptions]
+) -> Arrays: ...
+def pairs(
+    points: Any,
+    cutoff: Any,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    sort: bool = False,
+    index_dtype: npt.DTypeLike = np.int64,
+    out: Any = None,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
+) -> Arrays:
+    """Find every pair of points within a cutoff, each once.
+
+    Parameters
+    ----------
+    points : array_like of float, shape (n, d)
+        Coordinates, any length unit, 1 <= d <= 8. float32 and float64 values are used as they
+        are; integers, booleans and float16 are converted exactly or refused. Points may lie
+        anywhere, also outside the box. ``[]`` counts as shape (0, 3). An object with
+        ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
+        periodicity.
+    cutoff : float
+        Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
+        larger than the box.
+    box : array_like of float, shape (d,) or (d, d), or Box, optional
+        Edge lengths, or edge vectors as rows, in the unit of `points`; finite. None: open
+        space. Rows of axes that are not periodic may be anything finite, such as zero.
+    periodic : bool or sequence of bool, shape (d,), optional
+        Which box vectors repeat. Default: all with a box, none without.
+    quantities : str, default "ij"
+        Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
+        both indices. What is not asked for is not computed.
+    inclusive : bool, default True
+        Whether a pair at exactly `cutoff` counts.
+    sort : bool, default False
+        Ascending (i, j, S). Otherwise the order is fixed by the scene but not specified.
+    index_dtype : numpy.int64 or numpy.int32, default numpy.int64
+        Type of i, j and P.
+    out : ndarray or tuple of ndarray, optional
+        Where to write: one array for each letter of `quantities`, of the type and, but for its
+        length, the shape of the result, C-contiguous, apart from each other and from all inputs.
+        They may be longer than the result; what lies beyond it keeps its values.
+    precision : {"exact", "double", "single"}, default "exact"
+        "exact" decides by the real numbers that the inputs are. The others decide by one rounded
+        comparison, as most libraries do, and exist to be compared with: "double" by a fixed
+        formula in float64; "single" in float32 relative to the centre of a group of neighbouring
+        points, so that its answer near the cutoff also depends on the other points and their
+        order.
+    kernel : str, optional
+        One of ``kernels()``; for tests and timing. All give identical arrays. Default: what the
+        environment variable HALFSHELL_KERNEL said when halfshell was imported, otherwise the best.
+    threads : int, optional
+        Threads to use, at most four for each core. Default: one for small scenes, else the number
+        in the environment variable ``OMP_NUM_THREADS``, or as many as there are cores that this
+        process may run on. The arrays are the same for any number. Threads end before the call
+        returns.
+    memory_limit : float, optional
+        Bytes that search and result may take. Default: what the machine and its control group
+        have available.
+    batch : array_like of int, shape (n,), optional
+        Many systems in one call: the system of each point, ascending from 0 or above; numbers may
+        be left out. Points pair within their system only, and the result is that of one call for
+        each system, in ascending order, with i and j numbering all points. `periodic` and all
+        else hold for every system, but `box` may have shape (s, d, d), one a system, and `cutoff`
+        shape (s,); then every number in `batch` is less than s. A `box` with two axes is one box
+        for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
+        systems out.
+
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        One array per letter of `quantities`, in that order; a bare array for one letter. With
+        `out`, views of its filled parts. With m
+        pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with ``i < j``, or ``i == j`` for a point
+        and its own image; ``d`` float64 (m,); ``D`` float64 (m, d); ``S`` int32 (m, d);
+        ``P`` of `index_dtype` (m, 2). In real arithmetic ``D = points[j] - points[i] + S @ box``.
+
+        Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is
+        positive. (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within
+        1 ulp and never on the wrong side of the cutoff; each component of D is within 1 ulp of d.
+
+    Raises
+    ------
+    TypeError
+        If an argument is of the wrong kind: strings, complex numbers, long double, objects that
+        cannot be converted to an array, flags that are not bools.
+    ValueError
+        If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
+        finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
+        linearly dependent or so skewed or different in length that float64 does not place points
+        along the short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
+        or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
+        without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
+        not ascending or has a negative number or one that there is no box or cutoff for.
+    CapacityError
+        If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
+        then.
+    OverflowError
+        If there are 2**31 points or more, a number is too large for float64, or a shift that was
+        asked for does not fit int32; also if a point lies more than 2**51 box vectors away in a
+        box that is not axis-aligned, or in any box when S is asked for; and if, with `precision`
+        "double", points lie so many boxes away that rounding errors pass the cutoff.
+    MemoryError
+        If the result would not fit `memory_limit`: as a rule decided from a sample before the
+        search, otherwise during the search.
+
+    See Also
+    --------
+    count_pairs : the number of pairs, without storing them.
+    iter_pairs : the same pairs in blocks, where all of them would not fit.
+    verify : check anybody's list of pairs.
+
+    Notes
+    -----
+    Points are sorted into cells, each cell's neighbourhood is gathered once, and pairs are tested
+    in float32 with a proven error bound; what is too near the cutoff to tell is decided in
+    float64, double-word arithmetic [1]_ and at last in integers, so that no pair is missed or
+    invented. Scenes of evenly spread points take time in proportion to n plus the number of
+    pairs, strongly clustered ones more. Memory does not depend on the volume.
+
+    If you come from ASE: its lists are full and strict, so ask for ``inclusive=False``, and note
+    that each pair is here once. If you come from SciPy: ``boxsize`` may be a scalar there, but
+    lengths have shape (d,) here.
+
+    References
+    ----------
+    .. [1] Shewchuk, J. R. (1997). Adaptive precision floating-point arithmetic and fast robust
+       geometric predicates. Discrete & Computational Geometry 18, 305-363.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5)
+    >>> i.tolist(), j.tolist()
+    ([0], [1])
+
+    In a periodic box the first and the last point are neighbours too:
+
+    >>> i, j, d, S = hs.pairs([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 1.5, box=[4.0, 4.0],
+    ...                       quantities="ijdS", sort=True)
+    >>> i.tolist(), j.tolist(), d.tolist(), S.tolist()
+    ([0, 0], [1, 2], [1.0, 1.0], [[0, 0], [-1, 0]])
+
+    Two systems in one call, which do not see each other:
+
+    >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
+    ...                 batch=[0, 0, 1, 1])
+    >>> i.tolist(), j.tolist()
+    ([0, 2], [1, 3])
+    """
+    if type(box) is Box:
+        box = box.vectors
+    if batch is None:
+        # A small search takes as long as a handful of Python operations: none are made where the
+        # arguments need no conversion.
+        result: Any = _core.plain_pairs(
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None,
+            threads, quantities, sort, index_dtype, out,
+        )
+        if result is not NotImplemented:
+            return cast(Arrays, result)
+    return _pairs_with_progress(
+        points,
+        cutoff,
+        progress=None,
+        box=box,
+        periodic=periodic,
+        quantities=quantities,
+        inclusive=inclusive,
+        sort=sort,
+        index_dtype=index_dtype,
+        out=out,
+        precision=precision,
+        kernel=kernel,
+        threads=threads,
+        memory_limit=memory_limit,
+        batch=batch,
+    )
+
+
+def _pairs_with_progress(
+    points: Any,
+    cutoff: Any,
+    *,
+    progress: Callable[[float], object] | None,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    sort: bool = False,
+    index_dtype: npt.DTypeLike = np.int64,
+    out: Any = None,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
+) -> Arrays:
+    """`pairs` of what must be converted, calling ``progress(fraction)`` now and then."""
+    own = None
+    _inputs.check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch)
+    if batch is None:
+        array, vectors, bits = _inputs.scene(points, box, periodic)
+        scene = array, _inputs.as_cutoff(cutoff), vectors, bits
+    else:
+        scene, own = _batch.of(points, cutoff, box, periodic, batch)
+    shared = (
+        *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress,
+        threads, quantities, _inputs.as_flag(sort, "sort"), _inputs.as_index_bytes(index_dtype),
+        out,
+    )
+    return _core.pairs(*shared) if own is None else _core.batch_pairs(*(*shared, *own))

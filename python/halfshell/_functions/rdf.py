@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`rdf`: the radial distribution function, a histogram over that of an ideal gas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import inputs as _inputs
+from halfshell._convert.available import refuse_unavailable
+from halfshell._convert.options import Search
+from halfshell._extras import needs
+from halfshell._functions import histogram as _histogram
+
+_COLUMNS = 10
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class RadialDistribution:
+    """What `rdf` returns.
+
+    Attributes
+    ----------
+    r : ndarray of float64, shape (bins,)
+        The middle of each bin, in the unit of the points.
+    g : ndarray of float64, shape (bins,) or (t, t, bins)
+        g(r): 1 on average where points ignore each other. 0 in each bin without pairs: so also
+        where there are no points, or none of a type, and the density to divide by is 0 as well.
+        Infinite where a bin has pairs, but its shell is so small a part of the box that float64
+        does not hold it.
+    counts : ndarray of int64, the shape of `g`
+        Pairs in each bin, as `pair_histogram` counts them.
+    edges : ndarray of float64, shape (bins + 1,)
+        Limits of the bins.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> result = hs.rdf([[0.0], [1.0], [2.0], [3.0]], 2.5, bins=5, box=[4.0])
+    >>> result.r.tolist(), result.counts.tolist(), result.g.tolist()
+    ([0.25, 0.75, 1.25, 1.75, 2.25], [0, 0, 4, 0, 4], [0.0, 0.0, 2.0, 0.0, 2.0])
+    """
+
+    r: npt.NDArray[np.float64]
+    g: npt.NDArray[np.float64]
+    counts: npt.NDArray[np.int64]
+    edges: npt.NDArray[np.float64]
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw g(r), with types one line for each pair of them.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw. Default: axes of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            What has been drawn on.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed: ``pip install matplotlib``.
+        """
+        if ax is None:
+            ax = _new_axes()
+        if self.g.ndim == 1:
+            ax.step(self.r, self.g, where="mid")
+        else:
+            twice = np.array_equal(self.g, self.g.swapaxes(0, 1))
+            for a, b in np.ndindex(self.g.shape[:2]):
+                if a <= b or not twice:
+                    ax.step(self.r, self.g[a, b], where="mid", label=f"{a}-{b}")
+            ax.legend(title="types")
+        ax.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
+        ax.set_xlim(float(self.edges[0]), float(self.edges[-1]))
+        ax.set_ylim(bottom=0.0)
+        ax.set_xlabel("distance r")
+        ax.set_ylabel("g(r)")
+        return ax
+
+
+def _new_axes() -> Axes:
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError(needs("plot", "matplotlib")) from error
+    return pyplot.subplots(layout="constrained")[1]
+
+
+def rdf(
+    points: Any,
+    r_max: float,
+    bins: int = 100,
+    *,
+    queries: Any = None,
+    types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
+    box: Any = None,
+    periodic: Any = None,
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+) -> RadialDistribution:
+    """Compute the radial distribution function g(r) of points in a periodic box.
+
+    Parameters
+    ----------
+    points, kernel, threads, memory_limit
+        As in `pair_histogram`.
+    r_max : float
+        The largest distance, in the unit of `points`; finite, greater than 0. It may pass half
+        the box, and the box: all images are counted.
+    bins : int, default 100
+        Bins of equal width from 0 to `r_max`.
+    queries : array_like of float, shape (q, d), optional
+        g(r) of the points around these instead. A query that lies on a point finds it at distance
+        0, in the first bin.
+    types : array_like of int, shape (n,), optional
+        The type of each point, from 0 on: g(r) for each pair of types.
+    query_types : array_like of int, shape (q,), optional
+        The types of the queries: given if both `types` and `queries` are. [a, b] is then g(r) of
+        points of type b around queries of type a.
+    box : array_like of float, shape (d,) or (d, d), or Box
+        As in `pairs`. It must repeat along every axis, for a density is needed.
+    periodic : bool or sequence of bool, shape (d,), optional
+        As in `pairs`; all True, which is the default.
+
+    Returns
+    -------
+    RadialDistribution
+        An object with ``r``, ``g``, ``counts``, ``edges`` and ``plot()``.
+
+        g is the mean number of neighbours in a shell over what the density of all points, n / V,
+        would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two different types it
+        is ``counts / (n_a * n_b / V * shell)``, for queries ``counts / (q * n / V * shell)``, with
+        types ``counts / (q_a * n_b / V * shell)``. Without counts it is 0, also where n_a or n_b
+        is 0. A shell is the length, area, volume, ... between
+        two spheres, in any number of dimensions.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `pair_histogram`; ValueError also if there is no box or an axis does not repeat, or if
+        `r_max` or `bins` is not positive.
+
+    See Also
+    --------
+    pair_histogram : counts only, in bins of any width, in any box and in none.
+
+    Notes
+    -----
+    n points at random have n (n - 1) / 2 pairs in their box, not n**2 / 2, so below half the box
+    their g is (n - 1) / n on average; with all images up to large r it tends to 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import halfshell as hs
+    >>> points = np.random.default_rng(0).random((2000, 3))
+    >>> result = hs.rdf(points, 0.4, bins=4, box=[1.0, 1.0, 1.0])
+    >>> result.r.tolist()
+    [0.05, 0.15000000000000002, 0.25, 0.35000000000000003]
+    >>> bool(abs(result.g - 1.0).max() < 0.05)
+    True
+    >>> int(result.counts.sum()) == hs.count_pairs(points, 0.4, box=[1.0, 1.0, 1.0])
+    True
+    """
+    edges = _edges(r_max, bins)
+    asking, array, vectors, bits = _histogram.as_sets(queries, points, box, periodic)
+    shares = _shares(vectors, bits, edges)
+    search: Search = (
+        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
+    )
+    marks = _histogram.as_marks(len(array), asking, types, query_types)
+    counts = _histogram.binned(search, edges, asking, marks)
+    g = np.zeros(counts.shape)
+    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+        expected = _partners(len(array), asking, marks) * shares
+        np.divide(counts, expected, out=g, where=counts > 0)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
+
+
+def _edges(r_max: Any, bins: Any) -> _inputs.FloatArray:
+    n_bins = _inputs.as_count(bins, "bins")
+    array = _inputs.as_real_array(r_max, "r_max", "be a number")
+    if array.ndim != 0:
+        raise TypeError(f"r_max must be a number, got shape {array.shape}")
+    if not (np.isfinite(array) and array > 0.0):
+        raise ValueError(f"r_max must be finite and greater than 0, got {float(array)}")
+    # Of float64: edges, what numpy needs to make them, r, g and the shells.
+    refuse_unavailable(_COLUMNS * 8 * n_bins, "r, g and counts for so many bins")
+    return np.linspace(0.0, float(array), n_bins + 1)
+
+
+def _shares(
+    vectors: _inputs.FloatArray | None, bits: int, edges: _inputs.FloatArray
+) -> _inputs.FloatArray:
+    """The part of the box that lies between two spheres, for each bin.
+
+    In a unit of about the size of the box, a power of two: volumes of boxes in other units may be
+    too large or too small for a float64.
+    """
+    if vectors is None or bits != (1 << len(vectors)) - 1:
+        raise ValueError(
+            "rdf needs a box that repeats along every axis, for the density of the points; "
+            "pair_histogram counts without one"
+        )
+    power = -int(np.frexp(np.abs(vectors).max())[1])
+    volume: float = _core.box_measure(np.ldexp(vectors, power), bits)[1]
+    ndim = len(vectors)
+    unit_ball = 2.0 if ndim % 2 else 1.0
+    for k in range(2 + ndim % 2, ndim + 1, 2):
+        unit_ball *= 2.0 * math.pi / k
+    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+        shells: _inputs.FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
+        return unit_ball * shells / volume
+
+
+def _partners(
+    n: int, queries: _inputs.PointArray | None, marks: _histogram.Marks
+) -> npt.NDArray[np.float64]:
+    """Pairs that each shell would share out, with types of each two of them; one axis more for
+    shells."""
+    if marks.types is None:
+        return np.array([0.5 * n * n if queries is None else float(len(queries)) * n])
+    of_points = np.bincount(marks.types, minlength=marks.n_types).astype(np.float64)
+    if marks.query_types is not None:
+        of_queries = np.bincount(marks.query_types, minlength=marks.n_types)
+        return np.outer(of_queries, of_points)[:, :, np.newaxis]
+    pairs: npt.NDArray[np.float64] = np.outer(of_points, of_points)
+    pairs[np.diag_indices(len(of_points))] *= 0.5
+    return pairs[:, :, np.newaxis]

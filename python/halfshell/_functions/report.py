@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`report`: signature and documentation; the work is done by `halfshell._report`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from halfshell._report.page.rows import ReportRow
+
+__all__ = ["report"]
+
+
+def report(
+    scenes: Sequence[str] | None = None,
+    *,
+    methods: Sequence[str] | None = None,
+    peers: Sequence[str] | None = (),
+    size: str = "quick",
+    patience: float | None = None,
+) -> list[ReportRow]:
+    """Measure error against run time: this library and others, on scenes that are hard.
+
+    The truth that every list is held against calls nothing of this library's compiled core:
+    SciPy's k-d tree over explicit images with a proven margin, and integers inside the margin.
+
+    Parameters
+    ----------
+    scenes : sequence of str, optional
+        Names from `halfshell.scenes.names`. Default: all.
+    methods : sequence of str, optional
+        Any of "exact", "double" and "single" (the precisions of `pairs`), "float32" (points
+        rounded to float32 first), "verlet" and "stale" (on scenes that move: a `VerletList`,
+        and lists that are rebuilt by the clock, too late on purpose). Default: all.
+    peers : sequence of str or None, default ()
+        Other libraries to run beside ours, each in a process of its own: any of "vesin",
+        "cKDTree", "neighborlist-rs", "matscipy-neighbours", "matscipy", "MDAnalysis", "freud",
+        "pymatgen", "ase". None: all. One that is not installed gets rows that say so.
+    size : {"quick", "full", "small"}, default "quick"
+        Size of the scenes, as in `halfshell.scenes.load`, and care in timing.
+    patience : float, optional
+        Seconds that another library may take for one scene. Default: 60, and in "quick" 3, and
+        4 for all scenes together, after which it is left out.
+
+    Returns
+    -------
+    list of ReportRow
+        One for each method on each scene, in this order. A row is a frozen dataclass: what
+        was asked (``scene``, ``method``, ...), ``status`` ("ok", or why there are no figures),
+        ``seconds``, ``missed``, ``spurious``, ``duplicate``, errors of d and D in units in the
+        last place (ulp) and relative, errors of Lennard-Jones energy and forces, energy drift.
+        Its docstring tells all fields; what was not measured is None.
+
+    Raises
+    ------
+    ValueError
+        If a name is not known, or `patience` is not positive.
+    ImportError
+        If SciPy is not installed.
+
+    See Also
+    --------
+    verify : check one list of your own.
+
+    Notes
+    -----
+    ``halfshell report`` is the same from the command line; it also writes the rows as CSV and
+    a page with figures.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> rows = hs.report(["near-ties"], methods=["exact", "single"], size="small")
+    >>> [(row.method, row.wrong > 0) for row in rows]
+    [('exact', False), ('single', True)]
+    """
+    from halfshell._report.measure.run import plan_of, run
+
+    return run(plan_of(scenes, methods, peers, size, patience))

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The methods of `CellList` that hand out pairs: all at once, in blocks, one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Unpack, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import callbacks as _callbacks
+from halfshell._convert import inputs as _inputs
+from halfshell._functions.pairs import Arrays
+from halfshell._functions.stream import PairBlocks, as_progress, most_pairs
+from halfshell._objects.cell_layout import Asking, CellLayout
+
+
+class CellPairs(CellLayout):
+    """Half lists of the points in cells."""
+
+    __slots__ = ()
+
+    def pairs(
+        self,
+        cutoff: Any = None,
+        *,
+        quantities: str = "ij",
+        sort: bool = False,
+        index_dtype: npt.DTypeLike = np.int64,
+        out: Any = None,
+        **options: Unpack[Asking],
+    ) -> Arrays:
+        """Find every pair of points within a cutoff, as `halfshell.pairs` does.
+
+        Parameters
+        ----------
+        cutoff : float, optional
+            Default: that of the list.
+        quantities, sort, index_dtype, out, inclusive, kernel, threads, memory_limit
+            As in `halfshell.pairs`.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            As `halfshell.pairs`.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> cells.pairs(1.0, quantities="P").tolist()
+        [[0, 1]]
+        """
+        return _core.pairs(
+            *self._arguments(cutoff, options), quantities, _inputs.as_flag(sort, "sort"),
+            _inputs.as_index_bytes(index_dtype), out,
+        )
+
+    def iter_pairs(
+        self,
+        cutoff: Any = None,
+        *,
+        max_pairs: int = 1 << 20,
+        quantities: str = "ij",
+        index_dtype: npt.DTypeLike = np.int64,
+        progress: Callable[[float], object] | None = None,
+        **options: Unpack[Asking],
+    ) -> PairBlocks[Any]:
+        """Iterate over the pairs in blocks of bounded size, as `halfshell.iter_pairs` does.
+
+        Parameters
+        ----------
+        cutoff : float, optional
+            Default: that of the list.
+        max_pairs, quantities, index_dtype, progress, inclusive, kernel, threads, memory_limit
+            As in `halfshell.iter_pairs`.
+
+        Returns
+        -------
+        iterator of ndarray or tuple of ndarray
+            Joined, the blocks are what `pairs` returns, in the same order. They come from the
+            cells of the list, which live as long as the iterator.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> sum(len(i) for i, j in cells.iter_pairs(max_pairs=1))
+        2
+        """
+        most = most_pairs(max_pairs)
+        blocks = _core.iter_pairs(
+            *self._arguments(cutoff, options, as_progress(progress)), quantities,
+            _inputs.as_index_bytes(index_dtype), most,
+        )
+        return cast("PairBlocks[Any]", blocks)
+
+    def for_each_pair(
+        self,
+        callback: Any,
+        cutoff: Any = None,
+        *,
+        user_data: Any = None,
+        thread_safe: bool = False,
+        **options: Unpack[Asking],
+    ) -> int:
+        """Call a function for each pair, as `halfshell.for_each_pair` does.
+
+        Parameters
+        ----------
+        callback, user_data, thread_safe
+            As in `halfshell.for_each_pair`.
+        cutoff : float, optional
+            Default: that of the list.
+        inclusive, kernel, threads, memory_limit
+            As in `halfshell.for_each_pair`.
+
+        Returns
+        -------
+        int
+            Pairs that it was called for.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> cells.for_each_pair(lambda i, j, S, D, d2: print(i, j, d2))
+        0 1 1.0
+        1 2 4.0
+        2
+        """
+        target = _callbacks.target_of(callback, user_data)
+        return _core.for_each_pair(
+            *self._arguments(cutoff, options), target.function, target.user,
+            _inputs.as_flag(thread_safe, "thread_safe"),
+        )

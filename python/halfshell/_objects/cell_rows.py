@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The methods of `CellList` that return rows: neighbours of points or queries, or the nearest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Unpack, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import inputs as _inputs
+from halfshell._functions.nearest import as_k, as_max_distance, in_rows
+from halfshell._functions.pairs import Arrays
+from halfshell._objects import radii as _radii
+from halfshell._objects.cell_layout import Asking, CellLayout, Running
+from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._objects.origin import Origin
+
+
+class CellRows(CellLayout):
+    """Full lists among the points in cells."""
+
+    __slots__ = ()
+
+    def neighbors(
+        self,
+        cutoff: Any = None,
+        *,
+        quantities: str = "j",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[Asking],
+    ) -> NeighborTable:
+        """All neighbours of each point, as `halfshell.neighbors` finds them.
+
+        Parameters
+        ----------
+        cutoff : float, optional
+            Default: that of the list.
+        quantities, index_dtype, inclusive, kernel, threads, memory_limit
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+            A row for each point, ascending by (j, S).
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> [row.tolist() for row in cells.neighbors()]
+        [[1], [0, 2], [1]]
+        """
+        return self._rows(None, cutoff, quantities, index_dtype, options)
+
+    def query(
+        self,
+        queries: Any,
+        radius: Any = None,
+        *,
+        quantities: str = "j",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[Asking],
+    ) -> NeighborTable:
+        """All points within a radius of each query.
+
+        Parameters
+        ----------
+        queries : array_like of float, shape (q, d)
+            Coordinates that ask; they may lie anywhere.
+        radius : float or array_like of float, shape (q,), optional
+            One for all queries, or one for each. Default: the cutoff of the list. Up to that the
+            kept cells answer; larger radii cost a search of their own.
+        quantities, index_dtype, inclusive, kernel, threads, memory_limit
+            As in `halfshell.neighbors`.
+
+        Returns
+        -------
+        NeighborTable
+            A row for each query, ascending by (j, S). A point at the place of a query is its
+            neighbour at distance 0.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0)
+        >>> [row.tolist() for row in cells.query([[0.5], [9.0]])]
+        [[0, 1], []]
+        >>> [row.tolist() for row in cells.query([[0.0], [0.0]], [0.5, 3.0])]
+        [[0], [0, 1, 2]]
+        """
+        asking = self._queries(queries)
+        radii = _radii.as_radii(radius, len(asking))
+        if radii is None or isinstance(radii, float):
+            return self._rows(asking, radii, quantities, index_dtype, options)
+
+        def search(part: _inputs.PointArray, one: float, letters: str) -> _radii.Arrays:
+            return self._arrays(part, one, letters, index_dtype, options)
+
+        inclusive = _inputs.as_flag(options.get("inclusive", True), "inclusive")
+        arrays = _radii.search_each(
+            search, asking, radii, quantities, inclusive, self._precision == "exact"
+        )
+        origin = self._origin_of(asking, quantities, lambda queries: _radii.search_each(
+            search, queries, radii, "S", inclusive, self._precision == "exact"
+        ))  # fmt: skip
+        return NeighborTable(arrays, quantities, self._n_points, False, origin=origin)
+
+    def nearest(
+        self,
+        k: int,
+        queries: Any = None,
+        *,
+        max_distance: float = np.inf,
+        quantities: str = "jd",
+        index_dtype: npt.DTypeLike = np.int64,
+        **options: Unpack[Running],
+    ) -> Arrays:
+        """Find the k nearest points of each point or query, as `halfshell.nearest` does.
+
+        The first call makes a tree of the points, which is kept; later calls, with any `k` and
+        any queries, spare that. The cutoff and the precision of the list play no part: the order is
+        always exact.
+
+        Parameters
+        ----------
+        k : int
+            How many; 1 or more.
+        queries : array_like of float, shape (q, d), optional
+            Who asks. Default: each point of the list, which is left out of its own row.
+        max_distance, quantities, index_dtype, kernel, threads, memory_limit
+            As in `halfshell.nearest`. The tree that is kept does not count for `memory_limit`
+            together with the rest, but must fit it by itself.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            As `halfshell.nearest`: rows of k entries, in exact order, ties by (j, S).
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 2.0, box=[8.0])
+        >>> j, d = cells.nearest(2)
+        >>> j.tolist(), d.tolist()
+        ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+        >>> cells.nearest(1, [[7.0]], quantities="jS")
+        (array([[0]]), array([[[1]]], dtype=int32))
+        """
+        if "inclusive" in options:
+            raise TypeError("unexpected keyword argument 'inclusive'")
+        asking = None if queries is None else self._queries(queries)
+        number = as_k(k)
+        arrays = _core.nearest(
+            *self._arguments(as_max_distance(max_distance), cast(Asking, options)), quantities,
+            _inputs.as_index_bytes(index_dtype), asking, number,
+        )
+        return in_rows(arrays, self._n_points if asking is None else len(asking), number)
+
+    def _arrays(
+        self,
+        asking: _inputs.PointArray | None,
+        cutoff: Any,
+        quantities: str,
+        index_dtype: npt.DTypeLike,
+        options: Asking,
+    ) -> tuple[npt.NDArray[Any], ...]:
+        """Offsets of the rows and an array for each quantity."""
+        return _core.neighbors(
+            *self._arguments(cutoff, options), quantities, _inputs.as_index_bytes(index_dtype),
+            asking,
+        )
+
+    def _rows(
+        self,
+        asking: _inputs.PointArray | None,
+        cutoff: Any,
+        quantities: str,
+        index_dtype: npt.DTypeLike,
+        options: Asking,
+    ) -> NeighborTable:
+        cutoff = None if cutoff is None else _inputs.as_cutoff(cutoff)
+        arrays = self._arrays(asking, cutoff, quantities, index_dtype, options)
+        origin = self._origin_of(asking, quantities, lambda queries: self._arrays(
+            queries, cutoff, "S", index_dtype, options
+        ))  # fmt: skip
+        return NeighborTable(arrays, quantities, self._n_points, asking is None, origin=origin)
+
+    def _origin_of(
+        self,
+        asking: _inputs.PointArray | None,
+        quantities: str,
+        search: Callable[[Any], _radii.Arrays],
+    ) -> Origin | None:
+        """What a table with distances keeps; `search` returns offsets and S for queries."""
+        if "d" not in quantities:
+            return None
+        return self._origin.asked_by(asking, lambda origin: search(origin.queries)[1])

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows of neighbours in compressed form: their arrays, and one row after the other."""
+
+from __future__ import annotations
+
+import itertools
+import operator
+from collections.abc import Iterator
+from typing import Any, Self, SupportsIndex, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._objects.exact_order import settle
+from halfshell._objects.origin import Origin
+
+Array = npt.NDArray[Any]
+Row = Array | tuple[Array, ...]
+
+
+class TableRows:
+    """What a `NeighborTable` holds, which has the documentation."""
+
+    __slots__ = (
+        "_arrays", "_entries", "_first_row", "_is_complete", "_is_in_order", "_is_of_one_set",
+        "_n_points", "_origin", "_quantities",
+    )
+
+    _arrays: tuple[Array, ...]  # offsets, then one for each quantity
+    _quantities: str
+    _n_points: int
+    _is_of_one_set: bool  # rows are those of the points themselves
+    _is_complete: bool  # no entry was left out
+    _is_in_order: bool  # each row ascends by (j, S)
+    _origin: Origin | None  # None: exact comparisons are not possible
+    _first_row: int  # number of row 0 among those that asked
+    _entries: slice | Array  # which of all entries of the search, if their shifts are not here
+
+    def __init__(
+        self,
+        arrays: tuple[Array, ...],
+        quantities: str,
+        n_points: int,
+        is_of_one_set: bool,
+        is_complete: bool = True,
+        is_in_order: bool = True,
+        origin: Origin | None = None,
+        first_row: int = 0,
+        entries: slice | Array = slice(None),
+    ) -> None:
+        self._arrays = arrays
+        self._quantities = quantities
+        self._n_points = n_points
+        self._is_of_one_set = is_of_one_set
+        self._is_complete = is_complete
+        self._is_in_order = is_in_order
+        self._origin = origin
+        self._first_row = first_row
+        self._entries = entries
+
+    # ---- what is there ---------------------------------------------------------------------
+
+    @property
+    def offsets(self) -> npt.NDArray[np.int64]:
+        """Where each row begins, and the end of the last one; int64 (n_rows + 1,)."""
+        return self._arrays[0]
+
+    @property
+    def counts(self) -> npt.NDArray[np.int64]:
+        """Length of each row; int64 (n_rows,)."""
+        return read_only(np.diff(self._arrays[0]))
+
+    @property
+    def indices(self) -> Array:
+        """The neighbour j of each entry; (m,)."""
+        return self._column("j")
+
+    @property
+    def distances(self) -> npt.NDArray[np.float64]:
+        """The distance of each entry; float64 (m,)."""
+        return self._column("d")
+
+    @property
+    def vectors(self) -> npt.NDArray[np.float64]:
+        """The vector D of each entry; float64 (m, d)."""
+        return self._column("D")
+
+    @property
+    def shifts(self) -> npt.NDArray[np.int32]:
+        """The shift S of each entry; int32 (m, d)."""
+        return self._column("S")
+
+    @property
+    def quantities(self) -> str:
+        """Letters of what the table holds."""
+        return self._quantities
+
+    @property
+    def n_rows(self) -> int:
+        """Points or queries that ask."""
+        return len(self._arrays[0]) - 1
+
+    @property
+    def n_points(self) -> int:
+        """Points that can be found."""
+        return self._n_points
+
+    @property
+    def n_entries(self) -> int:
+        """Neighbours in all rows."""
+        return int(self._arrays[0][-1] - self._arrays[0][0])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_rows, n_points)."""
+        return self.n_rows, self._n_points
+
+    def _column(self, letter: str) -> Array:
+        at = self._quantities.find(letter)
+        if at < 0:
+            name = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}[letter]
+            raise AttributeError(
+                f"this table has no {name}: ask for them by "
+                f"{'an' if letter == 'S' else 'a'} {letter!r} in quantities, got "
+                f"{self._quantities!r}"
+            )
+        return self._arrays[at + 1]
+
+    # ---- rows ------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self._arrays[0]) - 1
+
+    @overload
+    def __getitem__(self, row: SupportsIndex) -> Row: ...
+    @overload
+    def __getitem__(self, row: slice) -> Self: ...
+    def __getitem__(self, row: SupportsIndex | slice) -> Row | Self:
+        if isinstance(row, slice):
+            return self._rows(row)
+        try:
+            i = operator.index(row)
+        except TypeError:
+            raise TypeError(
+                f"a row is chosen by a whole number, rows by a slice, got {type(row).__name__}"
+            ) from None
+        n = len(self)
+        if not -n <= i < n:
+            raise IndexError(f"row {i} of a table of {n} rows")
+        first, end = self._arrays[0][i % n : i % n + 2]
+        if len(self._arrays) == 2:
+            return self._arrays[1][first:end]
+        return tuple(column[first:end] for column in self._arrays[1:])
+
+    def __iter__(self) -> Iterator[Row]:
+        ends = self._arrays[0].tolist()
+        for first, end in itertools.pairwise(ends):
+            if len(self._arrays) == 2:
+                yield self._arrays[1][first:end]
+            else:
+                yield tuple(column[first:end] for column in self._arrays[1:])
+
+    def _rows(self, rows: slice) -> Self:
+        first, end, step = rows.indices(len(self))
+        if step != 1:
+            raise ValueError(f"rows of a slice must follow each other, got a step of {step}")
+        offsets = self._arrays[0][first : max(first, end) + 1]
+        parts = tuple(column[offsets[0] : offsets[-1]] for column in self._arrays[1:])
+        return type(self)(
+            (read_only(offsets - offsets[0]), *parts), self._quantities, self._n_points, False,
+            self._is_complete, self._is_in_order, self._origin, self._first_row + first,
+            self._entries_between(int(offsets[0]), int(offsets[-1])),
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}({len(self)} rows, {self.n_entries} entries, "
+            f"quantities {self._quantities!r})"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = tuple(getattr(self, name) for name in (
+            "_arrays", "_quantities", "_n_points", "_is_of_one_set", "_is_complete",
+            "_is_in_order", "_origin", "_first_row", "_entries",
+        ))  # fmt: skip
+        return _restored, (type(self), *state)
+
+    def _with(self, offsets: Array, entries: Array, complete: bool, order: bool) -> Self:
+        """These entries, by mask or position, in rows that begin there."""
+        columns = (read_only(column[entries]) for column in self._arrays[1:])
+        return type(self)(
+            (read_only(offsets), *columns), self._quantities, self._n_points,
+            self._is_of_one_set, complete, order, self._origin, self._first_row,
+            self._entries_at(entries),
+        )
+
+    # ---- which entries of the search they are ----------------------------------------------
+
+    def _lacks_shifts(self) -> bool:
+        """Whether shifts are not here, and may be other than zero."""
+        return self._origin is not None and "S" not in self._quantities and self._origin.has_images
+
+    def _entries_between(self, first: int, end: int) -> slice | Array:
+        if isinstance(self._entries, slice):
+            before = self._entries.start or 0
+            return slice(before + first, before + end)
+        return self._entries[first:end]
+
+    def _entries_at(self, entries: Array) -> slice | Array:
+        if not self._lacks_shifts():
+            return self._entries
+        if isinstance(self._entries, slice):
+            before = self._entries.start or 0
+            return np.arange(before, before + self.n_entries)[entries]
+        return self._entries[entries]
+
+    def _settled(self, order: Array) -> Array:
+        """These entries, sorted by row and rounded distance, in exact order."""
+        indices, origin, shifts = self.indices, self._origin, None
+        if origin is None:
+            raise AttributeError(
+                "this table does not know its points: sort one that neighbors or CellList has made"
+            )
+        if origin.has_images:
+            shifts = origin.shifts()[self._entries] if self._lacks_shifts() else self.shifts
+        rows = np.repeat(np.arange(len(self)) + self._first_row, self.counts)
+        settle(
+            order, rows, indices, self.distances, shifts, origin.points, origin.asking,
+            origin.rows,
+        )
+        return order
+
+
+def read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
+
+
+def _restored(kind: type[TableRows], arrays: tuple[Array, ...], *rest: Any) -> TableRows:
+    """A table from its pickle: arrays that are unpickled or deep-copied can be written to."""
+    return kind(tuple(read_only(array) for array in arrays), *rest)

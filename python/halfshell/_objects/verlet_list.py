@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A pair list that is built with a skin and used for many steps."""
+
+from __future__ import annotations
+
+import math
+import threading
+from time import perf_counter
+from typing import Any, Literal, NoReturn, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import inputs as _inputs
+from halfshell._functions.pairs import Arrays, Letter
+from halfshell._objects.skin import AutoSkin
+
+
+class VerletList:
+    """A list of pairs that is kept over many steps, and exact in each.
+
+    The list is built with a larger cutoff, `cutoff` + `skin`. As long as no point can have come
+    near enough for a pair to be missing from it, a new step costs only a pass over the points and
+    a pass over the list, which decides each pair anew, for the points of that step.
+
+    Parameters
+    ----------
+    cutoff : float
+        Largest distance of a pair, in the unit of the points; finite, not negative.
+    skin : float or "auto", default "auto"
+        By how much the list reaches farther, in the same unit; finite, not negative. Two points
+        may move towards each other by that much before it is built again. 0: it is built again
+        unless nothing has moved. "auto" measures what building and using take and how fast points
+        move, and settles after a few changes; the pairs never depend on it.
+    box, periodic : optional
+        As in `pairs`; `update` may give others.
+    inclusive : bool, default True
+        Whether a pair at exactly `cutoff` counts.
+    threads, kernel, memory_limit : optional
+        As in `pairs`.
+
+    Raises
+    ------
+    TypeError
+        If an argument is of the wrong kind.
+    ValueError
+        If `cutoff` or `skin` is negative or not finite.
+
+    See Also
+    --------
+    pairs : the same pairs for one set of points.
+
+    Notes
+    -----
+    Points may be wrapped into the box or not, at any time; the box may change in every step. The
+    points are copied: what happens to the array afterwards does not matter. If another list is
+    needed (other points, another number or type of them, a box that deformed too much), it is
+    built; that is no error.
+
+    A search is so fast that a list saves less than elsewhere: nothing for the indices of many
+    neighbours in three dimensions, something where there are few, or more dimensions, or d and D
+    are wanted. ``docs/verlet.md`` has measurements.
+
+    Several threads may use one list, one at a time: the others wait. It cannot be copied or
+    pickled.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import halfshell as hs
+    >>> rng = np.random.default_rng(0)
+    >>> points = rng.random((1000, 3)) * 10.0
+    >>> pair_list = hs.VerletList(2.0, skin=0.5, box=[10.0] * 3)
+    >>> for step in range(5):
+    ...     rebuilt = pair_list.update(points)
+    ...     i, j, d = pair_list.pairs("ijd")
+    ...     assert len(i) == hs.count_pairs(points, 2.0, box=[10.0] * 3)
+    ...     points += rng.uniform(-0.02, 0.02, points.shape)
+    >>> pair_list.n_updates, pair_list.n_builds
+    (5, 1)
+    """
+
+    def __init__(
+        self,
+        cutoff: float,
+        skin: float | Literal["auto"] = "auto",
+        *,
+        box: Any = None,
+        periodic: Any = None,
+        inclusive: bool = True,
+        threads: int | None = None,
+        kernel: str | None = None,
+        memory_limit: float | None = None,
+    ) -> None:
+        self._cutoff = _as_length(_inputs.as_cutoff(cutoff), "cutoff")
+        self._auto = AutoSkin(self._cutoff) if isinstance(skin, str) and skin == "auto" else None
+        self._skin = self._auto.skin if self._auto is not None else _as_skin(skin)
+        self._box = box
+        self._periodic = periodic
+        self._inclusive = _inputs.as_flag(inclusive, "inclusive")
+        self._threads = threads
+        self._kernel = kernel
+        self._memory_limit = memory_limit
+        self._list = _core.verlet_new()
+        self._lock = threading.RLock()
+        self._is_busy = False
+        self._n_builds = 0
+        self._n_updates = 0
+
+    def update(self, points: Any, box: Any = None, periodic: Any = None) -> bool:
+        """Take the points of the next step.
+
+        Parameters
+        ----------
+        points : array_like of float, shape (n, d)
+            As in `pairs`. They are copied.
+        box, periodic : optional
+            The box of this step, as in `pairs`. Default: those given last, to the list or here.
+
+        Returns
+        -------
+        bool
+            Whether the list was built again.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError, MemoryError
+            As `pairs` with S; OverflowError also where the S of a listed pair does not fit int32.
+            The list is then as it was before, with the points of the step before.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> pair_list = hs.VerletList(1.0, skin=0.2)
+        >>> pair_list.update([[0.0, 0.0], [1.1, 0.0]])
+        True
+        >>> pair_list.update([[0.0, 0.0], [0.95, 0.0]])
+        False
+        >>> pair_list.pairs("d").tolist()
+        [0.95]
+        """
+        with _Alone(self):
+            return self._update(points, box, periodic)
+
+    def _update(self, points: Any, box: Any, periodic: Any) -> bool:
+        box = self._box if box is None else box
+        periodic = self._periodic if periodic is None else periodic
+        array, vectors, bits = _inputs.scene(points, box, periodic)
+        auto = self._auto
+        change = auto is not None and auto.wants_change(array.shape[1])
+        skin = auto.next_skin() if auto is not None else self._skin
+        start = perf_counter()
+        rebuilt = _core.verlet_update(
+            self._list,
+            array,
+            self._cutoff,
+            vectors,
+            bits,
+            self._inclusive,
+            "exact",
+            self._kernel,
+            self._memory_limit,
+            None,
+            self._threads,
+            skin,
+            change,
+        )
+        taken = perf_counter() - start
+        self._box, self._periodic = box, periodic
+        self._n_updates += 1
+        self._n_builds += rebuilt
+        if rebuilt:
+            self._skin = skin
+        if auto is not None:
+            auto.updated(rebuilt, taken, self._state()["tried"], array.shape[1])
+        return rebuilt
+
+    @overload
+    def pairs(
+        self,
+        quantities: Literal["ij"] = "ij",
+        *,
+        sort: bool = False,
+        index_dtype: npt.DTypeLike = np.int64,
+        out: Any = None,
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
+    @overload
+    def pairs(
+        self,
+        quantities: Letter,
+        *,
+        sort: bool = False,
+        index_dtype: npt.DTypeLike = np.int64,
+        out: Any = None,
+    ) -> npt.NDArray[Any]: ...
+    @overload
+    def pairs(
+        self,
+        quantities: str,
+        *,
+        sort: bool = False,
+        index_dtype: npt.DTypeLike = np.int64,
+        out: Any = None,
+    ) -> Arrays: ...
+    def pairs(
+        self,
+        quantities: str = "ij",
+        *,
+        sort: bool = False,
+        index_dtype: npt.DTypeLike = np.int64,
+        out: Any = None,
+    ) -> Arrays:
+        """The pairs of the last step: what `halfshell.pairs` finds for its points.
+
+        Parameters
+        ----------
+        quantities, sort, index_dtype, out
+            As in `halfshell.pairs`.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            As `halfshell.pairs`: the same pairs, and the same bits of d, D and S. Their order is
+            that of the list: first those whose points were in one image when the list was built,
+            then the others, each as found then. It stays the same until the list is built again,
+            but for the pairs that come and go, and is the same for any kernel and number of
+            threads. With `sort` it is ascending (i, j, S).
+
+        Raises
+        ------
+        RuntimeError
+            Before the first `update`.
+        TypeError, ValueError, CapacityError, OverflowError, MemoryError
+            As `halfshell.pairs`.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> pair_list = hs.VerletList(1.5, box=[4.0, 4.0])
+        >>> pair_list.update([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])
+        True
+        >>> i, j, S = pair_list.pairs("ijS", sort=True)
+        >>> i.tolist(), j.tolist(), S.tolist()
+        ([0, 0], [1, 2], [[0, 0], [-1, 0]])
+        """
+        with _Alone(self):
+            state = self._state()
+            start = perf_counter()
+            arrays = _core.verlet_pairs(
+                self._list,
+                np.empty((0, state["ndim"])),
+                self._cutoff,
+                None,
+                0,
+                self._inclusive,
+                "exact",
+                self._kernel,
+                self._memory_limit,
+                None,
+                self._threads,
+                quantities,
+                _inputs.as_flag(sort, "sort"),
+                _inputs.as_index_bytes(index_dtype),
+                out,
+            )
+            if self._auto is not None:
+                self._auto.used(perf_counter() - start)
+            return arrays
+
+    @property
+    def cutoff(self) -> float:
+        """Largest distance of a pair."""
+        return self._cutoff
+
+    @property
+    def skin(self) -> float:
+        """By how much the list reaches beyond the cutoff: as given, or chosen last."""
+        return self._skin
+
+    @property
+    def margin(self) -> float:
+        """By how much pairs may still come closer before the list is built again, rounded down.
+
+        In the unit of the points; never negative. RuntimeError before the first `update`.
+        """
+        return float(self._state()["margin"])
+
+    @property
+    def n_points(self) -> int:
+        """Number of points of the last step; 0 before the first."""
+        return int(_core.verlet_look(self._list)["n_points"])
+
+    @property
+    def n_builds(self) -> int:
+        """How many times the list was built."""
+        return self._n_builds
+
+    @property
+    def n_updates(self) -> int:
+        """How many steps were taken."""
+        return self._n_updates
+
+    def _state(self) -> dict[str, Any]:
+        state = _core.verlet_look(self._list)
+        if not state["has_list"]:
+            raise RuntimeError("there are no points yet: call update first")
+        return state
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a VerletList cannot be copied or pickled: make a new one")
+
+    def __repr__(self) -> str:
+        return (
+            f"VerletList({self._cutoff!r}, skin={self._skin!r}): {self.n_points} points, "
+            f"{self._n_builds} builds in {self._n_updates} updates"
+        )
+
+
+class _Alone:
+    """One call at a time: other threads wait, a call from within a call is an error."""
+
+    def __init__(self, owner: VerletList) -> None:
+        self._owner = owner
+
+    def __enter__(self) -> None:
+        owner = self._owner
+        owner._lock.acquire()
+        if owner._is_busy:  # a signal handler, called while the core asks for signals
+            owner._lock.release()
+            raise RuntimeError("this VerletList is in the middle of another call")
+        owner._is_busy = True
+
+    def __exit__(self, *ignored: object) -> None:
+        self._owner._is_busy = False
+        self._owner._lock.release()
+
+
+def _as_length(value: float, name: str) -> float:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(f"{name} must be finite and not negative, got {value!r}")
+    return value
+
+
+def _as_skin(value: Any) -> float:
+    """A plain number, or "auto", which is no number and is settled before."""
+    if isinstance(value, str):
+        raise ValueError(f'skin must be a number or "auto", got {value!r}')
+    array = _inputs.as_real_array(value, "skin", 'be a number or "auto"')
+    if array.ndim != 0:
+        raise TypeError(f'skin must be a number or "auto", got shape {array.shape}')
+    return _as_length(float(array), "skin")

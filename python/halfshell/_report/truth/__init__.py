@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The true pairs, by integers, and the errors of a list against them."""
