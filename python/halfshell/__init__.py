@@ -4,13 +4,12 @@
 import importlib
 from typing import TYPE_CHECKING
 
-from halfshell._convert.cache import clear_cache, set_cache_limit
+from halfshell._convert.memory import clear_cache, set_cache_limit
 from halfshell._convert.options import kernels
 from halfshell._errors import CapacityError
-from halfshell._functions.between import pairs_between
 from halfshell._functions.counts import count_pairs
 from halfshell._functions.neighbors import coordination, neighbors
-from halfshell._functions.pairs import pairs
+from halfshell._functions.pairs import pairs, pairs_between
 from halfshell._objects.box import Box
 from halfshell._objects.graph import Graph
 from halfshell._objects.neighbor_table import NeighborTable
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
     from halfshell._functions.nearest import nearest
     from halfshell._functions.rdf import RadialDistribution, rdf
     from halfshell._functions.report import report
-    from halfshell._functions.stream import iter_pairs
-    from halfshell._functions.visit import for_each_pair
+    from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._include import get_include
     from halfshell._objects.cell_list import CellList
     from halfshell._objects.verlet_list import VerletList
@@ -67,7 +65,7 @@ _LATER = {
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
     "explain": "_functions.explain",
-    "for_each_pair": "_functions.visit",
+    "for_each_pair": "_functions.stream",
     "get_include": "_include",
     "iter_pairs": "_functions.stream",
     "nearest": "_functions.nearest",

@@ -15,12 +15,12 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli, selftest
-from halfshell._cli import pairs as _cli_pairs
-from halfshell._cli import peers as _cli_peers
-from halfshell._cli import scene as _cli_scene
-from halfshell._cli import verify as _cli_verify
+from halfshell._cli import pairs as cli_pairs
+from halfshell._cli import peers as cli_peers
+from halfshell._cli import scene as cli_scene
+from halfshell._cli import verify as cli_verify
 from halfshell._cli.files import InputError, Scene, read_scene, replacing
-from halfshell._functions import pairs as _pairs
+from halfshell._functions import pairs as pair_search
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
@@ -234,7 +234,7 @@ def test_box_is_described_by_lengths_angles_and_what_repeats():
         (np.ones(5), (True,) * 5, "1 x 1 x 1 x 1 x 1, periodic TTTTT"),
     ]:
         scene = Scene(np.ones((1, len(periodic))), box, periodic, "")
-        assert _cli_scene.describe_box(scene) == text
+        assert cli_scene.describe_box(scene) == text
 
 
 def test_cutoff_is_chosen_in_any_scene(command, tmp_path):
@@ -302,7 +302,7 @@ def test_csv_output_reads_back_to_the_same_numbers(summary, npz, tmp_path):
 def test_csv_is_written_in_blocks_without_loss():
     columns = {"i": np.arange(150_000), "D": np.arange(300_000.0).reshape(-1, 2) / 3}
     stream = io.BytesIO()
-    _cli_pairs.write_csv(stream, columns)
+    cli_pairs.write_csv(stream, columns)
     lines = stream.getvalue().decode().splitlines()
     assert lines[0] == "i,D0,D1"
     assert len(lines) == 150_001
@@ -332,7 +332,7 @@ def test_plot_makes_a_picture(command, npz, npy, tmp_path, name):
 def test_radial_distribution_of_an_ideal_gas_is_one():
     points = np.random.default_rng(2).random((3000, 3))
     d = hs.pairs(points, 0.3, box=np.ones(3), quantities="d")
-    r, g, normalised = _cli_scene.radial_distribution(
+    r, g, normalised = cli_scene.radial_distribution(
         d, Scene(points, np.ones(3), (True,) * 3, ""), 0.3
     )
     assert normalised
@@ -340,7 +340,7 @@ def test_radial_distribution_of_an_ideal_gas_is_one():
     assert abs(g[100:].mean() - 1) < 0.01
     # Where an axis is open there is no volume: the neighbours of a point per unit of distance.
     scene = Scene(points, np.ones(3), (True, True, False), "")
-    _, raw, normalised = _cli_scene.radial_distribution(d, scene, 0.3)
+    _, raw, normalised = cli_scene.radial_distribution(d, scene, 0.3)
     assert not normalised
     assert raw.sum() * (0.3 / 200) == pytest.approx(2 * len(d) / 3000)
 
@@ -612,10 +612,10 @@ def test_wrong_rows_are_found_both_ways(monkeypatch, command, npz):
         wrong_i = np.r_[i[1:], i[5], 3]  # the first missed, one twice, one invented
         wrong_j = np.r_[j[1:], j[5], 3]
         shifts = np.r_[S[1:], S[5:6], [[9, 9, 9]]]
-        return _cli_peers.PairList(wrong_i, wrong_j, shifts, inclusive=True, full=False)
+        return cli_peers.PairList(wrong_i, wrong_j, shifts, inclusive=True, full=False)
 
-    peer = _cli_peers.Peer((), "oracle", ask)
-    monkeypatch.setitem(_cli_peers.PEERS, "oracle", peer)
+    peer = cli_peers.Peer((), "oracle", ask)
+    monkeypatch.setitem(cli_peers.PEERS, "oracle", peer)
     status, out, _ = command("verify", npz, "--cutoff", "3", "--against", "oracle", "--json")
     assert status == 1
     for check in json.loads(out)["checks"]:
@@ -632,7 +632,7 @@ def test_a_peer_that_fails_is_an_error_in_one_line(monkeypatch, refusal, npz):
     def ask(_scene, _cutoff):
         raise RuntimeError("no\nlist")
 
-    monkeypatch.setitem(_cli_peers.PEERS, "oracle", _cli_peers.Peer((), "oracle", ask))
+    monkeypatch.setitem(cli_peers.PEERS, "oracle", cli_peers.Peer((), "oracle", ask))
     line = refusal("verify", npz, "--against", "oracle")
     assert "oracle gives no list: RuntimeError: no list" in line
 
@@ -655,19 +655,19 @@ def test_sample_is_smaller_where_a_point_has_many_images(command, tmp_path):
 
 def test_sample_is_points_near_one_another(npz):
     scene = read_scene(str(npz))
-    rows = _cli_verify.sample_points(scene, 24)
+    rows = cli_verify.sample_points(scene, 24)
     assert 6 <= len(rows) <= 24
     assert len(set(rows.tolist())) == len(rows)
     inside = hs.count_pairs(POINTS[rows], 3.0, box=BOX) / len(rows)
     anywhere = hs.count_pairs(POINTS[: len(rows)], 3.0, box=BOX) / len(rows)
     assert inside > anywhere
-    assert len(_cli_verify.sample_points(scene, 1)) == 1
-    assert _cli_verify.sample_points(scene, 60) is None
+    assert len(cli_verify.sample_points(scene, 1)) == 1
+    assert cli_verify.sample_points(scene, 60) is None
 
 
 def test_sample_of_a_long_list_is_compared_with_the_search(monkeypatch, command, npz):
     pytest.importorskip("ase")
-    monkeypatch.setattr(_cli_verify, "SEARCH_ROWS", 500)
+    monkeypatch.setattr(cli_verify, "SEARCH_ROWS", 500)
     status, out, _ = command("verify", npz, "--cutoff", "3", "--against", "ase", "--json")
     assert status == 0
     assert json.loads(out)["checks"][0]["points"] < 60
@@ -795,7 +795,7 @@ class Terminal(io.StringIO):
 
 def searching(seconds, clock):
     """A search that takes some seconds of a clock and tells its progress every 10 ms."""
-    search = _pairs._pairs_with_progress
+    search = pair_search.pairs_with_progress
 
     def pairs(*args, progress, **options):
         for k in range(round(seconds * 100)):
@@ -825,8 +825,8 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
     time = types.SimpleNamespace(monotonic=lambda: clock.now, perf_counter=lambda: clock.now)
     screen = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(_cli_pairs, "time", time)
-    monkeypatch.setattr(_pairs, "_pairs_with_progress", searching(seconds, clock))
+    monkeypatch.setattr(cli_pairs, "time", time)
+    monkeypatch.setattr(pair_search, "pairs_with_progress", searching(seconds, clock))
     monkeypatch.setenv("TERM", "xterm")
     assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
     assert ("searching" in screen.getvalue()) == shown
@@ -834,6 +834,6 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
 
 def test_progress_comes_from_the_search(monkeypatch, npz):
     told = []
-    i, j = _pairs._pairs_with_progress(POINTS, 3.0, progress=told.append, box=BOX)
+    i, j = pair_search.pairs_with_progress(POINTS, 3.0, progress=told.append, box=BOX)
     np.testing.assert_array_equal([i, j], hs.pairs(POINTS, 3.0, box=BOX))
     assert all(0 <= fraction <= 1 for fraction in told)

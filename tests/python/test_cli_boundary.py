@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfshell import cli
-from halfshell._cli import numpy_files as _numpy_files
+from halfshell._cli import numpy_files
 
 POINTS = np.arange(30.0).reshape(10, 3) % 7.0
 
@@ -199,7 +199,7 @@ def test_a_file_that_must_not_be_read(tmp_path, monkeypatch):
     def refuse(*arguments, **options):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(_numpy_files, "open", refuse, raising=False)  # also where root may read all
+    monkeypatch.setattr(numpy_files, "open", refuse, raising=False)  # also where root may read all
     assert "Permission denied" in refused("pairs", path, "--cutoff", "1.0")
 
 

@@ -8,9 +8,9 @@ import zipfile
 import numpy as np
 import pytest
 
-from halfshell._cli import files as _files
+from halfshell._cli import files
 from halfshell._cli.files import InputError, read_scene
-from halfshell._convert import available as _available
+from halfshell._convert import memory
 
 POINTS = np.random.default_rng(5).random((60, 3))
 
@@ -58,7 +58,7 @@ def little_memory(monkeypatch):
         def available_memory():
             return 90e6
 
-    monkeypatch.setattr(_available, "_core", Core)
+    monkeypatch.setattr(memory, "_core", Core)
 
 
 @pytest.mark.usefixtures("little_memory")
@@ -154,7 +154,7 @@ def test_every_version_of_the_format_is_read(tmp_path, version):
 
 
 def test_a_coordinate_that_is_not_finite_is_named_by_its_place(tmp_path, monkeypatch):
-    monkeypatch.setattr(_files, "ROWS_CHECKED", 7)
+    monkeypatch.setattr(files, "ROWS_CHECKED", 7)
     points = POINTS.copy()
     points[38, 1] = np.nan
     points[50, 0] = np.inf

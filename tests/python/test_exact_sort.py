@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._objects import exact_order as _exact_order
+from halfshell._objects import exact_order
 from oracles import BOX_KINDS, random_scene, same_arrays
 
 
@@ -144,7 +144,7 @@ def test_what_happens_to_the_arguments_changes_nothing():
 
 def test_many_entries_are_taken_in_parts(monkeypatch):
     whole = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jdS").sort()
-    monkeypatch.setattr(_exact_order, "AT_A_TIME", 24 * 50)
+    monkeypatch.setattr(exact_order, "AT_A_TIME", 24 * 50)
     parts = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jdS").sort()
     assert same_arrays(parts.indices, whole.indices) and same_arrays(parts.shifts, whole.shifts)
 

@@ -12,10 +12,9 @@ import halfshell as hs
 #: What `import halfshell` may load of its own.
 OWN = {
     "_core", "_errors", "_extras",
-    "_convert", "_convert.available", "_convert.batch", "_convert.cache", "_convert.foreign",
-    "_convert.inputs", "_convert.options",
-    "_functions", "_functions.between", "_functions.counts", "_functions.cutoffs",
-    "_functions.neighbors", "_functions.pairs",
+    "_convert", "_convert.arrays", "_convert.batch", "_convert.foreign", "_convert.lengths",
+    "_convert.memory", "_convert.options", "_convert.scene",
+    "_functions", "_functions.counts", "_functions.neighbors", "_functions.pairs",
     "_objects", "_objects.box", "_objects.exact_order", "_objects.graph",
     "_objects.neighbor_table", "_objects.origin", "_objects.table_forms", "_objects.table_rows",
 }  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._functions import pairs as _pairs
+from halfshell._functions import pairs as pair_search
 from subprocesses import RESIDENT, run
 
 BOX = np.array([[1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.4, 0.2, 1.1]])
@@ -210,7 +210,7 @@ def test_progress_of_what_is_repeated_never_falls(rng, threads):
 @pytest.mark.parametrize("sort", [False, True])
 def test_progress_of_all_pairs_at_once_never_falls(rng, threads, sort):
     told = []
-    _pairs._pairs_with_progress(
+    pair_search.pairs_with_progress(
         rng.random((60_000, 3)), 0.08, progress=told.append, threads=threads, sort=sort
     )
     assert len(told) > 3 and told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
@@ -294,7 +294,7 @@ def test_abandoning_it_leaves_nothing_behind():
 import gc, json
 import numpy as np
 import halfshell as hs
-from halfshell._functions import pairs as _pairs
+from halfshell._functions import pairs as pair_search
 points = np.random.default_rng(1).random((20_000, 3))
 
 def close():
@@ -342,7 +342,7 @@ def test_memory_does_not_grow_with_the_result():
 import json
 import numpy as np
 import halfshell as hs
-from halfshell._functions import pairs as _pairs
+from halfshell._functions import pairs as pair_search
 points = np.random.default_rng(1).random((20_000, 2))
 list(hs.iter_pairs(points[:100], 2.0))
 before = peak = resident()
@@ -363,7 +363,7 @@ def test_ctrl_c_within_a_block_and_between_blocks():
 import json, signal, threading, time
 import numpy as np
 import halfshell as hs
-from halfshell._functions import pairs as _pairs
+from halfshell._functions import pairs as pair_search
 points = np.random.default_rng(1).random((30_000, 3))
 sent = []
 

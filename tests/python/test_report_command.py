@@ -8,7 +8,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli, scenes
-from halfshell._cli import report as _cli_report
+from halfshell._cli import report
 from halfshell._peers import LIBRARIES
 from halfshell._report.measure import run
 from halfshell._report.measure.peers import PeerProcess
@@ -110,5 +110,5 @@ def test_all_missing_extras_are_named_at_once(command, monkeypatch):
 
 
 def test_quick_is_a_choice_of_scenes_that_there_are():
-    assert set(_cli_report.QUICK) <= set(scenes.names())
-    assert {"head-on", "stiff-chain"} <= set(_cli_report.QUICK)
+    assert set(report.QUICK) <= set(scenes.names())
+    assert {"head-on", "stiff-chain"} <= set(report.QUICK)

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert import inputs as _inputs
+from halfshell._convert.arrays import as_array
+from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.options import as_flag
+from halfshell._convert.scene import as_scene
 from halfshell._functions.pairs import pairs as find_pairs
 
 IntArray = npt.NDArray[np.int64]
@@ -109,10 +112,10 @@ def verify(
     >>> verdict.missed.tolist(), verdict.spurious.tolist()
     ([[0, 1], [1, 2]], [[0, 2]])
     """
-    full = _inputs.as_flag(full, "full")
-    inclusive = _inputs.as_flag(inclusive, "inclusive")
-    cutoff = _inputs.as_cutoff(cutoff)
-    array, vectors, bits = _inputs.scene(points, box, periodic)
+    full = as_flag(full, "full")
+    inclusive = as_flag(inclusive, "inclusive")
+    cutoff = as_cutoff(cutoff)
+    array, vectors, bits = as_scene(points, box, periodic)
     ndim = array.shape[1]
     given = _rows(i, j, S, len(array), ndim)
     flags = [bool(bits >> axis & 1) for axis in range(ndim)]
@@ -149,7 +152,7 @@ def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
     """The list as rows (i, j) or (i, j, *S), checked."""
     columns = []
     for name, values in (("i", i), ("j", j)):
-        column = _inputs.as_array(values, name)
+        column = as_array(values, name)
         if column.size and column.dtype.kind not in "iu":
             raise TypeError(f"{name} must hold integers, got dtype {column.dtype}")
         if column.ndim != 1:
@@ -165,7 +168,7 @@ def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
         )
     if S is None:
         return np.column_stack(columns)
-    shifts = _inputs.as_array(S, "S")
+    shifts = as_array(S, "S")
     if shifts.shape != (len(columns[0]), ndim):
         raise ValueError(f"S must have shape ({len(columns[0])}, {ndim}), got {shifts.shape}")
     if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell._cli.files import InputError, one_line
+from halfshell._machine import cpu_name, usable_cpus
 from halfshell._terminal import printable
 
 __all__ = ["main"]
@@ -171,12 +172,12 @@ def _add_verify(commands: Any) -> None:
 
 
 def _add_report(commands: Any) -> None:
-    from halfshell._cli import report as _cli_report
+    from halfshell._cli.report import add_options
 
     command = commands.add_parser(
         "report", help="error against run time, ours and other libraries', on hard scenes"
     )
-    _cli_report.add_options(command)
+    add_options(command)
     command.set_defaults(run=_run_report)
 
 
@@ -230,21 +231,21 @@ def _sample(text: str) -> int:
 
 
 def _run_pairs(args: argparse.Namespace) -> int:
-    from halfshell._cli import pairs as _cli_pairs
+    from halfshell._cli.pairs import run
 
-    return _cli_pairs.run(args)
+    return run(args)
 
 
 def _run_verify(args: argparse.Namespace) -> int:
-    from halfshell._cli import verify as _cli_verify
+    from halfshell._cli.verify import run
 
-    return _cli_verify.run(args)
+    return run(args)
 
 
 def _run_report(args: argparse.Namespace) -> int:
-    from halfshell._cli import report as _cli_report
+    from halfshell._cli.report import run
 
-    return _cli_report.run(args)
+    return run(args)
 
 
 def _run_selftest(args: argparse.Namespace) -> int:
@@ -266,8 +267,8 @@ def _run_info(args: argparse.Namespace) -> int:
         "python": f"{platform.python_version()} ({platform.python_implementation()})",
         "numpy": np.__version__,
         "platform": f"{platform.system()} {platform.machine()}",
-        "cpu": _cpu_name(),
-        "cpus usable": _usable_cpus(),
+        "cpu": cpu_name(),
+        "cpus usable": usable_cpus(),
     }
     facts.update({name: value for name, value in build.items() if name != "kernels"})
     if args.json:
@@ -282,21 +283,3 @@ def _run_info(args: argparse.Namespace) -> int:
             "searches that name none are refused"
         )
     return 0
-
-
-def _cpu_name() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
-
-
-def _usable_cpus() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1

@@ -17,7 +17,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._convert.available import refuse_unavailable
+from halfshell._convert.memory import refuse_unavailable
 
 __all__ = ["Unreadable", "read_arrays"]
 

@@ -28,7 +28,7 @@ from halfshell._cli.scene import (
     require_matplotlib,
     unit_suffix,
 )
-from halfshell._functions import pairs as _pairs
+from halfshell._functions import pairs as pair_search
 from halfshell._terminal import printable
 
 __all__ = ["run", "write_csv"]
@@ -133,7 +133,7 @@ def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[
             if advance is None:
                 found = hs.pairs(scene.points, cutoff, **options)
             else:
-                search = _pairs._pairs_with_progress
+                search = pair_search.pairs_with_progress
                 found = search(scene.points, cutoff, progress=advance, **options)
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise InputError(f"{scene.source}: {one_line(error)}") from None

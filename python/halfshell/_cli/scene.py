@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from halfshell._cli.files import InputError, Scene, missing_extra, read_scene
-from halfshell._convert.available import refuse_unavailable
+from halfshell._convert.memory import refuse_unavailable
 from halfshell._terminal import printable
 
 __all__ = [

@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.available import refuse_large
+from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a
+from halfshell._convert.memory import refuse_large
+from halfshell._convert.scene import MAX_DIM, as_points, as_scene, brings_its_box, vectors_of
 
 # What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
 # shape; periodic bits.
-Scene = tuple[_inputs.PointArray, float, _inputs.FloatArray | None, int]
+Scene = tuple[PointArray, float, FloatArray | None, int]
 
 # What each system has of its own: numbers, one a point; cutoffs and boxes, one a system.
-Systems = tuple[npt.NDArray[np.int64], _inputs.FloatArray | None, _inputs.FloatArray | None]
+Systems = tuple[npt.NDArray[np.int64], FloatArray | None, FloatArray | None]
 
 
 def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
     """System numbers as int64; whether they ascend is checked in the core."""
-    array = _inputs.as_array(values, "batch", "hold integers")
+    array = as_array(values, "batch", "hold integers")
     if array.shape != (n,):
         raise ValueError(f"batch must have shape ({n},), one number a point, got {array.shape}")
     if array.dtype.kind not in "iu" and n > 0:
@@ -30,47 +31,47 @@ def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
     if array.dtype == np.uint64:
         for k in np.flatnonzero(array >= np.uint64(2**62)):
             raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
-    return _inputs.in_order(array, np.int64)
+    return in_order(array, np.int64)
 
 
-def _as_boxes(array: npt.NDArray[Any], ndim: int) -> _inputs.FloatArray:
+def _as_boxes(array: npt.NDArray[Any], ndim: int) -> FloatArray:
     if array.shape[1:] != (ndim, ndim):
         raise ValueError(
             f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one a system "
             f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
         )
     refuse_large(8 * array.size, array, "box")
-    return _inputs.in_order(array, np.float64)
+    return in_order(array, np.float64)
 
 
 def _scene(
     points: Any, box: Any, periodic: Any
-) -> tuple[_inputs.PointArray, _inputs.FloatArray | None, int, _inputs.FloatArray | None]:
+) -> tuple[PointArray, FloatArray | None, int, FloatArray | None]:
     """As `scene` of one system, and boxes of each system."""
     if box is not None:
-        array = _inputs.as_real_array(_inputs.vectors_of(box), "box")
+        array = as_real_array(vectors_of(box), "box")
         if array.ndim == 3:
-            rows = np.eye(_inputs.MAX_DIM)
-            if not _inputs.brings_its_box(points):
-                points = _inputs.as_points(points)
+            rows = np.eye(MAX_DIM)
+            if not brings_its_box(points):
+                points = as_points(points)
                 rows = rows[: points.shape[1], : points.shape[1]]
             # Any box will do for the axes that repeat; objects with a box of their own refuse it.
-            points, box, bits = _inputs.scene(points, rows, periodic)
+            points, box, bits = as_scene(points, rows, periodic)
             return points, box, bits, _as_boxes(array, points.shape[1])
         box = array
         if array.ndim == 2 and array.shape[0] != array.shape[1]:
             raise ValueError(
                 f"box must have shape (d,) or (d, d), or one a system (s, d, d), got {array.shape}"
             )
-    points, box, bits = _inputs.scene(points, box, periodic)
+    points, box, bits = as_scene(points, box, periodic)
     return points, box, bits, None
 
 
-def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
+def _as_cutoffs(value: Any) -> tuple[float, FloatArray | None]:
     """One cutoff, or one a system."""
     if is_a(value, float):
         return float.__float__(value), None
-    array = _inputs.as_real_array(value, "cutoff", "be a number")
+    array = as_real_array(value, "cutoff", "be a number")
     if array.ndim == 0:
         return float(array), None
     if array.ndim != 1:
@@ -78,10 +79,10 @@ def _as_cutoffs(value: Any) -> tuple[float, _inputs.FloatArray | None]:
             f"cutoff must be a number or, one a system, have shape (s,), got {array.shape}"
         )
     refuse_large(8 * array.size, array, "cutoff")
-    return 0.0, _inputs.in_order(array, np.float64)
+    return 0.0, in_order(array, np.float64)
 
 
-def of(
+def as_systems(
     points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any
 ) -> tuple[Scene, Systems]:
     """Everything that makes up the systems, in the order of the core's arguments."""

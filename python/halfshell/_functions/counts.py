@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`count_pairs`: signature, defaults and documentation; the work is done in C."""
+"""`count_pairs`: one cutoff in one search; several in one, each an edge of a histogram."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import batch as _batch
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.options import Precision, SearchOptions
-from halfshell._functions import between as _between
-from halfshell._functions.cutoffs import count_within
+from halfshell._convert.arrays import FloatArray, PointArray
+from halfshell._convert.batch import as_systems
+from halfshell._convert.lengths import as_cutoffs
+from halfshell._convert.options import Precision, Rest, SearchOptions, as_flag
+from halfshell._convert.scene import as_sets
 from halfshell._objects.box import Box
 
 
@@ -120,17 +120,43 @@ def count_pairs(
         if result is not NotImplemented:
             return cast(int, result)
     rest = (
-        _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None, threads,
+        as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None, threads,
     )
-    if queries is not None:
-        if batch is not None:
-            raise ValueError("batch and queries cannot be given together")
-        return _between.count_between(queries, points, cutoff, box, periodic, rest)
     if batch is not None:
-        scene, own = _batch.of(points, cutoff, box, periodic, batch)
+        if queries is not None:
+            raise ValueError("batch and queries cannot be given together")
+        scene, own = as_systems(points, cutoff, box, periodic, batch)
         return _core.batch_count(*(*scene, *rest, *own))
-    array, vectors, bits = _inputs.scene(points, box, periodic)
-    cutoffs = _inputs.as_cutoffs(cutoff)
+    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+    return count_within(as_cutoffs(cutoff), array, vectors, bits, rest, asking)
+
+
+def count_within(
+    cutoffs: float | FloatArray,
+    points: Any,
+    box: FloatArray | None,
+    bits: int,
+    rest: Rest,
+    queries: PointArray | None = None,
+) -> int | npt.NDArray[np.int64]:
+    """How many pairs are within a cutoff, or within each of some, which ascend and are at least 0.
+
+    points: an array, or cells of the core in place of points and box.
+    """
+
+    def count(one: float) -> int:
+        if queries is None:
+            return _core.count_pairs(points, one, box, bits, *rest)
+        return _core.count_between(points, one, box, bits, *rest, queries)
+
     if isinstance(cutoffs, float):
-        return _core.count_pairs(array, cutoffs, vectors, bits, *rest)
-    return count_within(cutoffs, array, vectors, bits, rest)
+        return count(cutoffs)
+    if isinstance(rest[1], str) and rest[1] == "exact" and len(cutoffs) > 1:
+        edges = np.ascontiguousarray(cutoffs)
+        between: npt.NDArray[np.int64] = _core.histogram(
+            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None
+        )
+        return np.cumsum(between[0, 0])
+    # Without any, all else is checked as ever.
+    counts = [count(one) for one in cutoffs.tolist() or [0.0]]
+    return np.array(counts[: len(cutoffs)], dtype=np.int64)

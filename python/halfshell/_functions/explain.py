@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.options import Precision
+from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.options import Precision, as_flag, as_index_bytes
+from halfshell._convert.scene import as_scene
 
 
 @dataclass(frozen=True)
@@ -134,14 +135,14 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
-    inclusive = _inputs.as_flag(inclusive, "inclusive")
-    sort = _inputs.as_flag(sort, "sort")
-    measure = _inputs.as_flag(measure, "measure")
-    array, vectors, bits = _inputs.scene(points, box, periodic)
-    index_bytes = _inputs.as_index_bytes(index_dtype)
+    inclusive = as_flag(inclusive, "inclusive")
+    sort = as_flag(sort, "sort")
+    measure = as_flag(measure, "measure")
+    array, vectors, bits = as_scene(points, box, periodic)
+    index_bytes = as_index_bytes(index_dtype)
     plan = _core.explain(
         array,
-        _inputs.as_cutoff(cutoff),
+        as_cutoff(cutoff),
         vectors,
         bits,
         inclusive,

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.available import refuse_unavailable
+from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array
+from halfshell._convert.lengths import as_edges
+from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import Search
-from halfshell._objects.box import Box
+from halfshell._convert.scene import as_sets
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
 _COPIES = 4
@@ -124,8 +125,8 @@ def pair_histogram(
 
 def binned(
     search: Search,
-    edges: _inputs.FloatArray,
-    queries: _inputs.PointArray | None,
+    edges: FloatArray,
+    queries: PointArray | None,
     marks: Marks,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of points or cells, given as the first arguments of every search."""
@@ -138,40 +139,9 @@ def binned(
     return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])
 
 
-def as_sets(
-    queries: Any, points: Any, box: Any, periodic: Any
-) -> tuple[_inputs.PointArray | None, _inputs.PointArray, _inputs.FloatArray | None, int]:
-    """Queries or None, points, box and periodic bits."""
-    if type(box) is Box:
-        box = box.vectors
-    if queries is None:
-        return None, *_inputs.scene(points, box, periodic)
-    return _inputs.two_sets(queries, points, box, periodic)
-
-
-def as_edges(values: npt.ArrayLike) -> _inputs.FloatArray:
-    """Two or more limits of bins: finite, not negative, not descending."""
-    array = _inputs.as_real_array(values, "edges")
-    if array.ndim != 1 or len(array) < 2:
-        raise ValueError(
-            f"edges must have shape (bins + 1,), with one bin at least, got {array.shape}"
-        )
-    # The array, the one that it is checked with, and the counts.
-    refuse_unavailable(_COPIES * 8 * len(array), f"edges of shape {array.shape}")
-    array = array.astype(np.float64)
-    for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
-        raise ValueError(f"edges must be finite and not negative, got edges[{k}] = {array[k]}")
-    for k in np.flatnonzero(array[1:] < array[:-1]):
-        raise ValueError(
-            f"edges must be ascending, got edges[{k}] = {array[k]} before "
-            f"edges[{k + 1}] = {array[k + 1]}"
-        )
-    return np.ascontiguousarray(array)
-
-
 def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
     """The type of each of n points, from 0 on."""
-    array = _inputs.as_array(values, name, "hold integers")
+    array = as_array(values, name, "hold integers")
     if array.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), one a point, got {array.shape}")
     if array.dtype.kind not in "iu" and n > 0:
@@ -183,8 +153,8 @@ def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
     return np.ascontiguousarray(array, dtype=np.int32)
 
 
-def _as_weights(values: npt.ArrayLike, name: str, n: int) -> _inputs.FloatArray:
-    array = _inputs.as_real_array(values, name)
+def _as_weights(values: npt.ArrayLike, name: str, n: int) -> FloatArray:
+    array = as_real_array(values, name)
     if array.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), one a point, got {array.shape}")
     return np.ascontiguousarray(array, dtype=np.float64)
@@ -192,7 +162,7 @@ def _as_weights(values: npt.ArrayLike, name: str, n: int) -> _inputs.FloatArray:
 
 def as_marks(
     n: int,
-    queries: _inputs.PointArray | None,
+    queries: PointArray | None,
     types: Any,
     query_types: Any,
     weights: Any = None,

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._functions.pairs import Arrays
+from halfshell._convert.lengths import as_number
+from halfshell._convert.options import Arrays, as_count, as_index_bytes
+from halfshell._convert.scene import as_sets
 
 _MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
 
@@ -137,15 +138,11 @@ def nearest(
     >>> j.tolist(), d.tolist(), S.tolist()
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
-    asking = None
-    if queries is None:
-        array, vectors, bits = _inputs.scene(points, box, periodic)
-    else:
-        asking, array, vectors, bits = _inputs.two_sets(queries, points, box, periodic)
+    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
     k = as_k(k)
     result = _core.nearest(
         array, as_max_distance(max_distance), vectors, bits, True, "exact", kernel, memory_limit,
-        None, threads, quantities, _inputs.as_index_bytes(index_dtype), asking, k,
+        None, threads, quantities, as_index_bytes(index_dtype), asking, k,
     )
     return in_rows(result, len(array if asking is None else asking), k)
 
@@ -159,7 +156,7 @@ def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:
 
 def as_k(k: Any) -> int:
     """How many are wanted: a whole number from 1 on."""
-    number = _inputs.as_count(k, "k")
+    number = as_count(k, "k")
     if number > _MOST:
         raise MemoryError(f"k = {k} is more than any memory holds")
     return number
@@ -167,9 +164,7 @@ def as_k(k: Any) -> int:
 
 def as_max_distance(value: Any) -> float:
     """A number that is not negative; infinity is one."""
-    array = _inputs.as_real_array(value, "max_distance", "be a number")
-    if array.ndim != 0:
-        raise TypeError(f"max_distance must be a number, got shape {array.shape}")
-    if not array >= 0.0:
-        raise ValueError(f"max_distance must not be negative or NaN, got {float(array)}")
-    return float(array)
+    number = as_number(value, "max_distance")
+    if not number >= 0.0:
+        raise ValueError(f"max_distance must not be negative or NaN, got {number}")
+    return number

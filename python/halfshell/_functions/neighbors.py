@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.options import Precision
+from halfshell._convert.arrays import FloatArray, PointArray
+from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.options import Precision, as_flag, as_index_bytes
+from halfshell._convert.scene import as_sets
 from halfshell._objects.box import Box
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin, shifts_of_search
@@ -103,8 +105,8 @@ def neighbors(
         scene, points, asking = _scene(points, cutoff, queries, box, periodic)
         vectors, periods = scene[2:]
         arrays = _core.neighbors(
-            *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
-            threads, quantities, _inputs.as_index_bytes(index_dtype), asking,
+            *scene, as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
+            threads, quantities, as_index_bytes(index_dtype), asking,
         )
     origin = None
     if "d" in quantities:
@@ -166,7 +168,7 @@ def coordination(
         return cast("npt.NDArray[np.int64]", counts)
     scene, _, asking = _scene(points, cutoff, queries, box, periodic)
     return _core.coordination(
-        *scene, _inputs.as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
+        *scene, as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
         threads, asking,
     )
 
@@ -174,14 +176,10 @@ def coordination(
 def _scene(
     points: Any, cutoff: Any, queries: Any, box: Any, periodic: Any
 ) -> tuple[
-    tuple[_inputs.PointArray, float, _inputs.FloatArray | None, int],
-    _inputs.PointArray,
-    _inputs.PointArray | None,
+    tuple[PointArray, float, FloatArray | None, int],
+    PointArray,
+    PointArray | None,
 ]:
     """The first arguments of the core, the points among them, and the queries or None."""
-    asking = None
-    if queries is None:
-        array, vectors, bits = _inputs.scene(points, box, periodic)
-    else:
-        asking, array, vectors, bits = _inputs.two_sets(queries, points, box, periodic)
-    return (array, _inputs.as_cutoff(cutoff), vectors, bits), array, asking
+    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+    return (array, as_cutoff(cutoff), vectors, bits), array, asking

@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.available import refuse_unavailable
-from halfshell._convert.options import Search
+from halfshell._convert.arrays import FloatArray, PointArray
+from halfshell._convert.lengths import as_positive
+from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.options import Search, as_count
+from halfshell._convert.scene import as_sets
 from halfshell._extras import needs
-from halfshell._functions import histogram as _histogram
+from halfshell._functions.histogram import Marks, as_marks, binned
 
 _COLUMNS = 10
 
@@ -177,13 +179,13 @@ def rdf(
     True
     """
     edges = _edges(r_max, bins)
-    asking, array, vectors, bits = _histogram.as_sets(queries, points, box, periodic)
+    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
     shares = _shares(vectors, bits, edges)
     search: Search = (
         array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
     )
-    marks = _histogram.as_marks(len(array), asking, types, query_types)
-    counts = _histogram.binned(search, edges, asking, marks)
+    marks = as_marks(len(array), asking, types, query_types)
+    counts = binned(search, edges, asking, marks)
     g = np.zeros(counts.shape)
     with np.errstate(over="ignore", under="ignore", divide="ignore"):
         expected = _partners(len(array), asking, marks) * shares
@@ -192,21 +194,17 @@ def rdf(
     return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
 
 
-def _edges(r_max: Any, bins: Any) -> _inputs.FloatArray:
-    n_bins = _inputs.as_count(bins, "bins")
-    array = _inputs.as_real_array(r_max, "r_max", "be a number")
-    if array.ndim != 0:
-        raise TypeError(f"r_max must be a number, got shape {array.shape}")
-    if not (np.isfinite(array) and array > 0.0):
-        raise ValueError(f"r_max must be finite and greater than 0, got {float(array)}")
+def _edges(r_max: Any, bins: Any) -> FloatArray:
+    n_bins = as_count(bins, "bins")
+    largest = as_positive(r_max, "r_max")
     # Of float64: edges, what numpy needs to make them, r, g and the shells.
     refuse_unavailable(_COLUMNS * 8 * n_bins, "r, g and counts for so many bins")
-    return np.linspace(0.0, float(array), n_bins + 1)
+    return np.linspace(0.0, largest, n_bins + 1)
 
 
 def _shares(
-    vectors: _inputs.FloatArray | None, bits: int, edges: _inputs.FloatArray
-) -> _inputs.FloatArray:
+    vectors: FloatArray | None, bits: int, edges: FloatArray
+) -> FloatArray:
     """The part of the box that lies between two spheres, for each bin.
 
     In a unit of about the size of the box, a power of two: volumes of boxes in other units may be
@@ -224,12 +222,12 @@ def _shares(
     for k in range(2 + ndim % 2, ndim + 1, 2):
         unit_ball *= 2.0 * math.pi / k
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        shells: _inputs.FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
+        shells: FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
         return unit_ball * shells / volume
 
 
 def _partners(
-    n: int, queries: _inputs.PointArray | None, marks: _histogram.Marks
+    n: int, queries: PointArray | None, marks: Marks
 ) -> npt.NDArray[np.float64]:
     """Pairs that each shell would share out, with types of each two of them; one axis more for
     shells."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`iter_pairs`: signature, defaults and documentation; the work is done in C."""
+"""`iter_pairs` and `for_each_pair`: all pairs, of which few or none are held; done in C."""
 
 from __future__ import annotations
 
@@ -10,9 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.options import Precision, SearchOptions
-from halfshell._functions.pairs import Arrays, Letter
+from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.options import (
+    Arrays,
+    Letter,
+    Precision,
+    SearchOptions,
+    as_count,
+    as_flag,
+    as_index_bytes,
+)
+from halfshell._convert.scene import as_scene
 
 Block = TypeVar("Block", covariant=True)
 
@@ -129,18 +137,118 @@ def iter_pairs(
     True
     """
     most = most_pairs(max_pairs)
-    array, vectors, bits = _inputs.scene(points, box, periodic)
+    array, vectors, bits = as_scene(points, box, periodic)
     blocks = _core.iter_pairs(
-        array, _inputs.as_cutoff(cutoff), vectors, bits, _inputs.as_flag(inclusive, "inclusive"),
+        array, as_cutoff(cutoff), vectors, bits, as_flag(inclusive, "inclusive"),
         precision, kernel, memory_limit, as_progress(progress), threads, quantities,
-        _inputs.as_index_bytes(index_dtype), most,
+        as_index_bytes(index_dtype), most,
     )
     return cast("PairBlocks[Any]", blocks)
 
 
+def for_each_pair(
+    points: Any,
+    cutoff: Any,
+    callback: Any,
+    user_data: Any = None,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    thread_safe: bool = False,
+) -> int:
+    """Call a function for each pair of points within a cutoff, storing none of them.
+
+    Parameters
+    ----------
+    points, cutoff, box, periodic, inclusive, precision, kernel
+        As in `pairs`.
+    callback : scipy.LowLevelCallable, numba cfunc, ctypes or cffi function pointer, or callable
+        What to call. A compiled function has the C signature ::
+
+            int f(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)
+
+        where ``S`` and ``D`` have d entries and are valid during the call only, and anything but
+        0 ends the search. It is called without Python's lock; it must return, and may itself
+        search. Its types are checked as far as `callback` tells them. Any other callable is
+        called as ``callback(i, j, S, D, d2)`` with ints, a tuple of d ints, a tuple of d floats
+        and a float; a true result ends the search, an exception ends it and is raised here.
+    user_data : optional
+        The pointer ``user``: a ctypes or cffi pointer, an address as int, or an array or another
+        contiguous buffer, whose memory is passed as it is. None: NULL, or what a
+        `LowLevelCallable` brings. Not for Python callables.
+    threads : int, optional
+        As in `pairs`. Without `thread_safe` they only sort the points.
+    memory_limit : float, optional
+        Bytes that the search may take.
+    thread_safe : bool, default False
+        Declares that several threads may call the function at once. Then the order of the pairs
+        is unspecified, and what it writes to must be atomic or guarded.
+
+    Returns
+    -------
+    int
+        The number of pairs that the function was called for, the one that ended the search
+        included.
+
+    Raises
+    ------
+    TypeError
+        If `callback` is none of these or has another signature, which the message shows;
+        otherwise as `pairs`.
+    ValueError, OverflowError
+        As `pairs`; OverflowError also if a shift does not fit int32. ValueError if a pointer is
+        NULL.
+    MemoryError
+        If the search itself would not fit.
+    Exception
+        Whatever a Python callable raises. An exception within a ctypes callback is printed by
+        ctypes and not seen here.
+
+    See Also
+    --------
+    iter_pairs : blocks of arrays.
+    pairs : all pairs at once.
+
+    Notes
+    -----
+    Each pair comes once, with ``i < j`` or the orientation that `pairs` says, in the order of
+    `pairs` with ``sort=False``. S is zero where the box does not repeat. D is that of `pairs`,
+    and ``d2`` is ``d * d``, rounded once, of its d: sqrt(d2) gives d back, unless d * d overflows
+    or is subnormal. With `inclusive` d2 <= cutoff * cutoff as float64 rounds it.
+
+    The function runs with round-to-nearest and without flushing of subnormal numbers. Ctrl-C is
+    looked for between calls, once for some ten thousand pairs. When a function ends the search on
+    threads, the others may still visit pairs of a few hundred points each.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> bonds = []
+    >>> hs.for_each_pair([[0.0], [1.0], [2.5]], 1.5,
+    ...                  lambda i, j, S, D, d2: bonds.append((i, j, D, d2)))
+    2
+    >>> sorted(bonds)
+    [(0, 1, (1.0,), 1.0), (1, 2, (1.5,), 2.25)]
+    """
+    from halfshell._convert.callbacks import target_of  # here: iter_pairs does without
+
+    target = target_of(callback, user_data)
+    array, vectors, bits = as_scene(points, box, periodic)
+    return _core.for_each_pair(
+        array, as_cutoff(cutoff), vectors, bits, as_flag(inclusive, "inclusive"),
+        precision, kernel, memory_limit, None, threads, target.function, target.user,
+        as_flag(thread_safe, "thread_safe"),
+    )
+
+
 def most_pairs(max_pairs: Any) -> int:
     """A number of pairs from 1 on, as the core takes it."""
-    return min(_inputs.as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
+    return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
 
 
 def as_progress(progress: Any) -> Callable[[float], object] | None:

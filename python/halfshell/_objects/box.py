@@ -10,8 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.available import refuse_large
+from halfshell._convert.arrays import as_real_array
+from halfshell._convert.memory import refuse_large
+from halfshell._convert.scene import (
+    LENGTHS_AND_ANGLES,
+    MAX_DIM,
+    as_box,
+    as_periodic_bits,
+    as_points,
+    vectors_of,
+)
 
 
 class Box:
@@ -56,22 +64,22 @@ class Box:
     __slots__ = ("_heights", "_vectors", "_volume")
 
     def __init__(self, vectors: Any) -> None:
-        array = _inputs.as_real_array(_inputs.vectors_of(vectors), "box")
+        array = as_real_array(vectors_of(vectors), "box")
         if (
             array.ndim not in (1, 2)
-            or not 1 <= array.shape[0] <= _inputs.MAX_DIM
+            or not 1 <= array.shape[0] <= MAX_DIM
             or array.shape[0] != array.shape[-1]
         ):
             raise ValueError(
-                f"box must have shape (d,) or (d, d) with 1 <= d <= {_inputs.MAX_DIM}, "
+                f"box must have shape (d,) or (d, d) with 1 <= d <= {MAX_DIM}, "
                 f"got {array.shape}"
             )
         if array.shape == (6,):
             raise ValueError(
-                f"box must not be six bare numbers: {_inputs.LENGTHS_AND_ANGLES}, the lengths of "
+                f"box must not be six bare numbers: {LENGTHS_AND_ANGLES}, the lengths of "
                 "a box in six dimensions for Box.orthorhombic"
             )
-        own = _inputs.as_box(array, array.shape[0]).copy()
+        own = as_box(array, array.shape[0]).copy()
         own.flags.writeable = False
         self._vectors = own
         self._heights, self._volume = _core.box_measure(own, (1 << own.shape[0]) - 1)
@@ -104,7 +112,7 @@ class Box:
         >>> hs.Box.from_matrix([[2.0, 0.0], [1.0, 3.0]]).volume
         6.0
         """
-        array = _inputs.as_real_array(matrix, "matrix")
+        array = as_real_array(matrix, "matrix")
         if array.ndim != 2:
             raise ValueError(f"matrix must have shape (d, d), got {array.shape}")
         return cls(array)
@@ -137,10 +145,10 @@ class Box:
         2000.0
         """
         only: Any = lengths[0] if len(lengths) == 1 else lengths
-        array = np.atleast_1d(_inputs.as_real_array(only, "lengths"))
+        array = np.atleast_1d(as_real_array(only, "lengths"))
         if array.ndim != 1:
             raise ValueError(f"lengths must have shape (d,), got {array.shape}")
-        return cls(np.diag(array) if 1 <= len(array) <= _inputs.MAX_DIM else array)
+        return cls(np.diag(array) if 1 <= len(array) <= MAX_DIM else array)
 
     @classmethod
     def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:
@@ -172,8 +180,8 @@ class Box:
         >>> hs.Box.from_lengths_angles((2.0, 4.0), 90.0).vectors.tolist()
         [[2.0, 0.0], [0.0, 4.0]]
         """
-        edges = _inputs.as_real_array(lengths, "lengths").astype(np.float64)
-        degrees = np.atleast_1d(_inputs.as_real_array(angles, "angles").astype(np.float64))
+        edges = as_real_array(lengths, "lengths").astype(np.float64)
+        degrees = np.atleast_1d(as_real_array(angles, "angles").astype(np.float64))
         if (edges.shape, degrees.shape) not in (((3,), (3,)), ((2,), (1,))):
             raise ValueError(
                 "lengths and angles must be 3 and 3 numbers, or 2 and 1 in two dimensions, got "
@@ -247,13 +255,13 @@ class Box:
         >>> wrapped.tolist()
         [[0.5, 5.0]]
         """
-        array = _inputs.as_points(points)
+        array = as_points(points)
         ndim = self.vectors.shape[0]
         if array.shape[1] != ndim:
             raise ValueError(f"points must have shape (n, {ndim}) for this box, got {array.shape}")
         refuse_large(16 * array.size, array, "points")
         return _core.box_wrap(
-            array, self.vectors, _inputs.as_periodic_bits(periodic, ndim, default=True)
+            array, self.vectors, as_periodic_bits(periodic, ndim, default=True)
         )
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._functions import histogram as _histogram
-from halfshell._functions.cutoffs import count_within
+from halfshell._convert.lengths import as_cutoffs, as_edges
+from halfshell._functions.counts import count_within
+from halfshell._functions.histogram import as_marks, binned
 from halfshell._objects.cell_layout import Asking, CellLayout
 
 
@@ -64,15 +64,10 @@ class CellCounts(CellLayout):
         >>> cells.count_pairs([0.5, 1.0, 2.0]).tolist()
         [0, 1, 2]
         """
-        cutoffs = self.cutoff if cutoff is None else _inputs.as_cutoffs(cutoff)
+        cutoffs = self.cutoff if cutoff is None else as_cutoffs(cutoff)
         asking = None if queries is None else self._queries(queries)
-        if not isinstance(cutoffs, float):
-            cells, _, box, bits, *_ = whole = self._arguments(None, options)
-            return count_within(cutoffs, cells, box, bits, whole[4:], asking)
-        search = self._arguments(cutoffs, options)
-        if asking is None:
-            return _core.count_pairs(*search)
-        return _core.count_between(*search, asking)
+        cells, _, box, bits, *_ = whole = self._arguments(None, options)
+        return count_within(cutoffs, cells, box, bits, whole[4:], asking)
 
     def coordination(
         self, cutoff: Any = None, *, queries: Any = None, **options: Unpack[Asking]
@@ -140,11 +135,11 @@ class CellCounts(CellLayout):
         [-1.0, 0.0]
         """
         asking = None if queries is None else self._queries(queries)
-        limits = _histogram.as_edges(edges)
-        marks = _histogram.as_marks(
+        limits = as_edges(edges)
+        marks = as_marks(
             len(self), asking, types, query_types, weights, query_weights
         )
         own: Asking = {"inclusive": False, "kernel": kernel, "memory_limit": memory_limit}
         if threads is not None:
             own["threads"] = threads
-        return _histogram.binned(self._arguments(None, own), limits, asking, marks)
+        return binned(self._arguments(None, own), limits, asking, marks)

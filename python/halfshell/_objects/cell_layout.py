@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.options import Precision, Progress, Search
+from halfshell._convert.arrays import PointArray
+from halfshell._convert.lengths import as_cutoff, as_positive
+from halfshell._convert.options import Precision, Progress, Search, as_flag
+from halfshell._convert.scene import as_points, as_scene
 from halfshell._objects.box import Box
 from halfshell._objects.origin import Origin
 
@@ -61,11 +63,11 @@ class CellLayout:
     ) -> None:
         if type(box) is Box:
             box = box.vectors
-        array, vectors, bits = _inputs.scene(points, box, periodic)
-        self._cutoff = _inputs.as_cutoff(cutoff)
+        array, vectors, bits = as_scene(points, box, periodic)
+        self._cutoff = as_cutoff(cutoff)
         self._cells = _core.cells_build(
             array, self._cutoff, vectors, bits, True, precision, None, memory_limit, None, threads,
-            _as_cell_size(cell_size),
+            0.0 if cell_size is None else as_positive(cell_size, "cell_size"),
         )
         self._layout = _core.cells_layout(self._cells)
         self._n_points: int = array.shape[0]
@@ -174,8 +176,8 @@ class CellLayout:
         asking = None if queries is None else self._queries(queries)
         return Candidates(*_core.cells_candidates(*self._arguments(None, {}), asking))
 
-    def _queries(self, queries: Any, name: str = "queries") -> _inputs.PointArray:
-        array = _inputs.as_points(queries, name, self._ndim)
+    def _queries(self, queries: Any, name: str = "queries") -> PointArray:
+        array = as_points(queries, name, self._ndim)
         if array.shape[1] != self._ndim:
             raise ValueError(
                 f"{name} must have {self._ndim} columns, as the points, got shape {array.shape}"
@@ -189,25 +191,13 @@ class CellLayout:
             raise TypeError(f"unexpected keyword argument {name!r}")
         return (
             self._cells,
-            self.cutoff if cutoff is None else _inputs.as_cutoff(cutoff),
+            self.cutoff if cutoff is None else as_cutoff(cutoff),
             None,
             0,
-            _inputs.as_flag(options.get("inclusive", True), "inclusive"),
+            as_flag(options.get("inclusive", True), "inclusive"),
             self._precision,
             options.get("kernel"),
             options.get("memory_limit"),
             progress,
             options.get("threads", self._threads),
         )
-
-
-def _as_cell_size(value: Any) -> float:
-    """The least width of cells; 0: none is asked for."""
-    if value is None:
-        return 0.0
-    array = _inputs.as_real_array(value, "cell_size", "be a number")
-    if array.ndim != 0:
-        raise TypeError(f"cell_size must be a number, got shape {array.shape}")
-    if not (np.isfinite(array) and array > 0.0):
-        raise ValueError(f"cell_size must be finite and greater than 0, got {float(array)}")
-    return float(array)

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import callbacks as _callbacks
-from halfshell._convert import inputs as _inputs
-from halfshell._functions.pairs import Arrays
+from halfshell._convert.callbacks import target_of
+from halfshell._convert.options import Arrays, as_flag, as_index_bytes
 from halfshell._functions.stream import PairBlocks, as_progress, most_pairs
 from halfshell._objects.cell_layout import Asking, CellLayout
 
@@ -54,8 +53,8 @@ class CellPairs(CellLayout):
         [[0, 1]]
         """
         return _core.pairs(
-            *self._arguments(cutoff, options), quantities, _inputs.as_flag(sort, "sort"),
-            _inputs.as_index_bytes(index_dtype), out,
+            *self._arguments(cutoff, options), quantities, as_flag(sort, "sort"),
+            as_index_bytes(index_dtype), out,
         )
 
     def iter_pairs(
@@ -93,7 +92,7 @@ class CellPairs(CellLayout):
         most = most_pairs(max_pairs)
         blocks = _core.iter_pairs(
             *self._arguments(cutoff, options, as_progress(progress)), quantities,
-            _inputs.as_index_bytes(index_dtype), most,
+            as_index_bytes(index_dtype), most,
         )
         return cast("PairBlocks[Any]", blocks)
 
@@ -131,8 +130,8 @@ class CellPairs(CellLayout):
         1 2 4.0
         2
         """
-        target = _callbacks.target_of(callback, user_data)
+        target = target_of(callback, user_data)
         return _core.for_each_pair(
             *self._arguments(cutoff, options), target.function, target.user,
-            _inputs.as_flag(thread_safe, "thread_safe"),
+            as_flag(thread_safe, "thread_safe"),
         )

@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
+from halfshell._convert.arrays import PointArray
+from halfshell._convert.lengths import as_cutoff, as_radii
+from halfshell._convert.options import Arrays, as_flag, as_index_bytes
 from halfshell._functions.nearest import as_k, as_max_distance, in_rows
-from halfshell._functions.pairs import Arrays
-from halfshell._objects import radii as _radii
 from halfshell._objects.cell_layout import Asking, CellLayout, Running
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin
+from halfshell._objects.radii import Columns, search_each
 
 
 class CellRows(CellLayout):
@@ -92,18 +93,18 @@ class CellRows(CellLayout):
         [[0], [0, 1, 2]]
         """
         asking = self._queries(queries)
-        radii = _radii.as_radii(radius, len(asking))
+        radii = as_radii(radius, len(asking))
         if radii is None or isinstance(radii, float):
             return self._rows(asking, radii, quantities, index_dtype, options)
 
-        def search(part: _inputs.PointArray, one: float, letters: str) -> _radii.Arrays:
+        def search(part: PointArray, one: float, letters: str) -> Columns:
             return self._arrays(part, one, letters, index_dtype, options)
 
-        inclusive = _inputs.as_flag(options.get("inclusive", True), "inclusive")
-        arrays = _radii.search_each(
+        inclusive = as_flag(options.get("inclusive", True), "inclusive")
+        arrays = search_each(
             search, asking, radii, quantities, inclusive, self._precision == "exact"
         )
-        origin = self._origin_of(asking, quantities, lambda queries: _radii.search_each(
+        origin = self._origin_of(asking, quantities, lambda queries: search_each(
             search, queries, radii, "S", inclusive, self._precision == "exact"
         ))  # fmt: skip
         return NeighborTable(arrays, quantities, self._n_points, False, origin=origin)
@@ -155,13 +156,13 @@ class CellRows(CellLayout):
         number = as_k(k)
         arrays = _core.nearest(
             *self._arguments(as_max_distance(max_distance), cast(Asking, options)), quantities,
-            _inputs.as_index_bytes(index_dtype), asking, number,
+            as_index_bytes(index_dtype), asking, number,
         )
         return in_rows(arrays, self._n_points if asking is None else len(asking), number)
 
     def _arrays(
         self,
-        asking: _inputs.PointArray | None,
+        asking: PointArray | None,
         cutoff: Any,
         quantities: str,
         index_dtype: npt.DTypeLike,
@@ -169,19 +170,19 @@ class CellRows(CellLayout):
     ) -> tuple[npt.NDArray[Any], ...]:
         """Offsets of the rows and an array for each quantity."""
         return _core.neighbors(
-            *self._arguments(cutoff, options), quantities, _inputs.as_index_bytes(index_dtype),
+            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype),
             asking,
         )
 
     def _rows(
         self,
-        asking: _inputs.PointArray | None,
+        asking: PointArray | None,
         cutoff: Any,
         quantities: str,
         index_dtype: npt.DTypeLike,
         options: Asking,
     ) -> NeighborTable:
-        cutoff = None if cutoff is None else _inputs.as_cutoff(cutoff)
+        cutoff = None if cutoff is None else as_cutoff(cutoff)
         arrays = self._arrays(asking, cutoff, quantities, index_dtype, options)
         origin = self._origin_of(asking, quantities, lambda queries: self._arrays(
             queries, cutoff, "S", index_dtype, options
@@ -190,9 +191,9 @@ class CellRows(CellLayout):
 
     def _origin_of(
         self,
-        asking: _inputs.PointArray | None,
+        asking: PointArray | None,
         quantities: str,
-        search: Callable[[Any], _radii.Arrays],
+        search: Callable[[Any], Columns],
     ) -> Origin | None:
         """What a table with distances keeps; `search` returns offsets and S for queries."""
         if "d" not in quantities:

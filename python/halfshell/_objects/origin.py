@@ -10,7 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
+from halfshell._convert.arrays import PointArray
+from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.options import as_flag
+from halfshell._convert.scene import as_scene
 
 FindShifts = Callable[["Origin"], npt.NDArray[Any]]
 Floats = npt.NDArray[np.float64]
@@ -36,8 +39,8 @@ class Origin:
 
     def __init__(
         self,
-        points: _inputs.PointArray,
-        queries: _inputs.PointArray | None,
+        points: PointArray,
+        queries: PointArray | None,
         vectors: Floats | None,
         periodic: Any,
         find_shifts: FindShifts | None = None,
@@ -49,7 +52,7 @@ class Origin:
         self._find_shifts = find_shifts
         self._shifts: npt.NDArray[Any] | None = None
 
-    def asked_by(self, queries: _inputs.PointArray | None, find_shifts: FindShifts) -> Origin:
+    def asked_by(self, queries: PointArray | None, find_shifts: FindShifts) -> Origin:
         """The same points and box, not copied again, with these queries."""
         other = Origin.__new__(Origin)
         other.__setstate__({
@@ -60,15 +63,15 @@ class Origin:
         return other
 
     @property
-    def asking(self) -> _inputs.PointArray:
+    def asking(self) -> PointArray:
         """Whose rows they are."""
         return self.points if self.queries is None else self.queries
 
-    def scene(self) -> tuple[_inputs.PointArray, Floats | None, int]:
+    def scene(self) -> tuple[PointArray, Floats | None, int]:
         """Points, box vectors and periodic bits as the core takes them."""
         if isinstance(self._periodic, int) and not isinstance(self._periodic, bool):
             return self.points, self._box, self._periodic
-        return _inputs.scene(self.points, self._box, self._periodic)
+        return as_scene(self.points, self._box, self._periodic)
 
     @property
     def rows(self) -> Floats:
@@ -106,7 +109,7 @@ def shifts_of_search(
     cutoff: Any, inclusive: Any, precision: Any, threads: int | None
 ) -> FindShifts:
     """A search for the shifts of all rows that `neighbors` returns for these arguments."""
-    reach, includes_cutoff = _inputs.as_cutoff(cutoff), _inputs.as_flag(inclusive, "inclusive")
+    reach, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
 
     def find(origin: Origin) -> npt.NDArray[Any]:
         points, vectors, bits = origin.scene()

@@ -14,41 +14,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert import inputs as _inputs
+from halfshell._convert.arrays import PointArray
 
-Arrays = tuple[npt.NDArray[Any], ...]
+Columns = tuple[npt.NDArray[Any], ...]
 # Of (queries, radius, quantities): offsets, then an array for each quantity.
-Search = Callable[[_inputs.PointArray, float, str], Arrays]
+Search = Callable[[PointArray, float, str], Columns]
 
 _DOUBT = 4  # ulps of a radius: more than the 1 ulp of a distance and the rounding of this product
 
 
-def as_radii(radius: Any, n: int) -> npt.NDArray[np.float64] | float | None:
-    """None, one number, or an array of one for each of n queries; finite and not negative."""
-    if radius is None:
-        return None
-    array = _inputs.as_real_array(radius, "radius", "be a number").astype(np.float64)
-    if array.ndim == 0:
-        if not (np.isfinite(array) and array >= 0.0):
-            raise ValueError(f"radius must be finite and not negative, got {float(array)}")
-        return float(array)
-    if array.shape != (n,):
-        raise ValueError(
-            f"radius must be a number or have shape ({n},), one for each query, got {array.shape}"
-        )
-    for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
-        raise ValueError(f"radius must be finite and not negative, got radius[{k}] = {array[k]}")
-    return array
-
-
 def search_each(
     search: Search,
-    queries: _inputs.PointArray,
+    queries: PointArray,
     radii: npt.NDArray[np.float64],
     quantities: str,
     inclusive: bool,
     is_exact: bool = True,
-) -> Arrays:
+) -> Columns:
     """Offsets and arrays of all rows, in the order of the queries.
 
     is_exact: the search decides exactly. Otherwise distances do not tell what it would decide, and
@@ -76,14 +58,14 @@ def _octaves(radii: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
 
 def _split(
     search: Search,
-    queries: _inputs.PointArray,
+    queries: PointArray,
     radii: npt.NDArray[np.float64],
     members: npt.NDArray[np.intp],
     largest: float,
-    arrays: Arrays,
+    arrays: Columns,
     letters: str,
     inclusive: bool,
-) -> list[tuple[npt.NDArray[np.intp], Arrays]]:
+) -> list[tuple[npt.NDArray[np.intp], Columns]]:
     """These rows without what is beyond each radius, and those of which that could not be said."""
     offsets = arrays[0]
     row = np.repeat(np.arange(len(members)), np.diff(offsets))
@@ -104,8 +86,8 @@ def _split(
 
 
 def _join(
-    parts: list[tuple[npt.NDArray[np.intp], Arrays]], n_rows: int, n_quantities: int
-) -> Arrays:
+    parts: list[tuple[npt.NDArray[np.intp], Columns]], n_rows: int, n_quantities: int
+) -> Columns:
     """One table: row k of a part is that of query ``members[k]``."""
     counts = np.zeros(n_rows, np.int64)
     for members, arrays in parts:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert import inputs as _inputs
-from halfshell._convert.available import refuse_unavailable
+from halfshell._convert.arrays import as_array, as_real_array
 from halfshell._convert.foreign import kind_of, shown, whole_number
+from halfshell._convert.memory import refuse_unavailable
 from halfshell._errors import CapacityError
 from halfshell._extras import needs
 
@@ -26,7 +26,7 @@ def rows_of(offsets: Array, dtype: npt.DTypeLike = np.int64) -> Array:
     return np.repeat(np.arange(len(offsets) - 1, dtype=dtype), np.diff(offsets))
 
 
-def check_letters(quantities: Any) -> None:
+def check_pair_letters(quantities: Any) -> None:
     """Raise unless these are some of the letters that `pairs` knows, each at most once."""
     if not isinstance(quantities, str):
         raise TypeError(f"quantities must be a string, got {type(quantities).__name__}")
@@ -39,7 +39,7 @@ def check_letters(quantities: Any) -> None:
 
 def as_mask(mask: npt.ArrayLike, n_entries: int) -> npt.NDArray[np.bool_]:
     """One bool for each entry."""
-    array = _inputs.as_array(mask, "mask", "hold bools")
+    array = as_array(mask, "mask", "hold bools")
     if array.shape != (n_entries,):
         raise ValueError(
             f"mask must have shape ({n_entries},), one bool an entry, got {array.shape}"
@@ -97,7 +97,7 @@ def _as_capacity(value: Any) -> int:
 
 def _as_fill(value: Any, dtype: np.dtype[Any]) -> Any:
     """A number that this type holds as it is."""
-    array = _inputs.as_real_array(value, "fill", "be a number")
+    array = as_real_array(value, "fill", "be a number")
     if array.ndim != 0:
         raise TypeError(f"fill must be a number, got shape {array.shape}")
     if dtype.kind == "f":

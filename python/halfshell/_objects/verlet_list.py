@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert import inputs as _inputs
-from halfshell._functions.pairs import Arrays, Letter
+from halfshell._convert.lengths import as_cutoff, as_number
+from halfshell._convert.options import Arrays, Letter, as_flag, as_index_bytes
+from halfshell._convert.scene import as_scene
 from halfshell._objects.skin import AutoSkin
 
 
@@ -93,12 +94,12 @@ class VerletList:
         kernel: str | None = None,
         memory_limit: float | None = None,
     ) -> None:
-        self._cutoff = _as_length(_inputs.as_cutoff(cutoff), "cutoff")
+        self._cutoff = _as_length(as_cutoff(cutoff), "cutoff")
         self._auto = AutoSkin(self._cutoff) if isinstance(skin, str) and skin == "auto" else None
         self._skin = self._auto.skin if self._auto is not None else _as_skin(skin)
         self._box = box
         self._periodic = periodic
-        self._inclusive = _inputs.as_flag(inclusive, "inclusive")
+        self._inclusive = as_flag(inclusive, "inclusive")
         self._threads = threads
         self._kernel = kernel
         self._memory_limit = memory_limit
@@ -146,7 +147,7 @@ class VerletList:
     def _update(self, points: Any, box: Any, periodic: Any) -> bool:
         box = self._box if box is None else box
         periodic = self._periodic if periodic is None else periodic
-        array, vectors, bits = _inputs.scene(points, box, periodic)
+        array, vectors, bits = as_scene(points, box, periodic)
         auto = self._auto
         change = auto is not None and auto.wants_change(array.shape[1])
         skin = auto.next_skin() if auto is not None else self._skin
@@ -260,8 +261,8 @@ class VerletList:
                 None,
                 self._threads,
                 quantities,
-                _inputs.as_flag(sort, "sort"),
-                _inputs.as_index_bytes(index_dtype),
+                as_flag(sort, "sort"),
+                as_index_bytes(index_dtype),
                 out,
             )
             if self._auto is not None:
@@ -346,7 +347,4 @@ def _as_skin(value: Any) -> float:
     """A plain number, or "auto", which is no number and is settled before."""
     if isinstance(value, str):
         raise ValueError(f'skin must be a number or "auto", got {value!r}')
-    array = _inputs.as_real_array(value, "skin", 'be a number or "auto"')
-    if array.ndim != 0:
-        raise TypeError(f'skin must be a number or "auto", got shape {array.shape}')
-    return _as_length(float(array), "skin")
+    return _as_length(as_number(value, "skin", 'be a number or "auto"'), "skin")

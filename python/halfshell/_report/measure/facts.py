@@ -17,13 +17,13 @@ def machine_facts() -> dict[str, str]:
 
     import halfshell as hs
     from halfshell import _core
-    from halfshell._cli.main import _cpu_name, _usable_cpus
+    from halfshell._machine import cpu_name, usable_cpus
 
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": f"{platform.system()} {platform.machine()}",
-        "cpu": _cpu_name(),
-        "cores": str(_usable_cpus()),
+        "cpu": cpu_name(),
+        "cores": str(usable_cpus()),
         "threads": "1",
         "kernel": str(_core.default_kernel()),
         "halfshell": hs.__version__,

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Arrays of real numbers, with exactly the values that users pass, or a refusal.
+
+Types and shapes are settled here: an array is converted only when no value changes. Values
+(finite, not negative, independent) are checked in the core.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._convert.foreign import exact_number, is_a, kind_of, refuse_deep_lists, told
+from halfshell._convert.memory import refuse_large
+
+_BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
+
+FloatArray = npt.NDArray[np.float64]
+PointArray = npt.NDArray[np.float32] | FloatArray
+
+
+def as_real_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
+    """An array of native float32 or float64 with exactly the given values.
+
+    Raises TypeError for kinds that are no real numbers and ValueError, with the place, for values
+    that float64 cannot hold. `single` is what a message says that a value without a shape must do.
+    """
+    array = as_array(values, name, single)
+    kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "f" and size in (4, 8) and array.dtype.isnative:
+        return array
+    if kind in "fbiu":
+        refuse_large(8 * array.size, array, name)
+    if kind == "f" and size in (4, 8):
+        return array.astype(array.dtype.newbyteorder("="))
+    if kind == "b" or (kind == "f" and size == 2):
+        return array.astype(np.float64)
+    if kind in "iu":
+        _refuse_big_integers(array, name)
+        return array.astype(np.float64)
+    if kind == "f":
+        raise TypeError(f"{name} must be float64 or narrower: {array.dtype} would be rounded")
+    if kind == "O":
+        return _from_objects(array, name, single)
+    must = "hold real numbers" if array.ndim else single
+    raise TypeError(f"{name} must {must}, got dtype {array.dtype}")
+
+
+def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
+    """An array of whatever dtype; TypeError or ValueError, with the name, if there is none.
+
+    What a conversion raises (a tensor on another device, or one that requires its gradient) is the
+    cause of the TypeError.
+    """
+    if is_a(values, np.ma.MaskedArray):
+        return _unmasked(values, name)
+    if is_a(values, np.ndarray):
+        return np.asarray(values)
+    if is_a(values, (str, bytes)):
+        raise TypeError(f"{name} must {single}, got {kind_of(values)}")
+    if is_a(values, (list, tuple)):
+        refuse_deep_lists(values, name)
+        _refuse_masked_items(values, name)
+    try:
+        if not hasattr(values, "__array__") and hasattr(values, "__dlpack__"):
+            return np.asarray(np.from_dlpack(values))
+        return np.asarray(values)
+    except MemoryError as error:
+        if str(error):
+            raise
+        raise MemoryError(f"{name} cannot be converted to an array: too many items") from error
+    except ValueError as error:
+        raise ValueError(f"{name} must be a rectangular array of numbers: {told(error)}") from error
+    except Exception as error:
+        raise TypeError(
+            f"{name} cannot be converted to an array: "
+            f"{kind_of(values)} raised {kind_of(error)}: {told(error)}"
+        ) from error
+
+
+def in_order(array: npt.NDArray[Any], dtype: type[Any]) -> npt.NDArray[Any]:
+    """The array as the core takes small ones: of this type, C-contiguous and aligned."""
+    array = np.ascontiguousarray(array, dtype)
+    return array if array.flags.aligned else array.copy()
+
+
+def _unmasked(values: Any, name: str) -> npt.NDArray[Any]:
+    """The data of a masked array that masks nothing."""
+    mask = np.asarray(np.ma.getmaskarray(values))
+    if mask.dtype.kind == "b" and mask.any():  # structured ones are refused for their type
+        raise ValueError(f"{_element(name, np.argwhere(mask)[0])} must not be masked")
+    return np.asarray(values)
+
+
+def _refuse_masked_items(values: list[Any] | tuple[Any, ...], name: str) -> None:
+    """ValueError for masked arrays in a list: NumPy would drop their masks."""
+    kind_of_list: Any = list if is_a(values, list) else tuple
+    items = kind_of_list.__iter__(values)  # not one of its own, which may be anything
+    kinds = set(map(type, items))
+    if kinds <= {list, tuple, float, int, np.ndarray} or not any(
+        issubclass(kind, np.ma.MaskedArray) for kind in kinds
+    ):
+        return
+    for k, item in enumerate(kind_of_list.__iter__(values)):
+        if is_a(item, np.ma.MaskedArray):
+            _unmasked(item, f"{name}[{k}]")
+
+
+def _element(name: str, where: Iterable[Any]) -> str:
+    """``points[2, 1]``, or the name alone for a single number."""
+    place = ", ".join(str(int(k)) for k in where)
+    return f"{name}[{place}]" if place else name
+
+
+def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
+    if array.size == 0 or array.dtype.itemsize < 8:
+        return
+    suspects = (array > _BIGGEST_INTEGER) | (array < -_BIGGEST_INTEGER)
+    if not suspects.any():
+        return
+    # An integer is a float64 when at most 53 bits are left without the zeros at its end.
+    size = array[suspects].astype(np.uint64)
+    if array.dtype.kind == "i":
+        size = np.where(array[suspects] < 0, ~size + np.uint64(1), size)
+    odd = size // (size & (~size + np.uint64(1)))
+    wrong = np.flatnonzero(odd > _BIGGEST_INTEGER)
+    if len(wrong):
+        where = np.argwhere(suspects)[wrong[0]]
+        raise ValueError(
+            f"{_element(name, where)} = {array[tuple(where)]} is not a float64; integers beyond "
+            "2**53 are accepted only when float64 holds them exactly"
+        )
+
+
+def _from_objects(array: npt.NDArray[Any], name: str, single: str) -> FloatArray:
+    """Plain Python numbers in an object array: mixed, or integers too big for int64."""
+    result = np.empty(array.shape)
+    for where in np.ndindex(array.shape):
+        number = exact_number(array[where])
+        if number is None:
+            kind = kind_of(array[where])
+            if not where:
+                raise TypeError(f"{name} must {single}, got {kind}")
+            raise TypeError(f"{name} must hold real numbers, got {kind} at {list(where)}")
+        try:
+            result[where] = float(number)
+        except OverflowError:
+            power = f"{'-' if number < 0 else ''}2**{int(number).bit_length() - 1}"
+            raise OverflowError(
+                f"{_element(name, where)} = about {power} is too large for float64"
+            ) from None
+        if is_a(number, int) and int(result[where]) != number:
+            raise ValueError(f"{_element(name, where)} = {number} is not a float64")
+    return result

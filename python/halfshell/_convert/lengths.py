@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Cutoffs, radii and the like: one length, or several."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._convert.arrays import FloatArray, as_real_array
+from halfshell._convert.foreign import is_a
+from halfshell._convert.memory import refuse_large, refuse_unavailable
+
+# The array, the one that it is checked with, and the counts.
+_EDGE_COPIES = 4
+
+
+def as_number(value: Any, name: str, single: str = "be a number") -> float:
+    """A plain number; anything that float64 would have to round is refused."""
+    if is_a(value, float):
+        return float.__float__(value)
+    array = as_real_array(value, name, single)
+    if array.ndim != 0:
+        raise TypeError(f"{name} must {single}, got shape {array.shape}")
+    return float(array)
+
+
+def as_positive(value: Any, name: str) -> float:
+    """A number that is finite and greater than 0."""
+    number = as_number(value, name)
+    if not (math.isfinite(number) and number > 0.0):
+        raise ValueError(f"{name} must be finite and greater than 0, got {number}")
+    return number
+
+
+def as_cutoff(value: Any) -> float:
+    """One cutoff; the core checks its value."""
+    return as_number(value, "cutoff")
+
+
+def as_cutoffs(value: Any) -> float | FloatArray:
+    """One cutoff, or several in ascending order, which are finite and not negative."""
+    if is_a(value, float):
+        return float.__float__(value)
+    array = as_real_array(value, "cutoff", "be a number")
+    if array.ndim == 0:
+        return float(array)
+    if array.ndim != 1:
+        raise ValueError(f"cutoff must be a number or have shape (k,), got {array.shape}")
+    refuse_large(8 * array.size, array, "cutoff")
+    array = array.astype(np.float64)
+    check_lengths(array, "cutoff")
+    check_ascending(array, "cutoff", "several cutoffs")
+    return array
+
+
+def as_radii(value: Any, n: int) -> float | FloatArray | None:
+    """None, one number, or an array of one for each of n queries; finite and not negative."""
+    if value is None:
+        return None
+    array = as_real_array(value, "radius", "be a number").astype(np.float64)
+    if array.ndim == 0:
+        if not (np.isfinite(array) and array >= 0.0):
+            raise ValueError(f"radius must be finite and not negative, got {float(array)}")
+        return float(array)
+    if array.shape != (n,):
+        raise ValueError(
+            f"radius must be a number or have shape ({n},), one for each query, got {array.shape}"
+        )
+    check_lengths(array, "radius")
+    return array
+
+
+def as_edges(values: npt.ArrayLike) -> FloatArray:
+    """Two or more limits of bins: finite, not negative, not descending."""
+    array = as_real_array(values, "edges")
+    if array.ndim != 1 or len(array) < 2:
+        raise ValueError(
+            f"edges must have shape (bins + 1,), with one bin at least, got {array.shape}"
+        )
+    refuse_unavailable(_EDGE_COPIES * 8 * len(array), f"edges of shape {array.shape}")
+    array = array.astype(np.float64)
+    check_lengths(array, "edges")
+    check_ascending(array, "edges", "edges")
+    return np.ascontiguousarray(array)
+
+
+def check_lengths(array: FloatArray, name: str) -> None:
+    """ValueError, with the place, unless all are finite and not negative."""
+    for k in np.flatnonzero(~(np.isfinite(array) & (array >= 0.0))):
+        raise ValueError(f"{name} must be finite and not negative, got {name}[{k}] = {array[k]}")
+
+
+def check_ascending(array: FloatArray, name: str, all_of_them: str) -> None:
+    """ValueError, with the place, where one is less than the one before."""
+    for k in np.flatnonzero(array[1:] < array[:-1]):
+        raise ValueError(
+            f"{all_of_them} must be ascending, got {name}[{k}] = {array[k]} before "
+            f"{name}[{k + 1}] = {array[k + 1]}"
+        )

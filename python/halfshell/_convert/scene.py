@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Points, box and periodicity, and queries beside them, as the core takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array, in_order
+from halfshell._convert.foreign import attribute, is_a, kind_of, shown
+
+MAX_DIM = 8
+LENGTHS_AND_ANGLES = "lengths and angles are for Box.from_lengths_angles((a, b, c), (alpha, ...))"
+_MISSING = object()
+
+
+def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
+    """Points of shape (n, d); a list without elements counts as n = 0, d = `ndim`."""
+    array = as_array(values, name)
+    if array.ndim == 2 and array.shape[0] >= 2**31:  # before they are converted
+        raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
+    array = as_real_array(array, name)
+    if array.ndim != 2 or not 1 <= array.shape[1] <= MAX_DIM:
+        if array.shape == (0,):
+            return np.empty((0, ndim))
+        raise ValueError(
+            f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {array.shape}"
+        )
+    return array
+
+
+def vectors_of(values: Any, name: str = "box") -> Any:
+    """The vectors of a Box, or of another object that has some; else the object itself."""
+    if type(values) in (np.ndarray, list, tuple):
+        return values
+    return attribute(values, "vectors", name, values)
+
+
+def as_box(values: Any, ndim: int) -> FloatArray:
+    """Box vectors as the rows of a float64 array (ndim, ndim), from rows, lengths or a Box."""
+    array = as_real_array(vectors_of(values), "box")
+    if array.shape == (ndim,):
+        return np.diag(array.astype(np.float64))
+    if array.shape != (ndim, ndim):
+        hint = f": {LENGTHS_AND_ANGLES}" if array.shape == (6,) else ""
+        raise ValueError(
+            f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} dimensions, "
+            f"got {array.shape}{hint}"
+        )
+    return in_order(array, np.float64)
+
+
+def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
+    """Which axes repeat, as an integer with bit l set for box vector l."""
+    if values is None:
+        return (1 << ndim) - 1 if default else 0
+    if is_a(values, (bool, np.bool_)):
+        return (1 << ndim) - 1 if values else 0
+    if is_a(values, (str, bytes)):
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {shown(values)}")
+    array = as_array(values, "periodic")
+    if array.shape not in ((), (ndim,)) and array.dtype.kind in "biu":
+        raise ValueError(f"periodic must be a bool or {ndim} bools, got shape {array.shape}")
+    if array.dtype.kind != "b" and not (
+        array.dtype.kind in "iu" and bool(((array == 0) | (array == 1)).all())
+    ):
+        raise TypeError(f"periodic must be a bool or {ndim} bools, got {shown(values)}")
+    if array.shape == ():
+        return (1 << ndim) - 1 if array else 0
+    return sum(1 << axis for axis in range(ndim) if array[axis])
+
+
+def brings_its_box(points: Any, name: str = "points") -> bool:
+    """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms."""
+    return type(points) not in (np.ndarray, list) and all(
+        attribute(points, part, name, _MISSING) is not _MISSING
+        for part in ("positions", "cell", "pbc")
+    )
+
+
+def _own_scene(
+    atoms: Any, name: str = "points", ndim: int = 3
+) -> tuple[PointArray, FloatArray | None, int]:
+    """`as_scene` of an object that brings its box."""
+    array = as_points(attribute(atoms, "positions", name), name, ndim)
+    ndim = array.shape[1]
+    bits = as_periodic_bits(attribute(atoms, "pbc", "periodic"), ndim, default=False)
+    if not bits:
+        return array, None, 0
+    return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
+
+
+def as_scene(
+    points: Any, box: Any, periodic: Any, ndim: int = 3
+) -> tuple[PointArray, FloatArray | None, int]:
+    """Points, box and periodic bits; from an ASE-like object all three. `ndim`: of an empty list.
+
+    An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an
+    error.
+    """
+    if brings_its_box(points):
+        if box is not None or periodic is not None:
+            given = "box" if box is not None else "periodic"
+            raise ValueError(
+                f"{given} comes from the {kind_of(points)} object itself that points are"
+            )
+        return _own_scene(points, ndim=ndim)
+    array = as_points(points, ndim=ndim)
+    ndim = array.shape[1]
+    if box is None:
+        if as_periodic_bits(periodic, ndim, default=False):
+            raise ValueError("periodic needs a box: give box, or leave periodic out")
+        return array, None, 0
+    return array, as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
+
+
+def as_two_sets(
+    queries: Any, points: Any, box: Any, periodic: Any
+) -> tuple[PointArray, PointArray, FloatArray | None, int]:
+    """Queries, points, box and periodic bits.
+
+    The box of an ASE-like object holds for both sets: where both are such objects, they must agree.
+    """
+    own = _own_scene(queries, "queries") if brings_its_box(queries, "queries") else None
+    asking = as_points(queries, "queries") if own is None else own[0]
+    array, vectors, bits = as_scene(points, box, periodic, asking.shape[1])
+    if len(asking) == 0 and own is None:
+        asking = as_points(queries, "queries", array.shape[1])
+    if asking.shape[1] != array.shape[1]:
+        raise ValueError(
+            "queries and points must have the same number of columns, got shapes "
+            f"{asking.shape} and {array.shape}"
+        )
+    if own is not None and not _same_box(own[1:], (vectors, bits)):
+        raise ValueError(
+            "queries bring a box that is not that of points: give arrays, and box and periodic"
+        )
+    return asking, array, vectors, bits
+
+
+def as_sets(
+    queries: Any, points: Any, box: Any, periodic: Any
+) -> tuple[PointArray | None, PointArray, FloatArray | None, int]:
+    """As `as_two_sets`, where there may be no queries."""
+    if queries is None:
+        return None, *as_scene(points, box, periodic)
+    return as_two_sets(queries, points, box, periodic)
+
+
+def _same_box(
+    one: tuple[FloatArray | None, int], other: tuple[FloatArray | None, int]
+) -> bool:
+    """Whether the same axes repeat by the same vectors."""
+    if one[1] != other[1]:
+        return False
+    if one[0] is None or other[0] is None:
+        return True  # no axis repeats
+    return all(
+        np.array_equal(a, b) for k, (a, b) in enumerate(zip(one[0], other[0])) if one[1] >> k & 1
+    )
+
+
+def check_apart(out: Any, **inputs: Any) -> None:
+    """Raise ValueError if an array of `out` may share memory with an input, which it names.
+
+    For inputs as they were given: the core checks what they were converted to.
+    """
+    outputs = out if isinstance(out, tuple) else (out,)
+    for name, values in inputs.items():
+        for array in outputs:
+            if (
+                isinstance(array, np.ndarray)
+                and isinstance(values, np.ndarray)
+                and np.may_share_memory(array, values)
+            ):
+                raise ValueError(f"out must not share memory with {name}")
