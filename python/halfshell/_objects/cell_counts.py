@@ -13,10 +13,10 @@ from halfshell import _core
 from halfshell._convert.lengths import as_cutoffs, as_edges
 from halfshell._functions.counts import count_within
 from halfshell._functions.histogram import as_marks, binned
-from halfshell._objects.cell_layout import Asking, CellLayout
+from halfshell._objects.kept_cells import Asking, KeptCells
 
 
-class CellCounts(CellLayout):
+class CellCounts(KeptCells):
     """Counts among the points in cells."""
 
     __slots__ = ()
@@ -64,7 +64,7 @@ class CellCounts(CellLayout):
         >>> cells.count_pairs([0.5, 1.0, 2.0]).tolist()
         [0, 1, 2]
         """
-        cutoffs = self.cutoff if cutoff is None else as_cutoffs(cutoff)
+        cutoffs = self._cutoff if cutoff is None else as_cutoffs(cutoff)
         asking = None if queries is None else self._queries(queries)
         cells, _, box, bits, *_ = whole = self._arguments(None, options)
         return count_within(cutoffs, cells, box, bits, whole[4:], asking)
@@ -137,7 +137,7 @@ class CellCounts(CellLayout):
         asking = None if queries is None else self._queries(queries)
         limits = as_edges(edges)
         marks = as_marks(
-            len(self), asking, types, query_types, weights, query_weights
+            self._n_points, asking, types, query_types, weights, query_weights
         )
         own: Asking = {"inclusive": False, "kernel": kernel, "memory_limit": memory_limit}
         if threads is not None:

@@ -13,10 +13,10 @@ from halfshell import _core
 from halfshell._convert.callbacks import target_of
 from halfshell._convert.options import Arrays, as_flag, as_index_bytes
 from halfshell._functions.stream import PairBlocks, as_progress, most_pairs
-from halfshell._objects.cell_layout import Asking, CellLayout
+from halfshell._objects.kept_cells import Asking, KeptCells
 
 
-class CellPairs(CellLayout):
+class CellPairs(KeptCells):
     """Half lists of the points in cells."""
 
     __slots__ = ()

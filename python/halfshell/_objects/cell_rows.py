@@ -14,13 +14,13 @@ from halfshell._convert.arrays import PointArray
 from halfshell._convert.lengths import as_cutoff, as_radii
 from halfshell._convert.options import Arrays, as_flag, as_index_bytes
 from halfshell._functions.nearest import as_k, as_max_distance, in_rows
-from halfshell._objects.cell_layout import Asking, CellLayout, Running
+from halfshell._objects.kept_cells import Asking, KeptCells, Running
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin
 from halfshell._objects.radii import Columns, search_each
 
 
-class CellRows(CellLayout):
+class CellRows(KeptCells):
     """Full lists among the points in cells."""
 
     __slots__ = ()

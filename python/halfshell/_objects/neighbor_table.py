@@ -9,19 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.options import as_choice, as_flag
+from halfshell._objects import table_forms
 from halfshell._objects.graph import Graph, check_letters, turned
-from halfshell._objects.table_forms import (
-    as_mask,
-    check_pair_letters,
-    first_halves,
-    order_by_distance,
-    order_by_neighbor,
-    padded,
-    reverse_by_shift,
-    reverse_in_order,
-    rows_of,
-    sparse_array,
-)
 from halfshell._objects.table_rows import Array, Row, TableRows
 
 
@@ -119,7 +108,7 @@ class NeighborTable(TableRows):
         >>> [j.tolist() for j, d in table.filter(table.distances > 1.5)]
         [[], [2], [1]]
         """
-        keep = as_mask(mask, self.n_entries)
+        keep = table_forms.as_mask(mask, self.n_entries)
         before = np.concatenate(([0], np.cumsum(keep, dtype=np.int64)))
         return self._with(
             before[self.offsets], keep, self._is_complete and bool(keep.all()), self._is_in_order
@@ -159,7 +148,7 @@ class NeighborTable(TableRows):
         ([0, 1], [1, 0])
         """
         as_choice(by, "by", ("distance",))
-        order = order_by_distance(self.offsets, self.distances)
+        order = table_forms.order_by_distance(self.offsets, self.distances)
         return self._with(self.offsets, self._settled(order), self._is_complete, False)
 
     # ---- other forms -----------------------------------------------------------------------
@@ -200,7 +189,7 @@ class NeighborTable(TableRows):
         >>> i.tolist(), j.tolist()
         ([0, 1], [1, 2])
         """
-        check_pair_letters(quantities)
+        table_forms.check_letters(quantities)
         half = as_flag(half, "half")
         rows = self._row_numbers()
         columns = {"i": rows}
@@ -209,7 +198,7 @@ class NeighborTable(TableRows):
         columns |= {letter: self._column(letter) for letter in quantities if letter not in "iP"}
         if half:
             self._refuse_queries("half=True")
-            keep = first_halves(rows, self.indices, lambda: self.shifts)
+            keep = table_forms.first_halves(rows, self.indices, lambda: self.shifts)
             columns = {letter: column[keep] for letter, column in columns.items()}
         arrays = tuple(columns[letter] for letter in quantities)
         return arrays if len(arrays) > 1 else arrays[0]
@@ -247,9 +236,9 @@ class NeighborTable(TableRows):
         as_choice(duplicates, "duplicates", ("raise", "min"))
         indices, distances = self.indices, self.distances
         if not self._is_in_order:
-            order = order_by_neighbor(self.offsets, indices)
+            order = table_forms.order_by_neighbor(self.offsets, indices)
             indices, distances = indices[order], distances[order]
-        return sparse_array(
+        return table_forms.sparse_array(
             self.offsets, indices, distances, self._n_points, duplicates == "min"
         )
 
@@ -295,7 +284,7 @@ class NeighborTable(TableRows):
         2
         """
         as_choice(quantity, "quantity", ("j", "d", "D", "S"))
-        return padded(self.offsets, self._column(quantity), capacity, fill)
+        return table_forms.padded(self.offsets, self._column(quantity), capacity, fill)
 
     def edge_index(self) -> Array:
         """The entries as edges of a graph, from neighbour to point.
@@ -392,13 +381,13 @@ class NeighborTable(TableRows):
         """
         self._refuse_queries("reverse()")
         if self._is_complete and self._is_in_order:
-            return reverse_in_order(self.offsets, self.indices)
-        return reverse_by_shift(self.offsets, self.indices, self.shifts)
+            return table_forms.reverse_in_order(self.offsets, self.indices)
+        return table_forms.reverse_by_shift(self.offsets, self.indices, self.shifts)
 
     def _row_numbers(self) -> Array:
         """The row of each entry, of the type of the indices, if there are any."""
         dtype = self.indices.dtype if "j" in self._quantities else np.dtype(np.int64)
-        return rows_of(self.offsets, dtype)
+        return table_forms.rows_of(self.offsets, dtype)
 
     def _refuse_queries(self, what: str) -> None:
         if not self._is_of_one_set:

@@ -26,7 +26,7 @@ def rows_of(offsets: Array, dtype: npt.DTypeLike = np.int64) -> Array:
     return np.repeat(np.arange(len(offsets) - 1, dtype=dtype), np.diff(offsets))
 
 
-def check_pair_letters(quantities: Any) -> None:
+def check_letters(quantities: Any) -> None:
     """Raise unless these are some of the letters that `pairs` knows, each at most once."""
     if not isinstance(quantities, str):
         raise TypeError(f"quantities must be a string, got {type(quantities).__name__}")
