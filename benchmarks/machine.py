@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from halfshell._machine import cpu_name
+
 __all__ = ["available_bytes", "facts", "pin_to_cores", "touch_memory", "usable_cores"]
 
 
@@ -61,7 +63,7 @@ def facts(label: str | None = None, simd: str = "", compiler: str = "") -> dict[
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": label or f"{platform.system()} {platform.machine()}",
-        "cpu": _cpu_model(),
+        "cpu": cpu_name(),
         "cores": os.cpu_count() or 1,
         "kernel": simd,
         "compiler": compiler,
@@ -86,13 +88,6 @@ def _read(path: str) -> str:
 def _chosen(text: str) -> str:
     """Return what stands in brackets: "always [madvise] never" gives "madvise"."""
     return text.partition("[")[2].partition("]")[0]
-
-
-def _cpu_model() -> str:
-    for line in _read("/proc/cpuinfo").splitlines():
-        if line.startswith("model name"):
-            return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
 
 
 def _commit() -> str:

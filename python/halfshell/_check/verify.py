@@ -215,7 +215,10 @@ def _confirm(
     verdict: Verdict, points: Any, cutoff: float, box: Any, periodic: list[bool], inclusive: bool
 ) -> None:
     """Recompute the differences in rational arithmetic, which shares nothing with the search."""
-    from fractions import Fraction  # here, because importing it takes longer than the rest
+    # Here, because importing fractions takes longer than the rest.
+    from fractions import Fraction
+
+    from halfshell._check.reference import exact_square
 
     square = Fraction(float(cutoff)) ** 2
     for rows, should_be_within in ((verdict.missed, True), (verdict.spurious, False)):
@@ -224,15 +227,7 @@ def _confirm(
                 continue  # a point with itself is never a pair
             if any(s and not repeats for s, repeats in zip(shift, periodic)):
                 continue  # nor is anything across an axis that does not repeat
-            distance = sum(
-                (
-                    Fraction(float(points[j, k]))
-                    - Fraction(float(points[i, k]))
-                    + sum(s * Fraction(float(box[axis, k])) for axis, s in enumerate(shift) if s)
-                )
-                ** 2
-                for k in range(points.shape[1])
-            )
+            distance = exact_square(points, i, j, shift, box)
             within = distance <= square if inclusive else distance < square
             if within != should_be_within:
                 raise AssertionError(

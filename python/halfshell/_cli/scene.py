@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from halfshell._cli.files import InputError, Scene, missing_extra, read_scene
 from halfshell._convert.memory import refuse_unavailable
+from halfshell._functions.rdf import unit_ball
 from halfshell._terminal import printable
 
 __all__ = [
@@ -76,7 +77,7 @@ def choose_cutoff(scene: Scene) -> tuple[float, str]:
         reason = "all points are neighbours"
     else:
         with np.errstate(all="ignore"):
-            logs = np.log(np.array([NEIGHBORS_WANTED, 1 / n, 1 / _ball(k), *sides]))
+            logs = np.log(np.array([NEIGHBORS_WANTED, 1 / n, 1 / unit_ball(k), *sides]))
             cutoff = float(np.exp(logs.sum() / max(k, 1)))
         reason = f"about {NEIGHBORS_WANTED} neighbours at this density"
     if not sides or not 0 < cutoff < math.inf:
@@ -99,11 +100,6 @@ def _extents(points: NDArray[np.float64], longest: float) -> list[float]:
         floor = 1e-9 * max([longest, *sides])
         boxes.append([side for side in sides if side > floor])
     return min(boxes, key=lambda sides: (len(sides), math.prod(sides)))
-
-
-def _ball(ndim: int) -> float:
-    """Return the volume of a ball of radius 1."""
-    return float(math.pi ** (ndim / 2) / math.gamma(ndim / 2 + 1))
 
 
 def unit_suffix(scene: Scene) -> str:
@@ -163,7 +159,7 @@ def radial_distribution(
     volume = abs(float(np.linalg.det(rows))) if rows is not None and all(scene.periodic) else 0.0
     if not 0 < volume < math.inf:
         return middle, neighbors / np.diff(edges), False
-    shells = _ball(ndim) * np.diff(edges**ndim)
+    shells = unit_ball(ndim) * np.diff(edges**ndim)
     return middle, neighbors / (shells * (n / volume)), True
 
 

@@ -141,20 +141,8 @@ def explain(
     array, vectors, bits = as_scene(points, box, periodic)
     index_bytes = as_index_bytes(index_dtype)
     plan = _core.explain(
-        array,
-        as_cutoff(cutoff),
-        vectors,
-        bits,
-        inclusive,
-        precision,
-        kernel,
-        memory_limit,
-        None,
-        threads,
-        quantities,
-        sort,
-        index_bytes,
-        measure,
+        array, as_cutoff(cutoff), vectors, bits, inclusive, precision, kernel, memory_limit, None,
+        threads, quantities, sort, index_bytes, measure,
     )
     ndim = plan["ndim"]
     return Explanation(

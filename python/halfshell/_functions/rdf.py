@@ -218,12 +218,17 @@ def _shares(
     power = -int(np.frexp(np.abs(vectors).max())[1])
     volume: float = _core.box_measure(np.ldexp(vectors, power), bits)[1]
     ndim = len(vectors)
-    unit_ball = 2.0 if ndim % 2 else 1.0
-    for k in range(2 + ndim % 2, ndim + 1, 2):
-        unit_ball *= 2.0 * math.pi / k
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
         shells: FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
-        return unit_ball * shells / volume
+        return unit_ball(ndim) * shells / volume
+
+
+def unit_ball(ndim: int) -> float:
+    """The volume of a ball of radius 1."""
+    volume = 2.0 if ndim % 2 else 1.0
+    for k in range(2 + ndim % 2, ndim + 1, 2):
+        volume *= 2.0 * math.pi / k
+    return volume
 
 
 def _partners(

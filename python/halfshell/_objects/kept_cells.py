@@ -55,15 +55,9 @@ class KeptCells:
     ) -> Search:
         for name in options.keys() - {"inclusive", "kernel", "threads", "memory_limit"}:
             raise TypeError(f"unexpected keyword argument {name!r}")
+        reach = self._cutoff if cutoff is None else as_cutoff(cutoff)
+        inclusive = as_flag(options.get("inclusive", True), "inclusive")
         return (
-            self._cells,
-            self._cutoff if cutoff is None else as_cutoff(cutoff),
-            None,
-            0,
-            as_flag(options.get("inclusive", True), "inclusive"),
-            self._precision,
-            options.get("kernel"),
-            options.get("memory_limit"),
-            progress,
-            options.get("threads", self._threads),
+            self._cells, reach, None, 0, inclusive, self._precision, options.get("kernel"),
+            options.get("memory_limit"), progress, options.get("threads", self._threads),
         )
