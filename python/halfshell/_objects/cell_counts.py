@@ -66,8 +66,12 @@ class CellCounts(KeptCells):
         """
         cutoffs = self._cutoff if cutoff is None else as_cutoffs(cutoff)
         asking = None if queries is None else self._queries(queries)
-        cells, _, box, bits, *_ = whole = self._arguments(None, options)
-        return count_within(cutoffs, cells, box, bits, whole[4:], asking)
+        search = self._arguments(cutoffs if isinstance(cutoffs, float) else None, options)
+        if not isinstance(cutoffs, float):
+            return count_within(cutoffs, self._cells, None, 0, search[4:], asking)
+        if asking is None:
+            return _core.count_pairs(*search)
+        return _core.count_between(*search, asking)
 
     def coordination(
         self, cutoff: Any = None, *, queries: Any = None, **options: Unpack[Asking]

@@ -12,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import FloatArray, PointArray
 from halfshell._convert.lengths import as_cutoff, as_number
-from halfshell._convert.options import Arrays, Letter, Search, as_flag, as_index_bytes
+from halfshell._convert.options import Arrays, Letter, as_flag, as_index_bytes
 from halfshell._convert.scene import as_scene
 from halfshell._objects.skin import AutoSkin
 
@@ -153,8 +152,10 @@ class VerletList:
         change = auto is not None and auto.wants_change(array.shape[1])
         skin = auto.next_skin() if auto is not None else self._skin
         start = perf_counter()
-        search = self._arguments(array, vectors, bits)
-        rebuilt = _core.verlet_update(self._list, *search, skin, change)
+        rebuilt = _core.verlet_update(
+            self._list, array, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
+            self._memory_limit, None, self._threads, skin, change,
+        )
         taken = perf_counter() - start
         self._box, self._periodic = box, periodic
         self._n_updates += 1
@@ -236,10 +237,10 @@ class VerletList:
         with _Alone(self):
             state = self._state()
             start = perf_counter()
-            search = self._arguments(np.empty((0, state["ndim"])), None, 0)
             arrays = _core.verlet_pairs(
-                self._list, *search, quantities, as_flag(sort, "sort"),
-                as_index_bytes(index_dtype), out,
+                self._list, np.empty((0, state["ndim"])), self._cutoff, None, 0, self._inclusive,
+                "exact", self._kernel, self._memory_limit, None, self._threads, quantities,
+                as_flag(sort, "sort"), as_index_bytes(index_dtype), out,
             )
             if self._auto is not None:
                 self._auto.used(perf_counter() - start)
@@ -277,15 +278,6 @@ class VerletList:
     def n_updates(self) -> int:
         """How many steps were taken."""
         return self._n_updates
-
-    def _arguments(
-        self, points: PointArray, vectors: FloatArray | None, bits: int
-    ) -> Search:
-        """The first arguments of the core."""
-        return (
-            points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
-            self._memory_limit, None, self._threads,
-        )
 
     def _state(self) -> dict[str, Any]:
         state = _core.verlet_look(self._list)
