@@ -10,7 +10,7 @@
 static int
 is_elsewhere(const char *path)
 {
-    return strncmp(path, "/proc/self/cgroup", 17) == 0 || strcmp(path, "/proc/meminfo") == 0 ||
+    return strncmp(path, "/proc/self/", 11) == 0 || strcmp(path, "/proc/meminfo") == 0 ||
            strncmp(path, "/sys/fs/cgroup", 14) == 0;
 }
 
