@@ -101,7 +101,7 @@ def test_groups_of_version_1_are_no_groups_of_version_2(available):
 
 def test_the_memory_group_of_version_1_counts(available):
     folder = f"{GROUPS}/memory"
-    files = machine(900) | {
+    files = machine(900) | {"/proc/self/cgroup": "4:memory:/\n"} | {
         f"{folder}/memory.limit_in_bytes": f"{300 * MEGA}\n",
         f"{folder}/memory.usage_in_bytes": f"{250 * MEGA}\n",
         f"{folder}/memory.stat": f"inactive_file 1\ntotal_inactive_file {20 * MEGA}\n",
