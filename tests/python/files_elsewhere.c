@@ -10,8 +10,8 @@
 static int
 is_elsewhere(const char *path)
 {
-    return strncmp(path, "/proc/self/", 11) == 0 || strcmp(path, "/proc/meminfo") == 0 ||
-           strncmp(path, "/sys/fs/cgroup", 14) == 0;
+    return strcmp(path, "/proc/self/cgroup") == 0 || strcmp(path, "/proc/self/mountinfo") == 0 ||
+           strcmp(path, "/proc/meminfo") == 0 || strncmp(path, "/sys/fs/cgroup", 14) == 0;
 }
 
 static FILE *

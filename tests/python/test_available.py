@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much memory is left, by what Linux says of the machine and of control groups."""
+"""How much memory is left, by what Linux says of the machine; test_available_memory.py has the
+control groups."""
 
 import os
 import subprocess
@@ -12,7 +13,6 @@ from c_builds import compile, needs_c
 
 HERE = Path(__file__).resolve().parent
 MEGA = 1 << 20
-GROUPS = "/sys/fs/cgroup"
 
 pytestmark = [
     needs_c,
@@ -53,15 +53,6 @@ def machine(megabytes):
     return {"/proc/meminfo": f"MemTotal: 99999999 kB\nMemAvailable: {megabytes * 1024} kB\n"}
 
 
-def group(folder, limit, usage, stat=""):
-    """A control group of version 2."""
-    return {
-        f"{GROUPS}{folder}/memory.max": f"{limit}\n",
-        f"{GROUPS}{folder}/memory.current": f"{usage * MEGA}\n",
-        f"{GROUPS}{folder}/memory.stat": stat,
-    }
-
-
 def test_the_machine_sets_the_limit_where_there_is_no_group(available):
     assert available(machine(700)) == 700
 
@@ -71,39 +62,13 @@ def test_where_the_machine_says_nothing_all_its_memory_counts(available):
     assert available({}) == pages
 
 
-def test_the_narrowest_group_counts(available):
-    files = machine(900) | {"/proc/self/cgroup": "0::/outer/inner\n"}
-    files |= group("/outer/inner", 500 * MEGA, 100)
-    assert available(files) == 400
-    assert available(group("/outer", 600 * MEGA, 350)) == 250
-    assert available(group("", 800 * MEGA, 790)) == 10
-    assert available(group("", "max", 790)) == 250
-
-
-def test_a_group_may_be_over_its_limit(available):
-    files = machine(900) | {"/proc/self/cgroup": "0::/one\n"} | group("/one", 5 * MEGA, 6)
-    assert available(files) == 0
-
-
-def test_pages_of_files_can_be_dropped(available):
-    stat = f"anon 7\nactive_file_other 9\ninactive_file {30 * MEGA}\nactive_file {4 * MEGA}\n"
-    files = machine(900) | {"/proc/self/cgroup": "0::/one\n"}
-    assert available(files | group("/one", 500 * MEGA, 200, stat)) == 334
-
-
-def test_groups_of_version_1_are_no_groups_of_version_2(available):
-    files = machine(900) | {"/proc/self/cgroup": "2:memory:/one\n1:name=systemd:/one\n3::/one\n"}
-    files |= group("/one", 500 * MEGA, 200)
-    assert available(files) == 900
-    assert available({"/proc/self/cgroup": "1:name=systemd:/\n0::/one\n"}) == 300
-    assert available({"/proc/self/cgroup": ""}) == 900
-
-
-def test_the_memory_group_of_version_1_counts(available):
-    folder = f"{GROUPS}/memory"
-    files = machine(900) | {"/proc/self/cgroup": "4:memory:/\n"} | {
-        f"{folder}/memory.limit_in_bytes": f"{300 * MEGA}\n",
-        f"{folder}/memory.usage_in_bytes": f"{250 * MEGA}\n",
-        f"{folder}/memory.stat": f"inactive_file 1\ntotal_inactive_file {20 * MEGA}\n",
+def test_the_lesser_of_machine_and_group_counts(available):
+    folder = "/sys/fs/cgroup/one"
+    group = {
+        "/proc/self/cgroup": "0::/one\n",
+        "/proc/self/mountinfo": "31 23 0:28 / /sys/fs/cgroup rw - cgroup2 cgroup2 rw\n",
+        f"{folder}/memory.max": f"{500 * MEGA}\n",
+        f"{folder}/memory.current": f"{100 * MEGA}\n",
     }
-    assert available(files) == 70
+    assert available(machine(900) | group) == 400
+    assert available(machine(300)) == 300

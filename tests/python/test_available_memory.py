@@ -99,6 +99,14 @@ def test_version_2_counts_the_group_and_those_above_it(tree, mounts):
     assert tree.left() == 300 * MB
 
 
+def test_groups_of_version_1_are_no_groups_of_version_2(tree):
+    tree.v2("/sys/fs/cgroup/one", 400 * MB, 100 * MB)
+    tree.process("2:memory:/one\n1:name=systemd:/one\n3::/one\n", V2)
+    assert tree.left() == math.inf
+    tree.process("1:name=systemd:/\n0::/one\n3:cpu:/\n", V2)
+    assert tree.left() == 300 * MB
+
+
 @pytest.mark.parametrize("memory_in", ["v1", "v2"])
 def test_hybrid_setups_are_limited_by_the_hierarchy_that_has_the_memory(tree, memory_in):
     if memory_in == "v1":
