@@ -44,12 +44,14 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     return capsule;
 }
 
-/* A read-only array of int32 that borrows from the cells and keeps them alive. */
+/* A read-only array of n rows, or of n numbers if `width` is 0, that borrows from the cells and
+ * keeps them alive. */
 static PyObject *
-view_of(PyObject *capsule, const int32_t *data, int64_t n)
+view_of(PyObject *capsule, int type, const void *data, int64_t n, int width)
 {
-    npy_intp  shape = (npy_intp)n;
-    PyObject *array = PyArray_SimpleNewFromData(1, &shape, NPY_INT32, (void *)(uintptr_t)data);
+    npy_intp  shape[2] = {(npy_intp)n, width};
+    const int ndim = width > 0 ? 2 : 1;
+    PyObject *array = PyArray_SimpleNewFromData(ndim, shape, type, (void *)(uintptr_t)data);
     if (array == NULL) {
         return NULL;
     }
@@ -92,17 +94,21 @@ hs_py_cells_layout(PyObject *module, PyObject *capsule)
 {
     const hs_cells *cells = hs_cells_of(capsule);
     hs_layout       layout;
+    hs_points       points;
     (void)module;
     if (!expect_cells(cells)) {
         return NULL;
     }
     hs_cells_layout(cells, &layout);
-    return Py_BuildValue("{s:N,s:N,s:N,s:N,s:N}", /* takes the references */
+    hs_cells_points(cells, &points);
+    const int64_t n_starts = layout.n_cells + 1;
+    return Py_BuildValue("{s:N,s:N,s:N,s:N,s:N,s:N}", /* takes the references */
                          "shape", hs_tuple_of_integers(layout.shape, layout.ndim),
                          "cell_sizes", hs_tuple_of_reals(layout.cell_size, layout.ndim),
-                         "cell_start", view_of(capsule, layout.start, layout.n_cells + 1),
-                         "order", view_of(capsule, layout.order, layout.n_points),
-                         "cell_ids", indices_of(cells, &layout));
+                         "cell_start", view_of(capsule, NPY_INT32, layout.start, n_starts, 0),
+                         "order", view_of(capsule, NPY_INT32, layout.order, layout.n_points, 0),
+                         "cell_ids", indices_of(cells, &layout), "points",
+                         view_of(capsule, NPY_DOUBLE, points.data, points.n, points.ndim));
 }
 
 PyObject *

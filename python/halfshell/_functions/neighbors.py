@@ -109,7 +109,7 @@ def neighbors(
             threads, quantities, as_index_bytes(index_dtype), asking,
         )
     origin = None
-    if "d" in quantities:
+    if "d" in quantities and "j" in quantities:  # else it cannot be sorted
         find_shifts = shifts_of_search(cutoff, inclusive, precision, threads)
         origin = Origin(points, asking, vectors, periods, find_shifts)
     return NeighborTable(arrays, quantities, len(points), queries is None, origin=origin)

@@ -88,12 +88,15 @@ class CellList(CellPairs, CellRows, CellCounts):
 
     Notes
     -----
-    A cell list does not change, and any number of threads may ask it at once. Cells are found by a
-    counting sort in O(n + cells), and there are at most 2 n + 64 of them, however large the volume
-    (Hockney and Eastwood, Computer Simulation Using Particles, 1981, section 8-4). Answers are
-    those of the functions of the same names, decided exactly; only the order of `pairs` without
-    ``sort=True``, `iter_pairs` and `for_each_pair`, which is the same for the three, may differ
-    from theirs, since cells that are kept are cut a little differently.
+    A cell list does not change, and any number of threads may ask it at once. It holds the points
+    once as they were given, as float64, and once in cell order; tables with distances that it
+    makes refer to the former and keep the list alive.
+
+    Cells are found by a counting sort in O(n + cells), and there are at most 2 n + 64 of them,
+    however large the volume (Hockney and Eastwood, Computer Simulation Using Particles, 1981,
+    section 8-4). Answers are those of the functions of the same names, decided exactly; only the
+    order of `pairs` without ``sort=True``, `iter_pairs` and `for_each_pair`, which is the same for
+    the three, may differ from theirs, since cells that are kept are cut a little differently.
 
     Examples
     --------
@@ -134,7 +137,8 @@ class CellList(CellPairs, CellRows, CellCounts):
         self._n_points: int = array.shape[0]
         self._ndim: int = array.shape[1]
         self._precision = precision
-        self._origin = Origin(array, None, vectors, bits)
+        own_vectors = None if vectors is None else vectors.copy()
+        self._origin = Origin.of_own(self._layout["points"], None, own_vectors, bits)
         self._threads = threads
 
     def __len__(self) -> int:

@@ -195,7 +195,7 @@ class CellRows(KeptCells):
         quantities: str,
         search: Callable[[Any], Columns],
     ) -> Origin | None:
-        """What a table with distances keeps; `search` returns offsets and S for queries."""
-        if "d" not in quantities:
+        """What a table keeps to be sorted by; `search` returns offsets and S for queries."""
+        if "d" not in quantities or "j" not in quantities:
             return None
         return self._origin.asked_by(asking, lambda origin: search(origin.queries)[1])

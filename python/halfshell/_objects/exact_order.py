@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._available import refuse_unavailable
+
 Array = npt.NDArray[Any]
 Integers = npt.NDArray[np.int64]
 
 CLOSE = 4  # ulps: more than two distances lose together
 BITS = 24  # of a digit: sums of the products of two fit int64, for 8 axes and any exponents
-AT_A_TIME = 1 << 21  # digits of coordinates: tens of megabytes
+AT_A_TIME = 1 << 21  # int64s, 16 MB: but a group is never cut
 
 
 def settle(
@@ -57,24 +59,58 @@ def settle(
         place, entries = places[part], order[places[part]]
         p = asking[rows[place]].astype(np.float64)
         q = points[indices[entries]].astype(np.float64)
-        keys = _squares(p, q, None if shifts is None else shifts[entries], vectors)
-        order[place] = entries[np.lexsort((entries, *keys, groups[part]))]
+        steps = None if shifts is None else shifts[entries]
+        order[place] = entries[_exact(groups[part], entries, p, q, steps, vectors)]
+
+
+def _exact(
+    groups: Integers, entries: Integers, p: Array, q: Array, shifts: Array | None, vectors: Array
+) -> Integers:
+    """What sorts whole groups by |q - p + S @ vectors|, and equal ones by their entries."""
+    scale = _range([p, q] if shifts is None else [p, q, vectors])
+    # Digits of points twice, as they are and shortened, of squares twice, as sums and carried.
+    of_each = scale[1] * (2 * p.shape[1] + 4) + 4 * p.shape[1] + 16
+    order = np.arange(len(groups))
+    for part in _parts(groups, max(1, AT_A_TIME // of_each)):
+        n = part.stop - part.start
+        refuse_unavailable(8 * of_each * n, f"{n} neighbours at the same distance, compared exactly,")
+        steps = None if shifts is None else shifts[part]
+        keys = _squares(p[part], q[part], steps, vectors, scale)
+        order[part] = order[part][np.lexsort((entries[part], *keys, groups[part]))]
+    return order
 
 
 def _parts(groups: Integers, n: int) -> Iterator[slice]:
-    """Whole groups, about `n` entries at a time."""
+    """Whole groups, `n` entries at most, or one group that has more."""
     begin = 0
     while begin < len(groups):
-        last = groups[min(begin + n, len(groups)) - 1]
-        end = int(np.searchsorted(groups, last, side="right"))
+        end = min(begin + n, len(groups))
+        if end < len(groups) and groups[end] == groups[end - 1]:
+            cut = groups[end]
+            first = int(np.searchsorted(groups, cut))
+            end = first if first > begin else int(np.searchsorted(groups, cut, side="right"))
         yield slice(begin, end)
         begin = end
 
 
-def _squares(p: Array, q: Array, shifts: Array | None, vectors: Array) -> list[Integers]:
+def _squares(
+    p: Array, q: Array, shifts: Array | None, vectors: Array, scale: tuple[int, int]
+) -> list[Integers]:
     """|q - p + S @ vectors|**2 in some unit, as digits that are not negative, lowest first."""
-    used = [p, q] if shifts is None else [p, q, vectors]
-    bottom, n_digits = _range(used)
+    short = _short(_differences(p, q, shifts, vectors, scale))
+    sums: list[Integers] = [np.zeros(len(p), np.int64) for _ in range(2 * len(short) - 1)]
+    for a, one in enumerate(short):
+        sums[2 * a] += (one * one).sum(axis=1)
+        for b in range(a):
+            sums[a + b] += 2 * (one * short[b]).sum(axis=1)
+    return _carried(sums, 0)
+
+
+def _differences(
+    p: Array, q: Array, shifts: Array | None, vectors: Array, scale: tuple[int, int]
+) -> list[Integers]:
+    """q - p + S @ vectors, as digits of any sign, lowest first."""
+    bottom, n_digits = scale
     digits = _digits(q, bottom, n_digits)
     digits -= _digits(p, bottom, n_digits)
     if shifts is not None:
@@ -83,13 +119,7 @@ def _squares(p: Array, q: Array, shifts: Array | None, vectors: Array) -> list[I
                 steps = column.astype(np.int64)[:, None]
                 for digit, of_vector in zip(digits, _digits(vector, bottom, n_digits), strict=True):
                     digit += steps * of_vector
-    short = _short(list(digits))
-    sums: list[Integers] = [np.zeros(len(p), np.int64) for _ in range(2 * len(short) - 1)]
-    for a, one in enumerate(short):
-        sums[2 * a] += (one * one).sum(axis=1)
-        for b in range(a):
-            sums[a + b] += 2 * (one * short[b]).sum(axis=1)
-    return _carried(sums, 0)
+    return list(digits)
 
 
 def _range(arrays: list[Array]) -> tuple[int, int]:

@@ -57,6 +57,11 @@ class NeighborTable(TableRows):
     mean points of the whole, so that it counts as a table of queries. ``len(table)`` is the
     number of rows, and iteration goes over them.
 
+    A table with indices and distances also keeps points, queries and box, for `sort`: copies, or,
+    if it is from a `CellList`, what that holds. Rows of a slice keep all of it alive. A pickle has
+    the points that its rows name and no others, and the shifts of its entries if the box repeats:
+    for them the scene is searched once more if the table has no 'S'.
+
     Examples
     --------
     >>> import halfshell as hs
@@ -134,11 +139,14 @@ class NeighborTable(TableRows):
             If the table has no distances or no indices, or was not made by a search.
         ValueError
             If `by` is another word.
+        MemoryError
+            If the exact comparison does not fit.
 
         Notes
         -----
-        For this a table with distances keeps a copy of points, queries and box. One without shifts
-        searches for them once more if the box repeats.
+        For this the table keeps points, queries and box. One without shifts searches for them once
+        more if the box repeats. Entries that rounded distances cannot tell apart are compared about
+        16 MB at a time, those at one distance in one row always together.
 
         Examples
         --------

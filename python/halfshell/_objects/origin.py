@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a table of neighbours was made from: for exact comparisons of its distances."""
+"""What exact sorting needs of a table's search: its points, queries, box and shifts."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Origin:
         As users pass it.
     find_shifts : callable, optional
         Returns S of all entries of all rows, for tables that have no shifts: called with this
-        object, at most once.
+        object when they are first needed.
     """
 
-    __slots__ = ("_box", "_find_shifts", "_periodic", "_shifts", "points", "queries")
+    __slots__ = ("_box", "_find_shifts", "_numbers", "_periodic", "_shifts", "points", "queries")
 
     def __init__(
         self,
@@ -45,22 +45,67 @@ class Origin:
         periodic: Any,
         find_shifts: FindShifts | None = None,
     ) -> None:
-        self.points = points.copy()
-        self.queries = None if queries is None else queries.copy()
-        self._box = None if vectors is None else vectors.copy()
-        self._periodic = tuple(periodic) if isinstance(periodic, list) else periodic
+        periods = tuple(periodic) if isinstance(periodic, list) else periodic
+        box = None if vectors is None else vectors.copy()
+        self._keep(
+            points.copy(), None if queries is None else queries.copy(), box, periods, find_shifts
+        )
+
+    def _keep(
+        self,
+        points: PointArray,
+        queries: PointArray | None,
+        box: Floats | None,
+        periodic: Any,
+        find_shifts: FindShifts | None = None,
+        shifts: npt.NDArray[Any] | None = None,
+        numbers: npt.NDArray[Any] | None = None,
+    ) -> None:
+        self.points = points
+        self.queries = queries
+        self._box = box
+        self._periodic = periodic
         self._find_shifts = find_shifts
-        self._shifts: npt.NDArray[Any] | None = None
+        self._shifts = shifts
+        self._numbers = numbers  # which points these are, ascending; None: all
+
+    @classmethod
+    def of_own(cls, *fields: Any) -> Origin:
+        """As the constructor, of arrays that do not change: they are not copied.
+
+        Further fields are all shifts, and the numbers of `points` if they are not all.
+        """
+        origin = cls.__new__(cls)
+        origin._keep(*fields)
+        return origin
 
     def asked_by(self, queries: PointArray | None, find_shifts: FindShifts) -> Origin:
-        """The same points and box, not copied again, with these queries."""
-        other = Origin.__new__(Origin)
-        other.__setstate__({
-            "points": self.points, "_box": self._box, "_periodic": self._periodic,
-            "queries": None if queries is None else queries.copy(),
-            "_find_shifts": find_shifts, "_shifts": None,
-        })  # fmt: skip
-        return other
+        """The same points and box with these queries, which alone are copied."""
+        own = None if queries is None else queries.copy()
+        return Origin.of_own(self.points, own, self._box, self._periodic, find_shifts)
+
+    def of_rows(
+        self, rows: slice, indices: npt.NDArray[Any], entries: Any, lacks_shifts: bool
+    ) -> Origin:
+        """What these rows alone need, with the points that their entries name and no search.
+
+        `entries` says which of all entries they are, for their shifts where the table has none.
+        """
+        _, vectors, bits = self.scene()
+        points, numbers, queries = self.points, self._numbers, self.queries
+        all_ask = queries is None and rows == slice(0, len(points))
+        if not all_ask:
+            queries = self.asking[rows]
+            named = np.unique(indices)
+            taken = points[self.places_of(named)]
+            if taken.nbytes + named.nbytes < points.nbytes:
+                points, numbers = taken, named
+        shifts = self.shifts()[entries] if lacks_shifts else None
+        return Origin.of_own(points, queries, vectors, bits, None, shifts, numbers)
+
+    def places_of(self, indices: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Where in `points` these are, by their numbers."""
+        return indices if self._numbers is None else np.searchsorted(self._numbers, indices)
 
     @property
     def asking(self) -> PointArray:
@@ -88,21 +133,19 @@ class Origin:
         return self.scene()[2] != 0
 
     def shifts(self) -> npt.NDArray[Any]:
-        """S of all entries of all rows."""
-        if self._shifts is None:
-            assert self._find_shifts is not None
-            self._shifts, self._find_shifts = self._find_shifts(self), None
-        return self._shifts
+        """S of all entries of all rows. Threads may ask at once: each then searches."""
+        find = self._find_shifts  # before the shifts are looked at, which come before it goes
+        found = self._shifts
+        if found is None:
+            assert find is not None
+            self._shifts = found = find(self)
+            self._find_shifts = None
+        return found
 
-    def __getstate__(self) -> dict[str, Any]:
-        if self.has_images:
-            self.shifts()  # searches are not pickled
-        state = {name: getattr(self, name) for name in self.__slots__}
-        return {**state, "_find_shifts": None}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Origin.of_own, (
+            self.points, self.queries, self._box, self._periodic, None, self._shifts, self._numbers,
+        )  # fmt: skip
 
 
 def shifts_of_search(

@@ -178,12 +178,19 @@ class TableRows:
             f"quantities {self._quantities!r})"
         )
 
+    def __copy__(self) -> Self:
+        return self  # it does not change
+
     def __reduce__(self) -> tuple[Any, ...]:
-        state = tuple(getattr(self, name) for name in (
-            "_arrays", "_quantities", "_n_points", "_is_of_one_set", "_is_complete",
-            "_is_in_order", "_origin", "_first_row", "_entries",
-        ))  # fmt: skip
-        return _restored, (type(self), *state)
+        origin, first_row, entries = self._origin, self._first_row, self._entries
+        if origin is not None:  # of which pickles hold no more than their rows need
+            rows = slice(first_row, first_row + len(self))
+            origin = origin.of_rows(rows, self.indices, entries, self._lacks_shifts())
+            first_row, entries = 0, slice(None)
+        return _restored, (
+            type(self), self._arrays, self._quantities, self._n_points, self._is_of_one_set,
+            self._is_complete, self._is_in_order, origin, first_row, entries,
+        )  # fmt: skip
 
     def _with(self, offsets: Array, entries: Array, complete: bool, order: bool) -> Self:
         """These entries, by mask or position, in rows that begin there."""
@@ -225,8 +232,8 @@ class TableRows:
             shifts = origin.shifts()[self._entries] if self._lacks_shifts() else self.shifts
         rows = np.repeat(np.arange(len(self)) + self._first_row, self.counts)
         settle(
-            order, rows, indices, self.distances, shifts, origin.points, origin.asking,
-            origin.rows,
+            order, rows, origin.places_of(indices), self.distances, shifts, origin.points,
+            origin.asking, origin.rows,
         )
         return order
 
