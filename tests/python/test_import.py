@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`import halfshell` loads little beside NumPy; the rest comes when it is first used."""
 
+import ast
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -58,6 +60,26 @@ print(json.dumps([listed, first is second, name in vars(hs), first.__module__]))
     listed, same, kept, module = fresh(script, name)
     assert listed and same and kept
     assert module.startswith("halfshell.")
+
+
+def test_type_checkers_see_the_names_that_come_later():
+    """`_LATER` and the imports that only type checkers read name the same, from the same modules."""
+    tree = ast.parse(Path(hs.__file__).read_text())
+    for_types = next(
+        node for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )  # fmt: skip
+    seen = {}
+    for node in for_types.body:
+        assert isinstance(node, ast.ImportFrom) and not any(alias.asname for alias in node.names)
+        seen |= {alias.name: node.module.removeprefix("halfshell.") for alias in node.names}
+    assert seen == hs._LATER
+    at_once = {
+        alias.name for node in tree.body if isinstance(node, ast.ImportFrom)
+        and node.module.startswith("halfshell") for alias in node.names
+    }  # fmt: skip
+    assert not at_once & set(seen)
+    assert sorted(at_once | set(seen)) == sorted(hs.__all__)
 
 
 def test_all_names_come_with_a_star():

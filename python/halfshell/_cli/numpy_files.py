@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.scene import MAX_DIM, MAX_POINTS
 
 __all__ = ["Unreadable", "read_arrays"]
 
 _MAGIC = np.lib.format.MAGIC_PREFIX
 MOST_HEADER = 10_000  # bytes, as np.load has it
-MOST_POINTS = 2**31 - 1
-MOST_DIM = 8
 _COPIES = 2  # of the points: what is read, and the search's own
+
 
 class Unreadable(Exception):
     """A file that is not read, with the reason."""
@@ -84,13 +84,13 @@ def _check_header(name: str, stream: IO[bytes], n_bytes: int) -> None:
     needed = math.prod(shape) * dtype.itemsize
     what = f"{name!r} of shape {shape} and dtype {dtype}"
     if name != "points":
-        if math.prod(shape) > MOST_DIM**2:
+        if math.prod(shape) > MAX_DIM**2:
             raise Unreadable(f"{name!r} has shape {shape}, more than a box has")
     elif len(shape) != 2:
         raise Unreadable(f"points have shape {shape}; they must be (n, d)")
-    elif shape[1] > MOST_DIM:
-        raise Unreadable(f"points have shape {shape}; they must be (n, d) with d <= {MOST_DIM}")
-    elif shape[0] > MOST_POINTS:
+    elif shape[1] > MAX_DIM:
+        raise Unreadable(f"points have shape {shape}; they must be (n, d) with d <= {MAX_DIM}")
+    elif shape[0] > MAX_POINTS:
         raise Unreadable(f"points have shape {shape}; fewer than 2**31 points can be searched")
     if needed > n_bytes:
         raise Unreadable(f"{what} is cut off: that is {needed:,} bytes, there are {n_bytes:,}")

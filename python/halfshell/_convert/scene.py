@@ -11,14 +11,17 @@ from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
 
 MAX_DIM = 8
-LENGTHS_AND_ANGLES = "lengths and angles are for Box.from_lengths_angles((a, b, c), (alpha, ...))"
+MAX_POINTS = 2**31 - 1
+LENGTHS_AND_ANGLES = (
+    "six numbers may be lengths and angles: use Box.from_lengths_angles((a, b, c), (alpha, ...))"
+)
 _MISSING = object()
 
 
 def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
     """Points of shape (n, d); a list without elements counts as n = 0, d = `ndim`."""
     array = as_array(values, name)
-    if array.ndim == 2 and array.shape[0] >= 2**31:  # before they are converted
+    if array.ndim == 2 and array.shape[0] > MAX_POINTS:  # before they are converted
         raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
     array = as_real_array(array, name)
     if array.ndim != 2 or not 1 <= array.shape[1] <= MAX_DIM:

@@ -76,8 +76,8 @@ class Box:
             )
         if array.shape == (6,):
             raise ValueError(
-                f"box must not be six bare numbers: {LENGTHS_AND_ANGLES}, the lengths of "
-                "a box in six dimensions for Box.orthorhombic"
+                f"box must not be six bare numbers: {LENGTHS_AND_ANGLES}, or "
+                "Box.orthorhombic for six lengths"
             )
         own = as_box(array, array.shape[0]).copy()
         own.flags.writeable = False
