@@ -5,11 +5,13 @@ Usage: python3 mutants.py [--jobs N] [--work FOLDER] SEED NUMBER [part of a file
        python3 mutants.py [--jobs N] [--work FOLDER] --at FILE:LINE[-LINE] ...
        python3 mutants.py [...] --binding SEED NUMBER [part of a file's name]
 
-The first form tries NUMBER changes chosen by SEED in csrc/core/*/*.c, the second all changes of some
-lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not changed,
-and judged by the C tests that reach its function, quick ones first, until one fails, crashes or
-takes far longer than it should. --binding changes csrc/binding instead: mutants_python.py has
-the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first build quick. $MUTANT_FLAGS:
+The first form tries NUMBER changes chosen by SEED in csrc/core/*/*.c, the second all changes of
+some lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not
+changed, and judged by the C tests that reach its function, quick ones first, until one fails,
+crashes or takes far longer than it should. --binding changes csrc/binding instead:
+mutants_python.py has the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first
+build quick.
+$MUTANT_FLAGS:
 further flags; with -fsanitize=address,undefined the sanitizers judge too, in several times as long.
 
 Prints a line for each mutant, and the rate at the end:

@@ -59,7 +59,8 @@ class PythonTests:
         objects = self.work / "objects"
         shutil.rmtree(objects, ignore_errors=True)
         objects.mkdir()
-        sources = sorted(path for part in PARTS for path in (self.work / "base" / part).rglob("*.c"))
+        base = self.work / "base"
+        sources = sorted(path for part in PARTS for path in (base / part).rglob("*.c"))
         with ThreadPoolExecutor(jobs) as pool:
             done = list(pool.map(lambda s: self.compile(s, objects / (s.stem + ".o")), sources))
         errors = "".join(d.stderr for d in done if d.returncode)

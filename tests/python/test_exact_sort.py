@@ -178,30 +178,34 @@ def test_pickles_of_few_rows_are_small(rng):
         assert same_arrays(again.indices, table[100:9000].sort().indices)
 
 
+def sort_beside(table, stop):
+    """Another thread sorts before line `stop` of `shifts`: what comes, and how many lines ran."""
+    code, n_lines = type(table._origin).shifts.__code__, 0
+
+    def trace(frame, event, argument):
+        nonlocal n_lines
+        if frame.f_code is not code:
+            return None
+        n_lines += event == "line"
+        if event == "line" and n_lines == stop:
+            other = threading.Thread(target=table.sort)
+            other.start()
+            other.join()
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        return table.sort(), n_lines
+    finally:
+        sys.settrace(before)
+
+
 def test_threads_may_need_shifts_at_once():
     """Another thread finds them before any line of the first, as a switch of threads might."""
     wanted = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jdS").sort().indices
     for stop in range(1, 100):
-        table, n_lines = hs.neighbors(SCENE, 0.25, box=BOX, quantities="jd"), 0
-        code = type(table._origin).shifts.__code__
-
-        def trace(frame, event, argument):
-            nonlocal n_lines
-            if frame.f_code is not code:
-                return None
-            n_lines += event == "line"
-            if event == "line" and n_lines == stop:
-                other = threading.Thread(target=table.sort)
-                other.start()
-                other.join()
-            return trace
-
-        before = sys.gettrace()
-        sys.settrace(trace)
-        try:
-            done = table.sort()
-        finally:
-            sys.settrace(before)
+        done, n_lines = sort_beside(hs.neighbors(SCENE, 0.25, box=BOX, quantities="jd"), stop)
         assert np.array_equal(done.indices, wanted)
         if n_lines < stop:
             break
@@ -260,7 +264,7 @@ def test_ties_of_every_scale_take_the_memory_that_is_foreseen(n_rows, monkeypatc
     def refuse(needed, what):
         foreseen.append(needed)
 
-    monkeypatch.setattr(_exact_order, "refuse_unavailable", refuse)
+    monkeypatch.setattr(exact_order, "refuse_unavailable", refuse)
     table = wide_ties(n_rows, 30_000 // n_rows)
     taken = peak_of(table.sort)
     assert sum(foreseen) > 80e6 and len(foreseen) == (1 if n_rows == 1 else 6)
@@ -271,7 +275,7 @@ def test_ties_of_every_scale_take_the_memory_that_is_foreseen(n_rows, monkeypatc
 def test_a_long_tie_that_does_not_fit_is_refused(monkeypatch):
     table = wide_ties(1, 30_000)
     monkeypatch.setattr(_core, "available_memory", lambda: 50e6)
-    with pytest.raises(MemoryError, match=r"30000 neighbours .* compared exactly, would take 0\.08"):
+    with pytest.raises(MemoryError, match=r"30000 neighbours .* exactly, would take 0\.08"):
         table.sort()
 
 

@@ -9,6 +9,8 @@ places points as well as float64 does.
 
 import math
 from fractions import Fraction
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -127,7 +129,7 @@ def distances_of(scene, pairs, points):
 def binned(squares, edges):
     """As numpy.histogram: half-open, the last one closed."""
     squared = [Fraction(edge) ** 2 for edge in edges]
-    counts = [sum(a <= s < b for s in squares) for a, b in zip(squared, squared[1:])]
+    counts = [sum(a <= s < b for s in squares) for a, b in pairwise(squared)]
     counts[-1] += sum(s == squared[-1] for s in squares)
     return counts
 
@@ -191,7 +193,7 @@ def check_full(scene):
         counts = [sum(i == row for i, *_ in expected) for row in range(table.n_rows)]
         assert sorted(pairs_of(table)) == indices(expected)
         found = unless_too_far(
-            scene, lambda: hs.neighbors(points, cutoff, quantities="jS", **sets, **options)
+            scene, partial(hs.neighbors, points, cutoff, quantities="jS", **sets, **options)
         )
         assert found is None or entries(found) == expected
         assert hs.coordination(points, cutoff, **sets, **options).tolist() == counts
@@ -217,6 +219,21 @@ def check_between(scene):
     assert found.tolist() == counts
     found = hs.pair_histogram(points, scene.edges, queries=queries, **options)
     assert found.tolist() == binned(squares, scene.edges)
+
+
+def set_of_pairs(cells, radius):
+    return as_set(*cells.pairs(radius, quantities="ijS"))
+
+
+def entries_of(search, *arguments):
+    return entries(search(*arguments, quantities="jS"))
+
+
+def number_visited(cells, radius):
+    seen = []
+    n = cells.for_each_pair(lambda *pair: seen.append(pair), radius)
+    assert len(seen) == n
+    return n
 
 
 def check_cells(scene):
@@ -245,12 +262,11 @@ def check_cells(scene):
         assert pairs_of(asked) == indices(between)
         assert cells.histogram([0.0, radius]).tolist() == [len(half)]
         assert cells.histogram([0.0, radius], queries=queries).tolist() == [len(between)]
-        seen = []
         for search, expected in (
-            (lambda: as_set(*cells.pairs(radius, quantities="ijS")), set(half)),
-            (lambda: entries(cells.neighbors(radius, quantities="jS")), full),
-            (lambda: entries(cells.query(queries, radius, quantities="jS")), between),
-            (lambda: cells.for_each_pair(lambda *pair: seen.append(pair), radius), len(half)),
+            (partial(set_of_pairs, cells, radius), set(half)),
+            (partial(entries_of, cells.neighbors, radius), full),
+            (partial(entries_of, cells.query, queries, radius), between),
+            (partial(number_visited, cells, radius), len(half)),
         ):
             found = unless_too_far(scene, search)
             assert found is None or found == expected
@@ -265,7 +281,7 @@ def check_verlet(scene):
     points, cutoff = scene.points, scene.cutoff
     cells = hs.VerletList(0.5 * cutoff, skin=0.5 * cutoff, **scene.options)
     for moved in (points, points + np.array(0.125 * cutoff, points.dtype)):
-        if unless_too_far(scene, lambda: cells.update(moved)) is None:
+        if unless_too_far(scene, partial(cells.update, moved)) is None:
             return
         expected = remembered(reference_pairs, moved, 0.5 * cutoff, scene.box, scene.periodic)
         found = unless_too_far(scene, lambda: cells.pairs(quantities="ijSdD"))
@@ -298,14 +314,14 @@ def check_nearest(scene):
     for queries in (None, scene.queries):
         expected = expected_nearest(scene, queries, 3)
         how = {"queries": queries, "max_distance": scene.cutoff, **scene.options}
-        found = unless_it_loses_digits(scene, lambda: hs.nearest(scene.points, 3, **how))
+        found = unless_it_loses_digits(scene, partial(hs.nearest, scene.points, 3, **how))
         if found is None:
             continue
         assert [[a for a in row if a >= 0] for row in found[0].tolist()] == [
             [j for j, _ in row] for row in expected
         ]
         found = unless_it_loses_digits(
-            scene, lambda: hs.nearest(scene.points, 3, quantities="jS", **how)
+            scene, partial(hs.nearest, scene.points, 3, quantities="jS", **how)
         )
         assert found is None or nearest_rows(*found) == expected
 

@@ -63,7 +63,7 @@ print(json.dumps([listed, first is second, name in vars(hs), first.__module__]))
 
 
 def test_type_checkers_see_the_names_that_come_later():
-    """`_LATER` and the imports that only type checkers read name the same, from the same modules."""
+    """`_LATER` and the imports that only type checkers read agree, modules included."""
     tree = ast.parse(Path(hs.__file__).read_text())
     for_types = next(
         node for node in tree.body

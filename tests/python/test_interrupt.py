@@ -29,7 +29,8 @@ SEARCHES = {
 @pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES)
 def test_an_interrupt_stops_the_search(search):
     # The signal is raised by a second thread, which also shows that the lock is released. What a
-    # search still does is told by processor time, of all its threads: other programs take none of it.
+    # search still does is told by processor time, of all its threads: it is that of no other
+    # program.
     result = run(
         RESIDENT
         + f"""
@@ -61,7 +62,8 @@ begun, begun_by_clock = sent or [0.0, 0.0]
 delay, by_clock = time.process_time() - begun, time.perf_counter() - begun_by_clock
 hs.clear_cache()
 gc.collect()
-print(json.dumps([outcome, delay, by_clock, resident() - before, hs.count_pairs(small, 0.2) == expected]))
+is_right = hs.count_pairs(small, 0.2) == expected
+print(json.dumps([outcome, delay, by_clock, resident() - before, is_right]))
 """
     )
     outcome, delay, by_clock, grown, right = result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The structure that csrc/README.md promises: which folder stands on which, and every file on the map."""
+"""The structure that csrc/README.md promises: the order of its folders, every file on the map."""
 
 import re
 from collections import defaultdict

@@ -22,7 +22,8 @@ def probe(tmp_path_factory):
     binding = CSRC / "binding"
     path = build_extension(
         tmp_path_factory.mktemp("probe"), PROBE, "-std=c11", "-Wall", "-Wextra", "-Werror",
-        f"-I{binding}", "-isystem", np.get_include(), binding / "errors.c", CSRC / "core/base/status.c",
+        f"-I{binding}", "-isystem", np.get_include(), binding / "errors.c",
+        CSRC / "core/base/status.c",
     )  # fmt: skip
     spec = importlib.util.spec_from_file_location(PROBE.stem, path)
     module = importlib.util.module_from_spec(spec)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._available import refuse_unavailable
+from halfshell._convert.memory import refuse_unavailable
 
 Array = npt.NDArray[Any]
 Integers = npt.NDArray[np.int64]
@@ -73,7 +73,8 @@ def _exact(
     order = np.arange(len(groups))
     for part in _parts(groups, max(1, AT_A_TIME // of_each)):
         n = part.stop - part.start
-        refuse_unavailable(8 * of_each * n, f"{n} neighbours at the same distance, compared exactly,")
+        what = f"{n} neighbours at the same distance, compared exactly,"
+        refuse_unavailable(8 * of_each * n, what)
         steps = None if shifts is None else shifts[part]
         keys = _squares(p[part], q[part], steps, vectors, scale)
         order[part] = order[part][np.lexsort((entries[part], *keys, groups[part]))]

@@ -396,10 +396,3 @@ class NeighborTable(TableRows):
         """The row of each entry, of the type of the indices, if there are any."""
         dtype = self.indices.dtype if "j" in self._quantities else np.dtype(np.int64)
         return table_forms.rows_of(self.offsets, dtype)
-
-    def _refuse_queries(self, what: str) -> None:
-        if not self._is_of_one_set:
-            raise ValueError(
-                f"{what} needs a table of one set of points: rows of this one are of queries, or "
-                "some of the rows of another table"
-            )
