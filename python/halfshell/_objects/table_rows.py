@@ -237,6 +237,13 @@ class TableRows:
         )
         return order
 
+    def _refuse_queries(self, what: str) -> None:
+        if not self._is_of_one_set:
+            raise ValueError(
+                f"{what} needs a table of one set of points: rows of this one are of queries, or "
+                "some of the rows of another table"
+            )
+
 
 def read_only(array: Array) -> Array:
     array.flags.writeable = False
@@ -246,10 +253,3 @@ def read_only(array: Array) -> Array:
 def _restored(kind: type[TableRows], arrays: tuple[Array, ...], *rest: Any) -> TableRows:
     """A table from its pickle: arrays that are unpickled or deep-copied can be written to."""
     return kind(tuple(read_only(array) for array in arrays), *rest)
-
-    def _refuse_queries(self, what: str) -> None:
-        if not self._is_of_one_set:
-            raise ValueError(
-                f"{what} needs a table of one set of points: rows of this one are of queries, or "
-                "some of the rows of another table"
-            )
