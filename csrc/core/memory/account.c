@@ -33,7 +33,7 @@ hs_test_fail_allocation(int64_t nth)
 bool
 hs_test_failure_is_due(void)
 {
-    return fail_countdown > 0;
+    return fail_countdown > 0 || fail_countdown < -1;
 }
 
 int64_t
@@ -45,7 +45,11 @@ hs_test_live_blocks(void)
 bool
 hs_test_allocation_fails(void)
 {
-    return fail_countdown > 0 && --fail_countdown == 0;
+    if (fail_countdown < -1) {
+        fail_countdown++;
+        return false;
+    }
+    return fail_countdown == -1 || (fail_countdown > 0 && --fail_countdown == 0);
 }
 
 void

@@ -78,9 +78,10 @@ void hs_account_reassign(hs_account *account, hs_purpose from, hs_purpose to, in
 void hs_free(hs_account *account, void *block);
 
 #ifdef HS_TESTING
-/* Make the nth allocation from now fail (1: the next), once; 0 switches this off. */
+/* Make the nth allocation from now fail (1: the next), once; -n: that one and all behind it; 0
+ * switches this off. */
 void hs_test_fail_allocation(int64_t nth);
-/* Whether that one has not been asked for yet. */
+/* Whether that one has not been asked for yet; not for -1. */
 bool hs_test_failure_is_due(void);
 /* Blocks and arenas that are allocated and not yet freed, in the whole process. */
 int64_t hs_test_live_blocks(void);
