@@ -7,6 +7,9 @@
 
 #include <string.h>
 
+/* Points between two looks for Ctrl-C: some hundredths of a second in the most skewed box. */
+#define POINTS_PER_CALL 32768
+
 static PyObject *
 heights_and_volume(const double *heights, int ndim, double volume)
 {
@@ -47,14 +50,48 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     return heights_and_volume(heights, (int)ndim, volume);
 }
 
+/* Whether a failure's row is one of the points, and not of the box. */
+static bool
+is_of_point(hs_status status)
+{
+    return status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE;
+}
+
+/* Wraps some points after others; signals are handled in between. Returns false with an exception
+ * set. */
+static bool
+wrap_in_parts(const hs_box *box, const hs_points *points, double *wrapped, int64_t *shifts)
+{
+    hs_points  part = *points;
+    hs_failure failure;
+    int64_t    first = 0;
+    do {
+        hs_status status;
+        part.n = points->n - first < POINTS_PER_CALL ? points->n - first : POINTS_PER_CALL;
+        part.data = (const char *)points->data + first * points->row_stride;
+        Py_BEGIN_ALLOW_THREADS
+        status = hs_box_wrap(box, &part, wrapped + first * points->ndim,
+                             shifts + first * points->ndim, &failure);
+        Py_END_ALLOW_THREADS
+        if (status != HS_OK) {
+            failure.row += failure.row >= 0 && is_of_point(status) ? first : 0;
+            hs_raise(status, &failure, NULL);
+            return false;
+        }
+        if (PyErr_CheckSignals() != 0) {
+            return false;
+        }
+        first += part.n;
+    } while (first < points->n);
+    return true;
+}
+
 PyObject *
 hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_points  points;
-    hs_box     box;
-    hs_failure failure;
-    bool       given;
-    hs_status  status;
+    hs_points points;
+    hs_box    box;
+    bool      given;
     (void)module;
     if (n_arguments != 3) {
         PyErr_SetString(PyExc_TypeError, "box_wrap takes points, a box and periodic bits");
@@ -71,19 +108,12 @@ hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argume
     npy_intp  shape[2] = {(npy_intp)points.n, points.ndim};
     PyObject *wrapped = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
     PyObject *shifts = PyArray_SimpleNew(2, shape, NPY_INT64);
-    if (wrapped == NULL || shifts == NULL) {
+    if (wrapped == NULL || shifts == NULL ||
+        !wrap_in_parts(&box, &points, PyArray_DATA((PyArrayObject *)wrapped),
+                       PyArray_DATA((PyArrayObject *)shifts))) {
         Py_XDECREF(wrapped);
         Py_XDECREF(shifts);
         return NULL;
-    }
-    Py_BEGIN_ALLOW_THREADS
-    status = hs_box_wrap(&box, &points, PyArray_DATA((PyArrayObject *)wrapped),
-                         PyArray_DATA((PyArrayObject *)shifts), &failure);
-    Py_END_ALLOW_THREADS
-    if (status != HS_OK) {
-        Py_DECREF(wrapped);
-        Py_DECREF(shifts);
-        return hs_raise(status, &failure, NULL);
     }
     return Py_BuildValue("(NN)", wrapped, shifts);
 }

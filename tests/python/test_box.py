@@ -165,6 +165,26 @@ def test_points_inside_stay_where_they_are(rng):
     assert np.array_equal(wrapped, points)  # to the last bit: nothing was added
 
 
+def test_wrapping_many_points_is_wrapping_each(rng):
+    box = hs.Box([[1.0, 0.0], [0.4, 1.0]])
+    points = rng.normal(size=(70_001, 2)) * 5
+    for given in (points, np.asfortranarray(points), points[::-1], points[:32768], points[:32769]):
+        wrapped, shifts = box.wrap(given)
+        parts = zip(*(box.wrap(part) for part in np.array_split(given, [16384, 49152])))
+        assert np.array_equal([wrapped, shifts], [np.concatenate(part) for part in parts])
+    for row, number, error, message in (
+        (69_999, np.nan, ValueError, r"points\[69999, 1\]"),
+        (32_768, 1e30, OverflowError, r"points\[32768\]"),
+    ):
+        spoiled = points.copy()
+        spoiled[row, 1] = number
+        with pytest.raises(error, match=message):
+            box.wrap(spoiled)
+    with pytest.raises(ValueError, match="dependent"):
+        hs._core.box_wrap(points, np.array([[1.0, 1.0], [1.0, 1.0]]), 3)
+    assert box.wrap(points[:0])[0].shape == (0, 2)
+
+
 def test_open_axes_are_not_wrapped(rng):
     box = hs.Box.orthorhombic(1.0, 2.0, 3.0)
     points = rng.normal(size=(40, 3)) * 20

@@ -22,6 +22,7 @@ SEARCHES = {
     )""",
     "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
     "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
+    "wrap": "hs.Box([[1, 0, 0], [0.4, 1, 0], [0.3, 0.2, 1]]).wrap(np.concatenate([points] * 16))",
     "count of exact ties": "hs.count_pairs(grid, 40.0, box=[60.0] * 3)",
 }
 
