@@ -81,6 +81,27 @@ class Scene:
             self.box[1, 0] = 0.3 * lengths[0]
         self.periodic = flags if flags.any() else None
 
+    @classmethod
+    def with_subnormals(cls, rng, ndim):
+        """A long period, a short one and numbers that any scale between them brings to nothing."""
+        scene = cls.__new__(cls)
+        exponent = int(rng.choice([-30, -1, 1, 10, 20, 21, 60, 500, 990]))
+        scene.cutoff = math.ldexp(rng.choice([0.5, 1.0, 1.5, 2.5]), exponent)
+        short = math.ldexp(1.0, exponent)
+        long = math.ldexp(rng.choice([1.0, -1.25]), int(rng.integers(max(965, exponent + 2), 1021)))
+        lengths = rng.permutation([short, long, rng.choice([short, long])])[:ndim]
+        lengths[:2] = rng.permutation([short, long])
+        tiny = [5e-324, -1e-310, math.ldexp(1.0, -1050), math.ldexp(1.0, -1000)]
+        columns = []
+        for length in lengths:
+            near = 0.5 * length - math.copysign(min(scene.cutoff, abs(length) / 4), length)
+            far = [0.0, *tiny, 0.5 * length, -0.5 * length, near, 3 * length, -5.5 * length]
+            columns.append(rng.choice(far, 9))
+        scene.turns = Fraction(6)
+        scene.points, scene.queries = np.array(columns).T[:6], np.array(columns).T[6:]
+        scene.box, scene.periodic = np.diag(lengths), rng.random(ndim) < 0.8
+        return scene
+
     @property
     def options(self):
         return {"box": self.box, "periodic": self.periodic}
@@ -349,3 +370,9 @@ def test_points_of_float32(check):
 def test_beside_a_skewed_box(check):
     for seed in range(60):
         check(Scene(np.random.default_rng(seed), 3, skewed=True))
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_beside_subnormal_numbers(check):
+    for seed in range(60):
+        check(Scene.with_subnormals(np.random.default_rng(seed), 2 + seed % 2))

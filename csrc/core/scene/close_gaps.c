@@ -16,6 +16,10 @@
  * each of these stays what it is or more than the cutoff.
  *
  * Queries take part as if they were points: the differences that count are between both.
+ *
+ * Where scaling loses digits pairs are decided on coordinates and rows that are not scaled. Those
+ * that result will do, for the same reason; but S counts the turns that were made here as well, so
+ * a column with such turns is decided on as it was given, and so is its row.
  */
 #include "close_gaps.h"
 
@@ -41,6 +45,7 @@ typedef struct condensing {
     int64_t           n;            /* of both together */
     hs_condensed     *condensed;
     bool              changes_rows; /* boxes may be condensed as well */
+    bool              keeps_given;  /* columns that are wrapped, as they were before */
     hs_scale          to_units, from_units;
     double            far;          /* 2^54 u, in the caller's unit */
     hs_keys           keys;         /* room for n + 1 */
@@ -60,24 +65,17 @@ coordinate_of(const condensing *doing, int k, int32_t id)
     return id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - (int64_t)id];
 }
 
-/* Rows are left alone where points are kept as given: what is decided on those would not be the
- * same. That is so in coupled boxes, for precision="double", and where scaling loses digits. */
+/* Rows are left alone where what is decided on the points as given would not be the same: in
+ * coupled boxes, and for precision="double". */
 static bool
-rows_may_change(const condensing *doing, const hs_box *box, int unit)
+rows_may_change(const condensing *doing, const hs_box *box)
 {
-    if (box == NULL) {
-        return true;
-    }
-    for (int k = 0; k < box->ndim; k++) {
+    for (int k = 0; box != NULL && k < box->ndim; k++) {
         if (hs_mover_of(box, k) == HS_COUPLED) {
             return false;
         }
     }
-    bool keeps_digits = doing->options->precision != HS_DOUBLE;
-    for (int set = 0; set < doing->n_sets && keeps_digits && unit > 0; set++) {
-        keeps_digits = hs_cloud_smallest(doing->of[set]) >= ldexp(1.0, unit - 1022);
-    }
-    return keeps_digits;
+    return box == NULL || doing->options->precision != HS_DOUBLE;
 }
 
 static bool
@@ -92,32 +90,62 @@ anything_is_far(const hs_cloud *cloud, const hs_box *box, double far)
     return found;
 }
 
-/* Wraps what is far into the box; *turns is allocated once it is needed. */
+/* The column of both sets, before any number in it is wrapped. */
 static hs_status
-wrap_far(hs_account *account, bool wants_turns, double length, double far, int64_t n, double *x,
-         int64_t **turns, hs_failure *failure)
+keep_given(const condensing *doing, int k)
 {
-    for (int64_t i = 0; i < n; i++) {
+    for (int set = 0; set < doing->n_sets; set++) {
+        const hs_cloud *cloud = doing->of[set];
+        double **given = &doing->condensed->given[set][k];
+        *given = hs_alloc(doing->account, HS_FOR_ORIGINALS, cloud->n, sizeof **given);
+        if (*given == NULL) {
+            return HS_ERR_MEMORY;
+        }
+        memcpy(*given, cloud->x[k], (size_t)cloud->n * sizeof **given);
+    }
+    return HS_OK;
+}
+
+/* Room for the turns of a column, none so far. */
+static hs_status
+begin_turns(const condensing *doing, int set, int k)
+{
+    hs_condensed *condensed = doing->condensed;
+    const int64_t n = doing->of[set]->n;
+    int64_t      *turns = hs_alloc(doing->account, HS_FOR_WRAPS, n, sizeof *turns);
+    condensed->turns[set][k] = turns;
+    if (turns == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(turns, 0, (size_t)n * sizeof *turns);
+    condensed->has_turns = true;
+    return doing->keeps_given && condensed->given[0][k] == NULL ? keep_given(doing, k) : HS_OK;
+}
+
+/* Wraps what is far into the box; turns are counted where S is wanted. */
+static hs_status
+wrap_far(const condensing *doing, int set, int k, double length, hs_failure *failure)
+{
+    double *x = doing->of[set]->x[k];
+    for (int64_t i = 0; i < doing->of[set]->n; i++) {
         int64_t turned = 0;
-        if (!(fabs(x[i]) > far)) {
+        if (!(fabs(x[i]) > doing->far)) {
             continue;
         }
-        x[i] = hs_wrap_axis(x[i], length, &turned);
-        if (!wants_turns || turned == 0) {
-            continue;
-        }
-        if (turned == HS_WRAP_UNKNOWN) {
-            failure->row = i;
-            return HS_ERR_SHIFT_RANGE;
-        }
-        if (*turns == NULL) {
-            *turns = hs_alloc(account, HS_FOR_WRAPS, n, sizeof(int64_t));
-            if (*turns == NULL) {
+        const double wrapped = hs_wrap_axis(x[i], length, &turned);
+        if ((doing->options->want & HS_WANT_SHIFT) && turned != 0) {
+            if (turned == HS_WRAP_UNKNOWN) {
+                failure->row = i;
+                failure->in_queries = set > 0;
+                return HS_ERR_SHIFT_RANGE;
+            }
+            int64_t *const *turns = &doing->condensed->turns[set][k];
+            if (*turns == NULL && begin_turns(doing, set, k) != HS_OK) {
                 return HS_ERR_MEMORY;
             }
-            memset(*turns, 0, (size_t)n * sizeof(int64_t));
+            (*turns)[i] = turned;
         }
-        (*turns)[i] = turned;
+        x[i] = wrapped;
     }
     return HS_OK;
 }
@@ -246,26 +274,6 @@ measure_column(const condensing *doing, int k)
     }
 }
 
-/* Wraps what is far in this column of both sets. */
-static hs_status
-wrap_column(condensing *doing, int k, double length, hs_failure *failure)
-{
-    hs_condensed *condensed = doing->condensed;
-    for (int set = 0; set < doing->n_sets; set++) {
-        hs_cloud       *cloud = doing->of[set];
-        int64_t       **turns = &condensed->turns[set][k];
-        const hs_status status =
-            wrap_far(doing->account, doing->options->want & HS_WANT_SHIFT, length, doing->far,
-                     cloud->n, cloud->x[k], turns, failure);
-        condensed->has_turns = condensed->has_turns || *turns != NULL;
-        if (status != HS_OK) {
-            failure->in_queries = set > 0;
-            return status;
-        }
-    }
-    return HS_OK;
-}
-
 static hs_status
 condense_column(condensing *doing, int k, hs_failure *failure)
 {
@@ -279,8 +287,8 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     if (!is_far && !condensed->is_scaled) {
         return HS_OK;
     }
-    if (is_far && row >= 0) {
-        const hs_status status = wrap_column(doing, k, fabs(*entry), failure);
+    for (int set = 0; is_far && row >= 0 && set < doing->n_sets; set++) {
+        const hs_status status = wrap_far(doing, set, k, fabs(*entry), failure);
         if (status != HS_OK) {
             return status;
         }
@@ -299,25 +307,19 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     return status;
 }
 
+/* All four arrays are one block, which begins with the keys. */
 static bool
 allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
 {
     keys->options = options;
-    keys->keys = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int64_t));
-    keys->ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int32_t));
-    keys->spare_keys = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int64_t));
-    keys->spare_ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof(int32_t));
-    return keys->keys != NULL && keys->ids != NULL && keys->spare_keys != NULL &&
-           keys->spare_ids != NULL;
-}
-
-static void
-free_keys(hs_account *account, hs_keys *keys)
-{
-    hs_free(account, keys->keys);
-    hs_free(account, keys->ids);
-    hs_free(account, keys->spare_keys);
-    hs_free(account, keys->spare_ids);
+    keys->keys =
+        hs_alloc(account, HS_FOR_ORDER, n, 2 * (sizeof(int64_t) + sizeof(int32_t)));
+    if (keys->keys != NULL) {
+        keys->spare_keys = keys->keys + n;
+        keys->ids = (int32_t *)(void *)(keys->spare_keys + n);
+        keys->spare_ids = keys->ids + n;
+    }
+    return keys->keys != NULL;
 }
 
 /* Columns in which there is something to do, one after the other. */
@@ -347,9 +349,10 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
             hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
 {
     const double far = ldexp(1.0, unit + HS_FAR_EXPONENT);
-    condensed->box = box;
+    condensed->box = condensed->given_box = box;
     condensed->is_scaled = condensed->has_turns = false;
     memset(condensed->turns, 0, sizeof condensed->turns);
+    memset(condensed->given, 0, sizeof condensed->given);
     if (cloud->n == 0 || (asking != NULL && asking->n == 0) || !anything_is_far(cloud, box, far)) {
         return HS_OK;
     }
@@ -357,12 +360,13 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
                         .options = options,
                         .of = {cloud, asking},
                         .n_sets = asking != NULL ? 2 : 1,
+                        .keeps_given = unit > 0, /* scaling down may lose digits */
                         .n = cloud->n + (asking != NULL ? asking->n : 0),
                         .condensed = condensed,
                         .to_units = hs_scale_of(unit),
                         .from_units = hs_scale_of(-unit),
                         .far = far};
-    doing.changes_rows = rows_may_change(&doing, box, unit);
+    doing.changes_rows = rows_may_change(&doing, box);
     if (doing.changes_rows) {
         condensed->is_scaled = unit < 0;
         if (box != NULL) {
@@ -373,7 +377,7 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
     const hs_status status = allocate_keys(account, options, doing.n + 1, &doing.keys)
                                  ? condense_columns(&doing, failure)
                                  : HS_ERR_MEMORY;
-    free_keys(account, &doing.keys);
+    hs_free(account, doing.keys.keys);
     return status;
 }
 
@@ -383,7 +387,9 @@ hs_condensed_free(hs_account *account, hs_condensed *condensed)
     for (int set = 0; set < HS_CONDENSED_SETS; set++) {
         for (int k = 0; k < HS_MAX_DIM; k++) {
             hs_free(account, condensed->turns[set][k]);
+            hs_free(account, condensed->given[set][k]);
             condensed->turns[set][k] = NULL;
+            condensed->given[set][k] = NULL;
         }
     }
 }

@@ -255,15 +255,33 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     return status;
 }
 
-/* The turns that condensing made, added to those that wrapping made after it. */
+/* The turns that condensing made, added to those that wrapping made after it. With all of them the
+ * originals are the columns as given. */
 static void
 add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
 {
     for (int k = 0; condensed->has_turns && k < scene->ndim; k++) {
         const int64_t *more = condensed->turns[set][k];
+        const double  *given = condensed->given[set][k];
         const int      row = scene->lattice.row_of_axis[k];
         for (int64_t i = 0; more != NULL && i < scene->n; i++) {
             hs_turns_set(&scene->turns, row, i, hs_turns_get(&scene->turns, row, i) + more[i]);
+        }
+        if (scene->extreme && given != NULL) {
+            memcpy(scene->originals[k], given, (size_t)scene->n * sizeof *given);
+        }
+    }
+}
+
+/* In columns that are decided on as they were given, the rows as given. */
+static void
+restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
+{
+    for (int r = 0; condensed->has_turns && r < lattice->n_periodic; r++) {
+        for (int k = 0; k < lattice->ndim; k++) {
+            if (condensed->given[0][k] != NULL) {
+                lattice->given[r][k] = condensed->given_box->rows[lattice->vector_of_row[r]][k];
+            }
         }
     }
 }
@@ -283,6 +301,9 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     }
     const hs_box *box = empty ? NULL : condensed->box;
     hs_lattice_init(box, scene->ndim, scene->pending, &scene->lattice);
+    if (scene->extreme) {
+        restore_rows(condensed, &scene->lattice);
+    }
     if (scene->is_kept && no_scale_holds(scene, box)) {
         hs_scene_make_heap(scene);
     }
@@ -302,7 +323,7 @@ static hs_status
 scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
-    hs_condensed      condensed = {.box = box};
+    hs_condensed      condensed = {.box = box, .given_box = box};
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
     hs_status         status = HS_OK;

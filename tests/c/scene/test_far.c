@@ -51,6 +51,31 @@ make_far_scene(harness_random *random, int trial, far_scene *s)
                             sizeof(double)};
 }
 
+/* A long period, a short one, and numbers that no scale between these holds. */
+static void
+make_subnormal_scene(harness_random *random, int trial, far_scene *s)
+{
+    const int    exponents[] = {-30, -1, 1, 10, 20, 21, 60, 500, 990};
+    const int    ndim = 2 + trial % 2, exponent = exponents[random_below(random, 9)];
+    const double unit = ldexp(1.0, exponent);
+    const int    lowest = exponent + 2 > 965 ? exponent + 2 : 965;
+    const double long_one = ldexp(1.0, lowest + random_below(random, 1020 - lowest));
+    s->cutoff = unit * (0.5 + random_below(random, 3));
+    s->box = (hs_box){.ndim = ndim};
+    for (int k = 0; k < ndim; k++) {
+        const double length = (k + trial) % 2 == 0 ? unit : long_one;
+        const double places[] = {0.0,          0x1p-1074,      -0x1p-1030,   0x1p-1000,
+                                 0.5 * length, -0.5 * length,  3.0 * length, -5.5 * length};
+        s->box.periodic[k] = random_below(random, 5) > 0;
+        s->box.rows[k][k] = length;
+        for (int i = 0; i < N_FAR; i++) {
+            s->x[i * ndim + k] = places[random_below(random, 8)];
+        }
+    }
+    s->points = (hs_points){s->x, N_FAR, ndim, HS_FLOAT64, ndim * (ptrdiff_t)sizeof(double),
+                            sizeof(double)};
+}
+
 /* What scenes may be refused for. */
 static bool
 is_refusal(hs_status status)
@@ -147,8 +172,41 @@ every_search_counts_the_same(void)
     CHECK(answered > (IS_SLOW ? 20 : 200));
 }
 
+/* None is refused, and with S there are as many pairs. */
+static void
+subnormal_numbers_in_a_long_box(void)
+{
+    harness_random random = {20261123};
+    for (int trial = 0; trial < 300; trial += IS_SLOW ? 10 : 1) {
+        far_scene s;
+        hs_pairs *pairs = NULL;
+        int64_t   half = -1;
+        make_subnormal_scene(&random, trial, &s);
+        hs_options options = hs_options_default();
+        options.cutoff = s.cutoff;
+        options.threads = 1;
+        CHECK(hs_pairs_count(&s.points, &s.box, &options, &half, NULL) == HS_OK);
+        options.want = WANT_ALL;
+        CHECK(hs_pairs_find(&s.points, &s.box, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_length(pairs) == half);
+        hs_pairs_free(pairs);
+        check_rows(&s, options, half);
+        check_kept(&s, options, half);
+        check_list(&s, options, half);
+    }
+    /* Two images of each point by itself, and none of the other: a digit pushes it out. */
+    const double    x[] = {0.0, 0x1p-1074, 0x1p25, 0.0};
+    const hs_points two = {x, 2, 2, HS_FLOAT64, 2 * sizeof(double), sizeof(double)};
+    const hs_box    box = {2, {true, true}, {{0x1p1000, 0.0}, {0.0, 0x1p24}}};
+    hs_options      options = hs_options_default();
+    int64_t         half = -1;
+    options.cutoff = 0x1p25;
+    CHECK(hs_pairs_count(&two, &box, &options, &half, NULL) == HS_OK && half == 4);
+}
+
 void
 test_far(void)
 {
     RUN(every_search_counts_the_same);
+    RUN(subnormal_numbers_in_a_long_box);
 }
