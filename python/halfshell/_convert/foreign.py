@@ -8,6 +8,9 @@ that names the argument; only what is not the fault of the input passes: MemoryE
 from __future__ import annotations
 
 import operator
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -27,9 +30,9 @@ def kind_of(value: Any) -> str:
 
 
 def shown(value: Any) -> str:
-    """Its repr, cut to what fits a message; the name of its type if it has none."""
+    """Its repr on one line, cut to what fits a message; the name of its type if it has none."""
     try:
-        text = repr(value)
+        text = " ".join(repr(value).split())
     except MemoryError:
         raise
     except Exception:  # hostile, or an integer of more digits than Python writes
@@ -109,3 +112,15 @@ def refuse_deep_lists(values: Any, name: str) -> None:
         f"{name} must be a rectangular array of numbers: lists are nested more than "
         f"{_MOST_LEVELS - 1} levels deep"
     )
+
+
+@contextmanager
+def of_argument(name: str) -> Iterator[None]:
+    """Say `name` where the core speaks of a cutoff, which this call has under another name."""
+    try:
+        yield
+    except (MemoryError, ValueError, OverflowError) as error:
+        if not (len(error.args) == 1 and isinstance(error.args[0], str)):
+            raise
+        error.args = (re.sub(r"\bcutoff\b", name, error.args[0].replace("the cutoff", name)),)
+        raise

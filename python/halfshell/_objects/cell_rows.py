@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.arrays import PointArray
+from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_radii
 from halfshell._convert.options import Arrays, as_flag, as_index_bytes
 from halfshell._functions.nearest import as_k, as_max_distance, in_rows
@@ -94,18 +95,18 @@ class CellRows(KeptCells):
         """
         asking = self._queries(queries)
         radii = as_radii(radius, len(asking))
-        if radii is None or isinstance(radii, float):
+        if radii is None:
             return self._rows(asking, radii, quantities, index_dtype, options)
-
-        def search(part: PointArray, one: float, letters: str) -> Columns:
-            return self._arrays(part, one, letters, index_dtype, options)
+        if isinstance(radii, float):
+            with of_argument("radius"):
+                return self._rows(asking, radii, quantities, index_dtype, options)
 
         inclusive = as_flag(options.get("inclusive", True), "inclusive")
-        arrays = search_each(
-            search, asking, radii, quantities, inclusive, self._precision == "exact"
-        )
+        is_exact = self._precision == "exact"
+        searches = _Searches(self, index_dtype, options)
+        arrays = search_each(searches, asking, radii, quantities, inclusive, is_exact)
         origin = self._origin_of(asking, quantities, lambda queries: search_each(
-            search, queries, radii, "S", inclusive, self._precision == "exact"
+            searches, queries, radii, "S", inclusive, is_exact
         ))  # fmt: skip
         return NeighborTable(arrays, quantities, self._n_points, False, origin=origin)
 
@@ -199,3 +200,26 @@ class CellRows(KeptCells):
         if "d" not in quantities or "j" not in quantities:
             return None
         return self._origin.asked_by(asking, lambda origin: search(origin.queries)[1])
+
+
+class _Searches:
+    """The searches that rows with a radius each are made of."""
+
+    def __init__(self, cells: CellRows, index_dtype: npt.DTypeLike, options: Asking) -> None:
+        self._cells = cells
+        self._index_dtype = index_dtype
+        self._options = options
+        self.limit = options.get("memory_limit")
+
+    def rows(
+        self, queries: PointArray, radius: float, quantities: str, room: float | None
+    ) -> Columns:
+        options = self._options
+        if room is not None:
+            options = cast(Asking, {**options, "memory_limit": room})
+        with of_argument("radius"):
+            return self._cells._arrays(queries, radius, quantities, self._index_dtype, options)
+
+    def counts(self, queries: PointArray, radius: float) -> npt.NDArray[np.int64]:
+        with of_argument("radius"):
+            return _core.coordination(*self._cells._arguments(radius, self._options), queries)
