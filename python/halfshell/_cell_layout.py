@@ -159,7 +159,8 @@ class CellLayout:
         Raises
         ------
         ValueError
-            If a query is much further away than the points and the box reach.
+            If a query is much further away than the points and the box reach, or if there is but
+            one cell with everything (`cell_sizes` is infinite).
 
         Examples
         --------
