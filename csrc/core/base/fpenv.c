@@ -16,14 +16,17 @@
  * stands above the 32 bits of MXCSR. */
 #if defined(__MINGW32__)
 #define X87_ROUNDING 0x0c00u
+#define X87_MASKS 0x003fu /* an exception that is masked traps nothing */
 
+/* Flags are cleared before traps are unmasked or masked: a flag that stands unmasked would trap at
+ * the next instruction. */
 static uint64_t
 enter_x87(void)
 {
     uint16_t word;
     __asm__ __volatile__("fnstcw %0" : "=m"(word));
-    const uint16_t nearest = (uint16_t)(word & ~X87_ROUNDING);
-    __asm__ __volatile__("fldcw %0" : : "m"(nearest));
+    const uint16_t nearest = (uint16_t)((word & ~X87_ROUNDING) | X87_MASKS);
+    __asm__ __volatile__("fnclex\n\tfldcw %0" : : "m"(nearest));
     return word;
 }
 
@@ -31,7 +34,7 @@ static void
 leave_x87(uint64_t saved)
 {
     const uint16_t word = (uint16_t)saved;
-    __asm__ __volatile__("fldcw %0" : : "m"(word));
+    __asm__ __volatile__("fnclex\n\tfldcw %0" : : "m"(word));
 }
 #else
 #define enter_x87() UINT64_C(0)
