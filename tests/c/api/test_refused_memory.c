@@ -2,6 +2,7 @@
 /* test_refused_memory.c: what does not fit a limit is refused for what it is, before the system is
  * asked for it. */
 #include "../../../csrc/core/collect/columns.h"
+#include "../../../csrc/core/search/neighbourhood.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 
@@ -70,9 +71,41 @@ limits_are_heeded_before_anything_is_reserved(void)
     hs_account_close(&account);
 }
 
+/* So many points that only a walk can tell how large neighbourhoods are: whatever fails in it ends
+ * the call, and nothing is left. */
+static void
+rows_of_many_points_survive_each_failure(void)
+{
+    enum { N = HS_BLOCK_CANDIDATES + 100 };
+    double         *x = malloc(N * sizeof *x);
+    const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    const int64_t   before = hs_test_live_blocks();
+    bool            ended = false;
+    int             nth = 0;
+    options.threads = 1;
+    options.cutoff = 1.0;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    for (int i = 0; i < N; i++)
+        x[i] = 0.75 * i;
+    while (!ended && nth < 200) {
+        hs_pairs *rows = NULL;
+        hs_test_fail_allocation(++nth);
+        const hs_status status = hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL);
+        ended = hs_test_failure_is_due();
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK ? hs_pairs_length(rows) == 2 * (N - 1) : status == HS_ERR_MEMORY);
+        hs_pairs_free(rows);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(ended && nth > 10);
+    free(x);
+}
+
 void
 test_refused_memory(void)
 {
+    RUN(rows_of_many_points_survive_each_failure);
     RUN(rows_that_just_miss_their_limit_say_so);
     RUN(limits_are_heeded_before_anything_is_reserved);
 }
