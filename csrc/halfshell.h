@@ -60,7 +60,7 @@ typedef enum hs_status {
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */
     HS_ERR_KERNEL,        /* no kernel of that name on this CPU, or none compiled as it must be */
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
-    HS_ERR_FAR,           /* queries lie too far away for cells that were made without them */
+    HS_ERR_FAR,           /* queries, or points from each other, lie too far away for cells */
     HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
     HS_ERR_TYPES,         /* a type is none of those that there are: failure.row */
@@ -436,7 +436,9 @@ typedef struct hs_layout {
     int64_t        n_points;
     int64_t        n_cells;
     int64_t        shape[HS_MAX_DIM];     /* cells along each axis, occupied or not */
-    double         cell_size[HS_MAX_DIM]; /* extent across the faces of that axis */
+    double         cell_size[HS_MAX_DIM]; /* extent across the faces of that axis; infinity where
+                                           * points are so far from each other, or the box is so
+                                           * small beside that, that one cell holds everything */
     bool           occupied_only;         /* cells that hold no point have no id */
     const int32_t *start;                 /* n_cells + 1 */
     const int32_t *order;                 /* n_points */
@@ -457,7 +459,8 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * `order` that hold at least all points within the cutoff, images included, as HS_WANT_I (first)
  * and HS_WANT_J (end, not included) of rows as of hs_neighbors_find. A range may come more than
  * once, for several images. HS_ERR_CUTOFF for a cutoff that the cells cannot serve, HS_ERR_FAR for
- * queries that they cannot: some four times further away than the points and 1024 box vectors.
+ * queries that they cannot: some four times further away than the points and 1024 box vectors; and,
+ * with failure->in_queries false, for cells that are one cell with everything.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);

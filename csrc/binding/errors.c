@@ -26,13 +26,13 @@ set_of(const hs_failure *failure)
     return failure->in_queries ? "queries" : "points";
 }
 
+/* As PyErr_Format with a place or none, and a number. */
 static PyObject *
-raise_not_finite(const hs_failure *failure)
+raise_at(const char *format, const hs_failure *failure)
 {
     PyObject *number = PyFloat_FromDouble(failure->value);
     if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, "%s must be finite, got %s[%lld, %lld] = %R",
-                     set_of(failure), set_of(failure), (long long)failure->row,
+        PyErr_Format(PyExc_ValueError, format, (long long)failure->row,
                      (long long)failure->column, number);
         Py_DECREF(number);
     }
@@ -40,11 +40,19 @@ raise_not_finite(const hs_failure *failure)
 }
 
 static PyObject *
-raise_of_row(const char *format, const hs_failure *failure)
+raise_not_finite(const hs_failure *failure)
 {
-    PyObject *number = PyFloat_FromDouble(failure->value);
+    return raise_at(failure->in_queries ? "queries must be finite, got queries[%lld, %lld] = %R"
+                                        : "points must be finite, got points[%lld, %lld] = %R",
+                    failure);
+}
+
+static PyObject *
+raise_of_row(const char *format, long long row, double value)
+{
+    PyObject *number = PyFloat_FromDouble(value);
     if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, format, (long long)failure->row, number);
+        PyErr_Format(PyExc_ValueError, format, row, number);
         Py_DECREF(number);
     }
     return NULL;
@@ -54,20 +62,11 @@ static PyObject *
 raise_box(const hs_failure *failure)
 {
     PyObject *number = PyFloat_FromDouble(failure->value);
-    if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, "box must be finite, got box[%lld, %lld] = %R",
-                     (long long)failure->row, (long long)failure->column, number);
-        Py_DECREF(number);
+    if (failure->system < 0) {
+        Py_XDECREF(number);
+        return raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
     }
-    return NULL;
-}
-
-/* The same for entries of the box of one system out of many. */
-static PyObject *
-raise_box_of_system(const hs_failure *failure)
-{
-    PyObject *number = PyFloat_FromDouble(failure->value);
-    if (number != NULL) {
+    if (number != NULL) { /* of one system out of many */
         PyErr_Format(PyExc_ValueError, "box must be finite, got box[%lld, %lld, %lld] = %R",
                      (long long)failure->system, (long long)failure->row,
                      (long long)failure->column, number);
@@ -77,16 +76,14 @@ raise_box_of_system(const hs_failure *failure)
 }
 
 static PyObject *
-raise_cutoff_of_system(const hs_failure *failure)
+raise_cutoff(const hs_failure *failure)
 {
-    PyObject *number = PyFloat_FromDouble(failure->value);
-    if (number != NULL) {
-        PyErr_Format(PyExc_ValueError,
-                     "cutoff must be finite and not negative, got cutoff[%lld] = %R",
-                     (long long)failure->system, number);
-        Py_DECREF(number);
-    }
-    return NULL;
+    return failure->system >= 0
+               ? raise_of_row("cutoff must be finite and not negative, got cutoff[%lld] = %R",
+                              (long long)failure->system, failure->value)
+               : raise_with_number(PyExc_ValueError,
+                                   "cutoff must be finite and not negative, got %R",
+                                   failure->value);
 }
 
 /* "box", or which one of many. */
@@ -217,71 +214,121 @@ raise_capacity(const hs_failure *failure)
     return NULL;
 }
 
+static PyObject *
+raise_too_many(const hs_failure *failure)
+{
+    return raise_with_number(PyExc_OverflowError,
+                             "fewer than 2**31 points and systems and 2**62 pairs can be "
+                             "searched, got %R",
+                             failure->value);
+}
+
+static PyObject *
+raise_edges(const hs_failure *failure)
+{
+    return raise_of_row("edges must be finite, not negative and ascending, got edges[%lld] = %R",
+                        (long long)failure->row, failure->value);
+}
+
+static PyObject *
+raise_types(const hs_failure *failure)
+{
+    return raise_of_row(failure->in_queries ? "types must be from 0 on, got query_types[%lld] = %R"
+                                            : "types must be from 0 on, got types[%lld] = %R",
+                        (long long)failure->row, failure->value);
+}
+
+static PyObject *
+raise_weights(const hs_failure *failure)
+{
+    return raise_of_row(failure->in_queries
+                            ? "query_weights must be finite, got query_weights[%lld] = %R"
+                            : "weights must be finite, got weights[%lld] = %R",
+                        (long long)failure->row, failure->value);
+}
+
+static PyObject *
+raise_shift(const hs_failure *failure)
+{
+    PyErr_Format(PyExc_OverflowError,
+                 "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
+                 "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
+                 set_of(failure), (long long)failure->row);
+    return NULL;
+}
+
+static PyObject *
+raise_rounding(const hs_failure *failure)
+{
+    PyErr_Format(PyExc_OverflowError,
+                 "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
+                 "errors of precision='double' pass the cutoff; wrap the points first, or "
+                 "use precision='exact'",
+                 set_of(failure), (long long)failure->row);
+    return NULL;
+}
+
+static PyObject *
+raise_far(const hs_failure *failure)
+{
+    PyErr_SetString(PyExc_ValueError,
+                    failure->in_queries
+                        ? "queries lie too far from the points and the box for cells that were "
+                          "made without them: query() or pairs_between() have no such limit"
+                        : "points lie so far from each other, or the box is so small beside that, "
+                          "that one cell holds everything, and all points are candidates: the "
+                          "other methods and functions have no such limit");
+    return NULL;
+}
+
+static PyObject *
+raise_interrupted(const hs_failure *failure)
+{
+    (void)failure;
+    if (!PyErr_Occurred()) {
+        PyErr_SetString(PyExc_SystemError, "interrupted without an exception");
+    }
+    return NULL;
+}
+
+static PyObject *
+raise_argument(const hs_failure *failure)
+{
+    (void)failure;
+    /* Python's arguments are checked before the call; the core refuses what that let through. */
+    PyErr_SetString(PyExc_ValueError, hs_status_text(HS_ERR_ARGUMENT));
+    return NULL;
+}
+
+/* By status; NULL for those that are no failure, and for a kernel, whose name the options have. */
+static PyObject *(*const RAISE[])(const hs_failure *) = {
+    [HS_ERR_MEMORY] = raise_memory,
+    [HS_ERR_CUTOFF] = raise_cutoff,
+    [HS_ERR_NOT_FINITE] = raise_not_finite,
+    [HS_ERR_BOX_FINITE] = raise_box,
+    [HS_ERR_BOX_DEPENDENT] = raise_dependent,
+    [HS_ERR_BOX_SKEWED] = raise_skewed,
+    [HS_ERR_TOO_MANY] = raise_too_many,
+    [HS_ERR_SHIFT_RANGE] = raise_shift,
+    [HS_ERR_ROUNDING] = raise_rounding,
+    [HS_ERR_INTERRUPTED] = raise_interrupted,
+    [HS_ERR_FAR] = raise_far,
+    [HS_ERR_CAPACITY] = raise_capacity,
+    [HS_ERR_EDGES] = raise_edges,
+    [HS_ERR_TYPES] = raise_types,
+    [HS_ERR_WEIGHTS] = raise_weights,
+    [HS_ERR_ARGUMENT] = raise_argument,
+};
+
 PyObject *
 hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
 {
-    switch (status) {
-    case HS_ERR_MEMORY: return raise_memory(failure);
-    case HS_ERR_CUTOFF:
-        if (failure->system >= 0) {
-            return raise_cutoff_of_system(failure);
-        }
-        return raise_with_number(PyExc_ValueError,
-                                 "cutoff must be finite and not negative, got %R",
-                                 failure->value);
-    case HS_ERR_NOT_FINITE: return raise_not_finite(failure);
-    case HS_ERR_BOX_FINITE:
-        return failure->system >= 0 ? raise_box_of_system(failure) : raise_box(failure);
-    case HS_ERR_BOX_DEPENDENT: return raise_dependent(failure);
-    case HS_ERR_BOX_SKEWED: return raise_skewed(failure);
-    case HS_ERR_TOO_MANY:
-        return raise_with_number(PyExc_OverflowError,
-                                 "fewer than 2**31 points and systems and 2**62 pairs can be "
-                                 "searched, got %R",
-                                 failure->value);
-    case HS_ERR_EDGES:
-        return raise_of_row(
-            "edges must be finite, not negative and ascending, got edges[%lld] = %R", failure);
-    case HS_ERR_TYPES:
-        return raise_of_row(failure->in_queries
-                                ? "types must be from 0 on, got query_types[%lld] = %R"
-                                : "types must be from 0 on, got types[%lld] = %R",
-                            failure);
-    case HS_ERR_WEIGHTS:
-        return raise_of_row(failure->in_queries
-                                ? "query_weights must be finite, got query_weights[%lld] = %R"
-                                : "weights must be finite, got weights[%lld] = %R",
-                            failure);
-    case HS_ERR_SHIFT_RANGE:
-        PyErr_Format(PyExc_OverflowError,
-                     "%s[%lld] lies too many box vectors away, or a point that it pairs with does: "
-                     "shifts are counted up to 2**51, and S holds 2**31; wrap the points first",
-                     set_of(failure), (long long)failure->row);
-        return NULL;
-    case HS_ERR_ROUNDING:
-        PyErr_Format(PyExc_OverflowError,
-                     "%s[%lld] lies so far from the box, or the box is so skewed, that rounding "
-                     "errors of precision='double' pass the cutoff; wrap the points first, or "
-                     "use precision='exact'",
-                     set_of(failure), (long long)failure->row);
-        return NULL;
-    case HS_ERR_KERNEL: return raise_kernel(options);
-    case HS_ERR_FAR:
-        PyErr_SetString(PyExc_ValueError,
-                        "queries lie too far from the points and the box for cells that were made "
-                        "without them: query() or pairs_between() have no such limit");
-        return NULL;
-    case HS_ERR_CAPACITY: return raise_capacity(failure);
-    case HS_ERR_INTERRUPTED:
-        if (!PyErr_Occurred()) {
-            PyErr_SetString(PyExc_SystemError, "interrupted without an exception");
-        }
-        return NULL;
-    case HS_ERR_ARGUMENT: /* Python's arguments are checked before: these are for whatever passes */
-        PyErr_SetString(PyExc_ValueError, hs_status_text(status));
-        return NULL;
-    case HS_OK:
-    case HS_STATUS_END: break;
+    const size_t number = (size_t)status;
+    if (status == HS_ERR_KERNEL) {
+        return raise_kernel(options);
+    }
+    if (number < sizeof RAISE / sizeof RAISE[0] && RAISE[number] != NULL) {
+        return RAISE[number](failure);
     }
     PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status,
                  hs_status_text(status));

@@ -13,6 +13,8 @@
 
 #define LINE 8192
 #define PATH 4096
+/* Version 1 writes the largest multiple of a page below 2^63 for no limit. */
+#define NO_LIMIT 0x1p62
 
 typedef struct hierarchy {
     const char *type;  /* of the file system */
@@ -60,7 +62,7 @@ static double
 left_in_group(const hierarchy *version, const char *folder)
 {
     const double limit = number_in_folder(folder, version->limit, "");
-    if (limit < 0.0) {
+    if (limit < 0.0 || limit >= NO_LIMIT) {
         return INFINITY;
     }
     const double usage = number_in_folder(folder, version->usage, "");
@@ -155,9 +157,8 @@ unescape(char *text)
 {
     char *end = text;
     for (; *text != '\0'; text++, end++) {
-        unsigned code;
-        if (*text == '\\' && sscanf(text + 1, "%3o", &code) == 1) {
-            *end = (char)code;
+        if (*text == '\\' && strspn(text + 1, "01234567") >= 3) {
+            *end = (char)((text[1] - '0') * 64 + (text[2] - '0') * 8 + (text[3] - '0'));
             text += 3;
         } else {
             *end = *text;
@@ -177,11 +178,11 @@ is_mount_of(const hierarchy *version, char *line, char **top, char **place)
     }
     *top = next_field(&rest, " \n");
     *place = next_field(&rest, " \n");
-    rest = strstr(rest, "- ");
+    rest = strstr(rest, " - "); /* an option of the mount may end in a dash */
     if (rest == NULL) {
         return false;
     }
-    rest += 2;
+    rest += 3;
     const char *type = next_field(&rest, " \n");
     (void)next_field(&rest, " \n");
     unescape(*top);

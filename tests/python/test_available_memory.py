@@ -88,6 +88,19 @@ def test_version_1_is_where_the_mount_says(tree):
     assert tree.left() == 300 * MB
 
 
+def test_lines_of_mountinfo_are_read_field_by_field(tree):
+    mounts = "35 31 0:32 / /a\\4b rw,label=odd- master:1 - cgroup cgroup rw,memory\n"
+    tree.process("4:memory:/jobs\n", mounts)
+    tree.v1("/a\\4b/jobs", 400 * MB, 100 * MB)
+    assert tree.left() == 300 * MB
+
+
+def test_the_largest_limit_of_version_1_is_none(tree):
+    tree.process("4:memory:/\n", V1_MEMORY)
+    tree.v1("/sys/fs/cgroup/memory", NO_LIMIT_V1, 5000 * MB)
+    assert tree.left() == math.inf
+
+
 @pytest.mark.parametrize("mounts", [V2, None], ids=["mountinfo", "usual place"])
 def test_version_2_counts_the_group_and_those_above_it(tree, mounts):
     tree.process("0::/user.slice/job\n", mounts)

@@ -123,3 +123,14 @@ def test_any_number_that_pairs_takes():
 def test_what_is_no_size_is_refused(size, error, text):
     with pytest.raises(error, match=text):
         hs.CellList([[0.0, 0.0]], 1.0, cell_size=size)
+
+
+def test_one_cell_with_everything_says_so():
+    points = [[0.0, 2.0**1000], [0.0, -(2.0**1000)]]
+    box = [[2.0**-900, 0.0], [0.0, 1.0]]
+    cells = hs.CellList(points, 2.0**-899, box=box, periodic=[True, False])
+    assert cells.cell_sizes == (np.inf, np.inf) and cells.shape == (1, 1)
+    assert cells.cell_of(points).tolist() == [0, 0] and cells.count_pairs() == 4
+    for queries in (None, [[0.0, 0.0]]):
+        with pytest.raises(ValueError, match="one cell holds everything"):
+            cells.candidates(queries)

@@ -136,7 +136,7 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
             failure->row = i;
             return HS_ERR_SHIFT_RANGE;
         }
-        (void)hs_lattice_shift(lattice, turns, given); /* as wrapping has done with them */
+        (void)hs_lattice_shift(lattice, turns, given); /* these fit: wrap_row found it */
         for (int k = 0; wrapped != NULL && k < d; k++) {
             const bool stays = inside[k] == x[k]; /* scaling may have lost its last digits */
             wrapped[i * d + k] =

@@ -10,6 +10,7 @@
 #include "../search/cell_rows.h"
 #include "../search/search_reuse.h"
 
+#include <math.h>
 #include <string.h>
 
 void
@@ -33,7 +34,9 @@ hs_cells_layout(const hs_cells *cells, hs_layout *layout)
     const hs_fpenv saved = hs_fpenv_enter();
     for (int k = 0; k < grid->ndim; k++) {
         layout->shape[k] = grid->shape[k];
-        layout->cell_size[k] = hs_scale_apply(search->scene.unscale, grid->cell_size[k]);
+        layout->cell_size[k] = search->scene.in_one_cell
+                                   ? INFINITY
+                                   : hs_scale_apply(search->scene.unscale, grid->cell_size[k]);
     }
     hs_fpenv_leave(saved);
 }
@@ -295,6 +298,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
         hs_search_report(search, 0);
         status = options->cutoff == cells->search.options.cutoff ? HS_ERR_FAR : HS_ERR_CUTOFF;
         failure->value = status == HS_ERR_CUTOFF ? options->cutoff : 0.0;
+        failure->in_queries = status == HS_ERR_FAR && !cells->search.scene.in_one_cell;
     }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {

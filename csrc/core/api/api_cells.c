@@ -97,7 +97,7 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
     if (result != NULL) {
         *result = NULL;
     }
-    if (result == NULL || options == NULL) {
+    if (!hs_can_begin(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     failure = failure != NULL ? failure : &ignored;

@@ -224,7 +224,7 @@ hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     if (result != NULL) {
         *result = NULL;
     }
-    if (result == NULL || options == NULL || max_pairs < 1) {
+    if (!hs_can_begin(result, options) || max_pairs < 1) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
     failure = failure != NULL ? failure : &ignored;

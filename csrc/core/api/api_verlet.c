@@ -129,7 +129,7 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
                                                                              : options->cutoff;
         return HS_ERR_CUTOFF;
     }
-    hs_status status = hs_check_limits(options);
+    hs_status status = hs_check_resources(options);
     if (status == HS_OK) {
         status = hs_check_points(points, failure);
     }

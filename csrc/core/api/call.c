@@ -96,7 +96,8 @@ hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, h
 }
 
 #define ALL_WANTS 63u /* every HS_WANT_ bit */
-/* What no array reaches across, and roundings of float64 cannot hide. */
+/* Bytes that no array reaches across: a little less than addresses do, for the sum that is compared
+ * with it is rounded. */
 #define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
 
 static hs_status
@@ -129,6 +130,12 @@ hs_can_return(hs_pairs **result, const hs_options *options)
     if (result != NULL) {
         *result = NULL;
     }
+    return hs_can_begin(result, options);
+}
+
+bool
+hs_can_begin(const void *result, const hs_options *options)
+{
     return result != NULL && options != NULL;
 }
 
@@ -219,7 +226,7 @@ can_hold(const hs_pair_arrays *out, unsigned want)
 }
 
 hs_status
-hs_check_limits(const hs_options *options)
+hs_check_resources(const hs_options *options)
 {
     return status_of(options->threads > INT_MIN && options->memory_limit >= 0.0);
 }
@@ -229,7 +236,7 @@ hs_check_options(const hs_options *options)
 {
     const unsigned        want = options->want;
     const hs_pair_arrays *out = options->out;
-    if (hs_check_limits(options) != HS_OK) {
+    if (hs_check_resources(options) != HS_OK) {
         return HS_ERR_ARGUMENT;
     }
     return status_of((want & ~HS_WANT_ALL) == 0 &&

@@ -38,9 +38,10 @@ hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs *
                           hs_failure *failure);
 
 /*
- * What a program of C may get wrong about the arguments of halfshell.h and what would
- * then be read or written out of bounds; Python's are checked before. Values are not looked at
- * here: scene.h does that. Pointers may be NULL, but for the options of hs_check_* and the failure.
+ * Checks of what a program of C may get wrong about the arguments of halfshell.h, where memory
+ * would be read or written out of bounds. Python checks its own before. Coordinates, boxes and
+ * cutoffs are checked when the scene is made (scene.h). Any pointer may be NULL, except the options
+ * and the failure that are given to a function hs_check_*.
  */
 
 /* The counters, if any, of a call that ends before its search begins. */
@@ -52,6 +53,9 @@ hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *
 /* Whether a call that returns an object has these two, without which it cannot begin. *result,
  * unless NULL, is NULL afterwards. */
 bool hs_can_return(hs_pairs **result, const hs_options *options);
+
+/* The same for objects of other types, once their pointer, unless NULL, has been cleared. */
+bool hs_can_begin(const void *result, const hs_options *options);
 
 /* Whether an array is there that has one entry for each of these points, if there are any. */
 bool hs_has_entries(const void *array, const hs_points *points);
@@ -65,8 +69,8 @@ hs_status hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failu
 /* HS_OK or HS_ERR_ARGUMENT. The box may be NULL; ndim is that of the points. */
 hs_status hs_check_box(const hs_box *box, int ndim);
 
-/* Those of the options that every function heeds: threads and limits. */
-hs_status hs_check_limits(const hs_options *options);
+/* Those of the options that every function heeds: threads and the limit of memory. */
+hs_status hs_check_resources(const hs_options *options);
 
 hs_status hs_check_options(const hs_options *options);
 

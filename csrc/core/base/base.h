@@ -62,14 +62,14 @@ __extension__ typedef unsigned __int128 hs_uint128;
 /* The sanitizers of addresses and of memory watch malloc: under them, memory comes from nowhere
  * else. */
 #if defined(__SANITIZE_ADDRESS__)
-#define HS_ADDRESS_SANITIZER 1
+#define HS_WATCHED_MALLOC 1
 #elif defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer)
-#define HS_ADDRESS_SANITIZER 1
+#define HS_WATCHED_MALLOC 1
 #endif
 #endif
-#if !defined(HS_ADDRESS_SANITIZER)
-#define HS_ADDRESS_SANITIZER 0
+#if !defined(HS_WATCHED_MALLOC)
+#define HS_WATCHED_MALLOC 0
 #endif
 
 /* As fmax and fmin, which most C libraries make a call, where `b` is no NaN: an `a` that is one is

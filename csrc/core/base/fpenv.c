@@ -16,22 +16,34 @@
  * stands above the 32 bits of MXCSR. */
 #if defined(__MINGW32__)
 #define X87_ROUNDING 0x0c00u
+#define X87_EXCEPTIONS 0x003fu /* masks in the control word, flags in the status word */
+
+/* What fnstenv stores: the control word and the status word are the lower halves of the first two.
+ * Storing it masks all exceptions, so that no flag that stands traps at the next instruction. */
+typedef struct x87_state {
+    uint32_t words[7];
+} x87_state;
 
 static uint64_t
 enter_x87(void)
 {
-    uint16_t word;
-    __asm__ __volatile__("fnstcw %0" : "=m"(word));
-    const uint16_t nearest = (uint16_t)(word & ~X87_ROUNDING);
+    x87_state state;
+    __asm__ __volatile__("fnstenv %0" : "=m"(state));
+    const uint16_t control = (uint16_t)state.words[0];
+    const uint16_t nearest = (uint16_t)((control & ~X87_ROUNDING) | X87_EXCEPTIONS);
     __asm__ __volatile__("fldcw %0" : : "m"(nearest));
-    return word;
+    return control | (uint64_t)(state.words[1] & X87_EXCEPTIONS) << 16;
 }
 
+/* The caller's flags come back before its traps: those of the core would trap. */
 static void
 leave_x87(uint64_t saved)
 {
-    const uint16_t word = (uint16_t)saved;
-    __asm__ __volatile__("fldcw %0" : : "m"(word));
+    x87_state state;
+    __asm__ __volatile__("fnstenv %0" : "=m"(state));
+    state.words[0] = (state.words[0] & ~UINT32_C(0xffff)) | (uint32_t)(saved & 0xffff);
+    state.words[1] = (state.words[1] & ~X87_EXCEPTIONS) | (uint32_t)(saved >> 16 & X87_EXCEPTIONS);
+    __asm__ __volatile__("fnclex\n\tfldenv %0" : : "m"(state));
 }
 #else
 #define enter_x87() UINT64_C(0)

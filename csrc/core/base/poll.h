@@ -9,6 +9,9 @@
 /* Points that loading, wrapping and sorting handle between two questions: some milliseconds. */
 #define HS_POLL_POINTS (INT64_C(1) << 17)
 
+/* Candidates of one neighbourhood that a pass handles between two questions: some milliseconds. */
+#define HS_POLL_CANDIDATES (1 << 18)
+
 /* Nothing in it applies yet. */
 #define HS_NO_FAILURE ((hs_failure){.row = -1, .column = -1, .system = -1})
 

@@ -23,7 +23,7 @@ hs_status_text(hs_status status)
     case HS_ERR_SHIFT_RANGE: return "a shift does not fit its integer type";
     case HS_ERR_ROUNDING: return "too far from the box for precision=\"double\"";
     case HS_ERR_KERNEL: return "no such kernel on this CPU, or not compiled as it must be";
-    case HS_ERR_FAR: return "queries lie too far from the points that are in cells";
+    case HS_ERR_FAR: return "queries, or points from each other, lie too far away for cells";
     case HS_ERR_CAPACITY: return "the arrays that were given are too small";
     case HS_ERR_EDGES: return "edges must be finite, not negative and ascending";
     case HS_ERR_TYPES: return "types must be from 0 on and below the number of types";

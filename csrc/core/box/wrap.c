@@ -9,8 +9,16 @@
 #define TURNS_TAIL (INT64_C(1) << 26) /* splits 62 bits into 36 and 26, both exact as doubles */
 #define WRAP_PASSES 4 /* each pass gains 50 bits; from 2^51 turns two are enough, two are spare */
 
+/* Numbers beyond this are taken smaller, exactly, before they are split into halves: splitting
+ * multiplies by 2^27 + 1 (doubleword.h), and sums of a few products must be finite too. */
 #define LARGE 0x1p900
+/* Coordinates by so much: those that are large stay above 2^800, so that no digit of the length,
+ * which is at least 2^-52 of them, is lost. */
 #define REDUCE 0x1p-100
+/* Entries of a box by so much, and their products back again: what is below 2^1024 comes below
+ * 2^960, and stays above 2^836, far from the smallest numbers. */
+#define SHRINK 0x1p-64
+#define GROW 0x1p64
 
 /*
  * x - n * length, which must be a double, for an integer 1 <= |n| < 2^52 within 3/4 of x / length.
@@ -58,8 +66,8 @@ hs_wrap_axis(double x, double length, int64_t *turns)
 HS_ALWAYS_INLINE void
 subtract_product(double factor, double entry, double *sum, double *low, double *absolute)
 {
-    const bool   is_large = fabs(entry) > 0x1p900;
-    const double shrink = is_large ? 0x1p-64 : 1.0, grow = is_large ? 0x1p64 : 1.0;
+    const bool   is_large = fabs(entry) > LARGE;
+    const double shrink = is_large ? SHRINK : 1.0, grow = is_large ? GROW : 1.0;
     const hs_dw  scaled = hs_two_product(-factor, entry * shrink);
     const hs_dw  product = {scaled.hi * grow, scaled.lo * grow};
     const hs_dw  partial = hs_two_sum(*sum, product.hi);

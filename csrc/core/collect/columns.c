@@ -111,6 +111,15 @@ hs_output_bytes_per_pair(const hs_output *output)
     return hs_want_bytes(output->columns, output->ndim, output->index_bytes);
 }
 
+/* Whether the account has room for n pairs. */
+static bool
+may_charge(const hs_output *output, int64_t n)
+{
+    const double more = (double)n - (double)output->charged;
+    return output->account == NULL || more <= 0.0 ||
+           hs_account_allows(output->account, more * (double)hs_output_bytes_per_pair(output));
+}
+
 /* The account knows of as many pairs as are about to be written, not of what is only reserved:
  * of n, which are more than it knows of. */
 static bool
@@ -121,7 +130,7 @@ charge(hs_output *output, int64_t n)
     if (account == NULL) {
         return true;
     }
-    if (!hs_account_allows(account, (double)more * (double)hs_output_bytes_per_pair(output))) {
+    if (!may_charge(output, n)) {
         return false;
     }
     for (int k = 0; k < HS_QUANTITIES; k++) {
@@ -147,6 +156,9 @@ hs_status
 hs_output_reserve(hs_output *output, int64_t n, double fraction)
 {
     const int64_t needed = output->n_pairs + n;
+    if (!may_charge(output, needed)) { /* before the system is asked for it */
+        return HS_ERR_MEMORY;
+    }
     if (needed > output->capacity || output->capacity == 0) {
         /* What is needed now, half as much again, or the whole as far as it can be foreseen. */
         const double least = (double)needed + FIRST_CAPACITY;

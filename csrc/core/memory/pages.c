@@ -6,7 +6,7 @@
 #endif
 #include "pages.h"
 
-#if defined(__linux__) && !HS_ADDRESS_SANITIZER
+#if defined(__linux__) && !HS_WATCHED_MALLOC
 
 #include <sys/mman.h>
 

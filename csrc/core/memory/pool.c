@@ -225,7 +225,7 @@ hs_pool_give(void *data)
     void        *removed[HS_POOL_CHUNKS];
     int          n = 0;
     const size_t touched = hs_chunk_of(data)->touched;
-    if (HS_ADDRESS_SANITIZER || !try_lock()) { /* it must see who writes to what was freed */
+    if (HS_WATCHED_MALLOC || !try_lock()) { /* it must see who writes to what was freed */
         return false;
     }
     const bool keep = pool.limit > 0 && touched <= pool.limit;

@@ -6,7 +6,7 @@
 
 /* Beyond these each group walks down the tree by itself: it is far smaller than all together. */
 #define MOST_LEAVES 2048
-#define MOST_IMAGES 64
+#define MOST_SHARED_IMAGES 64
 /* Groups that look so many times as far as others do walk by themselves. */
 #define FARTHEST 2.0
 /* In units, where the radius is between 1 and 2: floats tell leaves apart. */
@@ -31,7 +31,7 @@ hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves)
            hs_shared_resize(shared, (void **)&leaves->runs, 0, room, sizeof *leaves->runs) &&
            hs_shared_resize(shared, (void **)&leaves->label, 0, room, sizeof(int32_t)) &&
            hs_shared_resize(shared, (void **)&leaves->hits, 0, room, sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&leaves->images, 0, MOST_IMAGES,
+           hs_shared_resize(shared, (void **)&leaves->images, 0, MOST_SHARED_IMAGES,
                             sizeof *leaves->images) &&
            hs_shared_resize(shared, (void **)&leaves->stack, 0, near->tree.depth + 2,
                             sizeof(int32_t));
@@ -188,7 +188,7 @@ hs_near_leaves_find(const hs_near *near, const hs_near_group *groups, int32_t n,
     }
     leaves->extent = 0.5 * widest + 4.0;
     if (!(widest < WIDEST) || hs_near_images_start(near, &all, &images) != HS_OK ||
-        images.count > MOST_IMAGES || images.error * leaves->unit > ROOM) {
+        images.count > MOST_SHARED_IMAGES || images.error * leaves->unit > ROOM) {
         return;
     }
     leaves->error = images.error;

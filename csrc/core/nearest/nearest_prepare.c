@@ -3,6 +3,7 @@
 #include "nearest_prepare.h"
 
 #include "nearest_kept.h"
+#include "../scene/unit.h"
 
 #include <math.h>
 
@@ -10,8 +11,6 @@
 #define LEAF_POINTS 8
 /* Largest distances below this scale the scene by themselves. */
 #define SMALL_LIMIT 0x1p-800
-/* In largest distances: what lies beyond is drawn together, which a tree that is kept is not. */
-#define FAR 0x1p50
 /* Periods below this do. */
 #define SMALL_BOX 0x1p-500
 
@@ -162,7 +161,7 @@ borrow(const hs_near *kept, hs_near *near)
 }
 
 /* HS_STATUS_END when what is kept does not serve: bounds that do not hold for the queries, a scale
- * that would lose digits of the largest distance; or somebody else is building it. */
+ * that would lose digits of the largest distance; or another thread is building it. */
 static hs_status
 prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
                   hs_failure *failure)
@@ -184,7 +183,9 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
         return kept == NULL ? HS_STATUS_END : status;
     }
     const hs_scene *scene = &kept->search->scene;
-    if (scene->is_heap || scene->cloud.largest > FAR * hs_scale_apply(scene->scale, limit)) {
+    const int       unit = hs_exponent_of(hs_scale_apply(scene->scale, limit));
+    /* What is far is drawn together, which a tree that is kept is not. */
+    if (scene->in_one_cell || hs_is_far(scene->cloud.largest, unit, HS_FAR_BOUNDED_EXPONENT)) {
         return HS_STATUS_END;
     }
     if (sets->queries != NULL) {

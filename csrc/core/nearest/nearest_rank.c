@@ -2,11 +2,14 @@
 /* nearest_rank.c: see nearest_rank.h. */
 #include "nearest_rank.h"
 
-/* Of the largest square: what two keys lose where their numbers are, twice. */
+/* A part of the largest square. The last bits of a key hold the number of its hit: so much two
+ * keys lose together, doubled. */
 #define KEY_ERROR 0x1p-15
-/* Of so many times the keys that are wanted, the others are first set aside. */
+/* Where there are more than so many times the keys that are wanted, the farthest are set aside
+ * before the others are sorted. */
 #define MANY 3
-/* Of keys that float64 cannot tell, up to so many of very many are found by insertion. */
+/* Among very many keys that float64 cannot tell apart, the nearest are found by insertion where no
+ * more than so many are wanted. */
 #define MOST_INSERTED 64
 
 void

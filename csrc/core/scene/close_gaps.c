@@ -9,7 +9,8 @@
  * and become smaller, so that nothing is rounded. Larger numbers are multiples of 4 u, so each is
  * 4 u or more from all others: only which are equal matters, and each follows at the next multiple.
  * So every difference of two coordinates stays what it is to the last bit, or was more than 2 u and
- * is so still. None becomes larger, so all are float64 numbers.
+ * is so still. None becomes larger, so all are float64 numbers. This holds wherever drawing
+ * together begins, at 2^54 u or before.
  *
  * Along a periodic axis of length L, all x lie in [-L/2, L/2] first, and L/2 takes part as one more
  * number. Across the face, the difference of two points is the sum of L/2 - |x| and L/2 - |y|, and
@@ -36,6 +37,10 @@
 /* Among the keys: half a box vector. Points are numbers from 0 on, queries from -2 on downwards. */
 #define HALF (-1)
 
+/* Rows with a half beyond this are halved exactly: the last place of the row is twice the smallest
+ * number. */
+#define LEAST_HALF 0x1p-1022
+
 /* How one call condenses. */
 typedef struct condensing {
     hs_account       *account;
@@ -47,7 +52,8 @@ typedef struct condensing {
     bool              changes_rows; /* boxes may be condensed as well */
     bool              keeps_given;  /* columns that are wrapped, as they were before */
     hs_scale          to_units, from_units;
-    double            far;          /* 2^54 u, in the caller's unit */
+    double            far;          /* drawn together from here on, in the caller's unit */
+    double            coarse;       /* 2^54 u, the same */
     hs_keys           keys;         /* room for n + 1 */
 } condensing;
 
@@ -79,12 +85,12 @@ rows_may_change(const condensing *doing, const hs_box *box)
 }
 
 static bool
-anything_is_far(const hs_cloud *cloud, const hs_box *box, double far)
+anything_is_far(const hs_cloud *cloud, const hs_box *box, int unit, int powers)
 {
-    bool found = cloud->largest > far;
+    bool found = hs_is_far(cloud->largest, unit, powers);
     for (int l = 0; box != NULL && l < box->ndim; l++) {
         for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
-            found = found || 0.5 * fabs(box->rows[l][k]) > far;
+            found = found || hs_is_far(0.5 * fabs(box->rows[l][k]), unit, powers);
         }
     }
     return found;
@@ -171,15 +177,15 @@ number_of(int64_t bits)
 typedef struct places {
     double last;  /* the last one, */
     double place; /* where it went, */
-    double moved; /* and, unless it is far, by what */
+    double moved; /* and, unless it is beyond 2^54 u, by what */
 } places;
 
 /* Where the next magnitude goes, and those that are equal to it. */
 static double
-next_place(places *at, double x, bool is_far)
+next_place(places *at, double x, bool is_coarse)
 {
     const double after = 4.0 * (ceil(0.25 * at->place) + 1.0);
-    if (is_far) {
+    if (is_coarse) {
         at->place = after;
     } else {
         if (x - at->last > 8.0) {
@@ -242,9 +248,9 @@ condense_numbers(condensing *doing, int k, double from, double *half)
     for (int64_t e = 0; e < found && status == HS_OK; e++) {
         if (e == 0 || keys->keys[e] != keys->keys[e - 1]) {
             const double size = number_of(keys->keys[e]);
-            const bool   is_far = size > doing->far;
-            const double x_units = is_far ? at.last : hs_scale_apply(doing->to_units, size);
-            place = placed(doing, next_place(&at, x_units, is_far));
+            const bool   is_coarse = size > doing->coarse;
+            const double x_units = is_coarse ? at.last : hs_scale_apply(doing->to_units, size);
+            place = placed(doing, next_place(&at, x_units, is_coarse));
         }
         if (keys->ids[e] == HALF) {
             *half = place;
@@ -293,7 +299,7 @@ condense_column(condensing *doing, int k, hs_failure *failure)
             return status;
         }
     }
-    const bool condenses = is_far && (row < 0 || half > far);
+    const bool condenses = is_far && (row < 0 || half > hs_larger(far, LEAST_HALF));
     /* What is dense enough already is left alone, so that one outlier costs no sorting. */
     const double dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)doing->n);
     const double from = condenses ? hs_smaller(dense, far) : INFINITY;
@@ -346,14 +352,15 @@ condense_columns(condensing *doing, hs_failure *failure)
 
 hs_status
 hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
-            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
+            int powers, hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
+            hs_failure *failure)
 {
-    const double far = ldexp(1.0, unit + HS_FAR_EXPONENT);
     condensed->box = condensed->given_box = box;
     condensed->is_scaled = condensed->has_turns = false;
     memset(condensed->turns, 0, sizeof condensed->turns);
     memset(condensed->given, 0, sizeof condensed->given);
-    if (cloud->n == 0 || (asking != NULL && asking->n == 0) || !anything_is_far(cloud, box, far)) {
+    if (cloud->n == 0 || (asking != NULL && asking->n == 0) ||
+        !anything_is_far(cloud, box, unit, powers)) {
         return HS_OK;
     }
     condensing doing = {.account = account,
@@ -365,7 +372,8 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
                         .condensed = condensed,
                         .to_units = hs_scale_of(unit),
                         .from_units = hs_scale_of(-unit),
-                        .far = far};
+                        .far = ldexp(1.0, unit + powers),
+                        .coarse = ldexp(1.0, unit + HS_FAR_EXPONENT)};
     doing.changes_rows = rows_may_change(&doing, box);
     if (doing.changes_rows) {
         condensed->is_scaled = unit < 0;

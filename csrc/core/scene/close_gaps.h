@@ -11,9 +11,6 @@
 #include "../box/lattice.h"
 #include "points.h"
 
-/* Far is beyond 2^54 units: numbers there are multiples of four units. */
-#define HS_FAR_EXPONENT 54
-
 /* Points, queries. */
 #define HS_CONDENSED_SETS 2
 
@@ -31,13 +28,14 @@ typedef struct hs_condensed {
 } hs_condensed;
 
 /*
- * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other. Does
- * nothing but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
+ * unit: the exponent of the cutoff, 2^unit <= cutoff < 2^(unit + 1); with cutoff 0 any other.
+ * powers: what is far is so beyond 2^powers units, HS_FAR_EXPONENT at most (unit.h). Does nothing
+ * but look at ranges where nothing is far. box: checked. asking: NULL, or queries, whose
  * range and that of the points have been joined. HS_ERR_SHIFT_RANGE only where S is wanted.
  * hs_condensed_free in any case.
  */
 hs_status hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
-                      hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
+                      int powers, hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
                       hs_failure *failure);
 
 void hs_condensed_free(hs_account *account, hs_condensed *condensed);

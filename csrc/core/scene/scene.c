@@ -9,9 +9,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Box vectors in a cutoff, along one of them, that nobody has memory for. */
-#define MOST_IMAGES 0x1p64
-
 /* Columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
@@ -119,14 +116,34 @@ box_is_vanishing(const hs_lattice *lattice)
     return false;
 }
 
+/* Whether a cutoff has more images than any memory holds. */
+static bool
+has_endless_images(const hs_scene *scene, const hs_condensed *condensed)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    const double      cutoff = condensed->is_scaled ? scene->cutoff : scene->sought;
+    return hs_is_far(cutoff, hs_exponent_of(size.short_row), HS_FAR_IMAGES_EXPONENT);
+}
+
 /* Whether open axes leave nothing of the box, so that the points cannot be in cells. */
 static bool
-no_scale_holds(const hs_scene *scene, const hs_box *box)
+no_scale_holds(const hs_scene *scene, const hs_condensed *condensed)
 {
-    const hs_box_size size = hs_box_size_of(box);
+    const hs_box_size size = hs_box_size_of(condensed->box);
     return (box_is_vanishing(&scene->lattice) ||
             hs_open_drowns_box(&scene->cloud, &size, scene->sought)) &&
-           scene->sought <= MOST_IMAGES * size.short_row;
+           !has_endless_images(scene, condensed);
+}
+
+/* Why there is no search in a box that scaling brought to nothing. */
+static hs_status
+refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, hs_failure *failure)
+{
+    if (!scene->lattice.aligned && !has_endless_images(scene, condensed)) {
+        return HS_ERR_BOX_SKEWED;
+    }
+    failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
+    return HS_ERR_MEMORY;
 }
 
 static hs_status
@@ -142,14 +159,7 @@ static hs_status
 fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
            hs_scene *asking, hs_failure *failure)
 {
-    double magnitude = 0.0, of_asking = 0.0;
-    if (box_is_vanishing(&scene->lattice)) {
-        if (!scene->lattice.aligned) {
-            return HS_ERR_BOX_SKEWED;
-        }
-        failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
-        return HS_ERR_MEMORY;
-    }
+    double    magnitude = 0.0, of_asking = 0.0;
     hs_status status = wrap_points(account, team, options, scene, &magnitude, failure);
     if (status == HS_OK && asking != NULL) {
         status = wrap_points(account, team, options, asking, &of_asking, failure);
@@ -181,7 +191,7 @@ start_scene(const hs_points *points, hs_scene *scene)
     scene->ndim = points->ndim;
     scene->n = points->n;
     scene->keeps_originals = scene->x_is_beside = scene->is_asked = scene->is_kept = false;
-    scene->is_heap = false;
+    scene->in_one_cell = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
     memset(scene->x_largest, 0, sizeof scene->x_largest);
@@ -304,8 +314,8 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     if (scene->extreme) {
         restore_rows(condensed, &scene->lattice);
     }
-    if (scene->is_kept && no_scale_holds(scene, box)) {
-        hs_scene_make_heap(scene);
+    if (scene->is_kept && !empty && no_scale_holds(scene, condensed)) {
+        hs_scene_put_in_one_cell(scene);
     }
     hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
     if (hs_scene_is_drowned(scene)) {
@@ -315,7 +325,9 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     if (asking != NULL) {
         hs_scene_share(scene, asking);
     }
-    return fill_scene(account, team, options, scene, asking, failure);
+    return box_is_vanishing(&scene->lattice)
+               ? refuse_vanishing(scene, condensed, failure)
+               : fill_scene(account, team, options, scene, asking, failure);
 }
 
 /* Chooses the scale of a scene whose points are as given, and fills it. */
@@ -330,7 +342,8 @@ scale_scene(hs_account *account, hs_team *team, const hs_options *options, const
     scene->sought = hs_scene_settle_cutoff(scene, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
     if (hs_scene_may_condense(scene, asking, &size, unit)) {
-        status = hs_condense(account, options, box, unit, cloud,
+        const int powers = scene->is_wide ? HS_FAR_BOUNDED_EXPONENT : HS_FAR_EXPONENT;
+        status = hs_condense(account, options, box, unit, powers, cloud,
                              asking != NULL ? &asking->cloud : NULL, &condensed, failure);
     }
     if (status == HS_OK) {

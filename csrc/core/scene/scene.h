@@ -11,6 +11,8 @@
 #include "../memory/account.h"
 #include "points.h"
 
+struct hs_box_size;
+
 /* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
 #define HS_SCALING_LOSS 0x1p-1000
 
@@ -42,8 +44,7 @@ typedef struct hs_scene {
     double     formula_error; /* precision="double": its |D| against the true one */
     bool       is_asked;      /* by queries: the bounds above hold for these too */
     bool       is_kept;       /* and for others that come later */
-    bool       is_heap;       /* kept, but no scale holds it: one cell with everything, which no
-                               * search can use: each makes a scene of its own */
+    bool       in_one_cell;   /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
     bool       is_plain;      /* as hs_sets says */
     bool       is_wide;       /* the same */
     double     least_cutoff;  /* the same */
@@ -57,7 +58,7 @@ typedef struct hs_sets {
     bool             is_kept; /* queries come later: bounds with room for them */
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
                                 * and points are drawn together (close_gaps.h) only if need be */
-    bool             is_wide; /* nobody makes float32 of X: it may be larger than that holds */
+    bool             is_wide; /* X is not made float32: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
     bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
@@ -86,7 +87,6 @@ hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *
                              hs_scene *asking, hs_failure *failure);
 
 /* Steps of that; scene_scale.c. The cutoff that scale and condensing go by. */
-struct hs_box_size;
 double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size,
                               double cutoff);
 
@@ -110,8 +110,13 @@ void hs_scene_share(const hs_scene *scene, hs_scene *asking);
 /* The scene's x_largest, lower and upper cover what wrapping found in both. */
 void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
 
-/* A scene that is kept for numbers that no scale holds: all points on one spot of open space. */
-void hs_scene_make_heap(hs_scene *scene);
+/*
+ * A scene that is kept for numbers that no scale holds: all points on one spot of open space, which
+ * gives one cell with everything. No search can use it: each reads the points again and makes a
+ * scene of its own. It is there because what keeps cells owns the points, which those searches
+ * read, and its layout is public: it must be a sound one that holds each point once.
+ */
+void hs_scene_put_in_one_cell(hs_scene *scene);
 
 /* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
  * its scale would round. */
@@ -152,9 +157,6 @@ void hs_scene_fold_far(hs_scene *scene);
  * lower and upper, and *magnitude as hs_wrap_point says. */
 hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
                         double *magnitude, hs_failure *failure);
-
-/* More than any digit that scaling can lose times any number of turns: 2^-1074 * 2^51 < 2^-1000. */
-#define HS_SCALING_LOSS 0x1p-1000
 
 /* Steps of scene_bounds.c. x_error and t_error, from x_largest and what wrapping says. */
 void hs_scene_bound_errors(hs_scene *scene, double magnitude);

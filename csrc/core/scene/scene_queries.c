@@ -58,7 +58,7 @@ hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
 }
 
 void
-hs_scene_make_heap(hs_scene *scene)
+hs_scene_put_in_one_cell(hs_scene *scene)
 {
     hs_cloud *cloud = &scene->cloud;
     for (int k = 0; k < scene->ndim; k++) {
@@ -70,7 +70,7 @@ hs_scene_make_heap(hs_scene *scene)
     scene->cutoff = scene->cutoff_low = scene->radius = 1.0;
     scene->formula_error = 0.0;
     scene->extreme = false;
-    scene->is_heap = true;
+    scene->in_one_cell = true;
     hs_lattice_init(NULL, scene->ndim, scene->pending, &scene->lattice);
 }
 
@@ -114,10 +114,10 @@ bool
 hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
 {
     const hs_scale scale = kept->scale;
-    if (kept->n == 0) { /* nobody is found, wherever queries are, but they need a place */
+    if (kept->n == 0) { /* no point is found, wherever queries are, but they need a place */
         return hs_scale_apply(scale, cloud->largest) < INFINITY;
     }
-    if (kept->extreme || kept->is_heap ||
+    if (kept->extreme || kept->in_one_cell ||
         !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
         return false;
     }

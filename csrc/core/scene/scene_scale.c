@@ -25,7 +25,7 @@ hs_scene_settle_cutoff(const hs_scene *scene, const hs_box_size *size, double cu
     const hs_cloud *cloud = &scene->cloud;
     if (scene->within > 0.0 &&
         !hs_fits_one_scale(cloud, size, hs_unit_exponent(cloud, size, scene->within),
-                           HS_FAR_EXPONENT)) {
+                           HS_FAR_BOUNDED_EXPONENT)) {
         return scene->within;
     }
     return scene->is_kept || scene->is_plain ? cutoff : hs_enough_cutoff(cloud, size, cutoff);

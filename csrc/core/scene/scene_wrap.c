@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scene_wrap.c: the pass over all points that wraps them into the box. See scene.h, fold.h. */
+/* scene_wrap.c: the pass over all points that wraps them into the box. See scene.h, wrap.h. */
 #include "scene.h"
 
 #include "../box/box_skew.h"
 #include "../threads/passes.h"
 #include "../box/wrap.h"
+#include "unit.h"
 
 #include <math.h>
 #include <string.h>
@@ -24,29 +25,13 @@ is_inside(const hs_scene *scene, int k)
     return scene->cloud.lower[k] >= -half && scene->cloud.upper[k] <= half;
 }
 
-/* The given row that alone has an entry in column k, and no other entry; -1 when there is none. */
-static int
-own_row(const hs_lattice *lattice, int k)
-{
-    int own = -1, rows = 0, entries = 0;
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        if (lattice->given[r][k] != 0.0) {
-            own = r;
-            rows++;
-        }
-    }
-    for (int c = 0; own >= 0 && c < lattice->ndim; c++) {
-        entries += lattice->given[own][c] != 0.0;
-    }
-    return rows == 1 && entries == 1 ? own : -1;
-}
-
 /* The length that the given numbers of column k repeat after; 0 where that is not known. */
 static double
 given_length(const hs_scene *scene, int k)
 {
     const hs_lattice *lattice = &scene->lattice;
-    const int         own = own_row(lattice, k);
+    const int own = hs_mover_among((const double(*)[HS_MAX_DIM])lattice->given, NULL,
+                                   lattice->n_periodic, lattice->ndim, k);
     if (own >= 0) {
         return fabs(lattice->given[own][k]);
     }

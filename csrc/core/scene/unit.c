@@ -7,44 +7,53 @@
 
 /* Cutoffs between 2^-20 and 2^20 are left alone: the float32 filter has room for their squares. */
 #define ORDINARY_EXPONENT 20
-/* Points of a skewed box may be 2^51 box vectors away; others are refused. */
-#define FARTHEST 0x1p52
-/* Open axes that are so many times as long leave less than 2^-10 of a coupled box certain: wrapping
- * errs by some 2^-99 of the largest coordinate (wrap.h). */
-#define DROWNING 0x1p88
 /* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
  * and a binary order apart. */
 #define WHOLE_EXPONENT 8
-/* Of zero. */
+/* Of zero, and of infinity less as much: sums with exponents of numbers stay integers. */
 #define NO_EXPONENT (INT32_MIN / 2)
 
-/* x = m 2^e with 1 <= m < 2: e. */
-static int
-exponent_of(double x)
+int
+hs_exponent_of(double x)
 {
-    return x == 0.0 ? NO_EXPONENT : ilogb(x);
+    return x == 0.0 ? NO_EXPONENT : isinf(x) ? -NO_EXPONENT : ilogb(x);
+}
+
+bool
+hs_is_far(double size, int unit, int powers)
+{
+    return size > ldexp(1.0, unit + powers); /* infinity, or 0, where that passes the range */
 }
 
 static int
-entries_of_row(const hs_box *box, int l)
+entries_of_row(const double *row, int ndim)
 {
     int entries = 0;
-    for (int k = 0; k < box->ndim; k++) {
-        entries += box->rows[l][k] != 0.0;
+    for (int k = 0; k < ndim; k++) {
+        entries += row[k] != 0.0;
     }
     return entries;
 }
 
 int
-hs_mover_of(const hs_box *box, int column)
+hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
+               int column)
 {
     int mover = HS_OPEN;
-    for (int l = 0; box != NULL && l < box->ndim; l++) {
-        if (box->periodic[l] && box->rows[l][column] != 0.0) {
-            mover = mover == HS_OPEN && entries_of_row(box, l) == 1 ? l : HS_COUPLED;
+    for (int l = 0; l < n_rows; l++) {
+        if ((periodic == NULL || periodic[l]) && rows[l][column] != 0.0) {
+            mover = mover == HS_OPEN && entries_of_row(rows[l], ndim) == 1 ? l : HS_COUPLED;
         }
     }
     return mover;
+}
+
+int
+hs_mover_of(const hs_box *box, int column)
+{
+    return box == NULL ? HS_OPEN
+                       : hs_mover_among((const double(*)[HS_MAX_DIM])box->rows, box->periodic,
+                                        box->ndim, box->ndim, column);
 }
 
 hs_box_size
@@ -53,20 +62,20 @@ hs_box_size_of(const hs_box *box)
     hs_box_size found = {0.0, INFINITY, INFINITY, 0, false};
     for (int l = 0; box != NULL && l < box->ndim; l++) {
         double row_largest = 0.0;
-        int    entries = 0;
         for (int k = 0; box->periodic[l] && k < box->ndim; k++) {
             const double size = fabs(box->rows[l][k]);
             row_largest = hs_larger(size, row_largest);
-            entries += size > 0.0;
-            found.is_coupled = found.is_coupled || (size > 0.0 && found.moved >> k & 1u);
-            found.moved |= (unsigned)(size > 0.0) << k;
             found.smallest = size > 0.0 ? hs_smaller(size, found.smallest) : found.smallest;
         }
-        found.is_coupled = found.is_coupled || entries > 1;
         found.largest = hs_larger(row_largest, found.largest);
         if (box->periodic[l]) {
             found.short_row = hs_smaller(row_largest, found.short_row);
         }
+    }
+    for (int k = 0; box != NULL && k < box->ndim; k++) {
+        const int mover = hs_mover_of(box, k);
+        found.moved |= (unsigned)(mover != HS_OPEN) << k;
+        found.is_coupled = found.is_coupled || mover == HS_COUPLED;
     }
     return found;
 }
@@ -77,14 +86,14 @@ hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
     if (!(cutoff > 64.0 * cloud->largest) || cloud->largest == 0.0 || box->largest > 0.0) {
         return cutoff;
     }
-    const int exponent = exponent_of(cloud->largest) + WHOLE_EXPONENT;
+    const int exponent = hs_exponent_of(cloud->largest) + WHOLE_EXPONENT;
     return exponent > 1023 ? cutoff : hs_smaller(ldexp(1.0, exponent), cutoff);
 }
 
 int
 hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 {
-    return exponent_of(cutoff > 0.0                 ? cutoff
+    return hs_exponent_of(cutoff > 0.0                 ? cutoff
                        : box->short_row != INFINITY ? box->short_row
                                                     : cloud->largest);
 }
@@ -93,7 +102,7 @@ bool
 hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers)
 {
     const double largest = hs_larger(box->largest, cloud->largest);
-    return exponent_of(largest) - unit <= powers;
+    return !hs_is_far(largest, unit, powers);
 }
 
 /* The largest coordinate that wrapping leaves as it is. */
@@ -112,7 +121,9 @@ open_reach(const hs_cloud *cloud, const hs_box_size *box)
 bool
 hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 {
-    return box->is_coupled && open_reach(cloud, box) > DROWNING * hs_larger(box->largest, cutoff);
+    return box->is_coupled &&
+           hs_is_far(open_reach(cloud, box), hs_exponent_of(hs_larger(box->largest, cutoff)),
+                     HS_FAR_DROWNING_EXPONENT);
 }
 
 int
@@ -120,19 +131,19 @@ hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff,
                    int largest, bool *extreme)
 {
     int       exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
-    const double reach = box->largest > 0.0 ? hs_smaller(FARTHEST * box->largest, cloud->largest)
-                                            : cloud->largest;
-    const int found = exponent_of(hs_larger(box->largest, reach));
+    const double turned = ldexp(box->largest, HS_FAR_TURNS_EXPONENT);
+    const double reach = turned > 0.0 ? hs_smaller(turned, cloud->largest) : cloud->largest;
+    const int found = hs_exponent_of(hs_larger(box->largest, reach));
     if (found - exponent > largest) {
         exponent = found - largest;
     }
-    const int wide = exponent_of(open_reach(cloud, box)) - HS_LARGEST_WIDE_EXPONENT;
+    const int wide = hs_exponent_of(open_reach(cloud, box)) - HS_LARGEST_WIDE_EXPONENT;
     exponent = exponent < wide ? wide : exponent;
     *extreme = false;
     if (exponent > 0) {
         double smallest = fmin(box->smallest, hs_cloud_smallest(cloud));
         smallest = cutoff > 0.0 ? fmin(smallest, cutoff) : smallest;
-        *extreme = smallest != INFINITY && exponent_of(smallest) - exponent < -1022;
+        *extreme = smallest != INFINITY && hs_exponent_of(smallest) - exponent < -1022;
     }
     return exponent;
 }

@@ -5,6 +5,40 @@
 
 #include "points.h"
 
+/*
+ * How far is far? So many powers of two beyond a length, each for a reason of its own. hs_is_far
+ * tells.
+ */
+/* Beyond so many cutoffs the points of a search are drawn together (close_gaps.h): float64 numbers
+ * are multiples of four cutoffs there. */
+#define HS_FAR_EXPONENT 54
+/* Beyond so many largest distances those of a bounded search for the nearest are. Wrapped into a
+ * coupled box, coordinates err by 2^-52 of the largest one. The radius that is looked at is 2^10
+ * times the error of two at least (nearest_block.c), so it passes the largest distance from here
+ * on, and soon spans many images. */
+#define HS_FAR_BOUNDED_EXPONENT 40
+/* Points may be 2^51 box vectors away, where turns are integers that float64 holds; there is one
+ * order to spare. What is further away is refused or wrapped before it is scaled. */
+#define HS_FAR_TURNS_EXPONENT 52
+/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
+ * in float32. What close_gaps.h takes care of does; what remains, coupled by a skewed box, is known
+ * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
+#define HS_LARGEST_EXPONENT 56
+/* So many vectors of the box in a cutoff have more images than any memory holds. */
+#define HS_FAR_IMAGES_EXPONENT 64
+/* Open axes that are so many times as long leave less than 2^-10 of a coupled box certain: wrapping
+ * errs by some 2^-99 of the largest coordinate (wrap.h). */
+#define HS_FAR_DROWNING_EXPONENT 88
+/* Where no float32 is made of scaled numbers they stay below 2^901, so that sums of a few are
+ * finite. */
+#define HS_LARGEST_WIDE_EXPONENT 900
+
+/* x = m 2^e with 1 <= m < 2: e. Of zero a very small number, of infinity a very large one. */
+int hs_exponent_of(double x);
+
+/* Whether a size is more than 2^powers times a length of the exponent `unit`, 2^unit. */
+bool hs_is_far(double size, int unit, int powers);
+
 /* Sizes of the periodic box entries. */
 typedef struct hs_box_size {
     double   largest;    /* 0 without rows */
@@ -22,7 +56,11 @@ hs_box_size hs_box_size_of(const hs_box *box);
 #define HS_COUPLED (-2) /* rows that have entries in other columns as well */
 
 /* HS_OPEN, HS_COUPLED, or the row that alone has an entry in this column, and no other entry.
- * box: NULL for none. */
+ * periodic: the rows that count; NULL: all. */
+int hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
+                   int column);
+
+/* The same for rows of a box. box: NULL for none. */
 int hs_mover_of(const hs_box *box, int column);
 
 /* The cutoff, or a smaller one if that is beyond all distances as well. */
@@ -31,13 +69,6 @@ double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cu
 /* The exponent of the length that a scene goes by: its cutoff, or with cutoff 0 its box, or where
  * its points are. A very small number if all is 0. */
 int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
-
-/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
- * in float32. What close_gaps.h takes care of does; what remains, coupled by a skewed box, is known
- * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
-#define HS_LARGEST_EXPONENT 56
-/* Where no float32 is made of them they stay below 2^901, so that sums of a few are finite. */
-#define HS_LARGEST_WIDE_EXPONENT 900
 
 /* Whether all numbers are at most so many powers of two above a length of this exponent. */
 bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers);

@@ -9,8 +9,6 @@
 
 #include <string.h>
 
-/* Candidates from which on passes over them are polled between: some milliseconds each. */
-#define LARGE (1 << 18)
 #define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the nearest cache */
 #define LEAD_BITS 8   /* of the only digit that few candidates are sorted by; one more for others */
 #define FEW 24        /* candidates that are quicker sorted by insertion */
@@ -243,7 +241,7 @@ sort_by_shift(const hs_block *block, const int64_t *shifts, bool upper, hs_order
 static hs_status
 poll_large(const hs_options *options, const hs_block *block)
 {
-    return block->n > LARGE ? hs_poll(options, 0.0) : HS_OK;
+    return block->n > HS_POLL_CANDIDATES ? hs_poll(options, 0.0) : HS_OK;
 }
 
 /* Candidates in their order. */

@@ -9,9 +9,6 @@
 /* Integers up to here are float64 numbers, and what the batch kernels take. */
 #define WIDEST_SHIFT (INT64_C(1) << 53)
 
-/* Loaded between two polls: some milliseconds. */
-#define POLL_CANDIDATES (1 << 18)
-
 /* Turns and images up to here are few: sums of four of them are int32. */
 #define MOST_FEW 0x1p28
 
@@ -195,7 +192,7 @@ load(hs_trace *trace, bool metric)
             load_given(trace, run, n);
         }
         unpolled += n;
-        if (unpolled > POLL_CANDIDATES && trace->polls != NULL) {
+        if (unpolled > HS_POLL_CANDIDATES && trace->polls != NULL) {
             unpolled = 0;
             if (hs_poll(trace->polls, 0.0) != HS_OK) {
                 return HS_ERR_INTERRUPTED;

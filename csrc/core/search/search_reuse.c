@@ -33,7 +33,7 @@ static bool
 serves(const hs_search *built, const hs_options *options, double least_cutoff)
 {
     const double before = built->options.cutoff, cutoff = options->cutoff;
-    if (options->precision != built->options.precision || built->scene.is_heap) {
+    if (options->precision != built->options.precision || built->scene.in_one_cell) {
         return false;
     }
     if (built->scene.extreme) { /* digits are lost, and kept beside */

@@ -199,9 +199,12 @@ hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
     const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 3 * sizeof(int32_t)) +
                         (double)(ndim + 1) * sizeof(float) + (double)ndim * sizeof(double) +
                         (double)m * sizeof(int64_t);
-    *bytes = (double)most->candidates * each;
-    return most->candidates <= HS_ORDER_CANDIDATES &&
-           hs_account_allows(&search->account, *bytes);
+    const double all = (double)most->candidates * each;
+    if (most->candidates <= HS_ORDER_CANDIDATES && hs_account_allows(&search->account, all)) {
+        return true;
+    }
+    *bytes = all;
+    return false;
 }
 
 static hs_status

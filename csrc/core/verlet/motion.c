@@ -101,7 +101,7 @@ take_jump(tracking *track, tile *t, int p, int64_t *given)
     if (!hs_wrap_point(&track->lattice, u, inside, turns, &track->magnitude)) {
         return false;
     }
-    (void)hs_lattice_shift(&track->lattice, turns, given); /* as wrapping has done with them */
+    (void)hs_lattice_shift(&track->lattice, turns, given); /* these fit: hs_wrap_point found it */
     for (int k = 0; k < track->lattice.ndim; k++) {
         t->u[k][p] = inside[k];
     }

@@ -67,7 +67,10 @@ class CellList(CellPairs, CellRows, CellCounts):
     shape : tuple of int, length d
         Cells along each axis, occupied or not.
     cell_sizes : tuple of float, length d
-        Extent of a cell, across its faces, in the unit of the points.
+        Extent of a cell, across its faces, in the unit of the points. Infinity where points are so
+        far from each other, or the box is so small beside that, that no float64 cells tell them
+        apart: there is one cell with everything then. All answers but `candidates` are as ever;
+        each call sorts the points anew.
     cell_start : ndarray of int32, shape (cells + 1,)
         Cell c holds the points ``order[cell_start[c]:cell_start[c + 1]]``.
     order : ndarray of int32, shape (n,)
@@ -227,7 +230,8 @@ class CellList(CellPairs, CellRows, CellCounts):
         Raises
         ------
         ValueError
-            If a query is much further away than the points and the box reach.
+            If a query is much further away than the points and the box reach, or if there is but
+            one cell with everything (`cell_sizes` is infinite).
 
         Examples
         --------

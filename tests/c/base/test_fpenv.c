@@ -299,9 +299,37 @@ no_entry_meets_the_callers_traps(void)
     hs_verlet_free(list);
 }
 
+#if defined(__MINGW32__)
+/* The x87 unit has rounding, traps and flags of its own: no trap of the caller's ends the core, and
+ * the core leaves no flag. */
+static void
+traps_and_flags_of_the_x87_stay_the_callers(void)
+{
+    uint16_t control, entered, left, status;
+    feclearexcept(FE_ALL_EXCEPT);
+    feraiseexcept(FE_DIVBYZERO);
+    __asm__ __volatile__("fnstcw %0" : "=m"(control));
+    const uint16_t trapping = (uint16_t)((control & ~0x21u) | 0x0800u); /* inexact; upwards */
+    __asm__ __volatile__("fldcw %0" : : "m"(trapping));
+    const hs_fpenv       saved = hs_fpenv_enter();
+    volatile long double one = 1.0L, three = 3.0L, quotient = one / three;
+    __asm__ __volatile__("fnstcw %0" : "=m"(entered));
+    hs_fpenv_leave(saved);
+    __asm__ __volatile__("fnstcw %0" : "=m"(left));
+    __asm__ __volatile__("fnstsw %0" : "=m"(status));
+    __asm__ __volatile__("fldcw %0" : : "m"(control));
+    CHECK(quotient > 0.0L && (entered & 0x0c3f) == 0x003f && left == trapping);
+    CHECK((status & 0x20) == 0 && fetestexcept(FE_ALL_EXCEPT) == FE_DIVBYZERO);
+    feclearexcept(FE_ALL_EXCEPT);
+}
+#endif
+
 void
 test_fpenv(void)
 {
+#if defined(__MINGW32__)
+    RUN(traps_and_flags_of_the_x87_stay_the_callers);
+#endif
     RUN(no_entry_meets_the_callers_traps);
     RUN(flushing_is_switched_on_and_off);
     RUN(entering_sets_and_leaving_restores);

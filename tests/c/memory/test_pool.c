@@ -46,7 +46,7 @@ reset_pool(void)
     hs_pool_set_limit(HS_POOL_LIMIT);
 }
 
-#if !HS_ADDRESS_SANITIZER
+#if !HS_WATCHED_MALLOC
 
 static void
 results_are_recycled(void)
@@ -350,7 +350,7 @@ fork_in_the_middle(void)
     for (int held = 0; held < 2; held++) {
         int status = -1;
         fflush(NULL);
-#if !HS_ADDRESS_SANITIZER
+#if !HS_WATCHED_MALLOC
         hs_test_pool_hold(held); /* the second child never gets the lock */
 #endif
         const pid_t child = fork();
@@ -358,7 +358,7 @@ fork_in_the_middle(void)
             harness_failures = 0;
             _exit(work_in_child(&region));
         }
-#if !HS_ADDRESS_SANITIZER
+#if !HS_WATCHED_MALLOC
         hs_test_pool_hold(false);
 #endif
         CHECK(child > 0 && waitpid(child, &status, 0) == child);
@@ -375,7 +375,7 @@ fork_in_the_middle(void)
 void
 test_pool(void)
 {
-#if !HS_ADDRESS_SANITIZER
+#if !HS_WATCHED_MALLOC
     RUN(results_are_recycled);
     RUN(recycled_memory_gets_more_room);
     RUN(scratch_is_always_found);

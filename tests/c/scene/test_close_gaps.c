@@ -4,6 +4,7 @@
 #include <float.h>
 
 #include "../../../csrc/core/scene/close_gaps.h"
+#include "../../../csrc/core/scene/unit.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
 
@@ -80,7 +81,8 @@ condense_random(harness_random *random, column_case *test)
     hs_account_init(&account, &options);
     CHECK(hs_cloud_load(&account, NULL, &points, &options, &cloud, &failure) == HS_OK);
     const hs_status status =
-        hs_condense(&account, &options, test->periodic ? &box : NULL, test->unit, &cloud, NULL,
+        hs_condense(&account, &options, test->periodic ? &box : NULL, test->unit,
+                    test->n % 2 ? HS_FAR_EXPONENT : HS_FAR_BOUNDED_EXPONENT, &cloud, NULL,
                     &test->condensed, &failure);
     memcpy(test->after, cloud.x[0], (size_t)test->n * sizeof(double));
     for (int i = 0; i < test->n && status == HS_OK; i++) {
@@ -195,7 +197,8 @@ dense_scenes_are_left_alone(void)
         x[17] = far ? 1e300 : 0x1p54;
         hs_account_init(&account, &options);
         CHECK(hs_cloud_load(&account, NULL, &points, &options, &cloud, &failure) == HS_OK);
-        CHECK(hs_condense(&account, &options, NULL, 0, &cloud, NULL, &condensed, &failure) == HS_OK);
+        CHECK(hs_condense(&account, &options, NULL, 0, HS_FAR_EXPONENT, &cloud, NULL, &condensed,
+                          &failure) == HS_OK);
         for (int i = 0; i < MANY; i++)
             CHECK(i == 17 || cloud.x[0][i] == x[i]);
         CHECK(cloud.x[0][17] == (far ? cloud.upper[0] : 0x1p54));

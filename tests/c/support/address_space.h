@@ -7,7 +7,7 @@
 #include "../../../csrc/core/base/base.h"
 #include "harness.h"
 
-#if defined(__linux__) && !HS_ADDRESS_SANITIZER
+#if defined(__linux__) && !HS_WATCHED_MALLOC
 #define HAS_PAGES 1
 #else
 #define HAS_PAGES 0
