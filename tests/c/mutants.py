@@ -9,10 +9,9 @@ The first form tries NUMBER changes chosen by SEED in csrc/core/*/*.c, the secon
 some lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not
 changed, and judged by the C tests that reach its function, quick ones first, until one fails,
 crashes or takes far longer than it should. --binding changes csrc/binding instead:
-mutants_python.py has the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first
-build quick.
-$MUTANT_FLAGS:
-further flags; with -fsanitize=address,undefined the sanitizers judge too, in several times as long.
+mutants_python.py has the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first build
+quick. $MUTANT_FLAGS: further flags for the core; with -fsanitize=address,undefined the sanitizers
+judge too, in several times as long.
 
 Prints a line for each mutant, and the rate at the end:
 
@@ -174,7 +173,37 @@ def trace(pool, work):
     return {"reached": reached, "seconds": seconds}
 
 
-class CTests:
+class Judge:
+    """Compiles mutants and has tests judge them, each job in a tree of sources of its own.
+
+    A kind of judge has `folder`, where its sources are, and sets `work`, `free` (the trees that no
+    job uses) and `objects` (what is linked); `compile` and `link_in` are as their names say, and
+    `first_failure_of` returns the test that fails, or "" and a comment.
+    """
+
+    def judge(self, mutation, source):
+        tree = self.free.get()
+        try:
+            return self.judge_in(tree, mutation, source)
+        finally:
+            self.free.put(tree)
+
+    def judge_in(self, tree, mutation, source):
+        path = next((tree / self.folder).rglob(mutation.file))
+        target = tree / (path.stem + ".o")
+        path.write_text(mutation.apply(source))
+        compiled = self.compile(tree, path, target)
+        path.write_text(source)
+        if compiled.returncode:
+            return "no compile", ""
+        if target.read_bytes() == (self.work / "objects" / target.name).read_bytes():
+            return "same code", ""
+        self.link_in(tree, [o for o in self.objects if o.name != target.name] + [target])
+        failed, comment = self.first_failure_of(tree, mutation, source)
+        return ("killed", failed) if failed else ("lived", comment)
+
+
+class CTests(Judge):
     """The judge of mutants of the core."""
 
     folder = "csrc/core"
@@ -239,30 +268,19 @@ class CTests:
             return "takes too long"
         return {0: "", 1: "fails"}.get(done.returncode, "crashes")
 
-    def judge(self, mutation, source):
-        tree = self.free.get()
-        try:
-            return self.judge_in(tree, mutation, source)
-        finally:
-            self.free.put(tree)
+    def compile(self, tree, source, target):
+        return compile_object(tree, source, target)
 
-    def judge_in(self, tree, mutation, source):
-        path = next((tree / self.folder).rglob(mutation.file))
-        target, program = tree / (path.stem + ".o"), tree / "core_tests"
-        path.write_text(mutation.apply(source))
-        compiled = compile_object(tree, path, target)
-        path.write_text(source)
-        if compiled.returncode:
-            return "no compile", ""
-        if target.read_bytes() == (self.work / "objects" / target.name).read_bytes():
-            return "same code", ""
-        self.link([o for o in self.objects if o.name != target.name] + [target], program)
+    def link_in(self, tree, objects):
+        self.link(objects, tree / "core_tests")
+
+    def first_failure_of(self, tree, mutation, source):
         tests = self.near(mutation, source)
         for test in tests or sorted(self.reached, key=self.seconds.get):
-            how = self.end_of(program, test)
+            how = self.end_of(tree / "core_tests", test)
             if how and self.is_sound(test):
-                return "killed", f"{test} {how}"
-        return "lived", "" if tests else "not reached"
+                return f"{test} {how}", ""
+        return "", "" if tests else "not reached"
 
 
 def choose(folder, options):
@@ -300,11 +318,11 @@ def main():
     options.work = options.work.resolve()
     options.work.mkdir(parents=True, exist_ok=True)
     if options.binding:
-        from mutants_python import PythonTests as Judge
+        from mutants_python import PythonTests as Tests
     else:
-        Judge = CTests
-    chosen, texts = choose(Judge.folder, options)
-    judge = Judge(options.work, options.jobs)
+        Tests = CTests
+    chosen, texts = choose(Tests.folder, options)
+    judge = Tests(options.work, options.jobs)
     totals = {"killed": 0, "lived": 0, "same code": 0, "no compile": 0}
 
     def one(mutation):

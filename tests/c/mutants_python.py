@@ -9,10 +9,9 @@ import subprocess
 import sys
 import sysconfig
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from queue import Queue
 
-from mutants import COMPILER, ROOT, demand, run
+from mutants import COMPILER, ROOT, Judge, copy_tree, demand, run
 
 PARTS = ["csrc/core", "csrc/kernels", "csrc/binding"]
 TESTS = ROOT / "tests" / "python"
@@ -46,7 +45,7 @@ LEFT_OUT += ["typing", "golden", "selftest", "scene", "peers"]
 SECONDS = 300  # of processor time, for the tests of one file
 
 
-class PythonTests:
+class PythonTests(Judge):
     folder = "csrc/binding"
 
     def __init__(self, work, jobs):
@@ -55,21 +54,23 @@ class PythonTests:
         import numpy
 
         self.includes = ["-I" + numpy.get_include(), "-I" + sysconfig.get_path("include")]
-        self.copy_sources(self.work / "base")
+        copy_tree(self.work / "base")
         objects = self.work / "objects"
         shutil.rmtree(objects, ignore_errors=True)
         objects.mkdir()
         base = self.work / "base"
         sources = sorted(path for part in PARTS for path in (base / part).rglob("*.c"))
         with ThreadPoolExecutor(jobs) as pool:
-            done = list(pool.map(lambda s: self.compile(s, objects / (s.stem + ".o")), sources))
+            done = list(
+                pool.map(lambda s: self.compile(base, s, objects / (s.stem + ".o")), sources)
+            )
         errors = "".join(d.stderr for d in done if d.returncode)
         if errors:
             sys.exit(errors)
         self.objects = sorted(objects.glob("*.o"))
         for number in range(jobs):
             tree = self.work / f"job{number}"
-            self.copy_sources(tree)
+            copy_tree(tree)
             package = tree / "python" / "halfshell"
             shutil.rmtree(package, ignore_errors=True)
             shutil.copytree(ROOT / "python" / "halfshell", package)
@@ -78,27 +79,19 @@ class PythonTests:
             self.free.put(tree)
         self.check_unchanged()
 
-    def copy_sources(self, tree):
-        for part in PARTS:
-            (tree / part).mkdir(parents=True, exist_ok=True)
-            for path in (ROOT / part).iterdir():
-                if path.suffix in (".c", ".h"):
-                    shutil.copy(path, tree / part)
-
-    def compile(self, source, target):
-        tree = source.parents[2]
+    def compile(self, tree, source, target):
         name = source.relative_to(tree)
         command = [*COMPILER, *FLAGS, *self.includes, "-c", name, "-o", target]
         return run(command, cwd=tree, timeout=300)
 
-    def link(self, tree, objects):
+    def link_in(self, tree, objects):
         linker = shlex.split(sysconfig.get_config_var("LDSHARED"))
         demand([*linker, *objects, "-o", tree / "python" / "halfshell" / NAME, "-lm", "-pthread"])
 
     def check_unchanged(self):
         """That the package is found, and passes what comes first."""
         tree = self.free.get()
-        self.link(tree, self.objects)
+        self.link_in(tree, self.objects)
         failed = self.first_failure(tree, [TESTS / f"test_{name}.py" for name in FIRST])
         self.free.put(tree)
         if failed:
@@ -136,23 +129,5 @@ class PythonTests:
                 return lines[0].split(" ")[1] if lines else f"{path.name} crashes"
         return ""
 
-    def judge(self, mutation, source):
-        tree = self.free.get()
-        try:
-            return self.judge_in(tree, mutation, source)
-        finally:
-            self.free.put(tree)
-
-    def judge_in(self, tree, mutation, source):
-        path = tree / self.folder / mutation.file
-        target = tree / (Path(mutation.file).stem + ".o")
-        path.write_text(mutation.apply(source))
-        compiled = self.compile(path, target)
-        path.write_text(source)
-        if compiled.returncode:
-            return "no compile", ""
-        if target.read_bytes() == (self.work / "objects" / target.name).read_bytes():
-            return "same code", ""
-        self.link(tree, [o for o in self.objects if o.name != target.name] + [target])
-        failed = self.first_failure(tree, self.near(mutation.file))
-        return ("killed", failed) if failed else ("lived", "")
+    def first_failure_of(self, tree, mutation, source):
+        return self.first_failure(tree, self.near(mutation.file)), ""

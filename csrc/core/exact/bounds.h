@@ -3,8 +3,8 @@
  * bounds.h: every error constant of the float stages, in one place, each with its reason.
  *
  * docs/exactness.md derives them. Each can be overridden from the command line, because
- * tests/c/mutate.py halves them one after the other and demands that a test notices: a constant
- * that can be halved without a test failing is either not needed or not tested.
+ * tests/c/halve_bounds.py halves them one after the other and demands that a test notices: a
+ * constant that can be halved without a test failing is either not needed or not tested.
  *
  * u is the unit roundoff of float32, v that of float64: rounding to nearest changes a number by
  * at most that factor of itself.

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Halve every error constant of csrc/core/exact/bounds.h in turn and demand that a C test fails.
 
-Usage: python3 mutate.py [part of a constant's name]. Uses $CC, or cc. Prints a table; the exit
-code is 1 if a constant can be halved without a test noticing, or if the tests fail as they are.
+Usage: python3 halve_bounds.py [part of a constant's name]. Uses $CC, or cc. Prints a table; the
+exit code is 1 if a constant can be halved without a test noticing, or if the tests fail as they
+are.
 """
 
 import os
