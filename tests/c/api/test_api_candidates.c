@@ -5,7 +5,9 @@
  */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/range_checks.h"
 
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/base/poll.h"
@@ -134,28 +136,6 @@ empty_cells_have_no_id(void)
     hs_cells_free(cells);
 }
 
-/* Every neighbour of a query is in one of its ranges. */
-static bool
-ranges_hold_rows(const hs_layout *layout, const hs_pairs *ranges, const hs_pairs *rows)
-{
-    const int64_t *range_of = hs_pairs_offsets(ranges), *row_of = hs_pairs_offsets(rows);
-    const int64_t *first = hs_pairs_array(ranges, HS_WANT_I);
-    const int64_t *end = hs_pairs_array(ranges, HS_WANT_J);
-    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
-    for (int64_t q = 0; q < hs_pairs_rows(rows); q++) {
-        for (int64_t e = row_of[q]; e < row_of[q + 1]; e++) {
-            bool found = false;
-            for (int64_t r = range_of[q]; r < range_of[q + 1]; r++) {
-                for (int64_t si = first[r]; si < end[r]; si++)
-                    found = found || layout->order[si] == j[e];
-            }
-            if (!found)
-                return false;
-        }
-    }
-    return true;
-}
-
 static void
 ranges_of_occupied_cells(void)
 {
@@ -181,14 +161,6 @@ ranges_of_occupied_cells(void)
     hs_cells_free(cells);
 }
 
-static bool
-stop_after(void *context, double fraction)
-{
-    int *left = context;
-    CHECK(fraction >= 0.0 && fraction <= 1.0);
-    return --*left >= 0;
-}
-
 static void
 ranges_that_are_refused(void)
 {
@@ -203,7 +175,7 @@ ranges_that_are_refused(void)
     const double    far[3] = {1e9, 0.0, 0.0};
     const hs_points points = points_of(&s.scene), query = {far, 1, 3, HS_FLOAT64, 24, 8};
     hs_options      options = options_of(&s.scene);
-    int             polls = INT32_MAX;
+    int64_t             polls = INT32_MAX;
     CHECK(hs_cells_candidates(cells, &query, &options, &ranges, &failure) == HS_ERR_FAR);
     options.cutoff = 0.75;
     CHECK(hs_cells_candidates(cells, &points, &options, &ranges, NULL) == HS_ERR_CUTOFF);
@@ -214,9 +186,9 @@ ranges_that_are_refused(void)
     options.poll_context = &polls;
     CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, NULL) == HS_OK);
     hs_pairs_free(ranges);
-    const int most = INT32_MAX - polls;
+    const int64_t most = INT32_MAX - polls;
     CHECK(most >= 2);
-    for (int n = 0; n < most; n++) {
+    for (int64_t n = 0; n < most; n++) {
         polls = n;
         CHECK(hs_cells_candidates(cells, NULL, &options, &ranges, NULL) == HS_ERR_INTERRUPTED);
         CHECK(ranges == NULL);

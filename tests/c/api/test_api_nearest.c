@@ -8,6 +8,7 @@
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
 #include "../support/near_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 
 void test_api_nearest(void);
@@ -205,17 +206,8 @@ list_orders(double (*to)[7])
     }
 }
 
-/* How many polls there may still be. */
-static bool
-stop_after(void *context, double fraction)
-{
-    int *left = context;
-    (void)fraction;
-    return --*left >= 0;
-}
-
 static hs_status
-find_ties(int64_t k, int polls, hs_counters *counters, int64_t *wrong)
+find_ties(int64_t k, int64_t polls, hs_counters *counters, int64_t *wrong)
 {
     static double   orders[ORDERS][7];
     const double    origin_of_all[7] = {0.0};
@@ -256,7 +248,7 @@ one_row_can_be_stopped_anywhere(void)
     hs_counters counters;
     int64_t     wrong;
     CHECK(find_ties(ORDERS, INT32_MAX, &counters, &wrong) == HS_OK);
-    const int polls = (int)counters.polls;
+    const int64_t polls = counters.polls;
     CHECK(polls > 1); /* more than there are groups */
     for (int n = 0; n < polls; n++)
         CHECK(find_ties(ORDERS, n, &counters, &wrong) == HS_ERR_INTERRUPTED && wrong == 0);

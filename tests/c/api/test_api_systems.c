@@ -354,7 +354,8 @@ far_points_are_named_among_all(void)
 {
     double           x[8] = {0.0, 0.0, 0.5, 0.5, 0.0, 3.9, 0.0, -3.9};
     const int64_t    first[] = {0, 2, 4};
-    hs_box           box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
+    hs_box           box = {
+        .ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
     const hs_points  points = {x, 4, 2, HS_FLOAT64, 16, 8};
     const hs_systems systems = {2, first, &box, NULL, NULL};
     hs_options       options = hs_options_default();

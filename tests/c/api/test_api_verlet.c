@@ -106,7 +106,7 @@ head_on_pairs_are_never_missed(void)
                                 .inclusive = true, .memory_limit = INFINITY};
     int64_t          n_found = 0, n_kept = 0;
     for (int skin = 1; skin < 40; skin++) {
-        for (int beside = -4; beside <= 4; beside++) { /* from some ulps to more than any rounding */
+        for (int beside = -4; beside <= 4; beside++) { /* ulps, to more than any rounding */
             const double reach = 0.013 * skin;
             double       x[2] = {0.0, nextafter(1.0 + reach, 9.0)};
             hs_points    points = {x, 2, 1, HS_FLOAT64, 8, 8};

@@ -2,22 +2,11 @@
 /* test_refusals.c: a poll that says no once, and yes ever after, ends a search of any kind. */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 
 void test_refusals(void);
 
 enum { N = 40000, CROWD = 2500 };
-
-typedef struct refusal {
-    int64_t n, nth; /* polls so far; the only one that says no */
-} refusal;
-
-static bool
-refuse_once(void *context, double fraction)
-{
-    refusal *once = context;
-    (void)fraction;
-    return ++once->n != once->nth;
-}
 
 /* 0: evenly. 1: one in four points in a second place far away, so that only occupied cells are
  * stored. 2: also a crowd that is more than one block of candidates. */

@@ -28,8 +28,8 @@ prepare(searched *s)
     const hs_options options = options_of(&shared.scene);
     hs_failure       failure;
     hs_account_init(&s->account, &options);
-    hs_status status = hs_scene_init(&s->account, NULL, &points, shared.scene.box, &options, &s->scene,
-                                     &failure);
+    hs_status status = hs_scene_init(&s->account, NULL, &points, shared.scene.box, &options,
+                                     &s->scene, &failure);
     if (status != HS_OK)
         return status;
     status = hs_grid_init(&s->scene, &s->grid, &failure);
@@ -120,7 +120,7 @@ random_neighbour(harness_random *random, const searched *s, const double *x, dou
     double vector[HS_MAX_DIM], square = 0.0;
     const int along = random_below(random, 2 * s->grid.ndim);
     for (int k = 0; k < s->grid.ndim; k++) {
-        vector[k] = along < s->grid.ndim ? (k == along ? 1.0 : 0.0) : 2.0 * random_unit(random) - 1.0;
+        vector[k] = along < s->grid.ndim ? (double)(k == along) : 2.0 * random_unit(random) - 1.0;
         if (random_below(random, 2))
             vector[k] = -vector[k];
         square += vector[k] * vector[k];

@@ -5,6 +5,7 @@
  */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 
 #include "../../../csrc/core/memory/account.h"
@@ -50,20 +51,11 @@ images_far_away_are_counted(void)
     CHECK(count_images(0.0, 150.0, &options, &count) == HS_OK && count == lattice_points(150));
 }
 
-static bool
-stop_after(void *context, double fraction)
-{
-    int *left = context;
-    (void)fraction;
-    return --*left >= 0;
-}
-
 static void
 long_lists_of_rows_can_be_stopped(void)
 {
     hs_options options = hs_options_default();
-    int64_t    count;
-    int        polls;
+    int64_t    count, polls;
     options.poll = stop_after;
     options.poll_context = &polls;
     for (int n = 0; n < 3; n++) {
@@ -90,23 +82,18 @@ too_many_rows_are_refused(void)
     CHECK(count_images(0.375, 200.0, &options, &count) == HS_ERR_MEMORY);
 }
 
+static hs_status
+count_some_images(void *context)
+{
+    int64_t count;
+    return count_images(0.375, 40.0, context, &count);
+}
+
 static void
 whichever_allocation_fails_nothing_is_left(void)
 {
-    const int64_t before = hs_test_live_blocks();
-    hs_options    options = hs_options_default();
-    bool          ended = false;
-    int           nth = 0;
-    while (!ended && nth < 100) {
-        int64_t count;
-        hs_test_fail_allocation(++nth);
-        const hs_status status = count_images(0.375, 40.0, &options, &count);
-        ended = hs_test_failure_is_due();
-        hs_test_fail_allocation(0);
-        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));
-        CHECK(hs_test_live_blocks() == before);
-    }
-    CHECK(ended && nth > 5);
+    hs_options options = hs_options_default();
+    CHECK(fail_each_allocation(count_some_images, &options, 100) > 5);
 }
 
 /* Narrow cells in many dimensions, or around a short box: as wide as there are rows for. */

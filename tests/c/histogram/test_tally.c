@@ -28,7 +28,8 @@ make_line(harness_random *random, int bits, line *made)
 {
     int n = 0;
     for (int i = 0; i < POINTS; i++) {
-        const int exponent = bits > 0 ? (int)(random_bits(random) % (unsigned)(2 * bits)) - bits : 0;
+        const int exponent =
+            bits > 0 ? (int)(random_bits(random) % (unsigned)(2 * bits)) - bits : 0;
         made->x[i] = ldexp(1.0, i);
         made->types[i] = (int32_t)(random_bits(random) % TYPES);
         made->weights[i] = ldexp(random_unit(random) - 0.5, exponent);
@@ -81,12 +82,14 @@ line_is_right(const line *made, int split)
             for (int k = 0; k < PAIRS; k++) {
                 const int  i = made->pair_of[k] / POINTS, j = made->pair_of[k] % POINTS;
                 const int  at = (a * n_types + b) * PAIRS + k;
-                const int  s = n_types > 1 ? made->types[i] : 0, t = n_types > 1 ? made->types[j] : 0;
+                const int  s = n_types > 1 ? made->types[i] : 0;
+                const int  t = n_types > 1 ? made->types[j] : 0;
                 const bool meant = (s == a && t == b) || (split == 0 && s == b && t == a);
                 const bool asked = split == 0 || (i < split && j >= split);
-                const double product =
-                    made->wanted.of_points.weights != NULL ? made->weights[i] * made->weights[j] : 1.0;
-                right = right && (made->wanted.counts == NULL || made->counts[at] == (meant && asked));
+                const bool weighted = made->wanted.of_points.weights != NULL;
+                const double product = weighted ? made->weights[i] * made->weights[j] : 1.0;
+                right = right &&
+                        (made->wanted.counts == NULL || made->counts[at] == (meant && asked));
                 right = right && (made->wanted.sums == NULL ||
                                   made->sums[at] == (meant && asked ? product : 0.0));
             }

@@ -91,7 +91,8 @@ relating_rounds_each_step(void)
             hs_relate     g = {.ndim = 1 + trial % HS_MAX_DIM,
                                .images = images,
                                .unit = ldexp(1.0, below(&random, 40) - 20),
-                               .extent = ldexp(1.0 + random_unit(&random), below(&random, 40) - 20)};
+                               .extent = 1.0 + random_unit(&random)};
+            g.extent = ldexp(g.extent, below(&random, 40) - 20);
             for (int k = 0; k < g.ndim; k++) {
                 double *x = guarded_place(double_pages[k], n_points + HS_PADDING, sizeof *x,
                                           trial & 1);

@@ -2,22 +2,11 @@
 /* test_nearest_bound.c: the search for a radius that surely suffices ends when it is told to. */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 
 #include <math.h>
 
 void test_nearest_bound(void);
-
-typedef struct refusal {
-    int64_t n, nth; /* polls so far; the only one that says no */
-} refusal;
-
-static bool
-refuse_once(void *context, double fraction)
-{
-    refusal *once = context;
-    (void)fraction;
-    return ++once->n != once->nth;
-}
 
 enum { N = 6000, QUERIES = 400, K = 10 };
 

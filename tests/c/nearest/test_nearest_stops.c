@@ -5,20 +5,12 @@
  */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/poll_checks.h"
 
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
 
 void test_nearest_stops(void);
-
-/* How many polls there may still be. */
-static bool
-stop_after(void *context, double fraction)
-{
-    int64_t *left = context;
-    (void)fraction;
-    return --*left >= 0;
-}
 
 /* Rows of a search that may be asked so often whether it goes on. */
 static hs_status
@@ -114,7 +106,6 @@ many_images_can_be_stopped(void)
     box.periodic[0] = false;
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
     x[3] = 6000.0; /* far along the open axis of the box: many images are about as near */
-    box.periodic[0] = false;
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
     box.rows[1][0] = 0.5; /* which is not upright any more */
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
@@ -144,6 +135,15 @@ clearing_the_result_polls(void)
     CHECK(hs_test_touch_parts(before) == PART);
 }
 
+static hs_status
+find_forty(void *scene)
+{
+    hs_pairs       *rows = NULL;
+    const hs_status status = find_until(scene, NULL, 40, INT64_MAX, NULL, &rows);
+    hs_pairs_free(rows);
+    return status;
+}
+
 /* Of a search that needs more leaves, runs and images than there is room for at first. */
 static void
 whichever_allocation_fails_nothing_is_left(void)
@@ -154,22 +154,9 @@ whichever_allocation_fails_nothing_is_left(void)
                           .periodic = {true, true, true},
                           .rows = {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}, {0.0, 0.0, 1e4}}};
     brute_scene    scene = {.ndim = 3, .n = 400, .x = x, .box = &box, .cutoff = INFINITY};
-    const int64_t  before = hs_test_live_blocks();
-    bool           ended = false;
-    int            nth = 0;
     for (int e = 0; e < 3 * 400; e++)
         x[e] = random_unit(&random);
-    while (!ended && nth < 300) {
-        hs_pairs *rows = NULL;
-        hs_test_fail_allocation(++nth);
-        const hs_status status = find_until(&scene, NULL, 40, INT64_MAX, NULL, &rows);
-        ended = hs_test_failure_is_due();
-        hs_test_fail_allocation(0);
-        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));
-        hs_pairs_free(rows);
-        CHECK(hs_test_live_blocks() == before);
-    }
-    CHECK(ended && nth > 30);
+    CHECK(fail_each_allocation(find_forty, &scene, 300) > 30);
 }
 
 void

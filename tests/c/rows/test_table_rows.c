@@ -27,7 +27,8 @@ rows_are_consistent(const hs_pairs *rows, int index_bytes)
         for (int64_t e = offsets[row]; e < offsets[row + 1]; e++) {
             right = right && number_at(i, index_bytes, e) == row;
             right = right && number_at(both, index_bytes, 2 * e) == row;
-            right = right && number_at(both, index_bytes, 2 * e + 1) == number_at(j, index_bytes, e);
+            right = right &&
+                    number_at(both, index_bytes, 2 * e + 1) == number_at(j, index_bytes, e);
         }
     }
     return right;
@@ -105,7 +106,8 @@ static void
 shifts_that_do_not_fit_name_a_point(void)
 {
     double          x[4] = {0.0, 3.9, 0.0, -3.9};
-    hs_box          box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
+    hs_box          box = {
+        .ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
     const hs_points points = {x, 2, 2, HS_FLOAT64, 16, 8};
     hs_options      options = hs_options_default();
     options.cutoff = 1.0;

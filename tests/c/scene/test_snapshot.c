@@ -6,6 +6,7 @@
 #include "../../../csrc/core/scene/snapshot.h"
 #include "../../../csrc/core/base/poll.h"
 #include "../support/harness.h"
+#include "../support/poll_checks.h"
 
 #include <float.h>
 #include <math.h>
@@ -96,14 +97,6 @@ the_first_that_is_not_finite_is_named(void)
     hs_frame_free(&frame);
 }
 
-static bool
-stop_after(void *context, double fraction)
-{
-    int *left = context;
-    (void)fraction;
-    return --*left >= 0;
-}
-
 /* One number for all points takes no memory to give, and some to copy. */
 static void
 large_frames_can_be_stopped(void)
@@ -114,7 +107,7 @@ large_frames_can_be_stopped(void)
     hs_options      options = hs_options_default();
     hs_frame        frame = {0};
     hs_failure      failure = HS_NO_FAILURE;
-    int             polls = 0;
+    int64_t         polls = 0;
     options.poll = stop_after;
     options.poll_context = &polls;
     CHECK(hs_frame_take(&points, NULL, &options, &frame, &failure) == HS_ERR_INTERRUPTED);

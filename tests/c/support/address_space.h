@@ -40,13 +40,25 @@ mapped(void)
     return number_in("/proc/self/statm") * (size_t)sysconf(_SC_PAGESIZE);
 }
 
-/* So many bytes more can be mapped; SIZE_MAX: as many as before. */
-static inline void
+/* So many bytes more can be mapped, until the limit that is returned is set again. */
+static inline rlim_t
 limit_addresses(size_t room)
 {
     struct rlimit limits;
     CHECK(getrlimit(RLIMIT_AS, &limits) == 0);
-    limits.rlim_cur = room == SIZE_MAX ? limits.rlim_max : mapped() + room;
+    const rlim_t before = limits.rlim_cur;
+    const rlim_t wanted = mapped() + room;
+    limits.rlim_cur = wanted < before ? wanted : before;
+    CHECK(setrlimit(RLIMIT_AS, &limits) == 0);
+    return before;
+}
+
+static inline void
+set_address_limit(rlim_t limit)
+{
+    struct rlimit limits;
+    CHECK(getrlimit(RLIMIT_AS, &limits) == 0);
+    limits.rlim_cur = limit;
     CHECK(setrlimit(RLIMIT_AS, &limits) == 0);
 }
 

@@ -36,8 +36,8 @@ do_task(void *context, int64_t task)
 #if !defined(_WIN32)
     sigset_t blocked;
     (void)pthread_sigmask(SIG_BLOCK, NULL, &blocked);
-    counts->signals_right[task] =
-        (sigismember(&blocked, SIGINT) == 1) != (pthread_equal(pthread_self(), counts->caller) != 0);
+    const bool is_caller = pthread_equal(pthread_self(), counts->caller) != 0;
+    counts->signals_right[task] = (sigismember(&blocked, SIGINT) == 1) != is_caller;
 #endif
 }
 

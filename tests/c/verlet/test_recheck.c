@@ -118,10 +118,12 @@ jump_by(int64_t periods, double tilt, double height, const char *kernel, hs_stat
     int64_t      n_pairs = 0;
     options.cutoff = 0.25;
     options.kernel = kernel;
-    CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) == HS_OK);
+    CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) ==
+          HS_OK);
     CHECK(list_difference(list, &points, &box, options, &n_pairs) == NULL && n_pairs == 1);
     x[3] += (double)periods * height;
-    CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) == HS_OK);
+    CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) ==
+          HS_OK);
     CHECK(!rebuilt);
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
     for (int sorted = 0; sorted < 2; sorted++) {

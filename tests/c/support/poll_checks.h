@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* poll_checks.h: polls that stop a search, and a call whose allocations are refused one by one. */
+#ifndef HS_POLL_CHECKS_H
+#define HS_POLL_CHECKS_H
+
+#include "../../../csrc/core/memory/account.h"
+#include "harness.h"
+
+/* The context is how many polls there may still be. */
+static inline bool
+stop_after(void *context, double fraction)
+{
+    int64_t *left = context;
+    CHECK(fraction >= 0.0 && fraction <= 1.0);
+    return --*left >= 0;
+}
+
+typedef struct refusal {
+    int64_t n, nth; /* polls so far; the only one that says no */
+} refusal;
+
+static inline bool
+refuse_once(void *context, double fraction)
+{
+    refusal *once = context;
+    (void)fraction;
+    return ++once->n != once->nth;
+}
+
+/* Calls the function, which frees what it is given, while its first, second, ... allocation is
+ * refused, until it has no more: each call succeeds or says that memory is short, and nothing is
+ * left. Returns which allocation there was not; 0 if `most` were not enough. */
+static inline int
+fail_each_allocation(hs_status (*call)(void *), void *context, int most)
+{
+    const int64_t before = hs_test_live_blocks();
+    for (int nth = 1; nth <= most; nth++) {
+        hs_test_fail_allocation(nth);
+        const hs_status status = call(context);
+        const bool      ended = hs_test_failure_is_due();
+        hs_test_fail_allocation(0);
+        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));
+        CHECK(hs_test_live_blocks() == before);
+        if (ended)
+            return nth;
+    }
+    CHECK(!"an allocation was left");
+    return 0;
+}
+
+#endif
