@@ -291,6 +291,7 @@ def leaks(allocator, call, n):
 # Further refusals behind the first; none where the interpreter's objects are from malloc as well,
 # for then it has no memory to end them.
 REFUSALS = (0,) if os.environ.get("PYTHONMALLOC") == "malloc" else (0, 10**6)
+MOST = 100_000  # allocations that a call may have
 SUCCESSES = 12  # in a row, of calls that may do without some memory: the last allocation is behind
 
 
@@ -298,7 +299,7 @@ def refuse_each(allocator, call, more):
     """Calls while allocation 1, 2, 3 ... is refused, and `more` behind it. Returns how many calls
     failed, and what was wrong."""
     expected, faults, nth, failed, successes = plain(call()), [], 1, 0, 0
-    while successes < SUCCESSES and nth < 100000:
+    while successes < SUCCESSES and nth < MOST:
         result = error = None
         try:
             allocator.begin(nth, nth + more)
@@ -317,6 +318,8 @@ def refuse_each(allocator, call, more):
                 faults.append(f"allocation {nth}: {fault_of(error)}")
         del result, error
         nth += 1
+    if successes < SUCCESSES:
+        faults.append(f"allocation {nth}: still another one to refuse")
     if plain(call()) != expected:
         faults.append("another answer afterwards")
     return failed, faults

@@ -14,10 +14,9 @@
 #include <sys/types.h>
 
 void refuse_from(long first, long last);
-long asked_for(void);
 long live_blocks(void);
 
-static atomic_long n_asked, first_refused, last_refused; /* first 0: none is */
+static atomic_long n_calls, first_refused, last_refused; /* first 0: none is */
 static atomic_long n_live;
 
 /* What dlsym itself takes before calloc is known; never given back. */
@@ -34,16 +33,9 @@ static size_t early_used;
 void
 refuse_from(long first, long last)
 {
-    n_asked = 0;
+    n_calls = 0;
     last_refused = last;
     first_refused = first;
-}
-
-/* Allocations since refuse_from. */
-long
-asked_for(void)
-{
-    return n_asked;
 }
 
 /* Blocks and mapped pages, less those that were given back. */
@@ -56,7 +48,7 @@ live_blocks(void)
 static int
 refuses(void)
 {
-    const long first = first_refused, number = ++n_asked;
+    const long first = first_refused, number = ++n_calls;
     return first > 0 && number >= first && number <= last_refused;
 }
 

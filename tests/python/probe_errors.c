@@ -41,12 +41,39 @@ static PyMethodDef methods[] = {{"raise_status", raise_status, METH_VARARGS, NUL
 static struct PyModuleDef definition = {
     PyModuleDef_HEAD_INIT, "probe_errors", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
+static const struct {
+    const char *name;
+    int         status;
+} statuses[] = {
+    {"HS_OK", HS_OK},
+    {"HS_ERR_MEMORY", HS_ERR_MEMORY},
+    {"HS_ERR_CUTOFF", HS_ERR_CUTOFF},
+    {"HS_ERR_NOT_FINITE", HS_ERR_NOT_FINITE},
+    {"HS_ERR_BOX_FINITE", HS_ERR_BOX_FINITE},
+    {"HS_ERR_BOX_DEPENDENT", HS_ERR_BOX_DEPENDENT},
+    {"HS_ERR_BOX_SKEWED", HS_ERR_BOX_SKEWED},
+    {"HS_ERR_TOO_MANY", HS_ERR_TOO_MANY},
+    {"HS_ERR_SHIFT_RANGE", HS_ERR_SHIFT_RANGE},
+    {"HS_ERR_ROUNDING", HS_ERR_ROUNDING},
+    {"HS_ERR_KERNEL", HS_ERR_KERNEL},
+    {"HS_ERR_INTERRUPTED", HS_ERR_INTERRUPTED},
+    {"HS_ERR_FAR", HS_ERR_FAR},
+    {"HS_ERR_CAPACITY", HS_ERR_CAPACITY},
+    {"HS_ERR_EDGES", HS_ERR_EDGES},
+    {"HS_ERR_TYPES", HS_ERR_TYPES},
+    {"HS_ERR_WEIGHTS", HS_ERR_WEIGHTS},
+    {"HS_ERR_ARGUMENT", HS_ERR_ARGUMENT},
+    {"HS_STATUS_END", HS_STATUS_END},
+};
+
 PyMODINIT_FUNC
 PyInit_probe_errors(void)
 {
     PyObject *module = PyModule_Create(&definition);
-    if (module != NULL && PyModule_AddIntConstant(module, "STATUS_END", HS_STATUS_END) < 0) {
-        Py_CLEAR(module);
+    for (size_t k = 0; module != NULL && k < sizeof statuses / sizeof *statuses; k++) {
+        if (PyModule_AddIntConstant(module, statuses[k].name, statuses[k].status) < 0) {
+            Py_CLEAR(module);
+        }
     }
     return module;
 }

@@ -294,7 +294,6 @@ def test_abandoning_it_leaves_nothing_behind():
 import gc, json
 import numpy as np
 import halfshell as hs
-from halfshell._functions import pairs as pair_search
 points = np.random.default_rng(1).random((20_000, 3))
 
 def close():
@@ -342,7 +341,6 @@ def test_memory_does_not_grow_with_the_result():
 import json
 import numpy as np
 import halfshell as hs
-from halfshell._functions import pairs as pair_search
 points = np.random.default_rng(1).random((20_000, 2))
 list(hs.iter_pairs(points[:100], 2.0))
 before = peak = resident()
@@ -363,7 +361,6 @@ def test_ctrl_c_within_a_block_and_between_blocks():
 import json, signal, threading, time
 import numpy as np
 import halfshell as hs
-from halfshell._functions import pairs as pair_search
 points = np.random.default_rng(1).random((30_000, 3))
 sent = []
 
