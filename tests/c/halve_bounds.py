@@ -21,7 +21,7 @@ COMPILER = os.environ.get("CC", "cc").split()
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", f"-I{HERE}"]
 
 MODULES = ["doubleword", "metric", "filter", "expanded", "metric_measure"]
-SOURCES = [CORE / f"{name}.c" for name in ("metric", "metric_integer", "metric_measure", "filter")]
+SOURCES = sorted(CORE.glob("*.c"))
 SOURCES += [HERE / "exact" / f"test_{name}.c" for name in MODULES]
 
 
