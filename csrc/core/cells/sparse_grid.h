@@ -19,10 +19,9 @@
  * The grid of the same scene with rows `width` ranges wide (a power of two from 1 on) and cells of
  * width / HS_SPARSE_SPLIT along the first axis, however many these are; range, shift_error and
  * expected_pairs are those of `dense`. stride is 0, and n_cells is 0 until hs_sparse_build has
- * counted the occupied cells. HS_ERR_MEMORY when the reach of a periodic axis passes its integers.
+ * counted the occupied cells.
  */
-hs_status hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width,
-                         hs_grid *grid);
+void hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_grid *grid);
 
 /* Number of the cell that a place is in: of places (multiples of the cell's width) below
  * HS_SPARSE_LINEAR their floor; beyond it cells widen as the numbers themselves do. */

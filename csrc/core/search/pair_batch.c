@@ -192,7 +192,7 @@ load(hs_trace *trace, bool metric)
             load_given(trace, run, n);
         }
         unpolled += n;
-        if (unpolled > HS_POLL_CANDIDATES && trace->polls != NULL) {
+        if (unpolled > HS_POLL_CANDIDATES) {
             unpolled = 0;
             if (hs_poll(trace->polls, 0.0) != HS_OK) {
                 return HS_ERR_INTERRUPTED;
@@ -200,7 +200,8 @@ load(hs_trace *trace, bool metric)
         }
     }
     trace->has_given = trace->needs_given;
-    trace->has_metric = trace->has_metric || metric;
+    HS_ASSERT(!trace->has_metric); /* or both would have been there */
+    trace->has_metric = metric;
     return HS_OK;
 }
 

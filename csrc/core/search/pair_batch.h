@@ -22,7 +22,7 @@ typedef struct hs_trace_block {
 typedef struct hs_trace {
     const hs_search *search; /* borrowed */
     const hs_block  *block;  /* borrowed */
-    const hs_options *polls; /* borrowed; asked while a large block is loaded; NULL: never */
+    const hs_options *polls; /* borrowed; asked while a large block is loaded */
     hs_trace_block   of;
     bool     has_metric, has_given; /* `of` is the block's: q and image; turned or few */
     bool     is_plain;       /* shifts over B are those over the rows as given */

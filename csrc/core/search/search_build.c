@@ -22,11 +22,9 @@ choose_grid(hs_search *search, hs_failure *failure)
     if (status == HS_OK && may_be_sparse) {
         const double width = hs_sparse_choose(&search->scene, &search->grid);
         const hs_grid dense = search->grid;
-        search->is_sparse =
-            width > 0.0 &&
-            hs_sparse_grid(&search->scene, &dense, width, &search->grid) == HS_OK;
-        if (!search->is_sparse) {
-            search->grid = dense;
+        search->is_sparse = width > 0.0;
+        if (search->is_sparse) {
+            hs_sparse_grid(&search->scene, &dense, width, &search->grid);
         }
     }
     return status;

@@ -59,7 +59,7 @@ compare_visit(const brute_scene *scene, int threads, bool many)
     const hs_points points = points_of(scene);
     hs_options      options = options_of(scene);
     seen            s = {.ndim = scene->ndim};
-    hs_visit        visit = {.pair = see_pair, .pairs = many ? see_pairs : NULL, .user = &s};
+    hs_visit        visit = {.pair = many ? NULL : see_pair, .pairs = many ? see_pairs : NULL, .user = &s};
     hs_pairs       *whole = NULL;
     int64_t         n = -1;
     options.want = WANT_ALL;

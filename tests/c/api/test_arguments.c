@@ -3,7 +3,7 @@
  * could, before anything is read. */
 #include "../support/harness.h"
 
-#include "../../../csrc/halfshell.h"
+#include "../../../csrc/core/base/want.h"
 
 #include <limits.h>
 #include <math.h>
@@ -199,9 +199,54 @@ cells_and_lists_are_asked_the_right_way(void)
     hs_verlet_free(list);
 }
 
+/* All that are wanted, of the arrays that the caller brings. */
+static void
+each_array_that_is_wanted_must_be_there(void)
+{
+    const hs_points points = good_points();
+    for (unsigned bit = 1; bit <= HS_WANT_BOTH; bit *= 2) {
+        int64_t        i[1], j[1], both[2];
+        int32_t        shift[3];
+        double         distance[1], vector[3];
+        hs_options     options = good_options();
+        hs_pairs      *pairs = NULL;
+        hs_pair_arrays out = {.capacity = 1, .index_bytes = 8, .i = i, .j = j, .both = both,
+                              .distance = distance, .vector = vector, .shift = shift};
+        options.out = &out;
+        options.want = bit;
+        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_length(pairs) == 1);
+        hs_pairs_free(pairs);
+        switch (bit) {
+        case HS_WANT_I: out.i = NULL; break;
+        case HS_WANT_J: out.j = NULL; break;
+        case HS_WANT_DISTANCE: out.distance = NULL; break;
+        case HS_WANT_VECTOR: out.vector = NULL; break;
+        case HS_WANT_SHIFT: out.shift = NULL; break;
+        default: out.both = NULL;
+        }
+        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
+        options.want = HS_WANT_ALL & ~bit;
+        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_OK);
+        hs_pairs_free(pairs);
+    }
+}
+
+/* Where neither what is asked about is there nor room for the answer. */
+static void
+nothing_at_all_is_refused(void)
+{
+    const hs_points  points = good_points();
+    const hs_options options = good_options();
+    CHECK(hs_neighbors_count(NULL, NULL, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_systems_count(&points, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
+}
+
 void
 test_arguments(void)
 {
+    RUN(each_array_that_is_wanted_must_be_there);
+    RUN(nothing_at_all_is_refused);
     bad_points_and_queries_are_refused();
     boxes_of_another_dimension_are_refused();
     bad_options_are_refused();

@@ -39,11 +39,11 @@ sparse_open(const brute_scene *brute, double width, sparse_scene *s)
     if (status != HS_OK)
         return status;
     status = hs_grid_init(&s->scene, &s->dense, &failure);
-    if (status == HS_OK)
-        status = hs_sparse_grid(&s->scene, &s->dense, width, &s->grid);
-    if (status == HS_OK)
+    if (status == HS_OK) {
+        hs_sparse_grid(&s->scene, &s->dense, width, &s->grid);
         status = hs_stencil_build(&s->account, &s->options, &s->scene, &s->grid, false,
-                                      &s->stencil);
+                                  &s->stencil);
+    }
     if (status != HS_OK) {
         hs_scene_free(&s->account, &s->scene);
         return status;

@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_large_blocks.c: one point with so many candidates that a search asks between its passes over
+ * them whether to go on: any of these polls ends it, and the last answer is right. */
+#include "../../../csrc/core/memory/account.h"
+#include "../support/harness.h"
+
+#include "../../../csrc/halfshell.h"
+
+void test_large_blocks(void);
+
+enum { SPOTS = 1024, N = 110 * SPOTS }; /* in three images, more than 2^18 candidates */
+
+static const hs_box box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+
+typedef struct refusal {
+    int64_t n, nth; /* polls so far; the only one that says no */
+} refusal;
+
+/* A hs_poll_fn. */
+static bool
+refuse_once(void *context, double fraction)
+{
+    refusal *once = context;
+    (void)fraction;
+    return ++once->n != once->nth;
+}
+
+static hs_status
+search(bool sorted, int threads, refusal *once, int64_t *found)
+{
+    static double       x[N];
+    static const double at = 0.5;
+    const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8}, query = {&at, 1, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    for (int p = 0; p < N; p++)
+        x[p] = (p * 77 % SPOTS) / (double)SPOTS;
+    options.cutoff = 0.75;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
+    options.sorted = sorted;
+    options.threads = threads;
+    options.poll = refuse_once;
+    options.poll_context = once;
+    const hs_status status =
+        hs_neighbors_find(&points, &query, &box, &options, &rows, NULL);
+    CHECK((status == HS_OK) == (rows != NULL));
+    *found = status == HS_OK ? hs_pairs_length(rows) : 0;
+    hs_pairs_free(rows);
+    return status;
+}
+
+static void
+any_poll_ends_a_search_of_many_candidates(void)
+{
+    const int64_t before = hs_test_live_blocks();
+    for (int sorted = 0; sorted < 2; sorted++) {
+        for (int threads = 1; threads <= 2; threads++) {
+            hs_status status = HS_ERR_INTERRUPTED;
+            int64_t   found = 0, nth = 0;
+            while (status != HS_OK && nth < 200) {
+                refusal once = {0, ++nth};
+                status = search(sorted, threads, &once, &found);
+                CHECK(status == (once.n == nth ? HS_ERR_INTERRUPTED : HS_OK));
+            }
+            CHECK(nth > 2 && nth < 200);
+            /* 1.5 box lengths: every spot once, half of them twice, and both ends. */
+            CHECK(found == (int64_t)(N / SPOTS) * (SPOTS + SPOTS / 2 + 1));
+        }
+    }
+    CHECK(hs_test_live_blocks() == before);
+}
+
+void
+test_large_blocks(void)
+{
+    RUN(any_poll_ends_a_search_of_many_candidates);
+}
