@@ -369,7 +369,8 @@ hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
 hs_status
 hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_grid *grid)
 {
-    const double ratio = cutoff_before > 0.0 ? scene->cutoff / cutoff_before : 1.0;
+    HS_ASSERT(cutoff_before > 0.0 && cutoff_before >= scene->cutoff);
+    const double ratio = scene->cutoff / cutoff_before;
     const hs_status status = set_ranges(scene, grid);
     for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
         HS_ASSERT(!grid->by_faces[k]);

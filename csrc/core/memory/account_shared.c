@@ -41,7 +41,8 @@ hs_shared_resize(hs_shared *shared, void **block, int64_t held, int64_t count, s
     void *larger = hs_alloc(shared->account, HS_FOR_CANDIDATES, count, size);
     if (larger != NULL) {
         if (*block != NULL) {
-            memcpy(larger, *block, (size_t)(held < count ? held : count) * size);
+            HS_ASSERT(held <= count);
+            memcpy(larger, *block, (size_t)held * size);
         }
         hs_free(shared->account, *block);
         *block = larger;

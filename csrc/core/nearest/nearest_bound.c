@@ -150,7 +150,7 @@ walk_images(const hs_near *near, const hs_options *options, const hs_near_group 
             probe->at[k] = bins->x[k][group->first] - images.moved[k];
         }
         status = walk_image(probe);
-        if (probe->bounder->work > POLL_WORK && status == HS_OK) {
+        if (status == HS_OK && probe->bounder->work > POLL_WORK) {
             probe->bounder->work = 0;
             status = hs_poll(options, 0.0);
         }

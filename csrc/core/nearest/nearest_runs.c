@@ -120,7 +120,7 @@ hs_near_runs_find(const hs_near *near, const hs_options *options, const hs_near_
         }
         status = find_in_image(near, group, images->moved, most, reach, block);
         block->n_images -= block->n == n; /* nothing there */
-        if (++since_poll == POLL_IMAGES && status == HS_OK) {
+        if (status == HS_OK && ++since_poll == POLL_IMAGES) {
             since_poll = 0;
             status = hs_poll(options, 0.0);
         }

@@ -208,9 +208,9 @@ split_all(tree_builder *builder)
             waiting[n_waiting++] = left_is_larger ? left : left + 1;
             waiting[n_waiting++] = left_is_larger ? left + 1 : left;
         }
-        if (builder->work > HS_POLL_POINTS) {
+        if (status == HS_OK && builder->work > HS_POLL_POINTS) {
             builder->work = 0;
-            status = status == HS_OK ? hs_poll(builder->options, 0.0) : status;
+            status = hs_poll(builder->options, 0.0);
         }
     }
     return status;

@@ -242,10 +242,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
     if (status == HS_OK) {
         status = take_sample(&walker, n, &taken);
-        if (status == HS_ERR_SHIFT_RANGE) {
-            failure->row = walker.scanner.failed_point;
-            failure->in_queries = search->has_queries;
-        }
+        HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* who counts needs no S */
         hs_walker_close(search, &walker);
     }
     if (status != HS_OK) {
