@@ -2,7 +2,8 @@
 /*
  * test_alloc_calls.c: every function of halfshell.h, on scenes of several kinds, while allocation
  * 1, 2, 3, ... fails, alone or with all behind it, until one call is undisturbed. Each failure is
- * HS_ERR_MEMORY and leaves nothing behind; what the call was about stays usable, and answers as if nothing had been.
+ * HS_ERR_MEMORY and leaves nothing behind; what the call was about stays usable, and answers as if
+ * nothing had been.
  */
 #include "../../../csrc/core/memory/account.h"
 #include "../support/call_kinds.h"

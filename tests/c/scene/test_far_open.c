@@ -6,6 +6,24 @@
 
 void test_far_open(void);
 
+/* Queries of kept cells find what those of a new search find. */
+static void
+check_queries(const hs_points *points, const hs_box *box, const hs_options *options,
+              hs_cells *cells)
+{
+    int64_t   count = -1, kept = -2;
+    hs_pairs *rows = NULL, *of_cells = NULL;
+    CHECK(hs_between_count(points, points, box, options, &count, NULL) == HS_OK);
+    CHECK(hs_cells_count(cells, points, options, &kept, NULL) == HS_OK && kept == count);
+    CHECK(hs_nearest_find(points, NULL, box, 2, options, &rows, NULL) == HS_OK);
+    CHECK(hs_cells_nearest(cells, NULL, 2, options, &of_cells, NULL) == HS_OK);
+    CHECK(rows != NULL && of_cells != NULL && hs_pairs_length(rows) == hs_pairs_length(of_cells) &&
+          memcmp(hs_pairs_array(rows, HS_WANT_DISTANCE), hs_pairs_array(of_cells, HS_WANT_DISTANCE),
+                 (size_t)hs_pairs_length(rows) * sizeof(double)) == 0);
+    hs_pairs_free(rows);
+    hs_pairs_free(of_cells);
+}
+
 /* Distances of all pairs of `points` in the box, which must be the n given ones, sorted by i and j;
  * by a search, and from cells where they can be kept. */
 static void
@@ -29,6 +47,8 @@ check_pairs(const hs_points *points, const hs_box *box, double cutoff, int64_t n
             CHECK(((const double *)hs_pairs_array(pairs, HS_WANT_DISTANCE))[e] == d[e]);
         hs_pairs_free(pairs);
     }
+    if (keeps)
+        check_queries(points, box, &options, cells);
     hs_cells_free(cells);
 }
 

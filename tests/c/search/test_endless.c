@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_endless.c: searches with more pairs than can be counted or held end soon, with a status that says
- * so, and may be interrupted before. */
+/* test_endless.c: searches with more pairs than can be counted or held end soon, with a status that
+ * says so, and may be interrupted before. */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 
