@@ -173,9 +173,29 @@ long_rows_are_the_same_by_one_walk(void)
     hs_pairs_free(rows);
 }
 
+/* Not even the point itself, where distances must be less than 0. */
+static void
+nothing_is_nearer_than_nothing(void)
+{
+    const double x[] = {0.5, 0.5, 0.75};
+    const hs_points points = {x, 3, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    options.cutoff = 0.0;
+    options.inclusive = false;
+    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == 0 && hs_pairs_offsets(rows)[3] == 0);
+    hs_pairs_free(rows);
+    options.inclusive = true;
+    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == 2 && hs_pairs_offsets(rows)[3] == 2);
+    hs_pairs_free(rows);
+}
+
 void
 test_table_rows(void)
 {
+    RUN(nothing_is_nearer_than_nothing);
     RUN(every_shape_of_columns_has_the_same_rows);
     RUN(crowds_are_counted_when_they_cannot_be_kept);
     RUN(long_rows_are_the_same_by_one_walk);
