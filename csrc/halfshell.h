@@ -459,8 +459,10 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * `order` that hold at least all points within the cutoff, images included, as HS_WANT_I (first)
  * and HS_WANT_J (end, not included) of rows as of hs_neighbors_find. A range may come more than
  * once, for several images. HS_ERR_CUTOFF for a cutoff that the cells cannot serve, HS_ERR_FAR for
- * queries that they cannot: some four times further away than the points and 1024 box vectors; and,
- * with failure->in_queries false, for cells that are one cell with everything.
+ * queries that they cannot. Open space and boxes along the coordinate axes take queries up to some
+ * 2^850 cutoffs away, skewed boxes those within four times the distance of the points or 1024 box
+ * vectors. failure.row, column and value tell which one; row is -1 for cells that are
+ * one cell with everything.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);

@@ -271,13 +271,19 @@ raise_rounding(const hs_failure *failure)
 static PyObject *
 raise_far(const hs_failure *failure)
 {
-    PyErr_SetString(PyExc_ValueError,
-                    failure->in_queries
-                        ? "queries lie too far from the points and the box for cells that were "
-                          "made without them: query() or pairs_between() have no such limit"
-                        : "points lie so far from each other, or the box is so small beside that, "
-                          "that one cell holds everything, and all points are candidates: the "
-                          "other methods and functions have no such limit");
+    PyObject *number = PyFloat_FromDouble(failure->value);
+    if (number != NULL && failure->row >= 0) {
+        PyErr_Format(PyExc_ValueError,
+                     "queries[%lld, %lld] = %R lies too far from the points and the box for cells "
+                     "that were made without it; query() and pairs_between() have no such limit",
+                     (long long)failure->row, (long long)failure->column, number);
+    } else if (number != NULL) {
+        PyErr_SetString(PyExc_ValueError,
+                        "points lie so far from each other, or the box is so small beside that, "
+                        "that one cell holds everything, and all points are candidates: the "
+                        "other methods and functions have no such limit");
+    }
+    Py_XDECREF(number);
     return NULL;
 }
 

@@ -171,6 +171,26 @@ add_window(range_list *list, int64_t query, hs_link *link, int64_t low, int64_t 
     } while (repeats && turn * n_x <= high);
 }
 
+/* Whether a query lies further beyond an open face than any point can be within the cutoff. */
+static bool
+is_far_outside(const hs_search *search, int64_t si)
+{
+    const hs_scene *scene = &search->scene;
+    double          x[HS_MAX_DIM];
+    for (int c = 0; c < scene->ndim; c++) {
+        x[c] = hs_search_asking(search)->x[c][si];
+    }
+    for (int k = 0; k < scene->ndim; k++) {
+        const double t = hs_lattice_coordinate(&scene->lattice, x, k);
+        const double reach = scene->radius * (1.0 + HS_GRID_SLACK) + 2.0 * scene->t_error[k];
+        if (scene->lattice.row_of_axis[k] < 0 &&
+            (t - scene->upper[k] > reach || scene->lower[k] - t > reach)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static hs_status
 add_queries(range_list *list)
 {
@@ -185,6 +205,10 @@ add_queries(range_list *list)
                 return HS_ERR_INTERRUPTED;
             }
             unpolled = 0;
+        }
+        if (is_far_outside(search, si)) {
+            unpolled++;
+            continue;
         }
         hs_row_open_at(search, (int32_t)si, &row, &group);
         const int64_t n_links = hs_row_links(search, &row, list->links, list->hints);
@@ -272,6 +296,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
     }
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
+    sets.is_untested = true;
     sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_pairs *rows = hs_pairs_new();
     if (rows == NULL) {
@@ -296,9 +321,13 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
     } else if (status == HS_STATUS_END) {
         hs_search_begin(options, search); /* for hs_pairs_free */
         hs_search_report(search, 0);
+        *failure = HS_NO_FAILURE;
         status = options->cutoff == cells->search.options.cutoff ? HS_ERR_FAR : HS_ERR_CUTOFF;
-        failure->value = status == HS_ERR_CUTOFF ? options->cutoff : 0.0;
-        failure->in_queries = status == HS_ERR_FAR && !cells->search.scene.in_one_cell;
+        if (status == HS_ERR_CUTOFF) {
+            failure->value = options->cutoff;
+        } else if (queries != NULL && !cells->search.scene.in_one_cell) {
+            hs_scene_name_refused(&cells->search.scene, queries, failure);
+        }
     }
     hs_fpenv_leave(saved);
     if (status != HS_OK) {

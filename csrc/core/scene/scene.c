@@ -191,7 +191,7 @@ start_scene(const hs_points *points, hs_scene *scene)
     scene->ndim = points->ndim;
     scene->n = points->n;
     scene->keeps_originals = scene->x_is_beside = scene->is_asked = scene->is_kept = false;
-    scene->in_one_cell = false;
+    scene->in_one_cell = scene->is_untested = false;
     scene->cloud.block = scene->beside = NULL;
     scene->turns = (hs_turns){.known = false};
     memset(scene->x_largest, 0, sizeof scene->x_largest);
@@ -204,7 +204,9 @@ hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs
     double     magnitude = 0.0;
     hs_options as_kept = *options;
     start_scene(queries, asking);
-    if (kept->turns.known) {
+    if (kept->is_untested) { /* however many turns that are */
+        as_kept.want &= ~(unsigned)HS_WANT_SHIFT;
+    } else if (kept->turns.known) {
         as_kept.want |= HS_WANT_SHIFT;
     }
     hs_status status =

@@ -45,7 +45,8 @@ typedef struct hs_scene {
     bool       is_asked;      /* by queries: the bounds above hold for these too */
     bool       is_kept;       /* and for others that come later */
     bool       in_one_cell;   /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
-    bool       is_plain;      /* as hs_sets says */
+    bool       is_untested;   /* as hs_sets says: bounds for the cells alone will do */
+    bool       is_plain;      /* the same */
     bool       is_wide;       /* the same */
     double     least_cutoff;  /* the same */
     double     within;        /* the same */
@@ -61,6 +62,7 @@ typedef struct hs_sets {
     bool             is_wide; /* X is not made float32: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
+    bool             is_untested; /* cells are all that is wanted, no distance is computed */
     bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
     bool             is_full; /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
@@ -119,11 +121,15 @@ void hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking);
 void hs_scene_put_in_one_cell(hs_scene *scene);
 
 /* Whether a scene that was kept can take this cloud as it was loaded: no larger numbers, none that
- * its scale would round. */
+ * its scale would round unless only cells are wanted. */
 bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
 
 /* And whether its bounds hold for what wrapping has made of it. */
 bool hs_scene_covers(const hs_scene *kept, const hs_scene *asking);
+
+/* Of queries whose cells are wanted: row, column and value of the first coordinate that a kept
+ * scene does not take; where each alone would do, of the largest. Nothing where no query would. */
+void hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure);
 
 /* Bounds on what was wrapped, with room for queries that come later. Before and after they are
  * settled. */

@@ -13,6 +13,8 @@
  * to nothing: they are some units in the last place. */
 #define FURTHER 4.0
 #define BOX_VECTORS 1024.0
+/* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
+#define MOST_FOR_CELLS 0x1p900
 
 void
 hs_scene_join_clouds(hs_scene *scene, hs_scene *asking)
@@ -99,6 +101,9 @@ hs_scene_make_room(hs_scene *scene, double *magnitude)
             across += 0.5 * fabs(lattice->rows[r][k]);
         }
         scene->x_largest[k] = 2.0 * hs_larger(scene->x_largest[k], across);
+        if (across == 0.0) { /* queries stay wherever they are along this axis */
+            scene->x_largest[k] = hs_larger(2.0 * scene->x_largest[k], away);
+        }
     }
 }
 
@@ -110,6 +115,13 @@ hs_scene_widen_errors(hs_scene *scene)
     }
 }
 
+/* The largest scaled coordinate of queries that come later. */
+static double
+most_taken(const hs_scene *kept, bool is_untested)
+{
+    return is_untested && kept->lattice.aligned ? MOST_FOR_CELLS : kept->cloud.largest;
+}
+
 bool
 hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
 {
@@ -117,8 +129,14 @@ hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
     if (kept->n == 0) { /* no point is found, wherever queries are, but they need a place */
         return hs_scale_apply(scale, cloud->largest) < INFINITY;
     }
-    if (kept->extreme || kept->in_one_cell ||
-        !(hs_scale_apply(scale, cloud->largest) <= kept->cloud.largest)) {
+    const double most = most_taken(kept, kept->is_untested);
+    if (kept->in_one_cell || !(hs_scale_apply(scale, cloud->largest) <= most)) {
+        return false;
+    }
+    if (kept->is_untested) { /* digits that are lost are less than the room between cells */
+        return true;
+    }
+    if (kept->extreme) {
         return false;
     }
     /* Scaling down must not reach the subnormal numbers. */
@@ -129,10 +147,36 @@ hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud)
 bool
 hs_scene_covers(const hs_scene *kept, const hs_scene *asking)
 {
-    bool covers = kept->n == 0 || asking->x_error <= kept->x_error;
+    const bool is_tested = kept->n > 0 && !kept->is_untested;
+    bool       covers = !is_tested || asking->x_error <= kept->x_error;
     for (int k = 0; kept->n > 0 && k < kept->ndim; k++) {
-        covers = covers && asking->x_largest[k] <= kept->x_largest[k] &&
-                 asking->t_error[k] <= kept->t_error[k];
+        covers = covers && asking->t_error[k] <= kept->t_error[k] &&
+                 (!is_tested || asking->x_largest[k] <= kept->x_largest[k]);
     }
     return covers;
+}
+
+void
+hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure)
+{
+    const hs_options options = hs_options_default();
+    const double     most = most_taken(kept, true);
+    double           largest = -1.0;
+    hs_cloud         cloud;
+    if (kept->is_heap || hs_cloud_load(NULL, NULL, queries, &options, &cloud, failure) != HS_OK) {
+        return;
+    }
+    for (int64_t i = 0; i < cloud.n; i++) {
+        for (int k = 0; k < cloud.ndim; k++) {
+            const double size = hs_scale_apply(kept->scale, fabs(cloud.x[k][i]));
+            if (largest <= most && size > largest) {
+                largest = size;
+                failure->row = i;
+                failure->column = k;
+                failure->value = cloud.x[k][i];
+                failure->in_queries = true;
+            }
+        }
+    }
+    hs_cloud_free(NULL, &cloud);
 }

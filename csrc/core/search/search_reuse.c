@@ -10,9 +10,10 @@
 
 /* What is shared, as the new search's own; what it must not free is marked as borrowed. */
 static void
-borrow(const hs_search *built, hs_search *search)
+borrow(const hs_search *built, bool is_untested, hs_search *search)
 {
     search->scene = built->scene;
+    search->scene.is_untested = is_untested;
     search->grid = built->grid;
     search->bins = built->bins;
     search->sparse = built->sparse;
@@ -90,7 +91,7 @@ hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *searc
         return HS_STATUS_END;
     }
     hs_search_begin(options, search);
-    borrow(built, search);
+    borrow(built, sets->is_untested, search);
     search->team = hs_team_create(hs_search_threads(sets->points->n + n_queries, options));
     search->kernel = hs_kernel_select(options->kernel);
     hs_status status = search->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);

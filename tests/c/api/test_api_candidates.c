@@ -172,11 +172,13 @@ ranges_that_are_refused(void)
     make_scene(&random, SCENE_ALIGNED, 3, 100, 4.0, 0, &s);
     s.scene.cutoff = 0.5;
     hs_cells       *cells = build(&s.scene, &layout);
-    const double    far[3] = {1e9, 0.0, 0.0};
-    const hs_points points = points_of(&s.scene), query = {far, 1, 3, HS_FLOAT64, 24, 8};
+    const double    far[6] = {1e9, 0.0, 0.0, 0.0, -1e300, 0.0};
+    const hs_points points = points_of(&s.scene), query = {far, 2, 3, HS_FLOAT64, 24, 8};
     hs_options      options = options_of(&s.scene);
     int64_t             polls = INT32_MAX;
     CHECK(hs_cells_candidates(cells, &query, &options, &ranges, &failure) == HS_ERR_FAR);
+    CHECK(failure.row == 1 && failure.column == 1 && failure.value == -1e300);
+    CHECK(failure.in_queries && failure.system == -1 && ranges == NULL);
     options.cutoff = 0.75;
     CHECK(hs_cells_candidates(cells, &points, &options, &ranges, NULL) == HS_ERR_CUTOFF);
     options.cutoff = NAN;
