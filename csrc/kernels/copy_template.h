@@ -45,7 +45,8 @@ gather_runs(hs_gather *gather, const hs_run *runs, int32_t n_runs, const int ndi
     }
     integers largest = broadcast_integer((int32_t)gather->largest);
     for (int k = 0; k < ndim; k++) {
-        largest = largest_of(y[k], runs[n_runs].at, largest);
+        const int32_t first = runs[0].at;
+        largest = largest_of(y[k] + first, runs[n_runs].at - first, largest);
     }
     gather->largest = (uint32_t)largest_lane(largest);
 }

@@ -116,7 +116,7 @@ typedef struct hs_gather {
     uint32_t       largest;       /* bits of the largest |y| so far; infinity and NaN are largest */
 } hs_gather;
 
-/* Copies n runs, and runs[n].at candidates in all: y_k = (float)(x_k + moved_k), each operation
+/* Copies n runs, candidates runs[0].at to runs[n].at: y_k = (float)(x_k + moved_k), each operation
  * rounded once, norm = sum of y_k^2, fused or not, and id = order. Entries past the last may be
  * overwritten. */
 typedef void (*hs_gather_fn)(hs_gather *gather, const hs_run *runs, int32_t n);

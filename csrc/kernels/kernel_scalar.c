@@ -193,7 +193,7 @@ gather(hs_gather *gather, const hs_run *runs, int32_t n_runs)
         memcpy(gather->id + at, gather->order + runs[r].si, (size_t)n * sizeof(int32_t));
     }
     for (int k = 0; k < gather->ndim; k++) {
-        for (int32_t c = 0; c < runs[n_runs].at; c++) {
+        for (int32_t c = runs[0].at; c < runs[n_runs].at; c++) {
             const uint32_t bits = hs_bits_of_float(gather->y[k][c]) & UINT32_C(0x7fffffff);
             largest = bits > largest ? bits : largest;
         }

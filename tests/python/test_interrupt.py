@@ -92,3 +92,34 @@ print(json.dumps([len(seen), hs.count_pairs(points, 2.0)]))
 """
     )
     assert calls == 1 and count == 30_000 * 29_999 // 2
+
+
+@pytest.mark.parametrize("size", [1.5e8, 5e8])
+def test_an_interrupt_is_heard_while_a_large_neighbourhood_is_gathered(size):
+    outcome, late = run(
+        RESIDENT
+        + f"""
+import json, signal, threading, time
+import numpy as np
+import halfshell as hs
+
+points = np.random.default_rng(0).random((9, 8))
+sent = []
+
+def interrupt():
+    while resident() < {size}:
+        time.sleep(0.005)
+    sent.append(time.process_time())
+    signal.raise_signal(signal.SIGINT)
+
+threading.Thread(target=interrupt, daemon=True).start()
+try:
+    hs.neighbors(points, 3.0, box=[1.0] * 8, memory_limit=1e13)
+    outcome = "finished"
+except KeyboardInterrupt:
+    outcome = "interrupted"
+print(json.dumps([outcome, time.process_time() - sent[0]]))
+"""
+    )
+    assert outcome == "interrupted"
+    assert late < 0.4  # of this process, however busy the machine is

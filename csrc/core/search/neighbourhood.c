@@ -2,6 +2,8 @@
 /* neighbourhood.c: see neighbourhood.h. */
 #include "neighbourhood.h"
 
+#include "../base/poll.h"
+
 #include <string.h>
 
 /* Every array begins on a cache line. */
@@ -116,9 +118,26 @@ hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double
     return n;
 }
 
-void
-hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_block *block,
-                hs_group *group)
+/* Some candidates after others where there are very many. */
+static hs_status
+gather_in_parts(const hs_kernel *kernel, const hs_options *options, const hs_block *block,
+                hs_gather *gather)
+{
+    for (int32_t first = 0, end; first < block->n_runs; first = end) {
+        const hs_run *runs = block->runs + first;
+        const int32_t left = block->n_runs - first;
+        if (first > 0 && hs_poll(options, 0.0) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
+        end = first + (left < HS_RUNS_PER_POLL ? left : HS_RUNS_PER_POLL);
+        kernel->gather(gather, runs, end - first);
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
+                bool is_first, hs_block *block, hs_group *group)
 {
     hs_gather gather;
     gather.ndim = bins->ndim;
@@ -131,7 +150,10 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_
     gather.id = block->id;
     gather.largest = group->largest;
     block->runs[block->n_runs].at = block->n;
-    kernel->gather(&gather, block->runs, block->n_runs);
+    const hs_status status = gather_in_parts(kernel, options, block, &gather);
+    if (status != HS_OK) {
+        return status;
+    }
     group->largest = gather.largest;
     for (int k = 0; k < bins->ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
@@ -144,6 +166,7 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_
             memcpy(group->q[k], block->y[k], bytes);
         }
     }
+    return HS_OK;
 }
 
 double

@@ -61,6 +61,9 @@ void      hs_block_free(hs_account *account, hs_block *block);
 /* most_hits of a block of this capacity. */
 int32_t hs_block_most_hits(int32_t capacity);
 
+/* Runs appended or gathered between two polls. Where there are so many each has few candidates. */
+#define HS_RUNS_PER_POLL (1 << 16)
+
 /* Chooses the centre. */
 void hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group);
 
@@ -77,10 +80,11 @@ int32_t hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, cons
 
 /*
  * Copies what was appended. The first block of a group must begin with the group's own points, in
- * the image 0: they are kept as its q.
+ * the image 0: they are kept as its q. Fails when poll() stops the search, which a large block
+ * asks now and then.
  */
-void hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, bool is_first, hs_block *block,
-                     hs_group *group);
+hs_status hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
+                          bool is_first, hs_block *block, hs_group *group);
 
 /* A bound on |y_k| of the block plus |q_k| of the group: twice the largest so far, a little rounded
  * up, so that few different thresholds are needed; NaN or infinite if one is. */

@@ -155,16 +155,20 @@ fill_block(hs_scanner *scanner)
     hs_block *block = &scanner->block;
     scanner->n_blocks++;
     set_flushing(scanner, true);
-    hs_block_gather(&scanner->search->bins, scanner->search->kernel, scanner->block_is_first, block,
-                    &scanner->group);
+    hs_status status = hs_block_gather(&scanner->search->bins, scanner->search->kernel,
+                                       &scanner->options, scanner->block_is_first, block,
+                                       &scanner->group);
     set_flushing(scanner, false);
+    if (status != HS_OK) {
+        return status;
+    }
     hs_trace_reset(&scanner->trace);
     set_form(scanner);
     if (!scanner->is_ordered) {
         return HS_OK;
     }
-    const hs_status status = hs_order_block(&scanner->search->scene.lattice, &scanner->options,
-                                            scanner->use, block, &scanner->order);
+    status = hs_order_block(&scanner->search->scene.lattice, &scanner->options, scanner->use,
+                            block, &scanner->order);
     if (status == HS_ERR_SHIFT_RANGE) {
         scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
     }
@@ -249,6 +253,9 @@ hs_scan_block(hs_scanner *scanner)
         return end_block(scanner);
     }
     hs_status status = fill_block(scanner);
+    if (status != HS_OK) {
+        return status;
+    }
     set_scan(scanner, &scan);
     scan.end = end;
     for (int32_t first = 0, next; status == HS_OK && first < scan.n_points; first = next) {
@@ -293,6 +300,10 @@ hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *sh
         }
         si += hs_block_append(&scanner->block, si, end, scanner->search->scene.ndim, shift, image,
                               &scanner->group);
+        if (scanner->block.n_runs % HS_RUNS_PER_POLL == 0 &&
+            hs_poll(&scanner->options, hs_scanner_fraction(scanner)) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
     }
     return HS_OK;
 }
