@@ -6,7 +6,9 @@ from __future__ import annotations
 import os
 import platform
 
-__all__ = ["cpu_name", "usable_cpus"]
+from halfshell import _core
+
+__all__ = ["cpu_name", "unknown_kernel", "usable_cpus"]
 
 
 def cpu_name() -> str:
@@ -27,3 +29,11 @@ def usable_cpus() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
         return os.cpu_count() or 1
+
+
+def unknown_kernel() -> str | None:
+    """Return what is wrong with HALFSHELL_KERNEL, which no call checks before it searches."""
+    named, known = _core.default_kernel(), _core.kernels()
+    if named in known:
+        return None
+    return f"HALFSHELL_KERNEL={named}: is not a kernel of this CPU ({', '.join(known)})"

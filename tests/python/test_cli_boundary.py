@@ -192,6 +192,27 @@ def test_places_that_are_no_files(tmp_path):
     refused("pairs", "x" * 5000, "--cutoff", "1.0")
 
 
+def test_a_pipe_is_not_waited_for(tmp_path):
+    for suffix in (".npy", ".npz"):
+        os.mkfifo(tmp_path / f"pipe{suffix}")
+        for command in ("pairs", "verify"):
+            error = refused(command, tmp_path / f"pipe{suffix}", "--cutoff", "1.0")
+            assert error.endswith(f"pipe{suffix}: cannot be read: not a regular file\n")
+
+
+def test_line_breaks_of_names_are_escaped(tmp_path):
+    assert r"/a\nb\x1bc.npy: no such file" in refused("pairs", tmp_path / "a\nb\x1bc.npy")
+    (tmp_path / "a\nb.npy").write_bytes(b"")
+    assert r"/a\nb.npy: is empty" in refused("pairs", tmp_path / "a\nb.npy")
+
+
+def test_negative_lengths_are_named(tmp_path):
+    path = tmp_path / "a.npy"
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3)}"
+    path.write_bytes(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(240))
+    assert "a.npy: 'points' has shape (-1, 3); no length is negative" in refused("pairs", path)
+
+
 def test_a_file_that_must_not_be_read(tmp_path, monkeypatch):
     path = tmp_path / "a.npy"
     path.write_bytes(valid_bytes("npy"))

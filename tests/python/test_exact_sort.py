@@ -13,7 +13,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import _core
-from halfshell._objects import exact_order
+from halfshell._objects import exact_order, table_rows
 from halfshell._objects.origin import Origin
 from oracles import BOX_KINDS, random_scene, same_arrays
 
@@ -286,3 +286,17 @@ def test_what_sorting_needs_is_named():
         bare.sort()
     with pytest.raises(AttributeError, match="'j' in quantities"):
         hs.neighbors(SCENE, 0.25, quantities="d").sort()
+
+
+@pytest.mark.parametrize("at_a_time", [1, 7, 100])
+def test_rows_are_sorted_a_few_at_a_time(at_a_time, monkeypatch):
+    points = crystal(0.1, 4, 3)
+    points = np.concatenate([points, [[90.0, 0.0, 0.0]], points + 0.01])  # one row is empty
+    table = hs.neighbors(points, 0.2, quantities="jdS")
+    whole = table.sort()
+    monkeypatch.setattr(table_rows, "_SORTED_AT_A_TIME", at_a_time)
+    parts = table.sort()
+    assert same_arrays(parts.to_pairs("ijdS"), whole.to_pairs("ijdS"))
+    assert_in_exact_order(parts[5:9], points, None, first=5)
+    assert same_arrays(table[3:90].sort().to_pairs("ijdS"), whole[3:90].to_pairs("ijdS"))
+    assert hs.neighbors(points[:0], 0.2, quantities="jd").sort().n_entries == 0

@@ -123,3 +123,37 @@ print(json.dumps([outcome, time.process_time() - sent[0]]))
     )
     assert outcome == "interrupted"
     assert late < 0.4  # of this process, however busy the machine is
+
+
+def test_an_interrupt_stops_the_sorting_of_rows():
+    # Late by processor time, which other processes do not take part in.
+    outcome, late = run(
+        """
+import json, signal, threading, time
+import numpy as np
+import halfshell as hs
+grid = np.stack(np.meshgrid(*[np.arange(32) * 0.1] * 3), axis=-1).reshape(-1, 3)
+table = hs.neighbors(grid, 0.33, quantities="jdS")
+sent = []
+
+def interrupt():
+    sent.append(time.process_time())
+    signal.raise_signal(signal.SIGINT)
+
+outcome, late = "finished", 0.0
+for wait in (0.03, 0.1, 0.2, 0.4, 0.7):
+    sent.clear()
+    timer = threading.Timer(wait, interrupt)
+    timer.start()
+    try:
+        while True:
+            table.sort()
+    except KeyboardInterrupt:
+        outcome = "interrupted"
+    late = max(late, time.process_time() - sent[0])
+    timer.join()
+print(json.dumps([outcome, late, table.n_entries]))
+"""
+    )[:2]
+    assert outcome == "interrupted"
+    assert late < 0.25

@@ -82,7 +82,9 @@ def one_line(error: BaseException) -> str:
         return printable(error.strerror)
     if isinstance(error, MemoryError) and not str(error):
         return "not enough memory"
-    text = printable(" ".join(str(error).split())) or type(error).__name__
+    # Messages of ours are of one line; line breaks in them are those of a name.
+    text = str(error) if isinstance(error, InputError) else " ".join(str(error).split())
+    text = printable(text) or type(error).__name__
     # What was wrong stands at the beginning or at the end; between them may be a very long name.
     half = MOST_CHARACTERS // 2
     return text if len(text) <= MOST_CHARACTERS else f"{text[:half]} ... {text[-half:]}"
@@ -156,6 +158,8 @@ def _shipped_scene() -> Scene:
 def _read_numpy(file: str, index: int | None) -> Scene:
     if index is not None:
         raise InputError(f"{file}: --index is for files with several frames, not for NumPy's")
+    if not os.path.isfile(file) and not os.path.isdir(file):  # a pipe may keep us waiting
+        raise InputError(f"{file}: cannot be read: not a regular file")
     try:
         content, names = read_arrays(file)
     except Unreadable as error:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell._cli.files import InputError, one_line
-from halfshell._machine import cpu_name, usable_cpus
+from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
 __all__ = ["main"]
@@ -258,12 +258,11 @@ def _run_info(args: argparse.Namespace) -> int:
     from halfshell import _core
 
     build = dict(_core.build_info())
-    named = _core.default_kernel()  # by HALFSHELL_KERNEL, which is not checked before a search
-    is_known = named in hs.kernels()
+    unknown = unknown_kernel()
     facts: dict[str, Any] = {
         "halfshell": hs.__version__,
         "kernels": list(hs.kernels()),
-        "kernel used": named if is_known else None,
+        "kernel used": _core.default_kernel() if unknown is None else None,
         "python": f"{platform.python_version()} ({platform.python_implementation()})",
         "numpy": np.__version__,
         "platform": f"{platform.system()} {platform.machine()}",
@@ -277,9 +276,6 @@ def _run_info(args: argparse.Namespace) -> int:
         for name, value in facts.items():
             text = ", ".join(value) if isinstance(value, (list, tuple)) else value
             print(printable(f"{name:<14}{'none' if value is None else text}"))
-    if not is_known:
-        raise InputError(
-            f"HALFSHELL_KERNEL={named}: is not a kernel of this CPU ({', '.join(hs.kernels())}); "
-            "searches that name none are refused"
-        )
+    if unknown is not None:
+        raise InputError(f"{unknown}; searches that name none are refused")
     return 0

@@ -81,6 +81,8 @@ def _check_header(name: str, stream: IO[bytes], n_bytes: int) -> None:
         return  # NumPy refuses it
     shape, dtype, n_header = header
     n_bytes -= n_header
+    if min(shape, default=0) < 0:
+        raise Unreadable(f"{name!r} has shape {shape}; no length is negative")
     needed = math.prod(shape) * dtype.itemsize
     what = f"{name!r} of shape {shape} and dtype {dtype}"
     if name != "points":
@@ -113,7 +115,5 @@ def _read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any], int
                 else np.lib.format.read_array_header_2_0)  # fmt: skip
         shape, _, dtype = read(whole)
     except ValueError:
-        return None
-    if min(shape, default=0) < 0:
         return None
     return shape, dtype, length + (10 if is_old else 12)

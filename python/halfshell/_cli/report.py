@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from halfshell._cli.files import InputError, missing_extra, one_line, replacing
+from halfshell._machine import unknown_kernel
 from halfshell._terminal import printable
 
 if TYPE_CHECKING:
@@ -84,6 +85,9 @@ def run(args: Namespace) -> int:
     if args.list:
         return _list()
     plan = _plan(args)
+    unknown = unknown_kernel()
+    if unknown is not None:
+        raise InputError(unknown)
     folder = Path(args.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -7,13 +7,20 @@ Types and shapes are settled here: an array is converted only when no value chan
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.foreign import exact_number, is_a, kind_of, refuse_deep_lists, told
+from halfshell._convert.foreign import (
+    exact_number,
+    is_a,
+    kind_of,
+    refuse_deep_lists,
+    shown,
+    told,
+)
 from halfshell._convert.memory import refuse_large
 
 _BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
@@ -22,14 +29,25 @@ FloatArray = npt.NDArray[np.float64]
 PointArray = npt.NDArray[np.float32] | FloatArray
 
 
-def as_real_array(values: Any, name: str, single: str = "hold real numbers") -> npt.NDArray[Any]:
+def as_real_array(
+    values: Any,
+    name: str,
+    single: str = "hold real numbers",
+    check_shape: Callable[[tuple[int, ...]], None] | None = None,
+) -> npt.NDArray[Any]:
     """An array of native float32 or float64 with exactly the given values.
 
     Raises TypeError for kinds that are no real numbers and ValueError, with the place, for values
     that float64 cannot hold. `single` is what a message says that a value without a shape must do.
+    `check_shape` raises for shapes that are refused, before anything is copied: views may be huge.
     """
     array = as_array(values, name, single)
     kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "O" and array.ndim == 0:  # what it is comes before what shape it has not
+        array = _from_objects(array, name, single)
+        kind, size = "f", 8
+    if check_shape is not None and kind in "fbiuO":
+        check_shape(array.shape)
     if kind == "f" and size in (4, 8) and array.dtype.isnative:
         return array
     if kind in "fbiu":
@@ -153,5 +171,5 @@ def _from_objects(array: npt.NDArray[Any], name: str, single: str) -> FloatArray
                 f"{_element(name, where)} = about {power} is too large for float64"
             ) from None
         if is_a(number, int) and int(result[where]) != number:
-            raise ValueError(f"{_element(name, where)} = {number} is not a float64")
+            raise ValueError(f"{_element(name, where)} = {shown(number)} is not a float64")
     return result

@@ -44,12 +44,19 @@ def _as_boxes(array: npt.NDArray[Any], ndim: int) -> FloatArray:
     return in_order(array, np.float64)
 
 
+def _check_box(shape: tuple[int, ...]) -> None:
+    if len(shape) == 2 and shape[0] != shape[1]:
+        raise ValueError(
+            f"box must have shape (d,) or (d, d), or one a system (s, d, d), got {shape}"
+        )
+
+
 def _scene(
     points: Any, box: Any, periodic: Any
 ) -> tuple[PointArray, FloatArray | None, int, FloatArray | None]:
     """As `scene` of one system, and boxes of each system."""
     if box is not None:
-        array = as_real_array(vectors_of(box), "box")
+        array = as_real_array(vectors_of(box), "box", check_shape=_check_box)
         if array.ndim == 3:
             rows = np.eye(MAX_DIM)
             if not brings_its_box(points):
@@ -59,10 +66,6 @@ def _scene(
             points, box, bits = as_scene(points, rows, periodic)
             return points, box, bits, _as_boxes(array, points.shape[1])
         box = array
-        if array.ndim == 2 and array.shape[0] != array.shape[1]:
-            raise ValueError(
-                f"box must have shape (d,) or (d, d), or one a system (s, d, d), got {array.shape}"
-            )
     points, box, bits = as_scene(points, box, periodic)
     return points, box, bits, None
 
@@ -71,13 +74,16 @@ def _as_cutoffs(value: Any) -> tuple[float, FloatArray | None]:
     """One cutoff, or one a system."""
     if is_a(value, float):
         return float.__float__(value), None
-    array = as_real_array(value, "cutoff", "be a number")
+
+    def check(shape: tuple[int, ...]) -> None:
+        if len(shape) > 1:
+            raise ValueError(
+                f"cutoff must be a number or, one a system, have shape (s,), got {shape}"
+            )
+
+    array = as_real_array(value, "cutoff", "be a number", check)
     if array.ndim == 0:
         return float(array), None
-    if array.ndim != 1:
-        raise ValueError(
-            f"cutoff must be a number or, one a system, have shape (s,), got {array.shape}"
-        )
     refuse_large(8 * array.size, array, "cutoff")
     return 0.0, in_order(array, np.float64)
 

@@ -122,5 +122,5 @@ def of_argument(name: str) -> Iterator[None]:
     except (MemoryError, ValueError, OverflowError) as error:
         if not (len(error.args) == 1 and isinstance(error.args[0], str)):
             raise
-        error.args = (re.sub(r"\bcutoff\b", name, error.args[0].replace("the cutoff", name)),)
+        error.args = (re.sub(r"\b(the )?cutoff\b", name, error.args[0]),)
         raise

@@ -21,10 +21,12 @@ def as_number(value: Any, name: str, single: str = "be a number") -> float:
     """A plain number; anything that float64 would have to round is refused."""
     if is_a(value, float):
         return float.__float__(value)
-    array = as_real_array(value, name, single)
-    if array.ndim != 0:
-        raise TypeError(f"{name} must {single}, got shape {array.shape}")
-    return float(array)
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != ():
+            raise TypeError(f"{name} must {single}, got shape {shape}")
+
+    return float(as_real_array(value, name, single, check))
 
 
 def as_positive(value: Any, name: str) -> float:
@@ -44,11 +46,14 @@ def as_cutoffs(value: Any) -> float | FloatArray:
     """One cutoff, or several in ascending order, which are finite and not negative."""
     if is_a(value, float):
         return float.__float__(value)
-    array = as_real_array(value, "cutoff", "be a number")
+
+    def check(shape: tuple[int, ...]) -> None:
+        if len(shape) > 1:
+            raise ValueError(f"cutoff must be a number or have shape (k,), got {shape}")
+
+    array = as_real_array(value, "cutoff", "be a number", check)
     if array.ndim == 0:
         return float(array)
-    if array.ndim != 1:
-        raise ValueError(f"cutoff must be a number or have shape (k,), got {array.shape}")
     refuse_large(8 * array.size, array, "cutoff")
     array = array.astype(np.float64)
     check_lengths(array, "cutoff")
@@ -60,26 +65,32 @@ def as_radii(value: Any, n: int) -> float | FloatArray | None:
     """None, one number, or an array of one for each of n queries; finite and not negative."""
     if value is None:
         return None
-    array = as_real_array(value, "radius", "be a number").astype(np.float64)
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape not in ((), (n,)):
+            raise ValueError(
+                f"radius must be a number or have shape ({n},), one for each query, got {shape}"
+            )
+
+    array = as_real_array(value, "radius", "be a number", check).astype(np.float64)
     if array.ndim == 0:
         if not (np.isfinite(array) and array >= 0.0):
             raise ValueError(f"radius must be finite and not negative, got {float(array)}")
         return float(array)
-    if array.shape != (n,):
-        raise ValueError(
-            f"radius must be a number or have shape ({n},), one for each query, got {array.shape}"
-        )
     check_lengths(array, "radius")
     return array
 
 
 def as_edges(values: npt.ArrayLike) -> FloatArray:
     """Two or more limits of bins: finite, not negative, not descending."""
-    array = as_real_array(values, "edges")
-    if array.ndim != 1 or len(array) < 2:
-        raise ValueError(
-            f"edges must have shape (bins + 1,), with one bin at least, got {array.shape}"
-        )
+
+    def check(shape: tuple[int, ...]) -> None:
+        if len(shape) != 1 or shape[0] < 2:
+            raise ValueError(
+                f"edges must have shape (bins + 1,), with one bin at least, got {shape}"
+            )
+
+    array = as_real_array(values, "edges", check_shape=check)
     refuse_unavailable(_EDGE_COPIES * 8 * len(array), f"edges of shape {array.shape}")
     array = array.astype(np.float64)
     check_lengths(array, "edges")

@@ -20,17 +20,15 @@ _MISSING = object()
 
 def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
     """Points of shape (n, d); a list without elements counts as n = 0, d = `ndim`."""
-    array = as_array(values, name)
-    if array.ndim == 2 and array.shape[0] > MAX_POINTS:  # before they are converted
-        raise OverflowError(f"fewer than 2**31 points can be searched, got {array.shape[0]}")
-    array = as_real_array(array, name)
-    if array.ndim != 2 or not 1 <= array.shape[1] <= MAX_DIM:
-        if array.shape == (0,):
-            return np.empty((0, ndim))
-        raise ValueError(
-            f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {array.shape}"
-        )
-    return array
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (0,) and (len(shape) != 2 or not 1 <= shape[1] <= MAX_DIM):
+            raise ValueError(f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {shape}")
+        if shape[0] > MAX_POINTS:
+            raise OverflowError(f"fewer than 2**31 {name} can be searched, got {shape[0]}")
+
+    array = as_real_array(values, name, check_shape=check)
+    return np.empty((0, ndim)) if array.shape == (0,) else array
 
 
 def vectors_of(values: Any, name: str = "box") -> Any:
@@ -42,15 +40,18 @@ def vectors_of(values: Any, name: str = "box") -> Any:
 
 def as_box(values: Any, ndim: int) -> FloatArray:
     """Box vectors as the rows of a float64 array (ndim, ndim), from rows, lengths or a Box."""
-    array = as_real_array(vectors_of(values), "box")
-    if array.shape == (ndim,):
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape not in ((ndim,), (ndim, ndim)):
+            hint = f": {LENGTHS_AND_ANGLES}" if shape == (6,) else ""
+            raise ValueError(
+                f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} "
+                f"dimensions, got {shape}{hint}"
+            )
+
+    array = as_real_array(vectors_of(values), "box", check_shape=check)
+    if array.ndim == 1:
         return np.diag(array.astype(np.float64))
-    if array.shape != (ndim, ndim):
-        hint = f": {LENGTHS_AND_ANGLES}" if array.shape == (6,) else ""
-        raise ValueError(
-            f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} dimensions, "
-            f"got {array.shape}{hint}"
-        )
     return in_order(array, np.float64)
 
 

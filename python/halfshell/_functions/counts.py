@@ -13,9 +13,12 @@ from halfshell import _core
 from halfshell._convert.arrays import FloatArray, PointArray
 from halfshell._convert.batch import as_systems
 from halfshell._convert.lengths import as_cutoffs
+from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import Precision, Rest, SearchOptions, as_flag
 from halfshell._convert.scene import as_sets
 from halfshell._objects.box import Box
+
+_MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 
 
 class _CountOptions(SearchOptions, total=False):
@@ -126,9 +129,21 @@ def count_pairs(
         if queries is not None:
             raise ValueError("batch and queries cannot be given together")
         scene, own = as_systems(points, cutoff, box, periodic, batch)
+        _refuse_systems(*own)
         return _core.batch_count(*(*scene, *rest, *own))
     asking, array, vectors, bits = as_sets(queries, points, box, periodic)
     return count_within(as_cutoffs(cutoff), array, vectors, bits, rest, asking)
+
+
+def _refuse_systems(
+    numbers: npt.NDArray[np.int64], cutoffs: FloatArray | None, boxes: FloatArray | None
+) -> None:
+    """MemoryError before counts of more systems than memory holds; the core checks all else."""
+    if cutoffs is not None or boxes is not None or len(numbers) == 0:
+        return
+    last = int(numbers[-1])
+    if _MANY_SYSTEMS < last < 2**62 and bool((numbers[1:] >= numbers[:-1]).all()):
+        refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")
 
 
 def count_within(

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array
+from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import Search
@@ -128,13 +129,18 @@ def binned(
     edges: FloatArray,
     queries: PointArray | None,
     marks: Marks,
+    name: str = "edges[-1]",
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-    """The histogram of points or cells, given as the first arguments of every search."""
+    """The histogram of points or cells, given as the first arguments of every search.
+
+    name: what a message calls the largest distance.
+    """
     refuse_unavailable(
         _COPIES * 8 * marks.n_types**2 * len(edges),
         f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
     )
-    found = _core.histogram(*search, edges, True, queries, *marks)
+    with of_argument(name):
+        found = _core.histogram(*search, edges, True, queries, *marks)
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])
 
@@ -154,9 +160,11 @@ def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
 
 
 def _as_weights(values: npt.ArrayLike, name: str, n: int) -> FloatArray:
-    array = as_real_array(values, name)
-    if array.shape != (n,):
-        raise ValueError(f"{name} must have shape ({n},), one a point, got {array.shape}")
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (n,):
+            raise ValueError(f"{name} must have shape ({n},), one a point, got {shape}")
+
+    array = as_real_array(values, name, check_shape=check)
     return np.ascontiguousarray(array, dtype=np.float64)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_number
 from halfshell._convert.options import Arrays, as_count, as_index_bytes
 from halfshell._convert.scene import as_sets
@@ -158,7 +159,7 @@ def as_k(k: Any) -> int:
     """How many are wanted: a whole number from 1 on."""
     number = as_count(k, "k")
     if number > _MOST:
-        raise MemoryError(f"k = {k} is more than any memory holds")
+        raise MemoryError(f"k = {shown(number)} is more than any memory holds")
     return number
 
 

@@ -185,7 +185,7 @@ def rdf(
         array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
     )
     marks = as_marks(len(array), asking, types, query_types)
-    counts = binned(search, edges, asking, marks)
+    counts = binned(search, edges, asking, marks, "r_max")
     g = np.zeros(counts.shape)
     with np.errstate(over="ignore", under="ignore", divide="ignore"):
         expected = _partners(len(array), asking, marks) * shares

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from halfshell._machine import unknown_kernel
+
 if TYPE_CHECKING:
     from halfshell._report.page.rows import ReportRow
 
@@ -55,7 +57,10 @@ def report(
     Raises
     ------
     ValueError
-        If a name is not known, or `patience` is not positive.
+        If a name is not known, or `patience` is not positive, or HALFSHELL_KERNEL names no kernel
+        of this CPU.
+    TypeError
+        If names are no sequence of strings, or `patience` is no number.
     ImportError
         If SciPy is not installed.
 
@@ -77,4 +82,8 @@ def report(
     """
     from halfshell._report.measure.run import plan_of, run
 
-    return run(plan_of(scenes, methods, peers, size, patience))
+    plan = plan_of(scenes, methods, peers, size, patience)
+    unknown = unknown_kernel()
+    if unknown is not None:
+        raise ValueError(unknown)
+    return run(plan)

@@ -156,8 +156,7 @@ class NeighborTable(TableRows):
         ([0, 1], [1, 0])
         """
         as_choice(by, "by", ("distance",))
-        order = table_forms.order_by_distance(self.offsets, self.distances)
-        return self._with(self.offsets, self._settled(order), self._is_complete, False)
+        return self._with(self.offsets, self._by_distance(), self._is_complete, False)
 
     # ---- other forms -----------------------------------------------------------------------
 

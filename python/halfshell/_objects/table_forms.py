@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_array, as_real_array
+from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import kind_of, shown, whole_number
+from halfshell._convert.lengths import as_number
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._errors import CapacityError
 from halfshell._extras import needs
@@ -97,15 +98,12 @@ def _as_capacity(value: Any) -> int:
 
 def _as_fill(value: Any, dtype: np.dtype[Any]) -> Any:
     """A number that this type holds as it is."""
-    array = as_real_array(value, "fill", "be a number")
-    if array.ndim != 0:
-        raise TypeError(f"fill must be a number, got shape {array.shape}")
+    number = as_number(value, "fill")
     if dtype.kind == "f":
-        return float(array)
+        return number
     limits = np.iinfo(dtype)
-    number = float(array)
     if not number.is_integer() or not limits.min <= int(number) <= limits.max:
-        raise ValueError(f"fill must be a whole number that {dtype} holds, got {value!r}")
+        raise ValueError(f"fill must be a whole number that {dtype} holds, got {shown(value)}")
     return int(number)
 
 

@@ -11,11 +11,15 @@ from typing import Any, Self, SupportsIndex, overload
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._convert.foreign import shown
 from halfshell._objects.exact_order import settle
 from halfshell._objects.origin import Origin
+from halfshell._objects.table_forms import order_by_distance
 
 Array = npt.NDArray[Any]
 Row = Array | tuple[Array, ...]
+
+_SORTED_AT_A_TIME = 1 << 17  # entries: some milliseconds
 
 
 class TableRows:
@@ -146,7 +150,7 @@ class TableRows:
             ) from None
         n = len(self)
         if not -n <= i < n:
-            raise IndexError(f"row {i} of a table of {n} rows")
+            raise IndexError(f"row {shown(i)} of a table of {n} rows")
         first, end = self._arrays[0][i % n : i % n + 2]
         if len(self._arrays) == 2:
             return self._arrays[1][first:end]
@@ -163,7 +167,7 @@ class TableRows:
     def _rows(self, rows: slice) -> Self:
         first, end, step = rows.indices(len(self))
         if step != 1:
-            raise ValueError(f"rows of a slice must follow each other, got a step of {step}")
+            raise ValueError(f"rows of a slice must follow each other, got a step of {shown(step)}")
         offsets = self._arrays[0][first : max(first, end) + 1]
         parts = tuple(column[offsets[0] : offsets[-1]] for column in self._arrays[1:])
         return type(self)(
@@ -221,20 +225,25 @@ class TableRows:
             return np.arange(before, before + self.n_entries)[entries]
         return self._entries[entries]
 
-    def _settled(self, order: Array) -> Array:
-        """These entries, sorted by row and rounded distance, in exact order."""
-        indices, origin, shifts = self.indices, self._origin, None
+    def _by_distance(self) -> Array:
+        """The entries by row and true distance; some rows at a time, between which Ctrl-C works."""
+        distances, indices, origin, shifts = self.distances, self.indices, self._origin, None
         if origin is None:
             raise AttributeError(
                 "this table does not know its points: sort one that neighbors or CellList has made"
             )
         if origin.has_images:
             shifts = origin.shifts()[self._entries] if self._lacks_shifts() else self.shifts
-        rows = np.repeat(np.arange(len(self)) + self._first_row, self.counts)
-        settle(
-            order, rows, origin.places_of(indices), self.distances, shifts, origin.points,
-            origin.asking, origin.rows,
-        )
+        order = np.empty(len(distances), np.int64)
+        points, asking, vectors = origin.points, origin.asking, origin.rows
+        places = origin.places_of(indices)
+        for first, end in _parts_of(self._arrays[0], _SORTED_AT_A_TIME):
+            offsets = self._arrays[0][first : end + 1]
+            a, b = int(offsets[0]), int(offsets[-1])
+            order[a:b] = order_by_distance(offsets - a, distances[a:b])
+            order[a:b] += a
+            rows = np.repeat(np.arange(first, end) + self._first_row, np.diff(offsets))
+            settle(order[a:b], rows, places, distances, shifts, points, asking, vectors)
         return order
 
     def _refuse_queries(self, what: str) -> None:
@@ -243,6 +252,16 @@ class TableRows:
                 f"{what} needs a table of one set of points: rows of this one are of queries, or "
                 "some of the rows of another table"
             )
+
+
+def _parts_of(offsets: Array, n_entries: int) -> Iterator[tuple[int, int]]:
+    """Whole rows, first and end, of so many entries at most, or one row that has more."""
+    first, n_rows = 0, len(offsets) - 1
+    while first < n_rows:
+        end = int(np.searchsorted(offsets, offsets[first] + n_entries, side="right")) - 1
+        end = max(first + 1, end)
+        yield first, end
+        first = end
 
 
 def read_only(array: Array) -> Array:

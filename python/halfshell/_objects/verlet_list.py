@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_number
 from halfshell._convert.options import Arrays, Letter, as_flag, as_index_bytes
 from halfshell._convert.scene import as_scene
@@ -152,10 +153,11 @@ class VerletList:
         change = auto is not None and auto.wants_change(array.shape[1])
         skin = auto.next_skin() if auto is not None else self._skin
         start = perf_counter()
-        rebuilt = _core.verlet_update(
-            self._list, array, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
-            self._memory_limit, None, self._threads, skin, change,
-        )
+        with of_argument("cutoff + skin" if skin > 0.0 and auto is None else "cutoff"):
+            rebuilt = _core.verlet_update(
+                self._list, array, self._cutoff, vectors, bits, self._inclusive, "exact",
+                self._kernel, self._memory_limit, None, self._threads, skin, change,
+            )
         taken = perf_counter() - start
         self._box, self._periodic = box, periodic
         self._n_updates += 1
