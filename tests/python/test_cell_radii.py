@@ -86,12 +86,12 @@ def test_a_result_that_does_not_fit_is_refused():
     radii = np.append(np.full(200, 1.95), np.full(200, 1.99))  # 3000 neighbours each, 8 bytes
     assert cells.query(queries, radii, memory_limit=40e6).n_entries == 1_200_000
     for limit in (3e6, 8e6):
-        with pytest.raises(MemoryError, match="would not fit"):
+        with pytest.raises(MemoryError, match=r"would not fit"):
             cells.query(queries, radii, memory_limit=limit)
 
 
 def test_messages_name_the_radius():
     cells = hs.CellList(RNG.random((50, 3)), 0.5, box=[1.0] * 3)
     for radius in (1e300, [1e300] * 2, [1e300, 1.0], [1e300, 1.1e300]):
-        with pytest.raises(MemoryError, match="radius spans more images.*smaller radius"):
+        with pytest.raises(MemoryError, match=r"radius spans more images.*smaller radius"):
             cells.query(np.zeros((2, 3)), radius)

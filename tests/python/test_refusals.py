@@ -50,24 +50,24 @@ def test_too_many_columns_are_refused_before_a_copy(name):
 
 
 def test_numbers_of_any_shape_are_refused_before_a_copy():
-    with pytest.raises(TypeError, match="^cutoff must be a number, got shape"):
+    with pytest.raises(TypeError, match=r"^cutoff must be a number, got shape"):
         hs.pairs(P, huge(np.int64))
-    with pytest.raises(TypeError, match="^r_max must be a number, got shape"):
+    with pytest.raises(TypeError, match=r"^r_max must be a number, got shape"):
         hs.rdf(P, huge(np.int64), box=BOX)
-    with pytest.raises(TypeError, match="^fill must be a number, got shape"):
+    with pytest.raises(TypeError, match=r"^fill must be a number, got shape"):
         hs.neighbors(P, 0.2).to_padded(fill=huge(np.int64))
 
 
 def test_what_an_object_is_comes_before_its_shape():
-    with pytest.raises(TypeError, match="^points must hold real numbers, got object"):
+    with pytest.raises(TypeError, match=r"^points must hold real numbers, got object"):
         hs.pairs(object(), 0.1)
     assert hs.count_pairs(P, 2**70, box=None) == 50 * 49 // 2  # an object array of one integer
 
 
 def test_numbers_of_systems_beyond_memory_are_refused_by_name():
-    with pytest.raises(MemoryError, match="systems up to 1099511627776 in batch would take"):
+    with pytest.raises(MemoryError, match=r"systems up to 1099511627776 in batch would take"):
         hs.count_pairs(P, 0.2, batch=np.full(50, 2**40))
-    with pytest.raises(ValueError, match="ascending"):
+    with pytest.raises(ValueError, match=r"ascending"):
         hs.count_pairs(P, 0.2, batch=np.arange(50)[::-1] + 2**40)
     assert hs.count_pairs(P, 0.2, batch=np.full(50, 2))[2] == hs.count_pairs(P, 0.2)
 
@@ -90,7 +90,7 @@ def test_too_many_queries_are_queries(call):
 
 def test_too_long_a_length_has_its_own_name():
     for length in (1e12, 1e300):
-        with pytest.raises(MemoryError, match="fit: r_max spans .* use a smaller r_max$"):
+        with pytest.raises(MemoryError, match=r"fit: r_max spans .* use a smaller r_max$"):
             hs.rdf(P, length, box=BOX)
         with pytest.raises(MemoryError, match=r"fit: edges\[-1\] spans .* smaller edges\[-1\]$"):
             hs.pair_histogram(P, [0.0, length], box=BOX)
@@ -105,19 +105,19 @@ def test_too_long_a_length_has_its_own_name():
 @pytest.mark.parametrize("power", [400, 5000])
 def test_large_integers_are_not_written_out(power):
     table = hs.neighbors(P, 0.1)
-    with pytest.raises(MemoryError, match="^k = ") as refused:
+    with pytest.raises(MemoryError, match=r"^k = ") as refused:
         hs.nearest(P, 10**power)
     assert len(str(refused.value)) < 200
-    with pytest.raises(IndexError, match="^row .* of a table of 50 rows") as refused:
+    with pytest.raises(IndexError, match=r"^row .* of a table of 50 rows") as refused:
         table[10**power]
     assert len(str(refused.value)) < 200
-    with pytest.raises(ValueError, match="rows of a slice") as refused:
+    with pytest.raises(ValueError, match=r"rows of a slice") as refused:
         table[:: 10**power]
     assert len(str(refused.value)) < 200
 
 
 def test_integers_that_are_no_float64_are_not_written_out():
-    with pytest.raises(ValueError, match="is not a float64") as refused:
+    with pytest.raises(ValueError, match=r"is not a float64") as refused:
         hs.pairs([[2**1000 + 1]], 1.0)
     assert len(str(refused.value)) < 200
 
@@ -133,6 +133,6 @@ def test_values_in_messages_stand_on_one_line():
         "sort": lambda: hs.pairs(P, 0.1, sort=matrix),
     }
     for name, call in calls.items():
-        with pytest.raises(TypeError, match=f"^{name} must") as refused:
+        with pytest.raises(TypeError, match=rf"^{name} must") as refused:
             call()
         assert "\n" not in str(refused.value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`report` refuses what is no list of names, no number, no kernel, and says which argument it is."""
+"""`report` refuses what is no list of names, no number, no kernel, and names the argument."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ class Gone:
 )
 def test_what_is_no_sequence_of_names(name, value):
     options = {"scenes": [], name: value}
-    with pytest.raises(TypeError, match=f"^{name} must be a sequence of names") as refused:
+    with pytest.raises(TypeError, match=rf"^{name} must be a sequence of names") as refused:
         hs.report(**options)
     assert "\n" not in str(refused.value) and len(str(refused.value)) < 300
     if isinstance(value, Gone):
@@ -32,25 +32,25 @@ def test_what_is_no_sequence_of_names(name, value):
 
 
 def test_unknown_names_are_plain_strings():
-    with pytest.raises(ValueError, match="^there is no scene 'x'; choose from"):
+    with pytest.raises(ValueError, match=r"^there is no scene 'x'; choose from"):
         hs.report(np.array(["x"]))
 
 
 @pytest.mark.parametrize("value", ["x", [1], np.zeros((2, 2)), 1j, object()])
 def test_patience_that_is_no_number(value):
-    with pytest.raises(TypeError, match="^patience must be a positive number of seconds, got"):
+    with pytest.raises(TypeError, match=r"^patience must be a positive number of seconds, got"):
         hs.report([], patience=value)
 
 
 @pytest.mark.parametrize("value", [0.0, -1, float("nan"), float("inf")])
 def test_patience_that_is_not_positive(value):
-    with pytest.raises(ValueError, match="^patience must be a positive number of seconds, got"):
+    with pytest.raises(ValueError, match=r"^patience must be a positive number of seconds, got"):
         hs.report([], patience=value)
 
 
 @pytest.mark.parametrize("value", [5, None, [1], np.zeros((2, 2))])
 def test_sizes_are_strings(value):
-    with pytest.raises(TypeError, match="^size must be a string"):
+    with pytest.raises(TypeError, match=r"^size must be a string"):
         hs.report([], size=value)
 
 
@@ -62,5 +62,5 @@ def test_an_unknown_kernel_is_refused_before_any_scene(monkeypatch, capsys, tmp_
     assert status == 2 and out == "" and not (tmp_path / "out").exists()
     assert err.startswith("halfshell: error: HALFSHELL_KERNEL=nonsense: is not a kernel")
     assert err.count("\n") == 1
-    with pytest.raises(ValueError, match="^HALFSHELL_KERNEL=nonsense: is not a kernel"):
+    with pytest.raises(ValueError, match=r"^HALFSHELL_KERNEL=nonsense: is not a kernel"):
         hs.report(["slab"], methods=["exact"], size="small")

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from halfshell._convert.foreign import is_a, kind_of, shown, told
+from halfshell._convert.lengths import as_number
 from halfshell._machine import unknown_kernel
 
 if TYPE_CHECKING:
@@ -82,8 +84,43 @@ def report(
     """
     from halfshell._report.measure.run import plan_of, run
 
-    plan = plan_of(scenes, methods, peers, size, patience)
+    plan = plan_of(
+        _names(scenes, "scenes"),
+        _names(methods, "methods"),
+        _names(peers, "peers"),
+        _as_string(size),
+        None if patience is None else as_number(
+            patience, "patience", "be a positive number of seconds"
+        ),
+    )  # fmt: skip
     unknown = unknown_kernel()
     if unknown is not None:
         raise ValueError(unknown)
     return run(plan)
+
+
+def _as_string(size: Any) -> str:
+    if not is_a(size, str):
+        raise TypeError(f"size must be a string, got {kind_of(size)}")
+    return str(size)
+
+
+def _names(given: Any, argument: str) -> tuple[str, ...] | None:
+    """Strings, whatever sequence holds them; None where all are meant."""
+    if given is None:
+        return None
+    must = f"{argument} must be a sequence of names"
+    if is_a(given, (str, bytes)):
+        raise TypeError(f"{must}, got the string {shown(given)}")
+    try:
+        names = tuple(given)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise TypeError(
+            f"{must}: {kind_of(given)} raised {kind_of(error)}: {told(error)}"
+        ) from error
+    for k, name in enumerate(names):
+        if not is_a(name, str):
+            raise TypeError(f"{must}, got {argument}[{k}] = {shown(name)}")
+    return names

@@ -193,7 +193,8 @@ class _Each:
         if limit is not None and self.held + needed > float(limit):
             raise MemoryError(
                 f"the result would not fit: {shape[0]} neighbours, joined from rows of different "
-                f"radii, take {gigabytes(self.held + needed)} GB, {gigabytes(limit)} GB are allowed"
+                f"radii, take {gigabytes(self.held + needed)} GB, {float(limit) / 1e9:.3g} GB are "
+                "allowed"
             )
         refuse_unavailable(needed, f"{shape[0]} neighbours of queries with a radius each")
         return np.empty(shape, dtype)

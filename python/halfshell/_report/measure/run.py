@@ -13,9 +13,6 @@ from typing import Any
 import numpy as np
 
 from halfshell import scenes as catalogue
-from halfshell._convert.foreign import is_a, kind_of, shown, told
-from halfshell._convert.lengths import as_number
-from halfshell._convert.options import as_choice
 from halfshell._peers import LIBRARIES, Library
 from halfshell._report.measure import methods
 from halfshell._report.measure.peers import PeerProcess
@@ -84,12 +81,10 @@ def plan_of(
     patience: float | None = None,
 ) -> Plan:
     """Check names; None means all. Raises ValueError with the nearest names."""
-    if patience is not None:
-        must = "be a positive number of seconds"
-        patience = as_number(patience, "patience", must)
-        if not 0.0 < patience < math.inf:
-            raise ValueError(f"patience must {must}, got {patience!r}")
-    as_choice(size, "size", tuple(catalogue.SIZES))
+    if patience is not None and not 0.0 < patience < math.inf:
+        raise ValueError(f"patience must be a positive number of seconds, got {patience!r}")
+    if size not in catalogue.SIZES:
+        raise ValueError(f"size must be one of {', '.join(catalogue.SIZES)}, got {size!r}")
     return Plan(
         _named("scene", scenes, catalogue.names()),
         _named("method", chosen, methods.METHODS),
@@ -102,24 +97,11 @@ def plan_of(
 def _named(kind: str, given: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:
     if given is None:
         return tuple(known)
-    must = f"{kind}s must be a sequence of names"
-    if is_a(given, (str, bytes)):
-        raise TypeError(f"{must}, got the string {shown(given)}")
-    try:
-        names = tuple(given)
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise TypeError(
-            f"{must}: {kind_of(given)} raised {kind_of(error)}: {told(error)}"
-        ) from error
-    for k, name in enumerate(names):
-        if not is_a(name, str):
-            raise TypeError(f"{must}, got {kind}s[{k}] = {shown(name)}")
+    for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=3, cutoff=0.4) or known
-            raise ValueError(f"there is no {kind} {shown(str(name))}; choose from {', '.join(near)}")
-    return tuple(dict.fromkeys(names))
+            raise ValueError(f"there is no {kind} {str(name)!r}; choose from {', '.join(near)}")
+    return tuple(dict.fromkeys(given))
 
 
 def run(plan: Plan, progress: Progress = lambda done, total, text: None) -> list[ReportRow]:
