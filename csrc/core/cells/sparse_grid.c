@@ -70,8 +70,8 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
         grid->skipped[k] = 0;
         if (scene->lattice.row_of_axis[k] >= 0) {
             const double count = floor(fmin(extent / pitch, MOST_PER_PERIOD));
-            /* Cells are range / 4 wide or more, or there is one: then its reach is no more than that
-             * of the dense grid, which has one or more. */
+            /* Cells are range / 4 wide or more, or there is one: then its reach is at most that of
+             * the dense grid, which has one or more. */
             const hs_status status = hs_grid_set_axis(scene, k, fmax(count, 1.0), grid);
             HS_ASSERT(status == HS_OK);
             (void)status;

@@ -9,14 +9,12 @@
  * and become smaller, so that nothing is rounded. Larger numbers are multiples of 4 u, so each is
  * 4 u or more from all others: only which are equal matters, and each follows at the next multiple.
  * So every difference of two coordinates stays what it is to the last bit, or was more than 2 u and
- * is so still. None becomes larger, so all are float64 numbers. This holds wherever drawing
- * together begins, at 2^54 u or before.
+ * is so still. None becomes larger, so all are float64 numbers, wherever drawing together begins.
  *
  * Along a periodic axis of length L, all x lie in [-L/2, L/2] first, and L/2 takes part as one more
  * number. Across the face, the difference of two points is the sum of L/2 - |x| and L/2 - |y|, and
- * each of these stays what it is or more than the cutoff.
- *
- * Queries take part as if they were points: the differences that count are between both.
+ * each of these stays what it is or more than the cutoff. Queries take part as if they were
+ * points: the differences that count are between both.
  *
  * Where scaling loses digits pairs are decided on coordinates and rows that are not scaled. Those
  * that result will do, for the same reason; but S counts the turns that were made here as well, so
@@ -37,8 +35,7 @@
 /* Among the keys: half a box vector. Points are numbers from 0 on, queries from -2 on downwards. */
 #define HALF (-1)
 
-/* Rows with a half beyond this are halved exactly: the last place of the row is twice the smallest
- * number. */
+/* Beyond it the half of a row is exact: the last place is twice the smallest number. */
 #define LEAST_HALF 0x1p-1022
 
 /* How one call condenses. */

@@ -104,48 +104,6 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
     return HS_OK;
 }
 
-/* A period that scaling brought to nothing. */
-static bool
-box_is_vanishing(const hs_lattice *lattice)
-{
-    for (int k = 0; k < lattice->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0 && !(lattice->period[k] > 0x1p-900)) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* Whether a cutoff has more images than any memory holds. */
-static bool
-has_endless_images(const hs_scene *scene, const hs_condensed *condensed)
-{
-    const hs_box_size size = hs_box_size_of(condensed->box);
-    const double      cutoff = condensed->is_scaled ? scene->cutoff : scene->sought;
-    return hs_is_far(cutoff, hs_exponent_of(size.short_row), HS_FAR_IMAGES_EXPONENT);
-}
-
-/* Whether open axes leave nothing of the box, so that the points cannot be in cells. */
-static bool
-no_scale_holds(const hs_scene *scene, const hs_condensed *condensed)
-{
-    const hs_box_size size = hs_box_size_of(condensed->box);
-    return (box_is_vanishing(&scene->lattice) ||
-            hs_open_drowns_box(&scene->cloud, &size, scene->sought)) &&
-           !has_endless_images(scene, condensed);
-}
-
-/* Why there is no search in a box that scaling brought to nothing. */
-static hs_status
-refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, hs_failure *failure)
-{
-    if (!scene->lattice.aligned && !has_endless_images(scene, condensed)) {
-        return HS_ERR_BOX_SKEWED;
-    }
-    failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
-    return HS_ERR_MEMORY;
-}
-
 static hs_status
 wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
             double *magnitude, hs_failure *failure)
@@ -316,7 +274,7 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     if (scene->extreme) {
         restore_rows(condensed, &scene->lattice);
     }
-    if (scene->is_kept && !empty && no_scale_holds(scene, condensed)) {
+    if (scene->is_kept && !empty && hs_scene_has_no_scale(scene, condensed)) {
         hs_scene_put_in_one_cell(scene);
     }
     hs_scene_set_radius(scene, options, hs_scale_apply(scene->pending, scene->cloud.largest));
@@ -327,8 +285,8 @@ fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
     if (asking != NULL) {
         hs_scene_share(scene, asking);
     }
-    return box_is_vanishing(&scene->lattice)
-               ? refuse_vanishing(scene, condensed, failure)
+    return hs_scene_box_vanishes(scene)
+               ? hs_scene_refuse_vanishing(scene, condensed, failure)
                : fill_scene(account, team, options, scene, asking, failure);
 }
 

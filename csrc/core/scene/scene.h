@@ -197,6 +197,17 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
+/* Steps of scene_scale.c once the box is scaled. Whether a period of it has come to nothing. */
+struct hs_condensed;
+bool hs_scene_box_vanishes(const hs_scene *scene);
+
+/* Whether open axes leave nothing of the box, so that the points cannot be in cells. */
+bool hs_scene_has_no_scale(const hs_scene *scene, const struct hs_condensed *condensed);
+
+/* Why there is no search in a box that vanishes: HS_ERR_BOX_SKEWED or HS_ERR_MEMORY. */
+hs_status hs_scene_refuse_vanishing(const hs_scene *scene, const struct hs_condensed *condensed,
+                                    hs_failure *failure);
+
 void hs_scene_free(hs_account *account, hs_scene *scene);
 
 #endif

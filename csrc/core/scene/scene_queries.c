@@ -163,7 +163,8 @@ hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure
     const double     most = most_taken(kept, true);
     double           largest = -1.0;
     hs_cloud         cloud;
-    if (kept->in_one_cell || hs_cloud_load(NULL, NULL, queries, &options, &cloud, failure) != HS_OK) {
+    if (kept->in_one_cell ||
+        hs_cloud_load(NULL, NULL, queries, &options, &cloud, failure) != HS_OK) {
         return;
     }
     for (int64_t i = 0; i < cloud.n; i++) {

@@ -6,6 +6,8 @@
 #include "close_gaps.h"
 #include "unit.h"
 
+#include <math.h>
+
 bool
 hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking, const hs_box_size *size,
                       int unit)
@@ -61,4 +63,45 @@ hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
         scene->cutoff_low -= HS_SCALING_LOSS;
         scene->cutoff += HS_SCALING_LOSS;
     }
+}
+
+bool
+hs_scene_box_vanishes(const hs_scene *scene)
+{
+    const hs_lattice *lattice = &scene->lattice;
+    for (int k = 0; k < lattice->ndim; k++) {
+        if (lattice->row_of_axis[k] >= 0 && !(lattice->period[k] > 0x1p-900)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a cutoff has more images than any memory holds. */
+static bool
+has_endless_images(const hs_scene *scene, const hs_condensed *condensed)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    const double      cutoff = condensed->is_scaled ? scene->cutoff : scene->sought;
+    return hs_is_far(cutoff, hs_exponent_of(size.short_row), HS_FAR_IMAGES_EXPONENT);
+}
+
+bool
+hs_scene_has_no_scale(const hs_scene *scene, const hs_condensed *condensed)
+{
+    const hs_box_size size = hs_box_size_of(condensed->box);
+    return (hs_scene_box_vanishes(scene) ||
+            hs_open_drowns_box(&scene->cloud, &size, scene->sought)) &&
+           !has_endless_images(scene, condensed);
+}
+
+hs_status
+hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed,
+                          hs_failure *failure)
+{
+    if (!scene->lattice.aligned && !has_endless_images(scene, condensed)) {
+        return HS_ERR_BOX_SKEWED;
+    }
+    failure->expected_pairs = failure->expected_bytes = INFINITY; /* of images */
+    return HS_ERR_MEMORY;
 }
