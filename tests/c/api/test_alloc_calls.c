@@ -152,6 +152,14 @@ lists_stay_as_they_were(void)
     hs_test_fail_allocation(1);
     CHECK(hs_verlet_new() == NULL);
     hs_test_fail_allocation(0);
+    hs_test_fail_allocation(-2);
+    hs_verlet *list = hs_verlet_new();
+    CHECK(list != NULL && !hs_test_failure_is_due());
+    CHECK(hs_verlet_new() == NULL && hs_verlet_new() == NULL);
+    hs_test_fail_allocation(-3);
+    CHECK(hs_test_failure_is_due());
+    hs_test_fail_allocation(0);
+    hs_verlet_free(list);
 }
 
 /* So many entries that their rows are found by one walk, in memory that is kept for them. */
