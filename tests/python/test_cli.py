@@ -758,7 +758,7 @@ def test_output_encoding_without_the_unit_sign():
 
 @pytest.mark.skipif(os.name != "posix", reason="named pipes and signals of POSIX")
 def test_ctrl_c_is_one_line_and_status_130(tmp_path):
-    pipe = tmp_path / "points.npy"
+    pipe = tmp_path / "points.xyz"
     os.mkfifo(pipe)
     run = [sys.executable, "-m", "halfshell", "pairs", str(pipe)]
     with subprocess.Popen(
