@@ -191,7 +191,7 @@ def test_lists_without_end():
 
 
 def test_views_too_large_to_convert_are_refused_before_they_are():
-    flat = np.broadcast_to(np.int8(1), (2**31 - 1, 8, 2**20))
+    flat = np.broadcast_to(np.int8(1), (2**31 - 1, 8))
     assert "points" in refusal(MemoryError, hs.pairs, flat, 1.0)
     many = np.broadcast_to(np.float32(1), (2**45,))
     assert "cutoff" in refusal(MemoryError, hs.count_pairs, POINTS, many)

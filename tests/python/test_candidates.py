@@ -47,6 +47,6 @@ def test_candidates_that_are_refused_name_the_query():
         skewed.candidates([[0.0, 0.0], [1000.0, 0.0], [0.0, 9e6], [9e9, 0.0]])
     box = [[1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]]
     far = hs.CellList([[0.1, 0.1, 1e200]], 0.3, box=box, periodic=[True, True, False])
-    with pytest.raises(ValueError, match="points, box and cutoff differ too much in size"):
+    with pytest.raises(ValueError, match="one cell holds everything"):
         far.candidates([[0.1, 0.1, 0.0]])
     assert len(far.query([[0.1, 0.1, 1e200]]).indices) == 1
