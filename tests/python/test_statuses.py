@@ -43,7 +43,7 @@ RAISED = {
     "HS_ERR_ROUNDING": (OverflowError, "points[3] lies so far from the box"),
     "HS_ERR_KERNEL": (ValueError, "kernel must be one of ('scalar',) on this CPU, got"),
     "HS_ERR_INTERRUPTED": (SystemError, "interrupted without an exception"),
-    "HS_ERR_FAR": (ValueError, "queries lie too far from the points and the box"),
+    "HS_ERR_FAR": (ValueError, "queries[3, 1] = 0.5 lies too far from the points and the box"),
     "HS_ERR_CAPACITY": (hs.CapacityError, "out is too small: there are 7 pairs"),
     "HS_ERR_EDGES": (ValueError, "edges must be finite, not negative and ascending, got edges[3]"),
     "HS_ERR_TYPES": (ValueError, "types must be from 0 on, got types[3] = 0.5"),
