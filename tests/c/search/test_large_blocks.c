@@ -62,7 +62,8 @@ any_poll_ends_a_search_of_many_candidates(void)
                 status = search(sorted, threads, &once, &found);
                 CHECK(status == (once.n == nth ? HS_ERR_INTERRUPTED : HS_OK));
             }
-            CHECK(nth > 2 && nth < 200);
+            /* Of two threads the other one, which does not poll, may do the work. */
+            CHECK((nth > 2 || threads > 1) && nth < 200);
             /* 1.5 box lengths: every spot once, half of them twice, and both ends. */
             CHECK(found == (int64_t)(N / SPOTS) * (SPOTS + SPOTS / 2 + 1));
         }
