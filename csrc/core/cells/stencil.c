@@ -120,7 +120,7 @@ static void
 set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, double radius,
           spans *t)
 {
-    for (int k = grid->ndim - 1; k >= 1; k--) {
+    for (int k = 1; k < grid->ndim; k++) {
         const double slack = slack_along(scene, grid, k);
         t->low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
         t->high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
