@@ -3,7 +3,7 @@
  * api_candidates.c: what cells say without a distance test: where points are, which points the
  * cells around a query hold. See halfshell.h.
  */
-#include "call.h"
+#include "request.h"
 #include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
@@ -88,7 +88,7 @@ hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_
     const hs_fpenv saved = hs_fpenv_enter();
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
-    options.cutoff = cells->search.options.cutoff;
+    options.cutoff = cells->call.options.cutoff;
     hs_account_init(&account, &options);
     hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
     if (status == HS_OK) {
@@ -201,7 +201,7 @@ add_queries(range_list *list)
         hs_row       row;
         hs_row_group group;
         if (unpolled >= HS_POLL_POINTS) {
-            if (hs_poll(&search->options, (double)si / (double)asking->n) != HS_OK) {
+            if (hs_poll(&search->call->options, (double)si / (double)asking->n) != HS_OK) {
                 return HS_ERR_INTERRUPTED;
             }
             unpolled = 0;
@@ -265,10 +265,9 @@ find_ranges(hs_pairs *rows, range_list *list, hs_failure *failure)
 
 /* With an open search: room to work in, and the ranges. */
 static hs_status
-list_ranges(hs_pairs *rows, hs_failure *failure)
+list_ranges(hs_search *search, hs_pairs *rows, hs_failure *failure)
 {
-    hs_search    *search = &rows->search;
-    hs_account   *account = &search->account;
+    hs_account   *account = &search->call->account;
     const int64_t n = hs_search_asking(search)->n, n_links = search->stencil.n_rows;
     range_list    list = {.search = search};
     list.links = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.links);
@@ -285,56 +284,61 @@ list_ranges(hs_pairs *rows, hs_failure *failure)
     return status;
 }
 
+/* Why the cells do not serve these queries at this cutoff. */
+static hs_status
+tell_unserved(const hs_cells *cells, const hs_points *queries, double cutoff, hs_failure *failure)
+{
+    *failure = HS_NO_FAILURE;
+    if (cutoff != cells->call.options.cutoff) {
+        failure->value = cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    if (queries != NULL && !cells->search.scene.in_one_cell) {
+        hs_scene_name_refused(&cells->search.scene, queries, failure);
+    }
+    return HS_ERR_FAR;
+}
+
+static hs_status
+find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
+                hs_failure *failure)
+{
+    hs_search search;
+    hs_call  *call = &rows->call;
+    hs_sets   sets = hs_cells_sets(cells, queries, true);
+    sets.is_untested = true;
+    sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
+    hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
+    if (status == HS_OK) {
+        status = hs_search_reuse(&sets, call, &search, failure);
+    }
+    if (status == HS_OK) {
+        const int d = cells->points.ndim;
+        hs_output_init(&call->account, d, HS_WANT_I | HS_WANT_J, 8, &rows->output);
+        hs_output_init(&call->account, d, HS_WANT_I, 8, &rows->offsets);
+        status = list_ranges(&search, rows, failure);
+        hs_search_close(&search);
+    } else if (status == HS_STATUS_END) {
+        status = tell_unserved(cells, queries, call->options.cutoff, failure);
+    }
+    if (status != HS_OK) {
+        failure->limit_bytes = status == HS_ERR_MEMORY ? call->account.limit : 0.0;
+    }
+    return status;
+}
+
 hs_status
 hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
                     hs_pairs **result, hs_failure *failure)
 {
-    hs_sets    sets = hs_cells_sets(cells, queries, true);
-    hs_failure ignored;
     if (!hs_can_return(result, options) || cells == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    sets.is_untested = true;
-    sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_pairs *rows = hs_pairs_new();
     if (rows == NULL) {
         return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
-    hs_search     *search = &rows->search;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status status = hs_check_arguments(&cells->points, queries, NULL, options, failure);
-    if (status == HS_OK) {
-        status = hs_search_reuse(&sets, options, search, failure);
-    } else {
-        hs_search_begin(options, search); /* for hs_pairs_free */
-        hs_search_report(search, 0);
-    }
-    if (status == HS_OK) {
-        hs_output_init(&search->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8,
-                       &rows->output);
-        hs_output_init(&search->account, cells->points.ndim, HS_WANT_I, 8, &rows->offsets);
-        status = list_ranges(rows, failure);
-        hs_search_report(search, 0);
-        hs_search_close(search);
-    } else if (status == HS_STATUS_END) {
-        hs_search_begin(options, search); /* for hs_pairs_free */
-        hs_search_report(search, 0);
-        *failure = HS_NO_FAILURE;
-        status = options->cutoff == cells->search.options.cutoff ? HS_ERR_FAR : HS_ERR_CUTOFF;
-        if (status == HS_ERR_CUTOFF) {
-            failure->value = options->cutoff;
-        } else if (queries != NULL && !cells->search.scene.in_one_cell) {
-            hs_scene_name_refused(&cells->search.scene, queries, failure);
-        }
-    }
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        failure->limit_bytes = status == HS_ERR_MEMORY ? search->account.limit : 0.0;
-        hs_pairs_free(rows);
-        return status;
-    }
-    *result = rows;
-    return HS_OK;
+    failure = hs_call_enter(options, failure, &rows->call);
+    const hs_status status = find_candidates(cells, queries, rows, failure);
+    return hs_pairs_finish(rows, status, 0, result);
 }

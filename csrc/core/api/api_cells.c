@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
-#include "call.h"
+#include "request.h"
 #include "api_cells.h"
-#include "../base/fpenv.h"
 #include "../base/poll.h"
 #include "api_stream.h"
 #include "api_visit.h"
@@ -33,7 +32,7 @@ static hs_status
 keep_points(const hs_points *points, hs_cells *cells)
 {
     const int64_t width = points->ndim * (int64_t)sizeof(double);
-    cells->copy = hs_alloc(&cells->search.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
+    cells->copy = hs_alloc(&cells->call.account, HS_FOR_ORIGINALS, points->n, (size_t)width);
     if (cells->copy == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -63,8 +62,9 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
             hs_failure *failure)
 {
     const hs_options of_cells = options_of_cells(options);
-    hs_search       *search = &cells->search;
-    hs_search_begin(&of_cells, search);
+    hs_call         *call = &cells->call;
+    failure = hs_call_enter(&of_cells, failure, call);
+    hs_search_begin(call, &cells->search);
     hs_status status = hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL,
                                           &of_cells, failure);
     if (status == HS_OK) {
@@ -73,19 +73,18 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     if (status == HS_OK) {
         /* Pairs are for later calls to keep, or only to count. */
         const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
-        search->team = hs_team_create(hs_search_threads(points->n, options));
-        status = hs_search_build(&sets, cells->has_box ? &cells->box : NULL, search, failure);
-        hs_team_free(search->team);
-        search->team = NULL;
+        hs_call_gather(call, points->n);
+        status = hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search,
+                                 failure);
+    }
+    if (status == HS_OK && cells->trees == NULL) {
+        status = HS_ERR_MEMORY;
     }
     if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = search->account.limit;
+        failure->limit_bytes = call->account.limit;
     }
-    /* What they point to is the caller's again. */
-    hs_search_report(search, 0);
-    search->options.poll = NULL;
-    search->options.counters = NULL;
-    search->options.kernel = NULL;
+    hs_call_leave(call, 0);
+    hs_call_detach(call);
     return status;
 }
 
@@ -93,15 +92,12 @@ hs_status
 hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *options,
                hs_cells **result, hs_failure *failure)
 {
-    hs_failure ignored;
     if (result != NULL) {
         *result = NULL;
     }
     if (!hs_can_begin(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
     hs_cells *cells = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *cells);
     if (cells == NULL) {
         return hs_end_early(HS_ERR_MEMORY, options, failure);
@@ -112,12 +108,7 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
     if (box != NULL) {
         cells->box = *box;
     }
-    const hs_fpenv  saved = hs_fpenv_enter();
-    hs_status       status = build_cells(points, options, cells, failure);
-    if (status == HS_OK && cells->trees == NULL) {
-        status = HS_ERR_MEMORY;
-    }
-    hs_fpenv_leave(saved);
+    const hs_status status = build_cells(points, options, cells, failure);
     if (status != HS_OK) {
         hs_cells_free(cells);
         return status;
@@ -133,8 +124,8 @@ hs_cells_free(hs_cells *cells)
         return;
     }
     hs_search_close(&cells->search);
-    hs_free(&cells->search.account, cells->copy);
-    hs_account_close(&cells->search.account);
+    hs_free(&cells->call.account, cells->copy);
+    hs_account_close(&cells->call.account);
     hs_near_kept_free(cells->trees);
     hs_free(NULL, cells);
 }

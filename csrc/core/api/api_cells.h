@@ -7,6 +7,7 @@
 #include "../collect/result.h"
 
 struct hs_cells {
+    hs_call   call;   /* that built them; its account holds them */
     hs_search search; /* open, never walked itself: calls borrow from it */
     hs_points points; /* of `copy` */
     hs_box    box;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_histogram.c: the public histogram of all pairs, which stores none of them. */
-#include "call.h"
+#include "request.h"
 #include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
@@ -74,7 +74,7 @@ static hs_status
 open_plan(hs_search *search, const hs_histogram *histogram, hs_tally_plan *plan,
           hs_failure *failure)
 {
-    hs_account *account = &search->account;
+    hs_account *account = &search->call->account;
     plan->account = account;
     plan->has_types = histogram->n_types > 1;
     plan->n_types = histogram->n_types;
@@ -159,9 +159,9 @@ static hs_status
 count_pairs(hs_search *search, const hs_tally_plan *plan, const hs_histogram *histogram,
             int64_t *n_pairs, hs_failure *failure)
 {
-    const int        n = hs_team_size(search->team);
+    const int        n = hs_team_size(search->call->team);
     const int32_t    capacity = hs_walker_capacity(search);
-    hs_account      *account = &search->account;
+    hs_account      *account = &search->call->account;
     hs_tally        *tallies = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(hs_tally));
     hs_status        status = tallies != NULL ? HS_OK : HS_ERR_MEMORY;
     int              opened = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_nearest.c: the public searches for the k nearest points: trees, then groups
  * (nearest_search.h). */
-#include "call.h"
+#include "request.h"
 #include "../base/fpenv.h"
 #include "../nearest/nearest_prepare.h"
 #include "../nearest/nearest_search.h"
@@ -20,7 +20,7 @@ make_room(hs_near *near, int64_t n_asking, hs_failure *failure)
     }
     failure->expected_pairs = n;
     failure->expected_bytes = n * (double)hs_output_bytes_per_pair(near->rows);
-    failure->limit_bytes = near->search->account.limit;
+    failure->limit_bytes = near->search->call->account.limit;
     return HS_ERR_MEMORY;
 }
 
@@ -29,19 +29,19 @@ find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *
 {
     hs_search    *search = near->search;
     const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
-    const double  limit = search->options.cutoff;
+    const double  limit = search->call->options.cutoff;
     hs_status     status = make_room(near, n_asking, failure);
     if (status == HS_OK) {
         status = hs_near_prepare(near, sets, box, limit, failure);
     }
     if (status == HS_OK) { /* rows are written in the order of the tree */
-        status = hs_touch_output(search->team, &search->options, near->rows);
+        status = hs_touch_output(search->call->team, &search->call->options, near->rows);
     }
     if (status == HS_OK) {
         status = hs_near_search(near, failure);
     }
     if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = search->account.limit;
+        failure->limit_bytes = search->call->account.limit;
     }
     hs_near_release(near);
     hs_search_close(search);
@@ -68,44 +68,34 @@ hs_status
 hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_options *options,
                    hs_pairs **result, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_sets    sets = *among;
+    hs_search search;
+    hs_sets   sets = *among;
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
     hs_pairs *rows = hs_pairs_new();
     if (rows == NULL) {
         return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     sets.is_plain = sets.is_wide = true;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_options     of_rows = *options;
+    hs_options of_rows = *options;
     of_rows.sorted = false;
     of_rows.out = NULL;
     of_rows.precision = HS_EXACT;
     of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    hs_search_begin(&of_rows, &rows->search);
-    hs_near near = {.search = &rows->search,
+    failure = hs_call_enter(&of_rows, failure, &rows->call);
+    hs_search_begin(&rows->call, &search);
+    hs_near near = {.search = &search,
                     .k = k,
                     .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
                     .omits_self = sets.queries == NULL,
                     .rows = &rows->output};
     hs_status status = check_nearest(&sets, box, k, &of_rows, failure);
     if (status == HS_OK) {
-        hs_output_init(&rows->search.account, sets.points->ndim, of_rows.want,
-                       options->index_bytes, &rows->output);
+        hs_pairs_open(rows, sets.points->ndim);
         status = find_nearest(&near, &sets, box, failure);
     }
-    hs_search_report(&rows->search, rows->output.n_pairs);
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(rows);
-        return status;
-    }
-    *result = rows;
-    return HS_OK;
+    return hs_pairs_finish(rows, status, rows->output.n_pairs, result);
 }
 
 hs_status

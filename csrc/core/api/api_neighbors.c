@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_neighbors.c: the public searches for all neighbours of each point, or of each query. */
-#include "call.h"
+#include "request.h"
 #include "../search/estimate.h"
 #include "../search/walk.h"
 #include "../rows/once.h"
@@ -49,19 +49,18 @@ find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
         status = make_room(rows, table->offsets[hs_search_asking(search)->n], failure);
     }
     if (status == HS_OK) {
-        status = hs_touch_output(search->team, &search->options, &rows->output);
+        status = hs_touch_output(search->call->team, &search->call->options, &rows->output);
     }
     return status == HS_OK ? hs_table_fill(table, failure) : status;
 }
 
 /* A hs_fill_fn. */
 static hs_status
-find_rows(hs_pairs *rows, hs_failure *failure)
+find_rows(hs_search *search, hs_pairs *rows, hs_failure *failure)
 {
-    hs_search    *search = &rows->search;
     const int64_t n = hs_search_asking(search)->n;
     hs_table      table = {.search = search, .entries = &rows->output};
-    hs_output_init(&search->account, search->scene.ndim, HS_WANT_I, 8, &rows->offsets);
+    hs_output_init(&search->call->account, search->scene.ndim, HS_WANT_I, 8, &rows->offsets);
     hs_status     status = hs_estimate_by_sample(search, failure);
     if (status == HS_OK) {
         status = hs_output_reserve(&rows->offsets, n + 1, 0.0);

@@ -2,7 +2,7 @@
 /* api_pairs.c: the public searches: find and count. */
 #include "../../halfshell.h"
 
-#include "call.h"
+#include "request.h"
 #include "../search/estimate.h"
 #include "../collect/crew.h"
 #include "../collect/record.h"
@@ -30,13 +30,13 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
     hs_status   status = hs_walker_init(search, hs_record_use(output->columns), hs_record_hits,
                                         &recorder, &walker);
     if (status == HS_OK) {
-        status = hs_recorder_init(&search->account, output, walker.scanner.block.most_hits,
+        status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits,
                                   &recorder);
     }
     if (status == HS_OK) {
         status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);
     }
-    hs_recorder_free(&search->account, &recorder);
+    hs_recorder_free(&search->call->account, &recorder);
     hs_walker_close(search, &walker);
     return status;
 }
@@ -49,7 +49,7 @@ record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
         return hs_parallel_record(search, output, failure);
     }
     hs_output_expect(output, search->grid.expected_pairs);
-    return search->team != NULL ? hs_parallel_record(search, output, failure)
+    return search->call->team != NULL ? hs_parallel_record(search, output, failure)
                                 : record_alone(search, output, failure);
 }
 
@@ -58,10 +58,10 @@ static hs_status
 sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_output found;
-    hs_output_init(&search->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
+    hs_output_init(&search->call->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
     hs_status status = record_pairs(search, &found, failure);
     if (status == HS_OK) {
-        status = hs_sort_pairs(search, &found, output);
+        status = hs_sort_pairs(search->call, search->first_point, search->scene.n, &found, output);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (double)found.n_pairs;
@@ -72,15 +72,14 @@ sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 
 /* A hs_fill_fn. */
 static hs_status
-fill_pairs(hs_pairs *pairs, hs_failure *failure)
+fill_pairs(hs_search *search, hs_pairs *pairs, hs_failure *failure)
 {
-    hs_search *search = &pairs->search;
     hs_output *output = &pairs->output;
     hs_status  status = hs_estimate_by_sample(search, failure);
     if (status != HS_OK) {
         return status;
     }
-    if (search->options.sorted) {
+    if (search->call->options.sorted) {
         status = sort_pairs(search, output, failure);
     } else {
         status = record_pairs(search, output, failure);

@@ -2,7 +2,7 @@
 /* api_plan.c: what a search of a scene would do, read off the same structures that would do it. */
 #include "../../halfshell.h"
 
-#include "call.h"
+#include "request.h"
 
 static void
 fill_plan(const hs_search *search, hs_plan *plan)
@@ -18,8 +18,8 @@ fill_plan(const hs_search *search, hs_plan *plan)
                       .all_pairs = grid->n_cells == 1,
                       .stencil_rows = search->stencil.n_rows,
                       .expected_pairs = grid->expected_pairs,
-                      .threads = hs_team_size(search->team),
-                      .kernel = search->kernel->name};
+                      .threads = hs_team_size(search->call->team),
+                      .kernel = search->call->kernel->name};
     for (int k = 0; k < scene->ndim; k++) {
         plan->shape[k] = grid->shape[k];
         plan->cell_size[k] = grid->cell_size[k] * unscale;

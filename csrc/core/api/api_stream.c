@@ -2,7 +2,7 @@
 /* api_stream.c: see api_stream.h. */
 #include "api_stream.h"
 
-#include "call.h"
+#include "request.h"
 #include "../base/fpenv.h"
 #include "../collect/result.h"
 #include "../collect/crew.h"
@@ -18,7 +18,8 @@
 #define MOST_EXPECTED 0x1p24
 
 struct hs_stream {
-    hs_search   search;    /* open, with a team only while it is walked */
+    hs_call     call;      /* that opened it; it has threads only while it looks for pairs */
+    hs_search   search;    /* open */
     hs_output   held;      /* pairs from `begin` on wait to be handed out */
     int64_t     begin;
     int64_t     max_pairs;
@@ -44,7 +45,7 @@ is_over(const hs_stream *stream)
 static void
 open_output(const hs_stream *stream, hs_account *account, hs_output *output)
 {
-    const hs_options *options = &stream->search.options;
+    const hs_options *options = &stream->call.options;
     hs_output_init(account, stream->search.scene.ndim, options->want, options->index_bytes,
                    output);
 }
@@ -72,7 +73,7 @@ static hs_status
 move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 {
     const double expected = fmin((double)fill_of(stream), stream->search.grid.expected_pairs);
-    open_output(stream, &stream->search.account, moved);
+    open_output(stream, &stream->call.account, moved);
     hs_output_expect(moved, fmin(expected, MOST_EXPECTED));
     const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
     if (status != HS_OK) {
@@ -97,16 +98,15 @@ fill(hs_stream *stream, hs_failure *failure)
         stream->begin = 0;
     }
     const int64_t before = stream->held.n_pairs;
-    search->team = hs_team_create(hs_search_threads(search->bins.n, &search->options));
+    hs_call_gather(search->call, search->bins.n);
     const hs_status status = hs_parallel_record_on(search, &stream->held, fill_of(stream),
                                                    &stream->next, failure);
-    hs_team_free(search->team);
-    search->team = NULL;
+    hs_call_dismiss(search->call);
     if (status != HS_OK) {
         stream->held.n_pairs = before;
         return status;
     }
-    return hs_poll(&search->options,
+    return hs_poll(&search->call->options,
                    (double)stream->next.point / (double)hs_search_asking(search)->n);
 }
 
@@ -149,7 +149,7 @@ take_block(hs_stream *stream, hs_pairs **result)
     if (block == NULL) {
         return HS_ERR_MEMORY;
     }
-    memset(&block->search.account, 0, sizeof block->search.account);
+    block->call.account = (hs_account){.arena = NULL}; /* what is held is not charged to it */
     /* What is held becomes the block where that leaves less to be copied. */
     const bool      gives = stream->begin == 0 && waiting(stream) - n < n;
     const hs_status status = gives ? give_away(stream, n, &block->output)
@@ -189,7 +189,7 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     hs_status      status = HS_OK;
     stream->poll = poll;
     stream->context = context;
-    hs_search_set_poll(poll != NULL ? tell : NULL, stream, &stream->search);
+    hs_call_set_poll(poll != NULL ? tell : NULL, stream, &stream->call);
     while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_over(stream)) {
         status = fill(stream, failure);
     }
@@ -197,9 +197,9 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
         status = take_block(stream, block);
     }
     if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = stream->search.account.limit;
+        failure->limit_bytes = stream->call.account.limit;
     }
-    hs_search_set_poll(NULL, NULL, &stream->search);
+    hs_call_set_poll(NULL, NULL, &stream->call);
     hs_fpenv_leave(saved);
     return status;
 }
@@ -219,37 +219,31 @@ hs_status
 hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
                   int64_t max_pairs, hs_stream **result, hs_failure *failure)
 {
-    hs_sets    of_pairs = *sets;
-    hs_failure ignored;
+    hs_sets of_pairs = *sets;
     if (result != NULL) {
         *result = NULL;
     }
     if (!hs_can_begin(result, options) || max_pairs < 1) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
     of_pairs.keeps_none = true;
     const hs_options of_stream = options_of_stream(options);
     const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_stream};
     hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
-        return HS_ERR_MEMORY;
+        return hs_end_early(HS_ERR_MEMORY, NULL, failure);
     }
-    hs_search      *search = &stream->search;
-    const hs_fpenv  saved = hs_fpenv_enter();
-    const hs_status status = hs_request_open(&request, search, failure);
-    hs_fpenv_leave(saved);
+    hs_call *call = &stream->call;
+    failure = hs_call_enter(&of_stream, failure, call);
+    const hs_status status = hs_request_open(&request, call, &stream->search, failure);
+    hs_call_leave(call, 0);
+    hs_call_detach(call);
     if (status != HS_OK) {
-        hs_account_close(&search->account);
+        hs_account_close(&call->account);
         hs_free(NULL, stream);
         return status;
     }
-    hs_team_free(search->team); /* threads last for a call only */
-    search->team = NULL;
-    search->options.kernel = NULL; /* it is chosen, and its name is the caller's again */
-    hs_search_set_poll(NULL, NULL, search);
-    open_output(stream, &search->account, &stream->held);
+    open_output(stream, &call->account, &stream->held);
     stream->begin = 0;
     stream->max_pairs = max_pairs;
     stream->next = (hs_bookmark){.point = 0};
@@ -274,6 +268,6 @@ hs_stream_free(hs_stream *stream)
     }
     hs_output_free(&stream->held);
     hs_search_close(&stream->search);
-    hs_account_close(&stream->search.account);
+    hs_account_close(&stream->call.account);
     hs_free(NULL, stream);
 }

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_systems.c: the public searches of many systems: find and count. Threads take ranges of
  * them. */
-#include "call.h"
+#include "request.h"
 #include "../search/estimate.h"
-#include "../base/fpenv.h"
 #include "../collect/result.h"
 #include "../base/poll.h"
 #include "systems_thread.h"
@@ -16,10 +15,10 @@
 
 /* `total` has the account of the output and sums up what was done. */
 static hs_status
-run_crew(hs_systems_crew *crew, hs_team *team, hs_search *total, hs_failure *failure)
+run_crew(hs_systems_crew *crew, hs_call *total, hs_failure *failure)
 {
     const hs_options *options = &total->options;
-    const int         n_workers = hs_team_size(team);
+    const int         n_workers = hs_team_size(total->team);
     const int64_t     n_systems = crew->systems->n, n_points = crew->points->n;
     const int64_t     in_range = RANGE_POINTS * n_systems / (n_points + 1);
     crew->in_range = in_range > 1 ? in_range : 1;
@@ -33,7 +32,7 @@ run_crew(hs_systems_crew *crew, hs_team *team, hs_search *total, hs_failure *fai
         hs_systems_open_worker(crew, options, &crew->workers[w]);
     }
     if (crew->workers != NULL && crew->commits != NULL) {
-        hs_team_run(team, n_workers, hs_systems_work, crew);
+        hs_team_run(total->team, n_workers, hs_systems_work, crew);
         status = HS_OK;
     }
     for (int w = 0; w < n_workers && crew->workers != NULL; w++) {
@@ -84,7 +83,7 @@ share_limit(hs_options *options, int n_threads)
 
 /* What a search that was refused memory would have taken, all systems together. */
 static void
-tell_shortage(const hs_systems_crew *crew, const hs_search *total, hs_failure *failure)
+tell_shortage(const hs_systems_crew *crew, const hs_call *total, hs_failure *failure)
 {
     hs_shortage shortage = {0.0, 0.0};
     for (int64_t s = 0; s < crew->systems->n; s++) {
@@ -100,17 +99,16 @@ tell_shortage(const hs_systems_crew *crew, const hs_search *total, hs_failure *f
 
 /* Both functions once all is checked. `total`: where the account and the counts are kept. */
 static hs_status
-search_systems(hs_systems_crew *crew, hs_search *total, hs_failure *failure)
+search_systems(hs_systems_crew *crew, hs_call *total, hs_failure *failure)
 {
     const hs_options *options = &total->options;
     hs_status         status = HS_OK;
     if (crew->systems->n > 0) {
-        const int n_threads = hs_search_threads(crew->points->n, options);
+        const int n_threads = hs_call_threads(crew->points->n, options);
         const int most = crew->systems->n < n_threads ? (int)crew->systems->n : n_threads;
-        hs_team  *team = hs_team_create(most);
-        share_limit(&total->options, hs_team_size(team));
-        status = run_crew(crew, team, total, failure);
-        hs_team_free(team);
+        total->team = hs_team_create(most);
+        share_limit(&total->options, hs_team_size(total->team));
+        status = run_crew(crew, total, failure);
     }
     if (status == HS_ERR_MEMORY) {
         const double found = crew->output != NULL ? (double)crew->output->n_pairs : 0.0;
@@ -124,59 +122,39 @@ hs_status
 hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_options *options,
                 hs_pairs **result, hs_failure *failure)
 {
-    hs_failure ignored;
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
     hs_pairs *pairs = hs_pairs_new();
     if (pairs == NULL) {
         return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_search     *total = &pairs->search;
-    hs_output     *output = &pairs->output;
-    hs_systems_crew crew = {.points = points, .systems = systems, .output = output};
-    hs_search_begin(options, total);
+    hs_systems_crew crew = {.points = points, .systems = systems, .output = &pairs->output};
+    failure = hs_call_enter(options, failure, &pairs->call);
     hs_status status = check_shared(points, systems, options, failure);
     if (status == HS_OK) {
-        hs_output_init(&total->account, points->ndim, options->want, options->index_bytes, output);
-        if (options->out != NULL) {
-            hs_output_fix(output, options->out);
-        }
-        status = search_systems(&crew, total, failure);
-        status = hs_pairs_conclude(output, status, failure);
+        hs_pairs_open(pairs, points->ndim);
+        status = search_systems(&crew, &pairs->call, failure);
+        status = hs_pairs_conclude(&pairs->output, status, failure);
     }
-    hs_search_report(total, output->n_pairs);
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(pairs);
-        return status;
-    }
-    *result = pairs;
-    return HS_OK;
+    return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
 }
 
 hs_status
 hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_options *options,
                  int64_t *counts, hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_search  total;
+    hs_call         total;
     hs_systems_crew crew = {.points = points, .systems = systems, .counts = counts};
-    int64_t    found = 0;
+    int64_t         found = 0;
     if (options == NULL || (counts == NULL && systems != NULL && systems->n > 0)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
     hs_options counting = *options;
     counting.want = 0;
     counting.sorted = false;
     counting.out = NULL;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_search_begin(&counting, &total);
+    failure = hs_call_enter(&counting, failure, &total);
     hs_status status = check_shared(points, systems, &counting, failure);
     if (status == HS_OK) {
         status = search_systems(&crew, &total, failure);
@@ -184,8 +162,7 @@ hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_op
     for (int64_t s = 0; status == HS_OK && s < systems->n; s++) {
         found += counts[s];
     }
-    hs_search_report(&total, found);
+    hs_call_leave(&total, found);
     hs_account_close(&total.account);
-    hs_fpenv_leave(saved);
     return status;
 }

@@ -3,7 +3,7 @@
 #include "../verlet/pair_list.h"
 #include "../verlet/recheck.h"
 
-#include "call.h"
+#include "request.h"
 #include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../memory/account.h"
@@ -178,28 +178,18 @@ hs_status
 hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **result,
                hs_failure *failure)
 {
-    hs_failure ignored;
     if (!hs_can_return(result, options) || list == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_options     of_list = *options;
+    hs_options of_list = *options;
     of_list.cutoff = list->cutoff;
     of_list.precision = HS_EXACT;
     hs_status status = hs_check_options(&of_list);
     hs_pairs *pairs = status == HS_OK ? hs_pairs_new() : NULL;
     if (pairs == NULL) {
-        status = hs_end_early(status == HS_OK ? HS_ERR_MEMORY : status, options, failure);
-    } else {
-        status = hs_recheck_find(list, &of_list, pairs, failure);
+        return hs_end_early(status == HS_OK ? HS_ERR_MEMORY : status, options, failure);
     }
-    hs_fpenv_leave(saved);
-    if (status != HS_OK) {
-        hs_pairs_free(pairs);
-        return status;
-    }
-    *result = pairs;
-    return HS_OK;
+    failure = hs_call_enter(&of_list, failure, &pairs->call);
+    status = hs_recheck_find(list, pairs, failure);
+    return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
 }

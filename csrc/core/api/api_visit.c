@@ -2,7 +2,7 @@
 /* api_visit.c: see api_visit.h. */
 #include "api_visit.h"
 
-#include "call.h"
+#include "request.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
@@ -74,13 +74,13 @@ open_visitor(hs_search *search, const hs_visit *visit, visitor *doing)
 {
     *doing = (visitor){.visit = visit};
     hs_output_init(NULL, search->scene.ndim, WANTED, sizeof(int64_t), &doing->part);
-    return hs_recorder_init(&search->account, &doing->part, HS_MOST_HITS, &doing->recorder);
+    return hs_recorder_init(&search->call->account, &doing->part, HS_MOST_HITS, &doing->recorder);
 }
 
 static void
 close_visitor(hs_search *search, visitor *doing)
 {
-    hs_recorder_free(&search->account, &doing->recorder);
+    hs_recorder_free(&search->call->account, &doing->recorder);
     hs_output_free(&doing->part);
 }
 
@@ -88,8 +88,8 @@ close_visitor(hs_search *search, visitor *doing)
 static hs_status
 visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
 {
-    const int n_threads = hs_team_size(search->team);
-    visitor  *visitors = hs_alloc(&search->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
+    const int n_threads = hs_team_size(search->call->team);
+    visitor  *visitors = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
     hs_status status = visitors != NULL ? HS_OK : HS_ERR_MEMORY;
     int       opened = 0;
     while (status == HS_OK && opened < n_threads) {
@@ -107,7 +107,7 @@ visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failu
         *n_visited += visitors[--opened].n_visited;
         close_visitor(search, &visitors[opened]);
     }
-    hs_free(&search->account, visitors);
+    hs_free(&search->call->account, visitors);
     return status == STOPPED ? HS_OK : status;
 }
 
@@ -123,8 +123,7 @@ visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
 {
     const visiting *doing = context;
     if (!doing->visit->thread_safe) { /* threads only make the search ready */
-        hs_team_free(search->team);
-        search->team = NULL;
+        hs_call_dismiss(search->call);
     }
     const hs_status status = visit_all(search, doing->visit, n_pairs, failure);
     *doing->n_visited = *n_pairs;

@@ -45,7 +45,7 @@ build_system(hs_systems_worker *worker, int64_t s)
     hs_points              points;
     const hs_box          *box = hs_systems_take(crew, s, &points, &worker->box);
     if (systems->cutoffs != NULL) {
-        worker->search.options.cutoff = systems->cutoffs[s];
+        worker->call.options.cutoff = systems->cutoffs[s];
     }
     const hs_status status = hs_search_build(&(hs_sets){.points = &points}, box, &worker->search,
                                              &worker->failure);
@@ -95,12 +95,12 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
     if (status != HS_OK) {
         return status;
     }
-    status = hs_recorder_init(&search->account, output, walker.scanner.block.most_hits, recorder);
+    status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits, recorder);
     if (status == HS_OK) {
         status = hs_walk(&walker, 0, (int32_t)search->bins.n);
     }
     note_walk(worker, &walker, status);
-    hs_recorder_free(&search->account, recorder);
+    hs_recorder_free(&search->call->account, recorder);
     hs_walker_close(search, &walker);
     return status;
 }
@@ -114,12 +114,13 @@ sort_system(hs_systems_worker *worker)
     const unsigned columns = hs_sort_columns(search);
     if (found->columns != columns) { /* systems with images need more of them */
         hs_output_free(found);
-        hs_output_init(&search->account, search->scene.ndim, columns, 4, found);
+        hs_output_init(&search->call->account, search->scene.ndim, columns, 4, found);
     }
     found->n_pairs = 0;
     hs_status status = record_system(worker, found, hs_record_hits, &worker->backlog.recorder);
     if (status == HS_OK) {
-        status = hs_sort_pairs(search, found, worker->target);
+        status = hs_sort_pairs(search->call, search->first_point, search->scene.n, found,
+                               worker->target);
     }
     if (status == HS_ERR_MEMORY) {
         worker->failure.expected_pairs = (double)found->n_pairs;
@@ -134,7 +135,7 @@ find_system(hs_systems_worker *worker)
     if (status != HS_OK) {
         return status;
     }
-    if (worker->search.options.sorted) {
+    if (worker->call.options.sorted) {
         return sort_system(worker);
     }
     return worker->crew->is_direct
@@ -151,7 +152,7 @@ search_system(hs_systems_worker *worker, int64_t s)
         status = worker->crew->output == NULL ? count_system(worker, s) : find_system(worker);
     }
     hs_search_close(search);
-    hs_account_reset(&search->account);
+    hs_account_reset(&search->call->account);
     if (status != HS_OK) {
         worker->failure.system = s;
         return status;
@@ -160,7 +161,7 @@ search_system(hs_systems_worker *worker, int64_t s)
     if (worker->work > POLL_WORK) {
         const hs_systems_crew *crew = worker->crew;
         worker->work = 0;
-        status = hs_poll(&search->options,
+        status = hs_poll(&search->call->options,
                          (double)crew->systems->first[s + 1] / (double)crew->points->n);
     }
     return status;
@@ -196,11 +197,9 @@ hs_systems_work(void *context, int64_t task)
 {
     hs_systems_crew   *crew = context;
     hs_systems_worker *worker = &crew->workers[task];
-    hs_commits_join(crew->commits, &worker->options, &worker->backlog.pairs, &worker->committer);
-    hs_search_begin(&worker->options, &worker->search);
-    /* What asks the caller has been made to count already; the rest is not to be counted. */
-    worker->search.options.poll = worker->options.poll;
-    worker->search.options.poll_context = worker->options.poll_context;
+    hs_commits_join(crew->commits, &worker->call.options, &worker->backlog.pairs,
+                    &worker->committer);
+    hs_search_begin(&worker->call, &worker->search);
     hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
 }
 
@@ -209,7 +208,8 @@ hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options, hs_syst
 {
     memset(worker, 0, sizeof *worker);
     worker->crew = crew;
-    worker->options = *options;
+    hs_call_begin(options, &worker->call);
+    worker->call.options = *options; /* their poll counts already, for the call as a whole */
     worker->failure = HS_NO_FAILURE;
     if (crew->systems->box != NULL) {
         worker->box = *crew->systems->box;
@@ -221,12 +221,12 @@ hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options, hs_syst
 }
 
 void
-hs_systems_close_worker(hs_systems_worker *worker, hs_search *total)
+hs_systems_close_worker(hs_systems_worker *worker, hs_call *total)
 {
-    hs_account *account = &worker->search.account;
+    hs_account *account = &worker->call.account;
     hs_backlog_free(account, &worker->backlog);
     hs_output_free(&worker->found);
-    hs_search_note(total, &worker->search.walked);
+    hs_call_note(total, &worker->call.done);
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += account->total.bytes[p];
     }

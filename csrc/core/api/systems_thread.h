@@ -14,7 +14,7 @@ typedef struct hs_systems_crew hs_systems_crew;
 /* What one thread works with. */
 typedef struct hs_systems_worker {
     hs_systems_crew *crew;
-    hs_options       options; /* the caller's, with this thread's poll */
+    hs_call          call;    /* with this thread's poll */
     hs_committer     committer;
     hs_search        search;  /* of one system after the other */
     hs_box           box;     /* of the present system, where each has its own */
@@ -48,6 +48,6 @@ void hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options,
 void hs_systems_work(void *crew, int64_t worker);
 
 /* Adds what the worker did to `total`, and frees what it has. */
-void hs_systems_close_worker(hs_systems_worker *worker, hs_search *total);
+void hs_systems_close_worker(hs_systems_worker *worker, hs_call *total);
 
 #endif

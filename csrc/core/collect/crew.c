@@ -112,7 +112,7 @@ open_worker(hs_crew *crew, int w)
     hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns),
                                       hs_backlog_hits, &worker->backlog, &worker->walker);
     if (status == HS_OK) {
-        status = hs_recorder_init(&search->account, &worker->backlog.pairs,
+        status = hs_recorder_init(&search->call->account, &worker->backlog.pairs,
                                   worker->walker.scanner.block.most_hits,
                                   &worker->backlog.recorder);
     }
@@ -125,7 +125,7 @@ limit_crew(const hs_crew *crew)
 {
     const int64_t bytes = hs_output_bytes_per_pair(crew->output);
     const int64_t slack =
-        hs_team_size(crew->search->team) * (int64_t)HS_COMMIT_BYTES / (bytes > 0 ? bytes : 1);
+        hs_team_size(crew->search->call->team) * (int64_t)HS_COMMIT_BYTES / (bytes > 0 ? bytes : 1);
     const bool    is_bounded = crew->enough <= INT64_MAX - slack;
     hs_commits_limit(crew->commits, crew->enough,
                      is_bounded ? crew->enough + slack : INT64_MAX);
@@ -137,19 +137,19 @@ run_crew(hs_crew *crew, hs_failure *failure)
     hs_search    *search = crew->search;
     const int64_t n = hs_search_asking(search)->n, n_left = n - crew->start.point;
     const int64_t n_ranges = (n_left + RANGE_POINTS - 1) / RANGE_POINTS;
-    crew->commits = hs_commits_new(&search->account, crew->output, n_ranges);
+    crew->commits = hs_commits_new(&search->call->account, crew->output, n_ranges);
     if (crew->commits == NULL) {
         return HS_ERR_MEMORY;
     }
     if (crew->enough > 0) {
         limit_crew(crew);
     }
-    hs_team_run(search->team, hs_team_size(search->team), work, crew);
+    hs_team_run(search->call->team, hs_team_size(search->call->team), work, crew);
     if (!crew->is_left) {
         const int64_t done = hs_commits_written(crew->commits) * RANGE_POINTS;
         crew->left = (hs_bookmark){.point = crew->start.point + (done < n_left ? done : n_left)};
     }
-    return hs_commits_end(&search->account, crew->commits, failure);
+    return hs_commits_end(&search->call->account, crew->commits, failure);
 }
 
 /* What a worker has found, and its end. */
@@ -164,7 +164,7 @@ close_worker(hs_crew *crew, hs_worker *worker)
     }
     hs_walker_close(crew->search, &worker->walker);
     if (crew->output != NULL) {
-        hs_backlog_free(&crew->search->account, &worker->backlog);
+        hs_backlog_free(&crew->search->call->account, &worker->backlog);
     }
 }
 
@@ -172,8 +172,8 @@ close_worker(hs_crew *crew, hs_worker *worker)
 static hs_status
 walk_together(hs_crew *crew, hs_failure *failure)
 {
-    hs_account *account = &crew->search->account;
-    const int   n_workers = hs_team_size(crew->search->team);
+    hs_account *account = &crew->search->call->account;
+    const int   n_workers = hs_team_size(crew->search->call->team);
     hs_status   status = HS_OK;
     int         opened = 0;
     crew->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof(hs_worker));

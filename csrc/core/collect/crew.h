@@ -21,7 +21,7 @@ typedef struct hs_visitors {
     size_t                  context_size;
 } hs_visitors;
 
-/* Records all pairs in the output, by search->team. HS_ERR_SHIFT_RANGE sets failure->row. */
+/* Records all pairs in the output, by search->call->team. HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
 
 /*

@@ -47,7 +47,7 @@ record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const h
         recorder->ids[h] = id[hits->label[h]];
     }
     by_id.label = recorder->ids;
-    put_indices(recorder, scanner->search->kernel, &by_id);
+    put_indices(recorder, scanner->search->call->kernel, &by_id);
     return hs_put_measures(recorder, scanner, first, hits);
 }
 
@@ -61,7 +61,7 @@ hs_record_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits 
     if (status == HS_OK && scanner->use == HS_BLOCK_LISTS_PLACES) {
         status = record_places(recorder, scanner, first, hits);
     } else if (status == HS_OK) {
-        put_indices(recorder, scanner->search->kernel, hits);
+        put_indices(recorder, scanner->search->call->kernel, hits);
     }
     output->n_pairs += status == HS_OK ? n : 0;
     return status;

@@ -51,7 +51,7 @@ measure(hs_recorder *recorder, const hs_trace *trace)
     uint8_t          done[HS_BATCH + HS_BATCH_PADDING] = {0};
     if (!trace->is_wide) {
         const hs_batch batch = hs_trace_batch(trace);
-        search->kernel->measure(metric, &batch, recorder->distance, vector, done);
+        search->call->kernel->measure(metric, &batch, recorder->distance, vector, done);
     }
     for (int32_t e = 0; e < trace->n; e++) {
         if (HS_UNLIKELY(!done[e])) {
@@ -69,7 +69,7 @@ measure(hs_recorder *recorder, const hs_trace *trace)
 static void
 put_distances(hs_recorder *recorder, const hs_search *search, int32_t first, int32_t n)
 {
-    const hs_options *options = &search->options;
+    const hs_options *options = &search->call->options;
     double           *to = hs_output_next(recorder->output, HS_WANT_DISTANCE);
     if (!search->scene.extreme && search->scene.unscale.exponent != 0) {
         hs_restore_distances(recorder->distance, n, search->scene.unscale);
@@ -147,7 +147,7 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
 {
     const hs_lattice *lattice = &trace->search->scene.lattice;
     const int         d = lattice->ndim, m = lattice->n_periodic;
-    const bool        keys_only = !(trace->search->options.want & HS_WANT_SHIFT);
+    const bool        keys_only = !(trace->search->call->options.want & HS_WANT_SHIFT);
     int64_t           keys[HS_MAX_DIM][HS_BATCH];
     int32_t *to = (int32_t *)hs_output_next(recorder->output, HS_WANT_SHIFT) + (int64_t)first * d;
     int32_t  fitting = trace->n;

@@ -17,6 +17,29 @@ hs_pairs_new(void)
     return pairs;
 }
 
+void
+hs_pairs_open(hs_pairs *pairs, int ndim)
+{
+    const hs_options *options = &pairs->call.options;
+    hs_output_init(&pairs->call.account, ndim, options->want, options->index_bytes,
+                   &pairs->output);
+    if (options->out != NULL) {
+        hs_output_fix(&pairs->output, options->out);
+    }
+}
+
+hs_status
+hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **result)
+{
+    hs_call_leave(&pairs->call, n_pairs);
+    if (status == HS_OK) {
+        *result = pairs;
+    } else {
+        hs_pairs_free(pairs);
+    }
+    return status;
+}
+
 hs_status
 hs_pairs_conclude(hs_output *output, hs_status status, hs_failure *failure)
 {
@@ -94,6 +117,6 @@ hs_pairs_free(hs_pairs *pairs)
     }
     hs_output_free(&pairs->output);
     hs_output_free(&pairs->offsets);
-    hs_account_close(&pairs->search.account);
+    hs_account_close(&pairs->call.account);
     hs_free(NULL, pairs);
 }

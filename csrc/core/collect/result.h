@@ -4,16 +4,23 @@
 #define HS_RESULT_H
 
 #include "columns.h"
-#include "../search/search.h"
+#include "../threads/call.h"
 
 struct hs_pairs {
-    hs_search search;  /* closed: kept for its account, options and scene */
+    hs_call   call;    /* which has ended: kept for its account */
     hs_output output;
     hs_output offsets; /* int64, where the rows of hs_neighbors_find begin; else nothing */
 };
 
-/* One that holds nothing yet; hs_search_begin comes first. NULL when memory is short. */
+/* One that holds nothing yet; its call is to be begun next. NULL when memory is short. */
 hs_pairs *hs_pairs_new(void);
+
+/* An empty output of the columns that the call wants, or the caller's arrays. */
+void hs_pairs_open(hs_pairs *pairs, int ndim);
+
+/* Leaves the call, which found so many pairs. *result becomes the object, or that is freed. Returns
+ * the status. */
+hs_status hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **result);
 
 /* When a search ends with this status: arrays also where there are no pairs; HS_ERR_CAPACITY where
  * those of the caller had no room for all. */

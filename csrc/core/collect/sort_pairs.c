@@ -91,18 +91,28 @@ images_repeat(const hs_search *search)
 unsigned
 hs_sort_columns(const hs_search *search)
 {
-    const unsigned wanted = search->options.want & ~(unsigned)HS_WANT_BOTH;
+    const unsigned wanted = search->call->options.want & ~(unsigned)HS_WANT_BOTH;
     return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(search) ? HS_WANT_SHIFT : 0);
 }
 
-/* places[]: the pairs by ascending i; start[i - first point] ends up where row i ends. */
+/* What is put in order. */
+typedef struct sorting {
+    hs_call         *call;
+    int32_t          first_point;
+    int64_t          n_points;
+    const hs_output *found;
+    int64_t         *start; /* n_points + 1; start[i - first_point] ends up where row i ends */
+    int64_t         *order; /* places of the pairs, ascending in the end */
+} sorting;
+
+/* order[]: the pairs by ascending i. */
 static hs_status
-sort_by_first(const hs_search *search, const int32_t *i, int64_t n_pairs, int64_t *start,
-              int64_t *places)
+sort_by_first(const sorting *all, const int32_t *i)
 {
-    const hs_options *options = &search->options;
-    const int64_t     n_points = search->scene.n;
-    const int32_t     first = search->first_point;
+    const hs_options *options = &all->call->options;
+    const int64_t     n_points = all->n_points, n_pairs = all->found->n_pairs;
+    const int32_t     first = all->first_point;
+    int64_t          *start = all->start;
     memset(start, 0, (size_t)(n_points + 1) * sizeof(int64_t));
     for (int64_t p = 0; p < n_pairs; p++) {
         start[i[p] - first + 1]++;
@@ -114,7 +124,7 @@ sort_by_first(const hs_search *search, const int32_t *i, int64_t n_pairs, int64_
         start[k + 1] += start[k];
     }
     for (int64_t p = 0; p < n_pairs; p++) {
-        places[start[i[p] - first]++] = p;
+        all->order[start[i[p] - first]++] = p;
         if (p % POLL_PAIRS == POLL_PAIRS - 1 && hs_poll(options, 1.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
@@ -122,21 +132,21 @@ sort_by_first(const hs_search *search, const int32_t *i, int64_t n_pairs, int64_
     return HS_OK;
 }
 
-/* order[]: receives the places of all pairs, ascending. */
 static hs_status
-find_order(hs_search *search, const hs_output *found, int64_t *start, int64_t *order)
+find_order(const sorting *all)
 {
-    const int64_t n_points = search->scene.n;
-    const keys    key = {hs_output_column(found, HS_WANT_I), hs_output_column(found, HS_WANT_J),
-                         hs_output_column(found, HS_WANT_SHIFT)};
-    hs_status     status = sort_by_first(search, key.i, found->n_pairs, start, order);
-    for (int64_t i = 0, first = 0, work = 0; i < n_points && status == HS_OK;
-         first = start[i++]) {
-        sort_row(&key, found->ndim, order + first, start[i] - first);
-        work += start[i] - first;
+    const hs_output *found = all->found;
+    const keys key = {hs_output_column(found, HS_WANT_I), hs_output_column(found, HS_WANT_J),
+                      hs_output_column(found, HS_WANT_SHIFT)};
+    hs_status  status = sort_by_first(all, key.i);
+    for (int64_t i = 0, first = 0, work = 0; i < all->n_points && status == HS_OK;
+         first = all->start[i++]) {
+        const int64_t n = all->start[i] - first;
+        sort_row(&key, found->ndim, all->order + first, n);
+        work += n;
         if (work > POLL_PAIRS) {
             work = 0;
-            status = hs_poll(&search->options, 1.0);
+            status = hs_poll(&all->call->options, 1.0);
         }
     }
     return status;
@@ -202,21 +212,27 @@ put_all(const hs_options *options, const hs_output *found, const int64_t *order,
 }
 
 hs_status
-hs_sort_pairs(hs_search *search, const hs_output *found, hs_output *sorted)
+hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points, const hs_output *found,
+              hs_output *sorted)
 {
-    hs_account *account = &search->account;
+    hs_account *account = &call->account;
     hs_status   status = HS_ERR_MEMORY;
-    int64_t    *start = hs_alloc(account, HS_FOR_SORTING, search->scene.n + 1, sizeof(int64_t));
-    int64_t    *order = hs_alloc(account, HS_FOR_SORTING, found->n_pairs, sizeof(int64_t));
-    if (start != NULL && order != NULL) {
-        status = found->n_pairs > 0 ? find_order(search, found, start, order) : HS_OK;
-        hs_free(account, start);
-        start = NULL;
+    sorting     all = {.call = call,
+                       .first_point = first_point,
+                       .n_points = n_points,
+                       .found = found,
+                       .start = hs_alloc(account, HS_FOR_SORTING, n_points + 1, sizeof *all.start),
+                       .order = hs_alloc(account, HS_FOR_SORTING, found->n_pairs,
+                                         sizeof *all.order)};
+    if (all.start != NULL && all.order != NULL) {
+        status = found->n_pairs > 0 ? find_order(&all) : HS_OK;
+        hs_free(account, all.start);
+        all.start = NULL;
         if (status == HS_OK) {
-            status = put_all(&search->options, found, order, sorted);
+            status = put_all(&call->options, found, all.order, sorted);
         }
     }
-    hs_free(account, start);
-    hs_free(account, order);
+    hs_free(account, all.start);
+    hs_free(account, all.order);
     return status;
 }

@@ -11,8 +11,9 @@ unsigned hs_sort_columns(const hs_search *search);
 
 /*
  * Writes `found`, which has these columns with int32 indices, to `sorted`, ascending by (i, j, S).
- * The account is charged for what `sorted` takes, and the poll asked now and then.
+ * Numbers i are those of n_points points from first_point on. The call is charged for the work.
  */
-hs_status hs_sort_pairs(hs_search *search, const hs_output *found, hs_output *sorted);
+hs_status hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points,
+                        const hs_output *found, hs_output *sorted);
 
 #endif

@@ -126,7 +126,7 @@ relate(const hs_near *near, const double *centre, hs_near_block *block)
         relate.y[k] = block->y[k];
         relate.centre[k] = centre[k];
     }
-    near->search->kernel->relate(&relate, block->runs, block->n_runs);
+    near->search->call->kernel->relate(&relate, block->runs, block->n_runs);
     for (int k = 0; k < near->tree.ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
     }
@@ -232,7 +232,7 @@ int32_t
 hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_block *block,
                    int32_t first, int32_t *end)
 {
-    const hs_kernel *kernel = near->search->kernel;
+    const hs_kernel *kernel = near->search->call->kernel;
     const int        d = near->tree.ndim;
     const double     extent = scan_extent(block);
     hs_scan          scan = {.ndim = d,

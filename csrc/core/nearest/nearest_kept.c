@@ -12,7 +12,8 @@ struct hs_near_kept {
     bool      is_building;
     bool      is_built;
     hs_near   near;
-    hs_search search; /* its own */
+    hs_search search; /* its own, as is its call */
+    hs_call   call;
 };
 
 hs_near_kept *
@@ -33,9 +34,9 @@ hs_near_kept_free(hs_near_kept *kept)
         return;
     }
     if (kept->is_built) {
-        hs_tree_free(&kept->search.account, &kept->near.tree);
+        hs_tree_free(&kept->call.account, &kept->near.tree);
         hs_search_close(&kept->search);
-        hs_account_close(&kept->search.account);
+        hs_account_close(&kept->call.account);
     }
     hs_mutex_destroy(&kept->mutex);
     hs_free(NULL, kept);
@@ -52,6 +53,7 @@ hs_near_kept_get(hs_near_kept *kept, hs_near **room)
     if (builds) {
         *room = &kept->near;
         kept->near = (hs_near){.search = &kept->search};
+        kept->search.call = &kept->call;
     }
     return is_built ? &kept->near : NULL;
 }

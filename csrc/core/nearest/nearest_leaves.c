@@ -216,5 +216,5 @@ hs_near_leaves_list(const hs_near *near, const hs_near_group *group, double radi
         boxes.from[k] = relative(leaves, k, group->lower[k]);
         boxes.to[k] = relative(leaves, k, group->upper[k]);
     }
-    return near->search->kernel->near_boxes(&boxes);
+    return near->search->call->kernel->near_boxes(&boxes);
 }

@@ -59,7 +59,7 @@ build_tree(hs_near *near, int32_t leaf_points)
     hs_metric_init(&near->order, scene->ndim, metric->n_rows, metric->rows, 1.0, true);
     hs_near_measure_drift(near);
     const hs_status status =
-        hs_tree_build(&search->account, search->team, &search->options, scene, leaf_points,
+        hs_tree_build(&search->call->account, search->call->team, &search->call->options, scene, leaf_points,
                       &search->bins, &near->tree);
     if (status == HS_OK) {
         hs_near_measure_layer(near);
@@ -75,9 +75,9 @@ build_asking_tree(hs_near *near, hs_scene *asking)
     search->has_queries = true;
     near->asking = &near->asking_tree;
     const hs_status status =
-        hs_tree_build(&search->account, search->team, &search->options, asking, LEAF_POINTS,
+        hs_tree_build(&search->call->account, search->call->team, &search->call->options, asking, LEAF_POINTS,
                       &search->query_bins, &near->asking_tree);
-    hs_scene_free(&search->account, asking);
+    hs_scene_free(&search->call->account, asking);
     return status;
 }
 
@@ -87,13 +87,13 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
 {
     hs_search    *search = near->search;
     hs_scene      queries, *asking = sets->queries != NULL ? &queries : NULL;
-    hs_options    options = search->options;
+    hs_options    options = search->call->options;
     const int32_t leaf_points = near->k < 4 * LEAF_POINTS ? LEAF_POINTS : 2 * LEAF_POINTS;
     hs_sets       bounded = *sets;
     bounded.within = limit < INFINITY ? limit : 0.0;
     options.cutoff = scene_cutoff(box, limit);
     near->asking = &near->tree;
-    hs_status status = hs_scene_init_sets(&search->account, search->team, &bounded, box, &options,
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &bounded, box, &options,
                                           &search->scene, asking, failure);
     if (status != HS_OK) {
         return status;
@@ -103,7 +103,7 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
     if (asking != NULL && status == HS_OK) {
         status = build_asking_tree(near, asking);
     } else if (asking != NULL) {
-        hs_scene_free(&search->account, asking);
+        hs_scene_free(&search->call->account, asking);
     }
     return status;
 }
@@ -114,7 +114,7 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
            hs_failure *failure)
 {
     hs_search    *search = room->search;
-    hs_options    options = near->search->options;
+    hs_options    options = near->search->call->options;
     const hs_sets kept = {.points = sets->points,
                           .is_kept = true,
                           .is_full = true,
@@ -123,21 +123,21 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
     options.cutoff = scene_cutoff(box, INFINITY);
     options.want = HS_WANT_SHIFT;
     options.counters = NULL;
-    hs_search_begin(&options, search);
-    search->team = near->search->team;
-    hs_status status = hs_scene_init_sets(&search->account, search->team, &kept, box, &options,
+    hs_call      *call = search->call;
+    hs_call_begin(&options, call);
+    hs_search_begin(call, search);
+    call->team = near->search->call->team;
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &kept, box, &options,
                                           &search->scene, NULL, failure);
     if (status == HS_OK) {
         status = build_tree(room, LEAF_POINTS);
     }
-    search->team = NULL;
-    /* What they point to is the caller's again. */
-    hs_search_set_poll(NULL, NULL, search);
-    search->options.kernel = NULL;
+    call->team = NULL;
+    hs_call_detach(call);
     if (status != HS_OK) {
-        hs_tree_free(&search->account, &room->tree);
+        hs_tree_free(&search->call->account, &room->tree);
         hs_search_close(search);
-        hs_account_close(&search->account);
+        hs_account_close(&call->account);
     }
     return status;
 }
@@ -189,8 +189,8 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
         return HS_STATUS_END;
     }
     if (sets->queries != NULL) {
-        status = hs_scene_like(&search->account, search->team, &kept->search->scene, sets->queries,
-                               &search->options, &asking, failure);
+        status = hs_scene_like(&search->call->account, search->call->team, &kept->search->scene, sets->queries,
+                               &search->call->options, &asking, failure);
         if (status != HS_OK) {
             failure->in_queries = status != HS_STATUS_END;
             return status;
@@ -207,11 +207,10 @@ hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double li
 {
     hs_search    *search = near->search;
     const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
-    search->kernel = hs_kernel_select(search->options.kernel);
-    if (search->kernel == NULL) {
+    if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
-    search->team = hs_team_create(hs_search_threads(sets->points->n + n_asking, &search->options));
+    hs_call_gather(search->call, sets->points->n + n_asking);
     search->is_full = true;
     hs_status status = HS_STATUS_END;
     if (sets->trees != NULL) {
@@ -223,7 +222,7 @@ hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double li
 void
 hs_near_release(hs_near *near)
 {
-    hs_account *account = &near->search->account;
+    hs_account *account = &near->search->call->account;
     if (!near->search->is_borrowed) {
         hs_tree_free(account, &near->tree);
     }

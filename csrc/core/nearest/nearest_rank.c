@@ -275,7 +275,7 @@ hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits, const
         return n < wanted;
     }
     ranker->si = si;
-    ranker->near->search->kernel->order(squares, (int32_t)n, keys);
+    ranker->near->search->call->kernel->order(squares, (int32_t)n, keys);
     keys[n] = HS_ORDER_LAST;
     bool is_sure = square_of(keys[wanted - 1]) + least < reach;
     for (int64_t e = 0; e < wanted; e++) {

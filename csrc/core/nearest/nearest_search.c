@@ -205,7 +205,7 @@ open_worker(near_crew *crew, near_worker *worker)
     const hs_near *near = crew->near;
     memset(worker, 0, sizeof *worker);
     worker->crew = crew;
-    worker->options = near->search->options;
+    worker->options = near->search->call->options;
     worker->failure = HS_NO_FAILURE;
     worker->ranker = (hs_near_ranker){
         .near = near, .block = &worker->block, .pace = {.options = &worker->options}};
@@ -227,7 +227,7 @@ close_worker(const near_crew *crew, near_worker *worker)
                                 .by_float64 = stages->by_float64,
                                 .by_double_word = stages->by_double_word,
                                 .by_integers = stages->by_integers};
-    hs_search_note(crew->near->search, &walked);
+    hs_call_note(crew->near->search->call, &walked);
     hs_near_ranker_free(&worker->ranker);
     hs_near_bounder_free(crew->near, &worker->bounder);
     hs_near_leaves_free(crew->near, &worker->leaves);
@@ -282,7 +282,7 @@ static hs_status
 run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
 {
     hs_search *search = crew->near->search;
-    const int  n_workers = hs_team_size(search->team);
+    const int  n_workers = hs_team_size(search->call->team);
     int        opened = 0;
     hs_status  status = HS_OK;
     crew->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof(near_worker));
@@ -294,7 +294,7 @@ run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
         status = open_worker(crew, &crew->workers[opened++]);
     }
     if (status == HS_OK) {
-        hs_team_run(search->team, n_workers, work, crew);
+        hs_team_run(search->call->team, n_workers, work, crew);
     }
     for (int w = 0; w < opened; w++) {
         close_worker(crew, &crew->workers[w]);
@@ -311,7 +311,7 @@ hs_status
 hs_near_search(hs_near *near, hs_failure *failure)
 {
     hs_search    *search = near->search;
-    hs_account   *account = &search->account;
+    hs_account   *account = &search->call->account;
     near_crew     crew = {.near = near};
     const int64_t n = hs_search_asking(search)->n;
     for (int64_t row = 0; near->tree.n_nodes == 0 && row < n; row++) {

@@ -88,7 +88,7 @@ measure(hs_near_writer *writer, double *const *vector)
         batch.shift[r] = writer->times[r];
     }
     if (!writer->is_wide) {
-        search->kernel->measure(metric, &batch, writer->distance, vector, done);
+        search->call->kernel->measure(metric, &batch, writer->distance, vector, done);
     }
     for (int32_t e = 0; e < writer->n; e++) {
         double p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
@@ -115,8 +115,8 @@ put_distances(hs_near_writer *writer, double *to)
     if (!search->scene.extreme && search->scene.unscale.exponent != 0) {
         hs_restore_distances(writer->distance, writer->n, search->scene.unscale);
     }
-    if (search->options.cutoff < INFINITY) {
-        hs_keep_all_within(writer->distance, writer->n, search->options.cutoff, true);
+    if (search->call->options.cutoff < INFINITY) {
+        hs_keep_all_within(writer->distance, writer->n, search->call->options.cutoff, true);
     }
     for (int32_t e = 0; e < writer->n; e++) {
         const int64_t at = writer->at[e];

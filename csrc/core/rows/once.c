@@ -28,7 +28,7 @@ hs_once_applies(const hs_table *table)
     const hs_search *search = table->search;
     const hs_output *entries = table->entries;
     return entries->columns == (HS_WANT_I | HS_WANT_J) && !entries->fixed &&
-           search->team == NULL &&
+           search->call->team == NULL &&
            search->grid.expected_pairs * search->pairs_per_half > LEAST_ENTRIES;
 }
 
@@ -129,7 +129,7 @@ hs_once_find(hs_table *table, hs_failure *failure)
     const int64_t n = hs_search_asking(search)->n;
     once          doing = {.table = table};
     hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &doing.kept);
-    doing.where = hs_alloc(&search->account, HS_FOR_CANDIDATES, n + 1, sizeof *doing.where);
+    doing.where = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n + 1, sizeof *doing.where);
     hs_status status = hs_filler_open(table, &doing.kept, &doing.fill);
     if (status == HS_OK) {
         status = doing.where != NULL ? HS_OK : HS_ERR_MEMORY;
@@ -140,13 +140,13 @@ hs_once_find(hs_table *table, hs_failure *failure)
     }
     if (status == HS_OK) {
         hs_table_sum(table);
-        status = write_column(&doing, HS_WANT_J, &search->options);
+        status = write_column(&doing, HS_WANT_J, &search->call->options);
     }
     if (status == HS_OK) {
-        status = write_column(&doing, HS_WANT_I, &search->options);
+        status = write_column(&doing, HS_WANT_I, &search->call->options);
     }
     hs_filler_close(&doing.fill);
-    hs_free(&search->account, doing.where);
+    hs_free(&search->call->account, doing.where);
     if (status == HS_ERR_MEMORY) {
         give_up(table->entries);
         return HS_STATUS_END;

@@ -68,11 +68,11 @@ will_keep(hs_table *table)
     hs_search       *search = table->search;
     const hs_output *entries = table->entries;
     const double     n = search->grid.expected_pairs * search->pairs_per_half;
-    hs_output_init(&search->account, entries->ndim, (entries->columns & HS_MEASURES) | HS_WANT_J,
+    hs_output_init(&search->call->account, entries->ndim, (entries->columns & HS_MEASURES) | HS_WANT_J,
                    4, &table->kept);
     const double bytes = n * (double)hs_output_bytes_per_pair(&table->kept);
-    return search->team == NULL && bytes < MOST_EXPECTED_KEPT &&
-           hs_account_allows(&search->account, 2.0 * HS_MOST_KEPT);
+    return search->call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
+           hs_account_allows(&search->call->account, 2.0 * HS_MOST_KEPT);
 }
 
 /* HS_STATUS_END: there were too many entries, and none is kept. */
@@ -112,8 +112,8 @@ hs_table_measure(hs_table *table, hs_failure *failure)
 static hs_status
 fill_all(hs_table *table, hs_failure *failure)
 {
-    hs_account *account = &table->search->account;
-    const int   n_fillers = hs_team_size(table->search->team);
+    hs_account *account = &table->search->call->account;
+    const int   n_fillers = hs_team_size(table->search->call->team);
     hs_status   status = HS_OK;
     int         opened = 0;
     hs_filler  *fillers = hs_alloc(account, HS_FOR_CANDIDATES, n_fillers, sizeof *fillers);

@@ -262,7 +262,7 @@ hs_keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *h
 hs_status
 hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
 {
-    hs_account *account = &table->search->account;
+    hs_account *account = &table->search->call->account;
     *fill = (hs_filler){.table = table, .to = to};
     hs_output_init(NULL, to->ndim, to->columns & HS_MEASURES, to->index_bytes, &fill->part);
     fill->numbers = hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1,
@@ -275,8 +275,8 @@ hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
 void
 hs_filler_close(hs_filler *fill)
 {
-    hs_recorder_free(&fill->table->search->account, &fill->recorder);
-    hs_free(&fill->table->search->account, fill->numbers);
+    hs_recorder_free(&fill->table->search->call->account, &fill->recorder);
+    hs_free(&fill->table->search->call->account, fill->numbers);
     hs_output_free(&fill->part);
 }
 

@@ -97,7 +97,7 @@ hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
         judge_scaled(metric, trace, verdict, &scanner->stages);
     } else if (by_batch) {
         const hs_batch batch = hs_trace_batch(trace);
-        scanner->search->kernel->judge(metric, &batch, verdict, &scanner->stages);
+        scanner->search->call->kernel->judge(metric, &batch, verdict, &scanner->stages);
     }
     for (int32_t e = 0; e < trace->n; e++) {
         within[e] = by_batch && verdict[e] != HS_UNDECIDED

@@ -69,7 +69,7 @@ bytes_per_pair_of(const hs_options *options, int ndim)
 static double
 find_bytes_per_pair(const hs_search *search)
 {
-    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->options, search->scene.ndim);
+    return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
 }
 
 /* Volume of the region that a search has to do with: of the periodic part, times the extents along
@@ -120,11 +120,11 @@ hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_searc
                       hs_failure *failure)
 {
     hs_shortage shortage = {0.0, 0.0};
-    hs_shortage_add(points, box, search->options.cutoff, &shortage);
+    hs_shortage_add(points, box, search->call->options.cutoff, &shortage);
     if (search->is_full) {
         shortage.pairs *= search->pairs_per_half;
     }
-    hs_shortage_tell(&shortage, &search->options, points->ndim, search->account.limit, failure);
+    hs_shortage_tell(&shortage, &search->call->options, points->ndim, search->call->account.limit, failure);
 }
 
 static hs_status
@@ -132,7 +132,7 @@ refuse(const hs_search *search, double pairs, double bytes_per_pair, hs_failure 
 {
     failure->expected_pairs = pairs;
     failure->expected_bytes = pairs * bytes_per_pair;
-    failure->limit_bytes = search->account.limit;
+    failure->limit_bytes = search->call->account.limit;
     return HS_ERR_MEMORY;
 }
 
@@ -185,7 +185,7 @@ hs_estimate_by_density(hs_search *search, hs_failure *failure)
         failure->value = least;
         return HS_ERR_TOO_MANY;
     }
-    if (!(least > 0.0) || hs_account_allows(&search->account, least * bytes_per_pair)) {
+    if (!(least > 0.0) || hs_account_allows(&search->call->account, least * bytes_per_pair)) {
         return HS_OK;
     }
     const bool   has_density = search->scene.lattice.n_periodic == search->scene.ndim;
@@ -236,7 +236,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     hs_walker     walker;
     sample        taken;
     if (n == 0 ||
-        hs_account_allows(&search->account, bound_pairs(search) * bytes_per_pair)) {
+        hs_account_allows(&search->call->account, bound_pairs(search) * bytes_per_pair)) {
         return HS_OK;
     }
     hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
@@ -253,7 +253,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double variance = fmax(0.0, taken.squares / many - mean * mean);
     const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
     const double least = (mean - SURE_ERRORS * error) * (double)n;
-    if (hs_account_allows(&search->account, least * bytes_per_pair)) {
+    if (hs_account_allows(&search->call->account, least * bytes_per_pair)) {
         return HS_OK;
     }
     return refuse(search, mean * (double)n, bytes_per_pair, failure);

@@ -96,8 +96,8 @@ hs_trace_init(hs_search *search, const hs_block *block, bool needs_given, hs_tra
     trace->is_plain = is_plain(&search->scene.lattice);
     trace->needs_given = needs_given || search->bins.keeps_originals;
     trace->is_narrow = is_narrow(search);
-    if (!allocate(&search->account, trace)) {
-        hs_trace_free(&search->account, trace);
+    if (!allocate(&search->call->account, trace)) {
+        hs_trace_free(&search->call->account, trace);
         return HS_ERR_MEMORY;
     }
     return HS_OK;

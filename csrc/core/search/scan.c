@@ -57,7 +57,7 @@ set_thresholds(hs_scanner *scanner)
 static void
 set_form(hs_scanner *scanner)
 {
-    const hs_kernel *kernel = scanner->search->kernel;
+    const hs_kernel *kernel = scanner->search->call->kernel;
     const bool       counts = scanner->use == HS_BLOCK_COUNTS;
     const double     extent = hs_group_extent(&scanner->group);
     if (extent == scanner->extent) {
@@ -155,7 +155,7 @@ fill_block(hs_scanner *scanner)
     hs_block *block = &scanner->block;
     scanner->n_blocks++;
     set_flushing(scanner, true);
-    hs_status status = hs_block_gather(&scanner->search->bins, scanner->search->kernel,
+    hs_status status = hs_block_gather(&scanner->search->bins, scanner->search->call->kernel,
                                        &scanner->options, scanner->block_is_first, block,
                                        &scanner->group);
     set_flushing(scanner, false);
@@ -328,10 +328,10 @@ hs_status
 hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                 bool is_ordered, hs_scanner *scanner)
 {
-    hs_account *account = &search->account;
+    hs_account *account = &search->call->account;
     memset(scanner, 0, sizeof *scanner);
     scanner->search = search;
-    scanner->options = search->options;
+    scanner->options = search->call->options;
     scanner->use = use;
     scanner->is_ordered = is_ordered;
     scanner->extent = -1.0;
@@ -358,10 +358,10 @@ hs_scanner_close(hs_search *search, hs_scanner *scanner)
                                 .by_float64 = scanner->stages.by_float64,
                                 .by_double_word = scanner->stages.by_double_word,
                                 .by_integers = scanner->stages.by_integers};
-    hs_search_note(search, &walked);
+    hs_call_note(search->call, &walked);
     scanner->n_groups = scanner->n_candidates = scanner->n_ambiguous = 0;
     scanner->stages = (hs_stages){0};
-    hs_order_free(&search->account, &scanner->block, &scanner->order);
-    hs_block_free(&search->account, &scanner->block);
-    hs_trace_free(&search->account, &scanner->trace);
+    hs_order_free(&search->call->account, &scanner->block, &scanner->order);
+    hs_block_free(&search->call->account, &scanner->block);
+    hs_trace_free(&search->call->account, &scanner->trace);
 }

@@ -16,7 +16,7 @@
 hs_status hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                           bool is_ordered, hs_scanner *scanner);
 
-/* Adds what was done to search->walked and frees; harmless twice. */
+/* Adds what was done to that of the call and frees; harmless twice. */
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
 
 /* Points [first, last) in cell order are the group from here on, with an empty block. */

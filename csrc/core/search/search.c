@@ -5,23 +5,6 @@
 #include <stddef.h>
 #include <string.h>
 
-/* An hs_poll_fn: the caller's, counted. */
-static bool
-counted_poll(void *context, double fraction)
-{
-    hs_search *search = context;
-    search->walked.polls++;
-    return search->callers_poll(search->callers_context, fraction);
-}
-
-int
-hs_search_threads(int64_t n_points, const hs_options *options)
-{
-    const int n = options->threads;
-    const int most = n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
-    return most < HS_MOST_THREADS ? most : HS_MOST_THREADS;
-}
-
 void
 hs_search_set_asking(const hs_sets *sets, hs_search *search)
 {
@@ -54,55 +37,18 @@ hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *sear
 }
 
 void
-hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search)
+hs_search_begin(hs_call *call, hs_search *search)
 {
-    search->callers_poll = poll;
-    search->callers_context = context;
-    search->options.poll = poll != NULL ? counted_poll : NULL;
-    search->options.poll_context = search;
-}
-
-void
-hs_search_begin(const hs_options *options, hs_search *search)
-{
-    memset((char *)search + offsetof(hs_search, account), 0,
-           sizeof *search - offsetof(hs_search, account));
+    memset((char *)search + offsetof(hs_search, call), 0,
+           sizeof *search - offsetof(hs_search, call));
     search->scene.cloud.block = search->scene.beside = NULL; /* freed also when never set */
-    search->options = *options;
-    hs_search_set_poll(options->poll, options->poll_context, search);
-    hs_account_init(&search->account, options);
-}
-
-void
-hs_search_note(hs_search *search, const hs_counters *walked)
-{
-    hs_counters *sum = &search->walked;
-    sum->groups += walked->groups;
-    sum->candidates += walked->candidates;
-    sum->ambiguous += walked->ambiguous;
-    sum->by_float64 += walked->by_float64;
-    sum->by_double_word += walked->by_double_word;
-    sum->by_integers += walked->by_integers;
-    sum->polls += walked->polls;
-}
-
-void
-hs_search_report(const hs_search *search, int64_t n_pairs)
-{
-    hs_counters *counters = search->options.counters;
-    if (counters == NULL) {
-        return;
-    }
-    *counters = search->walked;
-    memcpy(counters->bytes, search->account.total.bytes, sizeof counters->bytes);
-    counters->bytes_peak = search->account.total.bytes_peak;
-    counters->pairs = n_pairs;
+    search->call = call;
 }
 
 void
 hs_search_close(hs_search *search)
 {
-    hs_account *account = &search->account;
+    hs_account *account = &search->call->account;
     hs_stencil_free(account, &search->stencil);
     if (!search->is_borrowed) {
         hs_scene_free(account, &search->scene);
@@ -113,6 +59,4 @@ hs_search_close(hs_search *search)
         hs_bins_free(account, &search->query_bins);
         hs_sparse_free(account, &search->query_sparse);
     }
-    hs_team_free(search->team);
-    search->team = NULL;
 }

@@ -1,24 +1,21 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * search.h: one scene made ready: points in cell order, the neighbouring rows of cells, and the
- * account of what that took. Walkers (walk.h) read it and leave it as it is.
+ * search.h: one scene made ready for a call: points in cell order and the neighbouring rows of
+ * cells. Walkers (walk.h) read it and leave it as it is.
  */
 #ifndef HS_SEARCH_H
 #define HS_SEARCH_H
 
 #include "../cells/sparse_rows.h"
 #include "../cells/stencil.h"
-#include "../threads/team.h"
-
-#include "../../kernels/kernel.h"
+#include "../threads/call.h"
 
 typedef struct hs_search {
     /* Large, and filled before they are read: not cleared at first. */
     hs_scene         scene;   /* without its arrays: bins has them */
     hs_grid          grid;
     /* From here on all begins as zero. */
-    hs_account       account;
-    hs_options       options;
+    hs_call         *call;    /* borrowed: memory, threads, what is wanted and what was done */
     hs_stencil       stencil;
     hs_bins          bins;
     hs_sparse        sparse;  /* when is_sparse: the rows and cells that bins follows */
@@ -29,23 +26,14 @@ typedef struct hs_search {
     hs_bins          query_bins;
     hs_sparse        query_sparse;
     bool             is_sparse;
-    const hs_kernel *kernel;
     int32_t          first_point;  /* number of the first point */
     int64_t          n_in_all;     /* points, of which these may be a part: for fractions done */
     double           pairs_per_half; /* pairs to be found for each pair of the half list */
     double           filter_error; /* bound on each component before rounding to float32 */
-    hs_poll_fn       callers_poll; /* behind options.poll, which counts the calls */
-    void            *callers_context;
-    hs_counters      walked;       /* what finished walkers did */
-    hs_team         *team;         /* owned; NULL: the caller's thread alone */
 } hs_search;
 
-/* Whom to ask whether to go on, in place of the options' poll; NULL: nobody. The search must not
- * move any more. */
-void hs_search_set_poll(hs_poll_fn poll, void *context, hs_search *search);
-
-/* An account and options, no scene yet. */
-void hs_search_begin(const hs_options *options, hs_search *search);
+/* Nothing in it yet; the call must outlive it. */
+void hs_search_begin(hs_call *call, hs_search *search);
 
 /* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
 void hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
@@ -63,16 +51,7 @@ void hs_search_set_asking(const hs_sets *sets, hs_search *search);
 /* What follows from scene and grid. */
 void hs_search_settle(hs_search *search);
 
-/* How many threads these options mean for so many points. */
-int hs_search_threads(int64_t n_points, const hs_options *options);
-
-/* Adds what a walker, or another search, did to search->walked. */
-void hs_search_note(hs_search *search, const hs_counters *walked);
-
-/* Copies the counts to options.counters, if wanted. */
-void hs_search_report(const hs_search *search, int64_t n_pairs);
-
-/* Frees all but what belongs to the account alone; harmless twice. */
+/* Frees what it has; harmless twice. The call goes on. */
 void hs_search_close(hs_search *search);
 
 #endif

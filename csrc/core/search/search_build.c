@@ -9,7 +9,7 @@
 static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {
-    const double wanted = search->options.cell_size;
+    const double wanted = search->call->options.cell_size;
     hs_status    status = HS_STATUS_END;
     bool         may_be_sparse = true;
     if (wanted > 0.0) {
@@ -34,10 +34,10 @@ choose_grid(hs_search *search, hs_failure *failure)
 static hs_status
 build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
 {
-    hs_account *account = &search->account;
+    hs_account *account = &search->call->account;
     return search->is_sparse
-               ? hs_sparse_build(account, search->team, &search->options, scene, grid, sparse, bins)
-               : hs_bins_build(account, search->team, &search->options, scene, grid, bins);
+               ? hs_sparse_build(account, search->call->team, &search->call->options, scene, grid, sparse, bins)
+               : hs_bins_build(account, search->call->team, &search->call->options, scene, grid, bins);
 }
 
 hs_status
@@ -57,7 +57,7 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
         status = hs_estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
-        status = hs_stencil_build(&search->account, &search->options, scene, &search->grid,
+        status = hs_stencil_build(&search->call->account, &search->call->options, scene, &search->grid,
                                   search->is_full, &search->stencil);
         if (status == HS_ERR_MEMORY) {
             failure->search_bytes = hs_stencil_bytes(&search->grid, search->is_full);
@@ -75,19 +75,18 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
 hs_status
 hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
 {
-    const hs_options *options = &search->options;
+    const hs_options *options = &search->call->options;
     hs_scene          queries, *asking = sets->queries != NULL ? &queries : NULL;
-    search->kernel = hs_kernel_select(options->kernel);
-    if (search->kernel == NULL) {
+    if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
     hs_search_set_asking(sets, search);
-    hs_status status = hs_scene_init_sets(&search->account, search->team, sets, box, options,
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box, options,
                                           &search->scene, asking, failure);
     if (status == HS_OK) {
         status = build_cells(search, asking, failure);
         if (asking != NULL) {
-            hs_scene_free(&search->account, asking);
+            hs_scene_free(&search->call->account, asking);
         }
     }
     if (status == HS_OK) {

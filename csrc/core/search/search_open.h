@@ -6,12 +6,10 @@
 #include "search.h"
 
 /*
- * Everything up to the first group: hs_search_begin, the team, hs_search_build; or what can be
- * reused of sets->built. On failure nothing is held but the account, which the caller closes in any
- * case. The options are copied; what they point to is borrowed until hs_search_close; the points
- * are not needed any more.
+ * Everything up to the first group: threads and cells, or what can be reused of sets->built. On
+ * failure the search is closed. The points are not needed any more.
  */
-hs_status hs_search_open(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                         hs_search *search, hs_failure *failure);
+hs_status hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search *search,
+                         hs_failure *failure);
 
 #endif

@@ -33,8 +33,8 @@ keeps_digits(const hs_search *built, double length)
 static bool
 serves(const hs_search *built, const hs_options *options, double least_cutoff)
 {
-    const double before = built->options.cutoff, cutoff = options->cutoff;
-    if (options->precision != built->options.precision || built->scene.in_one_cell) {
+    const double before = built->call->options.cutoff, cutoff = options->cutoff;
+    if (options->precision != built->call->options.precision || built->scene.in_one_cell) {
         return false;
     }
     if (built->scene.extreme) { /* digits are lost, and kept beside */
@@ -48,10 +48,10 @@ serves(const hs_search *built, const hs_options *options, double least_cutoff)
 static hs_status
 adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
 {
-    const hs_options *options = &search->options;
+    const hs_options *options = &search->call->options;
     const double      before = search->scene.cutoff;
     hs_status         status = HS_OK;
-    if (options->cutoff != sets->built->options.cutoff) {
+    if (options->cutoff != sets->built->call->options.cutoff) {
         hs_scene_set_cutoff(&search->scene, options);
         status = hs_grid_narrow(&search->scene, search->is_sparse, before, &search->grid);
     }
@@ -62,7 +62,7 @@ adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
         status = hs_estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
-        status = hs_stencil_build(&search->account, options, &search->scene, &search->grid,
+        status = hs_stencil_build(&search->call->account, options, &search->scene, &search->grid,
                                   search->is_full, &search->stencil);
     }
     return status;
@@ -72,37 +72,34 @@ static hs_status
 take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
 {
     hs_scene  asking;
-    hs_status status = hs_scene_like(&search->account, search->team, &search->scene, queries,
-                                     &search->options, &asking, failure);
+    hs_status status = hs_scene_like(&search->call->account, search->call->team, &search->scene, queries,
+                                     &search->call->options, &asking, failure);
     if (status == HS_OK) {
         status = hs_search_bin_queries(search, &asking);
-        hs_scene_free(&search->account, &asking);
+        hs_scene_free(&search->call->account, &asking);
     }
     return status;
 }
 
 hs_status
-hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *search,
-                hs_failure *failure)
+hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failure *failure)
 {
     const hs_search *built = sets->built;
     const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
-    if (!serves(built, options, sets->least_cutoff)) {
+    if (!serves(built, &call->options, sets->least_cutoff)) {
         return HS_STATUS_END;
     }
-    hs_search_begin(options, search);
+    hs_search_begin(call, search);
     borrow(built, sets->is_untested, search);
-    search->team = hs_team_create(hs_search_threads(sets->points->n + n_queries, options));
-    search->kernel = hs_kernel_select(options->kernel);
-    hs_status status = search->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
+    hs_call_gather(call, sets->points->n + n_queries);
+    hs_status status = call->kernel == NULL ? HS_ERR_KERNEL : adapt(sets, search, failure);
     if (status == HS_OK && sets->queries != NULL) {
         status = take_queries(sets->queries, search, failure);
     }
     if (status != HS_OK) {
-        hs_search_report(search, 0);
         hs_search_close(search);
         if (status == HS_STATUS_END) {
-            hs_account_close(&search->account);
+            hs_call_restart(call);
             failure->in_queries = false;
         }
     }

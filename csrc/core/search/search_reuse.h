@@ -15,7 +15,7 @@
  * it cannot serve them: the cutoff is larger than its own, or its bounds do not hold for the
  * queries. Else as hs_search_open.
  */
-hs_status hs_search_reuse(const hs_sets *sets, const hs_options *options, hs_search *search,
+hs_status hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search,
                           hs_failure *failure);
 
 #endif

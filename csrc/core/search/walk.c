@@ -200,7 +200,7 @@ hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
                         (double)(ndim + 1) * sizeof(float) + (double)ndim * sizeof(double) +
                         (double)m * sizeof(int64_t);
     const double all = (double)most->candidates * each;
-    if (most->candidates <= HS_ORDER_CANDIDATES && hs_account_allows(&search->account, all)) {
+    if (most->candidates <= HS_ORDER_CANDIDATES && hs_account_allows(&search->call->account, all)) {
         return true;
     }
     *bytes = all;
@@ -210,7 +210,7 @@ hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
 static hs_status
 init_links(hs_search *search, hs_cursor *cursor)
 {
-    hs_account   *account = &search->account;
+    hs_account   *account = &search->call->account;
     const int64_t n = search->stencil.n_rows;
     cursor->links = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(hs_link));
     if (cursor->links == NULL) {
@@ -280,8 +280,8 @@ void
 hs_walker_close(hs_search *search, hs_walker *walker)
 {
     hs_scanner_close(search, &walker->scanner);
-    hs_free(&search->account, walker->cursor.links);
+    hs_free(&search->call->account, walker->cursor.links);
     walker->cursor.links = NULL;
-    hs_free(&search->account, walker->cursor.hints);
+    hs_free(&search->call->account, walker->cursor.hints);
     walker->cursor.hints = NULL;
 }

@@ -15,6 +15,7 @@
 
 /* A search, and what it has found in cell order. */
 typedef struct building {
+    hs_call     call;
     hs_search   search;
     hs_pieces   pieces;
     hs_listing *listing; /* borrowed: what it becomes; its stores are those of the list in use */
@@ -212,7 +213,7 @@ take(hs_store *store, hs_store *renewed)
 static bool
 count_pairs(building *built, placing *place)
 {
-    hs_account *account = &built->search.account;
+    hs_account *account = &built->call.account;
     hs_listing *listing = built->listing;
     int64_t     n_shifted = 0;
     place->plain = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof(int64_t));
@@ -269,19 +270,19 @@ settle_pairs(building *built)
     }
     complete = complete && make_room(built->listing);
     if (complete) {
-        hs_team_run(search->team, built->pieces.n, place_piece, &place);
+        hs_team_run(search->call->team, built->pieces.n, place_piece, &place);
     }
-    hs_free(&search->account, place.shifted);
-    hs_free(&search->account, place.plain);
+    hs_free(&search->call->account, place.shifted);
+    hs_free(&search->call->account, place.plain);
     return complete ? HS_OK : HS_ERR_MEMORY;
 }
 
 static hs_status
-build(const hs_frame *frame, building *built, const hs_options *options, hs_failure *failure)
+build(const hs_frame *frame, building *built, hs_failure *failure)
 {
-    hs_search    *search = &built->search;
+    hs_call      *call = &built->call;
     const hs_sets sets = {.points = &frame->points, .is_plain = true};
-    hs_status     status = hs_search_open(&sets, hs_frame_box(frame), options, search, failure);
+    hs_status     status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
     const bool opened = status == HS_OK;
     if (status == HS_OK) {
         status = find(built, failure);
@@ -292,11 +293,11 @@ build(const hs_frame *frame, building *built, const hs_options *options, hs_fail
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs =
             fmax(failure->expected_pairs, (double)built->listing->n_pairs);
-        failure->limit_bytes = search->account.limit;
+        failure->limit_bytes = call->account.limit;
     }
     if (opened) {
-        hs_pieces_free(&search->account, &built->pieces);
-        hs_search_close(search);
+        hs_pieces_free(&call->account, &built->pieces);
+        hs_search_close(&built->search);
     }
     return status;
 }
@@ -320,8 +321,10 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     next.turn = 1 - listing->turn;
     built->listing = &next;
     built->pieces = (hs_pieces){0};
-    const hs_status status = build(frame, built, &searching, failure);
-    hs_account_close(&built->search.account);
+    hs_call_begin(&searching, &built->call);
+    const hs_status status = build(frame, built, failure);
+    hs_call_dismiss(&built->call);
+    hs_account_close(&built->call.account);
     hs_free(NULL, built);
     if (status == HS_OK) {
         hs_images_free(&listing->images);

@@ -196,7 +196,7 @@ take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits
         me->ids[h] = scanner->block.id[hits->label[h]];
     }
     by_id.label = me->ids;
-    scanner->search->kernel->emit_int32(&by_id, hs_output_next(pairs, HS_WANT_I),
+    scanner->search->call->kernel->emit_int32(&by_id, hs_output_next(pairs, HS_WANT_I),
                                        hs_output_next(pairs, HS_WANT_J));
     status = note_shifts(me, first, hits);
     pairs->n_pairs += n;
@@ -235,7 +235,7 @@ open_worker(crew *all, worker *me)
     hs_status status =
         hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
     if (status == HS_OK) {
-        hs_account     *account = &search->account;
+        hs_account     *account = &search->call->account;
         const hs_block *block = &me->walker.scanner.block;
         const int64_t   n_runs = block->most_runs + 1;
         me->ids = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING,
@@ -254,8 +254,8 @@ open_worker(crew *all, worker *me)
 static hs_status
 run_crew(crew *all, hs_failure *failure)
 {
-    hs_account *account = &all->search->account;
-    const int   n_workers = hs_team_size(all->search->team);
+    hs_account *account = &all->search->call->account;
+    const int   n_workers = hs_team_size(all->search->call->team);
     hs_status   status = HS_OK;
     int         opened = 0;
     all->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof *all->workers);
@@ -271,7 +271,7 @@ run_crew(crew *all, hs_failure *failure)
         status = all->commits != NULL ? HS_OK : HS_ERR_MEMORY;
     }
     if (status == HS_OK) {
-        hs_team_run(all->search->team, n_workers, work, all);
+        hs_team_run(all->search->call->team, n_workers, work, all);
         status = hs_commits_end(account, all->commits, failure);
     }
     for (int w = 0; w < opened; w++) {
@@ -300,9 +300,9 @@ hs_status
 hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
 {
     crew all = {.search = search, .pieces = pieces};
-    pieces->n = search->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(search->team);
+    pieces->n = search->call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(search->call->team);
     pieces->of =
-        hs_alloc(&search->account, HS_FOR_CANDIDATES, pieces->n, sizeof *pieces->of);
+        hs_alloc(&search->call->account, HS_FOR_CANDIDATES, pieces->n, sizeof *pieces->of);
     if (pieces->of == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -312,7 +312,7 @@ hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
     }
     const hs_status status = run_crew(&all, failure);
     if (status != HS_OK) {
-        hs_pieces_free(&search->account, pieces);
+        hs_pieces_free(&search->call->account, pieces);
     }
     return status;
 }

@@ -83,7 +83,7 @@ place_hits(const hs_refilter *refilter, round_of_slabs *doing, int64_t end, int6
            bool *writes)
 {
     hs_output   *output = refilter->output;
-    hs_counters *walked = &refilter->search->walked;
+    hs_counters *walked = &refilter->call->done;
     int64_t      n = 0;
     for (int s = 0; s < doing->n; s++) {
         hs_sifted *slab = &doing->slabs[s];
@@ -114,10 +114,10 @@ run_rounds(hs_refilter *refilter, hs_sifted *slabs, int most, hs_failure *failur
     for (int64_t first = 0; first < listing->n_pairs;) {
         bool writes;
         first = cut_slabs(listing, first, most, &doing);
-        hs_team_run(refilter->search->team, doing.n, sift_task, &doing);
+        hs_team_run(refilter->call->team, doing.n, sift_task, &doing);
         hs_status status = place_hits(refilter, &doing, first, &work, &writes);
         if (status == HS_OK && writes) {
-            hs_team_run(refilter->search->team, doing.n, put_task, &doing);
+            hs_team_run(refilter->call->team, doing.n, put_task, &doing);
         }
         for (int s = 0; s < doing.n; s++) {
             if (status == HS_OK && doing.slabs[s].status != HS_OK) {
@@ -128,7 +128,7 @@ run_rounds(hs_refilter *refilter, hs_sifted *slabs, int most, hs_failure *failur
         }
         if (status == HS_OK && work > POLL_WORK) {
             work = 0;
-            status = hs_poll(&refilter->search->options,
+            status = hs_poll(&refilter->call->options,
                              (double)first / (double)listing->n_pairs);
         }
         if (status != HS_OK) {
@@ -141,7 +141,7 @@ run_rounds(hs_refilter *refilter, hs_sifted *slabs, int most, hs_failure *failur
 static void
 free_refilter(hs_refilter *refilter)
 {
-    hs_account *account = &refilter->search->account;
+    hs_account *account = &refilter->call->account;
     hs_free(account, refilter->lagging);
     hs_free(account, refilter->lag);
     hs_free(account, refilter->image);
@@ -154,8 +154,8 @@ free_refilter(hs_refilter *refilter)
 hs_status
 hs_refilter_run(hs_refilter *refilter, hs_failure *failure)
 {
-    hs_account *account = &refilter->search->account;
-    const int   wanted = SLABS_A_THREAD * hs_team_size(refilter->search->team);
+    hs_account *account = &refilter->call->account;
+    const int   wanted = SLABS_A_THREAD * hs_team_size(refilter->call->team);
     const int   most = wanted < MOST_SLABS ? wanted : MOST_SLABS;
     hs_sifted  *slabs = hs_alloc(account, HS_FOR_CANDIDATES, most, sizeof *slabs);
     hs_status   status = slabs == NULL ? HS_ERR_MEMORY : hs_refilter_prepare(refilter);
@@ -178,7 +178,7 @@ static void
 put_shifts(const hs_refilter *refilter, hs_sifted *slab)
 {
     const hs_listing *listing = &refilter->list->listing;
-    const bool        keys_only = !(refilter->search->options.want & HS_WANT_SHIFT);
+    const bool        keys_only = !(refilter->call->options.want & HS_WANT_SHIFT);
     const int         d = refilter->d, m = refilter->m;
     int32_t          *to = hs_refilter_column(refilter, HS_WANT_SHIFT, slab->at);
     const bool        plain = slab->first < listing->n_plain;
@@ -300,7 +300,7 @@ decide_open(const hs_refilter *refilter, const open_batch *open, int32_t n, hs_s
         batch.shift[r] = open->times[r];
     }
     if (!open->is_wide) {
-        refilter->search->kernel->judge(metric, &batch, verdict, stages);
+        refilter->call->kernel->judge(metric, &batch, verdict, stages);
     }
     for (int32_t b = 0; b < n; b++) {
         double p[HS_MAX_DIM], q[HS_MAX_DIM];

@@ -9,7 +9,8 @@
 
 #include "../collect/columns.h"
 #include "../collect/result.h"
-#include "../search/search.h"
+#include "../scene/scene.h"
+#include "../threads/call.h"
 #include "sift.h"
 #include "pair_list.h"
 
@@ -20,7 +21,7 @@
 typedef struct hs_refilter {
     const hs_verlet *list;   /* borrowed */
     const hs_frame  *now;    /* the list's */
-    hs_search       *search; /* borrowed: account, options, team, kernel; scene if measuring */
+    hs_call         *call;   /* borrowed */
     hs_output       *output; /* borrowed */
     int              d, m;
     int              vector_of_row[HS_MAX_DIM];
@@ -31,6 +32,7 @@ typedef struct hs_refilter {
     float           *offset; /* owned; one row for each image */
     hs_thresholds    plain, shifted; /* for pairs without and with an image */
     bool             measures;       /* d or D are wanted. Then: */
+    hs_scene         scene;
     double          *x;       /* owned; d a point: what the scene's metric measures between */
     int64_t         *image;   /* owned; m for each image: its shift is image + lag_j - lag_i */
     int64_t         *lag;     /* owned; m a point */
@@ -94,9 +96,8 @@ hs_refilter_shift(const hs_refilter *refilter, int64_t e, int64_t *shift)
     }
 }
 
-/* The pairs of the last step, into a result that holds nothing yet; recheck_find.c. options:
- * checked, with the cutoff of the list. Fails as hs_verlet_find. */
-hs_status hs_recheck_find(const hs_verlet *list, const hs_options *options, hs_pairs *pairs,
-                          hs_failure *failure);
+/* The pairs of the last step, into a result whose call has begun; recheck_find.c. The call's options
+ * are checked and have the cutoff of the list. Fails as hs_verlet_find. */
+hs_status hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure);
 
 #endif

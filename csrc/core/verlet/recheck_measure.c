@@ -72,7 +72,7 @@ reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int6
 static bool
 allocate(hs_refilter *refilter)
 {
-    hs_account   *account = &refilter->search->account;
+    hs_account   *account = &refilter->call->account;
     const int64_t n = refilter->now->points.n, m = refilter->m;
     const int64_t n_images = refilter->list->listing.images.n;
     refilter->x = hs_alloc(account, HS_FOR_POINTS, n * refilter->d, sizeof *refilter->x);
@@ -90,7 +90,7 @@ allocate(hs_refilter *refilter)
 static void
 set_lags(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_DIM])
 {
-    const hs_scene *scene = &refilter->search->scene;
+    const hs_scene *scene = &refilter->scene;
     const int       m = refilter->m;
     for (int64_t a = 0; m > 0 && a < refilter->now->points.n; a++) {
         const int64_t i = refilter->list->listing.order[a];
@@ -133,7 +133,7 @@ set_images(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_D
 static void
 set_coordinates(hs_refilter *refilter)
 {
-    const hs_scene *scene = &refilter->search->scene;
+    const hs_scene *scene = &refilter->scene;
     double *const  *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
     const int       d = refilter->d;
     const int32_t *order = refilter->list->listing.order;
@@ -151,22 +151,23 @@ set_coordinates(hs_refilter *refilter)
 hs_status
 hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure)
 {
-    hs_search *search = refilter->search;
-    hs_options options = search->options;
+    hs_call   *call = refilter->call;
+    hs_scene  *scene = &refilter->scene;
+    hs_options options = call->options;
     int64_t    over[HS_MAX_DIM][HS_MAX_DIM] = {{0}};
     options.want |= HS_WANT_SHIFT; /* the turns by which points were wrapped are needed */
     const hs_status status =
-        hs_scene_init(&search->account, search->team, &refilter->now->points,
-                      hs_frame_box(refilter->now), &options, &search->scene, failure);
+        hs_scene_init(&call->account, call->team, &refilter->now->points,
+                      hs_frame_box(refilter->now), &options, scene, failure);
     if (status != HS_OK) {
         return status;
     }
     if (!allocate(refilter)) {
         return HS_ERR_MEMORY;
     }
-    const bool over_given = search->scene.keeps_originals;
+    const bool over_given = scene->keeps_originals;
     if (!over_given && refilter->m > 0) {
-        divide_rows(&search->scene.lattice, over);
+        divide_rows(&scene->lattice, over);
     }
     set_lags(refilter, over_given, (const int64_t(*)[HS_MAX_DIM])over);
     set_images(refilter, over_given, (const int64_t(*)[HS_MAX_DIM])over);
@@ -239,7 +240,7 @@ fill(const hs_refilter *refilter, const hs_sifted *slab, int32_t first, measured
 static void
 measure(const hs_refilter *refilter, double *const *vector, measured *batch)
 {
-    const hs_metric *metric = &refilter->search->scene.metric;
+    const hs_metric *metric = &refilter->scene.metric;
     uint8_t          done[IN_BATCH] = {0};
     hs_batch         given = {.n = batch->n};
     for (int k = 0; k < refilter->d; k++) {
@@ -250,7 +251,7 @@ measure(const hs_refilter *refilter, double *const *vector, measured *batch)
         given.shift[r] = batch->times[r];
     }
     if (!batch->is_wide) {
-        refilter->search->kernel->measure(metric, &given, batch->distance, vector, done);
+        refilter->call->kernel->measure(metric, &given, batch->distance, vector, done);
     }
     for (int32_t b = 0; b < batch->n; b++) {
         double p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
@@ -271,8 +272,8 @@ measure(const hs_refilter *refilter, double *const *vector, measured *batch)
 void
 hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab)
 {
-    const hs_scene   *scene = &refilter->search->scene;
-    const hs_options *options = &refilter->search->options;
+    const hs_scene   *scene = &refilter->scene;
+    const hs_options *options = &refilter->call->options;
     const hs_scale    same = {.exponent = 0, .first = 1.0, .second = 1.0};
     const hs_scale    unscale = scene->extreme ? same : scene->unscale;
     const int         d = refilter->d;

@@ -26,7 +26,7 @@ add_counts(hs_refilter *refilter)
         return HS_OK;
     }
     refilter->counts =
-        hs_alloc(&refilter->search->account, HS_FOR_WRAPS, n * m, sizeof *refilter->counts);
+        hs_alloc(&refilter->call->account, HS_FOR_WRAPS, n * m, sizeof *refilter->counts);
     if (refilter->counts == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -201,7 +201,7 @@ set_thresholds(hs_refilter *refilter, hs_scale scale, double largest, double err
 hs_status
 hs_refilter_prepare(hs_refilter *refilter)
 {
-    hs_account   *account = &refilter->search->account;
+    hs_account   *account = &refilter->call->account;
     const int     stride = hs_sift_stride(refilter->d);
     const double  cutoff = refilter->given.cutoff;
     const int     exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;

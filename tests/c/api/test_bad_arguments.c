@@ -256,10 +256,10 @@ numbers_that_are_only_large_are_fine(void)
     hs_options options = hs_options_default();
     for (int n = 1; n < INT_MAX / 3; n *= 3) {
         options.threads = n;
-        CHECK(hs_search_threads(1, &options) == (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
+        CHECK(hs_call_threads(1, &options) == (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
         options.threads = -n;
-        CHECK(hs_search_threads(1, &options) == 1);
-        CHECK(hs_search_threads(INT64_MAX, &options) ==
+        CHECK(hs_call_threads(1, &options) == 1);
+        CHECK(hs_call_threads(INT64_MAX, &options) ==
               (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
     }
 }

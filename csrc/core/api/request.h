@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * call.h: what the public searches of one scene share: from their arguments to an open search,
+ * request.h: what the public searches of one scene share: from their arguments to an open search,
  * and from its end to what the caller gets. What each does with the search is its own.
  */
-#ifndef HS_CALL_H
-#define HS_CALL_H
+#ifndef HS_REQUEST_H
+#define HS_REQUEST_H
 
 #include "../../halfshell.h"
 #include "../base/base.h"
@@ -17,9 +17,10 @@ typedef struct hs_request {
     const hs_options *options;
 } hs_request;
 
-/* Checks the arguments, and opens a search of them. On failure nothing is held but its account,
- * which the caller closes in any case. */
-hs_status hs_request_open(const hs_request *request, hs_search *search, hs_failure *failure);
+/* Checks the arguments, and opens a search of them for a call that has begun. On failure it is
+ * closed. */
+hs_status hs_request_open(const hs_request *request, hs_call *call, hs_search *search,
+                          hs_failure *failure);
 
 /* Uses an open search; *n_pairs, zero before, is how many it found. */
 typedef hs_status (*hs_use_fn)(void *context, hs_search *search, int64_t *n_pairs,
@@ -30,8 +31,8 @@ typedef hs_status (*hs_use_fn)(void *context, hs_search *search, int64_t *n_pair
 hs_status hs_request_use(const hs_request *request, hs_use_fn use, void *context,
                          hs_failure *failure);
 
-/* Fills the output, which is empty and of the options' columns, from the search. */
-typedef hs_status (*hs_fill_fn)(hs_pairs *pairs, hs_failure *failure);
+/* Fills the output, which is empty and of the options' columns, from an open search. */
+typedef hs_status (*hs_fill_fn)(hs_search *search, hs_pairs *pairs, hs_failure *failure);
 
 /* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
 hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result,

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* call.c: what a call has and does is kept in one place, so that each part adds to the same sums. */
+#include "call.h"
+
+#include "../base/poll.h"
+
+#include <string.h>
+
+/* An hs_poll_fn: the caller's, counted. */
+static bool
+counted_poll(void *context, double fraction)
+{
+    hs_call *call = context;
+    call->done.polls++;
+    return call->callers_poll(call->callers_context, fraction);
+}
+
+void
+hs_call_set_poll(hs_poll_fn poll, void *context, hs_call *call)
+{
+    call->callers_poll = poll;
+    call->callers_context = context;
+    call->options.poll = poll != NULL ? counted_poll : NULL;
+    call->options.poll_context = call;
+}
+
+void
+hs_call_begin(const hs_options *options, hs_call *call)
+{
+    call->options = *options;
+    call->kernel = hs_kernel_select(options->kernel);
+    call->team = NULL;
+    call->done = (hs_counters){.pairs = 0};
+    hs_call_set_poll(options->poll, options->poll_context, call);
+    hs_account_init(&call->account, options);
+}
+
+hs_failure *
+hs_call_enter(const hs_options *options, hs_failure *failure, hs_call *call)
+{
+    failure = failure != NULL ? failure : &call->ignored;
+    *failure = HS_NO_FAILURE;
+    call->saved = hs_fpenv_enter();
+    hs_call_begin(options, call);
+    return failure;
+}
+
+void
+hs_call_leave(hs_call *call, int64_t n_pairs)
+{
+    hs_call_dismiss(call);
+    hs_call_report(call, n_pairs);
+    hs_fpenv_leave(call->saved);
+}
+
+int
+hs_call_threads(int64_t n_points, const hs_options *options)
+{
+    const int n = options->threads;
+    const int most = n < 0 ? (n_points >= HS_POINTS_FOR_THREADS ? -n : 1) : n;
+    return most < HS_MOST_THREADS ? most : HS_MOST_THREADS;
+}
+
+void
+hs_call_gather(hs_call *call, int64_t n_points)
+{
+    if (call->team == NULL) {
+        call->team = hs_team_create(hs_call_threads(n_points, &call->options));
+    }
+}
+
+void
+hs_call_dismiss(hs_call *call)
+{
+    hs_team_free(call->team);
+    call->team = NULL;
+}
+
+void
+hs_call_note(hs_call *call, const hs_counters *done)
+{
+    hs_counters *sum = &call->done;
+    sum->groups += done->groups;
+    sum->candidates += done->candidates;
+    sum->ambiguous += done->ambiguous;
+    sum->by_float64 += done->by_float64;
+    sum->by_double_word += done->by_double_word;
+    sum->by_integers += done->by_integers;
+    sum->polls += done->polls;
+}
+
+void
+hs_call_report(const hs_call *call, int64_t n_pairs)
+{
+    hs_counters *counters = call->options.counters;
+    if (counters == NULL) {
+        return;
+    }
+    *counters = call->done;
+    memcpy(counters->bytes, call->account.total.bytes, sizeof counters->bytes);
+    counters->bytes_peak = call->account.total.bytes_peak;
+    counters->pairs = n_pairs;
+}
+
+void
+hs_call_restart(hs_call *call)
+{
+    hs_account_close(&call->account);
+    hs_account_init(&call->account, &call->options);
+    call->done = (hs_counters){.pairs = 0};
+}
+
+void
+hs_call_detach(hs_call *call)
+{
+    hs_call_set_poll(NULL, NULL, call);
+    call->options.counters = NULL;
+    call->options.kernel = NULL;
+    call->options.out = NULL;
+}
