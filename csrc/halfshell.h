@@ -206,6 +206,21 @@ typedef struct hs_options {
 /* Defaults: cutoff 0, inclusive, unsorted, exact, i and j of 8 bytes, no limit, no poll. */
 hs_options hs_options_default(void);
 
+/* Points that are sorted into cells once and searched many times; see hs_cells_build. */
+typedef struct hs_cells hs_cells;
+
+/*
+ * Among what a search looks: points in a box, or cells, which have both. All borrowed: points must
+ * not move during the call (a concurrent write may change the answer, it cannot corrupt memory:
+ * each number is read once).
+ */
+typedef struct hs_among {
+    const hs_points *points;
+    const hs_box    *box;     /* NULL: open space */
+    const hs_points *queries; /* where neighbours are looked for; NULL: at each of the points */
+    const hs_cells  *cells;   /* in place of points and box, which are NULL then; or NULL */
+} hs_among;
+
 /* A finished search: opaque, owned by the caller. */
 typedef struct hs_pairs hs_pairs;
 
@@ -213,24 +228,23 @@ typedef struct hs_pairs hs_pairs;
  * Find every pair within the cutoff, each once (half list): i < j, or i == j and the first
  * nonzero component of S positive. (i, i, S = 0) is no pair; coincident points are.
  *
- * points, options  borrowed; points must not move during the call (a concurrent write may
- *                  change the answer, it cannot corrupt memory: each number is read once)
- * box              borrowed; NULL: open space
+ * among, options   borrowed; no queries, which hs_neighbors_find is for
  * pairs            receives an object to be freed with hs_pairs_free; NULL on failure
  * failure          filled on failure; may be NULL
  *
  * Order: fixed by the scene; it does not depend on the kernel. Returns any status.
  */
-hs_status hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
-                        hs_pairs **pairs, hs_failure *failure);
+hs_status hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **pairs,
+                        hs_failure *failure);
 
-/* The same search, counting only; options->want and ->sorted are ignored. */
-hs_status hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
-                         int64_t *count, hs_failure *failure);
+/* The same search, counting only; options->want and ->sorted are ignored. With queries: every
+ * neighbour of each, the sum of what hs_neighbors_count counts. */
+hs_status hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
+                         hs_failure *failure);
 
 /*
  * Find all neighbours of each query among the points, row after row: pairs (i in queries, j in
- * points, S) with the vector D = points[j] - queries[i] + S * box. queries NULL: of each point
+ * points, S) with the vector D = points[j] - queries[i] + S * box. Without queries: of each point
  * among the points, itself left out where S = 0, so that each pair is there twice, as (i, j, S) and
  * (j, i, -S). With queries nothing is left out: an identical point is a neighbour at distance 0.
  *
@@ -238,16 +252,12 @@ hs_status hs_pairs_count(const hs_points *points, const hs_box *box, const hs_op
  * hs_pairs_offsets says where each begins. Memory and failures as for hs_pairs_find; a failure's
  * row is that of a query when failure->in_queries.
  */
-hs_status hs_neighbors_find(const hs_points *points, const hs_points *queries, const hs_box *box,
-                            const hs_options *options, hs_pairs **rows, hs_failure *failure);
+hs_status hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **rows,
+                            hs_failure *failure);
 
 /* The length of each row only. counts: one for each query, or point; unspecified on failure. */
-hs_status hs_neighbors_count(const hs_points *points, const hs_points *queries, const hs_box *box,
-                             const hs_options *options, int64_t *counts, hs_failure *failure);
-
-/* The sum of these lengths only, for queries that are not NULL. */
-hs_status hs_between_count(const hs_points *points, const hs_points *queries, const hs_box *box,
-                           const hs_options *options, int64_t *count, hs_failure *failure);
+hs_status hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
+                             hs_failure *failure);
 
 /* What is known of each point of a set beside its place; borrowed. */
 typedef struct hs_marks {
@@ -280,15 +290,14 @@ typedef struct hs_histogram {
  * options->cutoff, inclusive and precision are ignored, as are want and sorted. Outputs are
  * unspecified on failure.
  */
-hs_status hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_box *box,
-                             const hs_options *options, const hs_histogram *histogram,
-                             hs_failure *failure);
+hs_status hs_pairs_histogram(const hs_among *among, const hs_options *options,
+                             const hs_histogram *histogram, hs_failure *failure);
 
 /*
  * Find the k nearest points of each query, k >= 1, row after row and k entries in each: pairs (i in
  * queries, j in points, S) with the vector D = points[j] - queries[i] + S * box, ascending by the
  * exact distance and, where that is the same, by (j, S). In a periodic box each image of a point
- * counts for itself. queries NULL: of each point among the points, itself left out where S = 0.
+ * counts for itself. Without queries: of each point among the points, itself left out where S = 0.
  *
  * options->cutoff is the largest distance that counts, itself included, and may be infinite. What a
  * row lacks is j = -1, distance infinity, vector NaN, S = 0. Of options->want, j, distance, vector
@@ -297,9 +306,8 @@ hs_status hs_pairs_histogram(const hs_points *points, const hs_points *queries, 
  * query is so far from points that repeat that more of their images than memory holds are about as
  * near.
  */
-hs_status hs_nearest_find(const hs_points *points, const hs_points *queries, const hs_box *box,
-                          int64_t k, const hs_options *options, hs_pairs **rows,
-                          hs_failure *failure);
+hs_status hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options,
+                          hs_pairs **rows, hs_failure *failure);
 
 /* Rows of a result of hs_neighbors_find, hs_cells_neighbors or hs_cells_candidates, and where each
  * begins: rows + 1 numbers, the last one the length of all; borrowed. 0 and NULL when taken, or of
@@ -333,12 +341,13 @@ void hs_pairs_free(hs_pairs *pairs);
 typedef struct hs_stream hs_stream;
 
 /*
- * All is borrowed for this call only: points may change afterwards. max_pairs >= 1: of a block.
+ * All is borrowed for this call only: points may change afterwards, but cells must outlive the
+ * stream. No queries. max_pairs >= 1: of a block.
  * options->sorted, ->out and ->counters are ignored, ->poll is asked by this call; the limits,
  * whose context must stay, hold for what the stream has. *stream is NULL on failure.
  */
-hs_status hs_stream_open(const hs_points *points, const hs_box *box, const hs_options *options,
-                         int64_t max_pairs, hs_stream **stream, hs_failure *failure);
+hs_status hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pairs,
+                         hs_stream **stream, hs_failure *failure);
 
 /* The next max_pairs pairs, or those that are left, for hs_pairs_free; *block is NULL after the
  * last ones. poll may be NULL; from call to call its fraction never falls, and it is 1 once all
@@ -372,16 +381,13 @@ typedef struct hs_visit {
  * ignored. *n_visited, set also on failure: pairs looked at, the one that ended the search
  * included, which is no failure; other threads may go on for some hundred points then.
  */
-hs_status hs_pairs_visit(const hs_points *points, const hs_box *box, const hs_options *options,
-                         const hs_visit *visit, int64_t *n_visited, hs_failure *failure);
+hs_status hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
+                         int64_t *n_visited, hs_failure *failure);
 
 /*
  * Points that are sorted into cells once and asked many times. Immutable: any number of calls may
- * use it at once. Opaque, owned by the caller.
- */
-typedef struct hs_cells hs_cells;
-
-/*
+ * use them at once. Opaque, owned by the caller.
+ *
  * points, box, options are borrowed for this call only: the points are copied. options->cutoff is
  * the largest cutoff that the cells are made for; larger ones, and queries much further away than
  * the points or the box reach, are answered as well, by cells that are made for that call.
@@ -398,32 +404,9 @@ void hs_cells_free(hs_cells *cells);
 void          hs_cells_points(const hs_cells *cells, hs_points *points);
 const hs_box *hs_cells_box(const hs_cells *cells);
 
-/* As hs_pairs_find, hs_pairs_count or, with queries that are not NULL, hs_between_count,
- * hs_neighbors_find, hs_neighbors_count and hs_pairs_histogram for these points. counters tell what
- * the call took, not what the cells hold. */
-hs_status hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
-                         hs_failure *failure);
-hs_status hs_cells_count(const hs_cells *cells, const hs_points *queries,
-                         const hs_options *options, int64_t *count, hs_failure *failure);
-hs_status hs_cells_neighbors(const hs_cells *cells, const hs_points *queries,
-                             const hs_options *options, hs_pairs **rows, hs_failure *failure);
-hs_status hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
-                                   const hs_options *options, int64_t *counts,
-                                   hs_failure *failure);
-hs_status hs_cells_histogram(const hs_cells *cells, const hs_points *queries,
-                             const hs_options *options, const hs_histogram *histogram,
-                             hs_failure *failure);
-
-/* As hs_nearest_find. The first call builds a tree of the points, which stays with the cells and is
- * not counted as memory of the call; later calls begin with that. */
-hs_status hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
-                           const hs_options *options, hs_pairs **rows, hs_failure *failure);
-
-/* As hs_stream_open, whose stream must be freed before the cells, and hs_pairs_visit. */
-hs_status hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
-                          hs_stream **stream, hs_failure *failure);
-hs_status hs_cells_visit(const hs_cells *cells, const hs_options *options, const hs_visit *visit,
-                         int64_t *n_visited, hs_failure *failure);
+/* hs_among.cells: counters tell what the call took, not what the cells hold. The first
+ * hs_nearest_find builds a tree of the points, which stays with the cells and is not counted as
+ * memory of the call. */
 
 /*
  * The layout of cells: points order[start[c]] to order[start[c + 1] - 1] are in cell c, ascending.
@@ -558,8 +541,8 @@ typedef struct hs_plan {
     const char *kernel;               /* static storage */
 } hs_plan;
 
-hs_status hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *options,
-                       hs_plan *plan, hs_failure *failure);
+hs_status hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan,
+                       hs_failure *failure);
 
 /* Check a box: every periodic entry finite, periodic rows linearly independent (decided
  * exactly). heights[l]: distance between the faces that box vector l connects, for periodic

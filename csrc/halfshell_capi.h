@@ -5,7 +5,7 @@
  *
  *     static const hs_capi *halfshell;                      once, when the module is initialised:
  *     halfshell = hs_capi_import();                         NULL: an exception is set
- *     status = halfshell->pairs_find(&points, NULL, &options, &pairs, &failure);
+ *     status = halfshell->pairs_find(&among, &options, &pairs, &failure);
  *
  * Member `pairs_find` is hs_pairs_find, and so on: halfshell.h says what each does. Do not call the
  * functions by their own names, unless you link a core of your own; never free by one of the two
@@ -31,7 +31,7 @@ extern "C" {
 
 /* Of the structs, enums and signatures in halfshell.h. It grows when one changes such that modules
  * that were compiled before would misread it; not when functions are appended to the table. */
-#define HS_CAPI_VERSION 1
+#define HS_CAPI_VERSION 2
 
 #define HS_CAPI_NAME "halfshell._core._C_API"
 
@@ -42,21 +42,18 @@ typedef struct hs_capi {
     int (*version)(void);
     const char *(*status_text)(hs_status status);
     hs_options (*options_default)(void);
-    hs_status (*pairs_find)(const hs_points *points, const hs_box *box, const hs_options *options,
-                            hs_pairs **pairs, hs_failure *failure);
-    hs_status (*pairs_count)(const hs_points *points, const hs_box *box, const hs_options *options,
-                             int64_t *count, hs_failure *failure);
-    hs_status (*neighbors_find)(const hs_points *points, const hs_points *queries,
-                                const hs_box *box, const hs_options *options, hs_pairs **rows,
+    hs_status (*pairs_find)(const hs_among *among, const hs_options *options, hs_pairs **pairs,
+                            hs_failure *failure);
+    hs_status (*pairs_count)(const hs_among *among, const hs_options *options, int64_t *count,
+                             hs_failure *failure);
+    hs_status (*neighbors_find)(const hs_among *among, const hs_options *options, hs_pairs **rows,
                                 hs_failure *failure);
-    hs_status (*neighbors_count)(const hs_points *points, const hs_points *queries,
-                                 const hs_box *box, const hs_options *options, int64_t *counts,
+    hs_status (*neighbors_count)(const hs_among *among, const hs_options *options, int64_t *counts,
                                  hs_failure *failure);
-    hs_status (*between_count)(const hs_points *points, const hs_points *queries, const hs_box *box,
-                               const hs_options *options, int64_t *count, hs_failure *failure);
-    hs_status (*pairs_histogram)(const hs_points *points, const hs_points *queries,
-                                 const hs_box *box, const hs_options *options,
+    hs_status (*pairs_histogram)(const hs_among *among, const hs_options *options,
                                  const hs_histogram *histogram, hs_failure *failure);
+    hs_status (*nearest_find)(const hs_among *among, int64_t k, const hs_options *options,
+                              hs_pairs **rows, hs_failure *failure);
     int64_t (*pairs_rows)(const hs_pairs *pairs);
     const int64_t *(*pairs_offsets)(const hs_pairs *pairs);
     int64_t *(*pairs_take_offsets)(hs_pairs *pairs);
@@ -65,31 +62,18 @@ typedef struct hs_capi {
     void *(*pairs_take)(hs_pairs *pairs, unsigned which);
     void (*array_free)(void *array);
     void (*pairs_free)(hs_pairs *pairs);
-    hs_status (*stream_open)(const hs_points *points, const hs_box *box, const hs_options *options,
-                             int64_t max_pairs, hs_stream **stream, hs_failure *failure);
+    hs_status (*stream_open)(const hs_among *among, const hs_options *options, int64_t max_pairs,
+                             hs_stream **stream, hs_failure *failure);
     hs_status (*stream_next)(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                              hs_failure *failure);
     void (*stream_free)(hs_stream *stream);
-    hs_status (*pairs_visit)(const hs_points *points, const hs_box *box, const hs_options *options,
+    hs_status (*pairs_visit)(const hs_among *among, const hs_options *options,
                              const hs_visit *visit, int64_t *n_visited, hs_failure *failure);
     hs_status (*cells_build)(const hs_points *points, const hs_box *box, const hs_options *options,
                              hs_cells **cells, hs_failure *failure);
     void (*cells_free)(hs_cells *cells);
     void (*cells_points)(const hs_cells *cells, hs_points *points);
     const hs_box *(*cells_box)(const hs_cells *cells);
-    hs_status (*cells_pairs)(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
-                             hs_failure *failure);
-    hs_status (*cells_count)(const hs_cells *cells, const hs_points *queries,
-                             const hs_options *options, int64_t *count, hs_failure *failure);
-    hs_status (*cells_neighbors)(const hs_cells *cells, const hs_points *queries,
-                                 const hs_options *options, hs_pairs **rows, hs_failure *failure);
-    hs_status (*cells_neighbors_count)(const hs_cells *cells, const hs_points *queries,
-                                       const hs_options *options, int64_t *counts,
-                                       hs_failure *failure);
-    hs_status (*cells_stream)(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
-                              hs_stream **stream, hs_failure *failure);
-    hs_status (*cells_visit)(const hs_cells *cells, const hs_options *options,
-                             const hs_visit *visit, int64_t *n_visited, hs_failure *failure);
     void (*cells_layout)(const hs_cells *cells, hs_layout *layout);
     void (*cells_indices)(const hs_cells *cells, int64_t *indices);
     hs_status (*cells_find)(const hs_cells *cells, const hs_points *points, int64_t *cell,
@@ -109,8 +93,8 @@ typedef struct hs_capi {
                              hs_failure *failure);
     hs_verlet_state (*verlet_look)(const hs_verlet *list);
     void (*verlet_free)(hs_verlet *list);
-    hs_status (*plan_make)(const hs_points *points, const hs_box *box, const hs_options *options,
-                           hs_plan *plan, hs_failure *failure);
+    hs_status (*plan_make)(const hs_among *among, const hs_options *options, hs_plan *plan,
+                           hs_failure *failure);
     hs_status (*box_measure)(const hs_box *box, double *heights, double *volume,
                              hs_failure *failure);
     hs_status (*box_wrap)(const hs_box *box, const hs_points *points, double *wrapped,
@@ -120,14 +104,6 @@ typedef struct hs_capi {
     size_t (*pool_held)(void);
     void (*pool_clear)(void);
     int (*kernel_names)(const char **names, int capacity);
-    hs_status (*cells_histogram)(const hs_cells *cells, const hs_points *queries,
-                                 const hs_options *options, const hs_histogram *histogram,
-                                 hs_failure *failure);
-    hs_status (*nearest_find)(const hs_points *points, const hs_points *queries, const hs_box *box,
-                              int64_t k, const hs_options *options, hs_pairs **rows,
-                              hs_failure *failure);
-    hs_status (*cells_nearest)(const hs_cells *cells, const hs_points *queries, int64_t k,
-                               const hs_options *options, hs_pairs **rows, hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -15,8 +15,8 @@ static const hs_capi table = {
     .pairs_count = hs_pairs_count,
     .neighbors_find = hs_neighbors_find,
     .neighbors_count = hs_neighbors_count,
-    .between_count = hs_between_count,
     .pairs_histogram = hs_pairs_histogram,
+    .nearest_find = hs_nearest_find,
     .pairs_rows = hs_pairs_rows,
     .pairs_offsets = hs_pairs_offsets,
     .pairs_take_offsets = hs_pairs_take_offsets,
@@ -33,12 +33,6 @@ static const hs_capi table = {
     .cells_free = hs_cells_free,
     .cells_points = hs_cells_points,
     .cells_box = hs_cells_box,
-    .cells_pairs = hs_cells_pairs,
-    .cells_count = hs_cells_count,
-    .cells_neighbors = hs_cells_neighbors,
-    .cells_neighbors_count = hs_cells_neighbors_count,
-    .cells_stream = hs_cells_stream,
-    .cells_visit = hs_cells_visit,
     .cells_layout = hs_cells_layout,
     .cells_indices = hs_cells_indices,
     .cells_find = hs_cells_find,
@@ -58,9 +52,6 @@ static const hs_capi table = {
     .pool_held = hs_pool_held,
     .pool_clear = hs_pool_clear,
     .kernel_names = hs_kernel_names,
-    .cells_histogram = hs_cells_histogram,
-    .nearest_find = hs_nearest_find,
-    .cells_nearest = hs_cells_nearest,
 };
 
 int

@@ -143,7 +143,7 @@ length_of(PyObject *object, int n_axes, int64_t otherwise, const double **data)
 /* Three arguments: batch, int64 (n,); cutoffs, None or float64 (s,); boxes, None or float64
  * (s, d, d), for which the call's box has the axes that repeat. */
 static bool
-take_batch(PyObject *const *arguments, const hs_call *call, batch *given)
+take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
 {
     PyArrayObject *numbers = (PyArrayObject *)arguments[0];
     hs_systems    *systems = &given->systems;
@@ -158,7 +158,7 @@ take_batch(PyObject *const *arguments, const hs_call *call, batch *given)
     if (n_cutoffs < 0 || n_boxes < 0) {
         return false;
     }
-    systems->box = hs_call_box(call);
+    systems->box = hs_py_call_box(call);
     if (systems->rows != NULL) {
         const npy_intp *shape = PyArray_DIMS((PyArrayObject *)arguments[2]);
         if (systems->box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1] ||
@@ -181,7 +181,7 @@ take_batch(PyObject *const *arguments, const hs_call *call, batch *given)
 
 /* Systems are named where each has something of its own. */
 static PyObject *
-raise_failure(hs_status status, hs_failure *failure, const hs_call *call, const batch *given)
+raise_failure(hs_status status, hs_failure *failure, const hs_py_call *call, const batch *given)
 {
     if (given->number != NULL) {
         failure->system = -1;
@@ -192,7 +192,7 @@ raise_failure(hs_status status, hs_failure *failure, const hs_call *call, const 
 PyObject *
 hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_result  result;
     hs_failure failure;
     hs_pairs  *pairs = NULL;
@@ -202,7 +202,7 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         return NULL;
     }
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    if (!hs_call_init(&call, arguments) || !hs_result_init(&result, more, &call) ||
+    if (!hs_py_call_init(&call, arguments) || !hs_result_init(&result, more, &call) ||
         !hs_result_is_apart(&result, arguments[0], "points") ||
         !hs_result_is_apart(&result, arguments[2], "box") ||
         !hs_result_is_apart(&result, more[4], "batch") ||
@@ -211,10 +211,10 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         !take_batch(more + 4, &call, &given)) {
         return NULL;
     }
-    hs_call_release(&call);
+    hs_py_call_release(&call);
     const hs_status status =
         hs_systems_find(&call.points, &given.systems, &call.options, &pairs, &failure);
-    hs_call_acquire(&call);
+    hs_py_call_acquire(&call);
     PyObject *arrays = status == HS_OK ? hs_result_of(&result, pairs, &call)
                                        : raise_failure(status, &failure, &call, &given);
     hs_pairs_free(pairs);
@@ -225,14 +225,14 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
 PyObject *
 hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     batch      given;
     (void)module;
     if (!hs_expect_arguments("batch_count", n_arguments, HS_CALL_ARGUMENTS + 3)) {
         return NULL;
     }
-    if (!hs_call_init(&call, arguments) ||
+    if (!hs_py_call_init(&call, arguments) ||
         !take_batch(arguments + HS_CALL_ARGUMENTS, &call, &given)) {
         return NULL;
     }
@@ -252,10 +252,10 @@ hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         Py_CLEAR(array);
     }
     if (array != NULL) {
-        hs_call_release(&call);
+        hs_py_call_release(&call);
         const hs_status status =
             hs_systems_count(&call.points, &given.systems, &call.options, counts, &failure);
-        hs_call_acquire(&call);
+        hs_py_call_acquire(&call);
         if (status != HS_OK) {
             Py_CLEAR(array);
             (void)raise_failure(status, &failure, &call, &given);

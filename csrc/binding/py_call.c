@@ -20,8 +20,8 @@
 static bool
 poll_python(void *context, double fraction)
 {
-    hs_call *call = context;
-    hs_call_acquire(call);
+    hs_py_call *call = context;
+    hs_py_call_acquire(call);
     bool go_on = PyErr_CheckSignals() == 0;
     if (go_on && call->progress != NULL) {
         PyObject *result = PyObject_CallFunction(call->progress, "d", fraction);
@@ -74,7 +74,7 @@ take_threads(PyObject *object, hs_options *options)
 }
 
 static bool
-take_queries(PyObject *object, hs_call *call)
+take_queries(PyObject *object, hs_py_call *call)
 {
     const hs_points *points = &call->points, *queries = &call->queries;
     call->has_queries = object != Py_None;
@@ -95,7 +95,7 @@ take_queries(PyObject *object, hs_call *call)
 }
 
 static int64_t
-count_points(const hs_call *call)
+count_points(const hs_py_call *call)
 {
     return call->points.n + (call->has_queries ? call->queries.n : 0);
 }
@@ -110,14 +110,14 @@ hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
 }
 
 bool
-hs_call_init(hs_call *call, PyObject *const *arguments)
+hs_py_call_init(hs_py_call *call, PyObject *const *arguments)
 {
-    return hs_call_init_sets(call, arguments, Py_None);
+    return hs_py_call_init_sets(call, arguments, Py_None);
 }
 
 /* Points and box: arrays, or what cells hold. */
 static bool
-take_scene(PyObject *points, PyObject *box, PyObject *periodic, hs_call *call)
+take_scene(PyObject *points, PyObject *box, PyObject *periodic, hs_py_call *call)
 {
     call->cells = hs_cells_of(points);
     if (call->cells != NULL) {
@@ -134,7 +134,7 @@ take_scene(PyObject *points, PyObject *box, PyObject *periodic, hs_call *call)
 }
 
 bool
-hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries)
+hs_py_call_init_sets(hs_py_call *call, PyObject *const *arguments, PyObject *queries)
 {
     call->options = hs_options_default();
     call->thread = NULL;
@@ -162,7 +162,7 @@ hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries)
 }
 
 void
-hs_call_release(hs_call *call)
+hs_py_call_release(hs_py_call *call)
 {
     if (count_points(call) >= FEW_POINTS) {
         call->thread = PyEval_SaveThread();
@@ -170,7 +170,7 @@ hs_call_release(hs_call *call)
 }
 
 void
-hs_call_acquire(hs_call *call)
+hs_py_call_acquire(hs_py_call *call)
 {
     if (call->thread != NULL) {
         PyEval_RestoreThread(call->thread);
@@ -178,53 +178,12 @@ hs_call_acquire(hs_call *call)
     }
 }
 
-hs_status
-hs_call_find_pairs(hs_call *call, hs_pairs **pairs, hs_failure *failure)
+hs_among
+hs_py_call_among(const hs_py_call *call)
 {
-    return call->cells != NULL
-               ? hs_cells_pairs(call->cells, &call->options, pairs, failure)
-               : hs_pairs_find(&call->points, hs_call_box(call), &call->options, pairs, failure);
-}
-
-hs_status
-hs_call_find_rows(hs_call *call, hs_pairs **rows, hs_failure *failure)
-{
-    const hs_points *queries = hs_call_queries(call);
-    return call->cells != NULL
-               ? hs_cells_neighbors(call->cells, queries, &call->options, rows, failure)
-               : hs_neighbors_find(&call->points, queries, hs_call_box(call), &call->options, rows,
-                                   failure);
-}
-
-hs_status
-hs_call_find_nearest(hs_call *call, int64_t k, hs_pairs **rows, hs_failure *failure)
-{
-    const hs_points *queries = hs_call_queries(call);
-    return call->cells != NULL
-               ? hs_cells_nearest(call->cells, queries, k, &call->options, rows, failure)
-               : hs_nearest_find(&call->points, queries, hs_call_box(call), k, &call->options,
-                                 rows, failure);
-}
-
-hs_status
-hs_call_count(hs_call *call, int64_t *count, hs_failure *failure)
-{
-    const hs_points  *queries = hs_call_queries(call);
-    const hs_box     *box = hs_call_box(call);
-    const hs_options *options = &call->options;
-    if (call->cells != NULL) {
-        return hs_cells_count(call->cells, queries, options, count, failure);
-    }
-    return queries != NULL ? hs_between_count(&call->points, queries, box, options, count, failure)
-                           : hs_pairs_count(&call->points, box, options, count, failure);
-}
-
-hs_status
-hs_call_count_rows(hs_call *call, int64_t *counts, hs_failure *failure)
-{
-    const hs_points *queries = hs_call_queries(call);
-    return call->cells != NULL
-               ? hs_cells_neighbors_count(call->cells, queries, &call->options, counts, failure)
-               : hs_neighbors_count(&call->points, queries, hs_call_box(call), &call->options,
-                                    counts, failure);
+    const bool has_cells = call->cells != NULL;
+    return (hs_among){.points = has_cells ? NULL : &call->points,
+                      .box = has_cells ? NULL : hs_py_call_box(call),
+                      .queries = hs_py_call_queries(call),
+                      .cells = call->cells};
 }

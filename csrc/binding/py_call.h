@@ -9,7 +9,7 @@
 
 /* The arguments of a search, as views; the Python arguments that they borrow from must stay
  * alive. */
-typedef struct hs_call {
+typedef struct hs_py_call {
     hs_points       points;
     const hs_cells *cells;    /* borrowed: points and box are theirs; or NULL */
     hs_points       queries;  /* when has_queries */
@@ -19,7 +19,7 @@ typedef struct hs_call {
     hs_options      options;
     PyObject       *progress; /* borrowed; called with the fraction done, or NULL */
     PyThreadState  *thread;   /* saved while the GIL is released, else NULL */
-} hs_call;
+} hs_py_call;
 
 /* Whether a function got as many arguments as it takes; false with an exception set. */
 bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected);
@@ -31,33 +31,29 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  * (None: as many as pay). Returns false with an exception set.
  */
 enum { HS_CALL_ARGUMENTS = 10 };
-bool hs_call_init(hs_call *call, PyObject *const *arguments);
+bool hs_py_call_init(hs_py_call *call, PyObject *const *arguments);
 
 /* The same for two sets. queries: None, or an array as points, with as many columns. */
-bool hs_call_init_sets(hs_call *call, PyObject *const *arguments, PyObject *queries);
+bool hs_py_call_init_sets(hs_py_call *call, PyObject *const *arguments, PyObject *queries);
 
 /* Release and take the GIL around a call of the core; poll() takes it in between. With few points
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
-void hs_call_release(hs_call *call);
-void hs_call_acquire(hs_call *call);
+void hs_py_call_release(hs_py_call *call);
+void hs_py_call_acquire(hs_py_call *call);
 
-/* The searches of one set or two, in cells where the call has some. */
-hs_status hs_call_find_pairs(hs_call *call, hs_pairs **pairs, hs_failure *failure);
-hs_status hs_call_find_rows(hs_call *call, hs_pairs **rows, hs_failure *failure);
-hs_status hs_call_find_nearest(hs_call *call, int64_t k, hs_pairs **rows, hs_failure *failure);
-hs_status hs_call_count(hs_call *call, int64_t *count, hs_failure *failure);
-hs_status hs_call_count_rows(hs_call *call, int64_t *counts, hs_failure *failure);
+/* Among what to search: the cells or the points of the call, which it borrows from. */
+hs_among hs_py_call_among(const hs_py_call *call);
 
 /* The box, or NULL for open space. */
 static inline const hs_box *
-hs_call_box(const hs_call *call)
+hs_py_call_box(const hs_py_call *call)
 {
     return call->has_box ? &call->box : NULL;
 }
 
 /* The queries, or NULL where there is one set. */
 static inline const hs_points *
-hs_call_queries(const hs_call *call)
+hs_py_call_queries(const hs_py_call *call)
 {
     return call->has_queries ? &call->queries : NULL;
 }

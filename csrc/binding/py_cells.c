@@ -18,7 +18,7 @@ free_cells(PyObject *capsule)
 PyObject *
 hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     hs_cells  *cells = NULL;
     (void)module;
@@ -26,14 +26,14 @@ hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         return NULL;
     }
     const double cell_size = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS]);
-    if ((cell_size == -1.0 && PyErr_Occurred()) || !hs_call_init(&call, arguments)) {
+    if ((cell_size == -1.0 && PyErr_Occurred()) || !hs_py_call_init(&call, arguments)) {
         return NULL;
     }
     call.options.cell_size = cell_size;
-    hs_call_release(&call);
+    hs_py_call_release(&call);
     const hs_status status =
-        hs_cells_build(&call.points, hs_call_box(&call), &call.options, &cells, &failure);
-    hs_call_acquire(&call);
+        hs_cells_build(&call.points, hs_py_call_box(&call), &call.options, &cells, &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
     }
@@ -146,21 +146,21 @@ hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
 PyObject *
 hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     hs_pairs  *ranges = NULL;
     (void)module;
     if (!hs_expect_arguments("cells_candidates", n_arguments, HS_CALL_ARGUMENTS + 1)) {
         return NULL;
     }
-    if (!hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS]) ||
+    if (!hs_py_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS]) ||
         !expect_cells(call.cells)) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_status status = hs_cells_candidates(call.cells, hs_call_queries(&call), &call.options,
-                                                 &ranges, &failure);
-    hs_call_acquire(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_cells_candidates(call.cells, hs_py_call_queries(&call),
+                                                 &call.options, &ranges, &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
     }

@@ -79,7 +79,7 @@ dictionary_of(const hs_plan *plan, const hs_counters *counters)
 
 /* quantities, sort, index_bytes, measure. */
 static bool
-take_more(PyObject *const *more, hs_call *call, bool *measures)
+take_more(PyObject *const *more, hs_py_call *call, bool *measures)
 {
     const char *letters;
     if (!hs_quantities_of(more[0], HS_LETTERS, &letters, &call->options.want)) {
@@ -96,7 +96,7 @@ take_more(PyObject *const *more, hs_call *call, bool *measures)
 PyObject *
 hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call     call;
+    hs_py_call     call;
     hs_failure  failure;
     hs_plan     plan;
     hs_counters counters = {0};
@@ -106,18 +106,18 @@ hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     if (!hs_expect_arguments("explain", n_arguments, HS_CALL_ARGUMENTS + 4)) {
         return NULL;
     }
-    if (!hs_call_init(&call, arguments) ||
+    if (!hs_py_call_init(&call, arguments) ||
         !take_more(arguments + HS_CALL_ARGUMENTS, &call, &measures)) {
         return NULL;
     }
-    hs_call_release(&call);
-    hs_status status =
-        hs_plan_make(&call.points, hs_call_box(&call), &call.options, &plan, &failure);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    hs_status status = hs_plan_make(&among, &call.options, &plan, &failure);
     if (status == HS_OK && measures) {
         call.options.counters = &counters;
-        status = hs_pairs_find(&call.points, hs_call_box(&call), &call.options, &pairs, &failure);
+        status = hs_pairs_find(&among, &call.options, &pairs, &failure);
     }
-    hs_call_acquire(&call);
+    hs_py_call_acquire(&call);
     hs_pairs_free(pairs);
     return status == HS_OK ? dictionary_of(&plan, measures ? &counters : NULL)
                            : hs_raise(status, &failure, &call.options);

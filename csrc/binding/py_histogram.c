@@ -37,7 +37,7 @@ take_marks(PyObject *types, PyObject *weights, const char *name, int64_t n, hs_m
 
 /* edges, last_inclusive, queries, n_types; types and weights of the points and of the queries. */
 static bool
-take_histogram(PyObject *const *more, const hs_call *call, hs_histogram *wanted)
+take_histogram(PyObject *const *more, const hs_py_call *call, hs_histogram *wanted)
 {
     const void *edges = NULL;
     const int   last_inclusive = PyObject_IsTrue(more[1]);
@@ -79,28 +79,24 @@ PyObject *
 hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_call          call;
+    hs_py_call          call;
     hs_failure       failure;
     hs_histogram     wanted;
     (void)module;
     if (!hs_expect_arguments("histogram", n_arguments, HS_CALL_ARGUMENTS + 8)) {
         return NULL;
     }
-    if (!hs_call_init_sets(&call, arguments, more[2]) || !take_histogram(more, &call, &wanted)) {
+    if (!hs_py_call_init_sets(&call, arguments, more[2]) || !take_histogram(more, &call, &wanted)) {
         return NULL;
     }
     PyObject *array = new_result(&wanted);
     if (array == NULL) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_points *queries = hs_call_queries(&call);
-    const hs_status  status =
-        call.cells != NULL
-            ? hs_cells_histogram(call.cells, queries, &call.options, &wanted, &failure)
-            : hs_pairs_histogram(&call.points, queries, hs_call_box(&call), &call.options, &wanted,
-                                 &failure);
-    hs_call_acquire(&call);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_pairs_histogram(&among, &call.options, &wanted, &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(array);
         return hs_raise(status, &failure, &call.options);

@@ -36,7 +36,7 @@ raise_memory(const hs_failure *failure)
 PyObject *
 hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call     call;
+    hs_py_call     call;
     hs_failure  failure;
     hs_pairs   *rows = NULL;
     const char *letters;
@@ -53,14 +53,15 @@ hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
         }
         return NULL;
     }
-    if (PyErr_Occurred() || !hs_call_init_sets(&call, arguments, own[2]) ||
+    if (PyErr_Occurred() || !hs_py_call_init_sets(&call, arguments, own[2]) ||
         !hs_quantities_of(own[0], HS_ROW_LETTERS, &letters, &call.options.want)) {
         return NULL;
     }
     call.options.index_bytes = index_bytes;
-    hs_call_release(&call);
-    const hs_status status = hs_call_find_nearest(&call, k, &rows, &failure);
-    hs_call_acquire(&call);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_nearest_find(&among, k, &call.options, &rows, &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return status == HS_ERR_MEMORY ? raise_memory(&failure)
                                        : hs_raise(status, &failure, &call.options);

@@ -21,13 +21,14 @@ expect_queries(PyObject *queries)
 
 /* Rows of all neighbours, or NULL with an exception set. */
 static hs_pairs *
-find_rows(hs_call *call)
+find_rows(hs_py_call *call)
 {
     hs_failure failure;
     hs_pairs  *rows = NULL;
-    hs_call_release(call);
-    const hs_status status = hs_call_find_rows(call, &rows, &failure);
-    hs_call_acquire(call);
+    const hs_among among = hs_py_call_among(call);
+    hs_py_call_release(call);
+    const hs_status status = hs_neighbors_find(&among, &call->options, &rows, &failure);
+    hs_py_call_acquire(call);
     if (status != HS_OK) {
         (void)hs_raise(status, &failure, &call->options);
     }
@@ -38,12 +39,12 @@ PyObject *
 hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_call          call;
+    hs_py_call          call;
     hs_result        result;
     (void)module;
     if (!hs_expect_arguments("pairs_between", n_arguments, HS_CALL_ARGUMENTS + 5) ||
         !expect_queries(more[4]) ||
-        !hs_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call) ||
+        !hs_py_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call) ||
         !hs_result_is_apart(&result, more[4], "queries") ||
         !hs_result_is_apart(&result, arguments[0], "points") ||
         !hs_result_is_apart(&result, arguments[2], "box")) {
@@ -58,18 +59,19 @@ hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
 PyObject *
 hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     int64_t    count = 0;
     (void)module;
     if (!hs_expect_arguments("count_between", n_arguments, HS_CALL_ARGUMENTS + 1) ||
         !expect_queries(arguments[HS_CALL_ARGUMENTS]) ||
-        !hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
+        !hs_py_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_status status = hs_call_count(&call, &count, &failure);
-    hs_call_acquire(&call);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_pairs_count(&among, &call.options, &count, &failure);
+    hs_py_call_acquire(&call);
     return status == HS_OK ? PyLong_FromLongLong(count)
                            : hs_raise(status, &failure, &call.options);
 }
@@ -78,11 +80,11 @@ PyObject *
 hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_call          call;
+    hs_py_call          call;
     const char      *letters;
     (void)module;
     if (!hs_expect_arguments("neighbors", n_arguments, HS_CALL_ARGUMENTS + 3) ||
-        !hs_call_init_sets(&call, arguments, more[2]) ||
+        !hs_py_call_init_sets(&call, arguments, more[2]) ||
         !hs_quantities_of(more[0], HS_ROW_LETTERS, &letters, &call.options.want)) {
         return NULL;
     }
@@ -101,11 +103,11 @@ hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
 PyObject *
 hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     (void)module;
     if (!hs_expect_arguments("coordination", n_arguments, HS_CALL_ARGUMENTS + 1) ||
-        !hs_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
+        !hs_py_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS])) {
         return NULL;
     }
     npy_intp  n_rows = (npy_intp)(call.has_queries ? call.queries.n : call.points.n);
@@ -113,10 +115,11 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
     if (counts == NULL) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_status status =
-        hs_call_count_rows(&call, PyArray_DATA((PyArrayObject *)counts), &failure);
-    hs_call_acquire(&call);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_neighbors_count(
+        &among, &call.options, PyArray_DATA((PyArrayObject *)counts), &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(counts);
         return hs_raise(status, &failure, &call.options);

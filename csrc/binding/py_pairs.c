@@ -9,7 +9,7 @@
 PyObject *
 hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_result  result;
     hs_failure failure;
     hs_pairs  *pairs = NULL;
@@ -17,15 +17,16 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
     if (!hs_expect_arguments("pairs", n_arguments, HS_CALL_ARGUMENTS + 4)) {
         return NULL;
     }
-    if (!hs_call_init(&call, arguments) ||
+    if (!hs_py_call_init(&call, arguments) ||
         !hs_result_init(&result, arguments + HS_CALL_ARGUMENTS, &call) ||
         !hs_result_is_apart(&result, arguments[0], "points") ||
         !hs_result_is_apart(&result, arguments[2], "box")) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_status status = hs_call_find_pairs(&call, &pairs, &failure);
-    hs_call_acquire(&call);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_pairs_find(&among, &call.options, &pairs, &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
     }
@@ -37,19 +38,20 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
 PyObject *
 hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     int64_t    count = 0;
     (void)module;
     if (!hs_expect_arguments("count_pairs", n_arguments, HS_CALL_ARGUMENTS)) {
         return NULL;
     }
-    if (!hs_call_init(&call, arguments)) {
+    if (!hs_py_call_init(&call, arguments)) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_status status = hs_call_count(&call, &count, &failure);
-    hs_call_acquire(&call);
+    const hs_among among = hs_py_call_among(&call);
+    hs_py_call_release(&call);
+    const hs_status status = hs_pairs_count(&among, &call.options, &count, &failure);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
     }

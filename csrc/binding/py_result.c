@@ -6,7 +6,7 @@
 #include "outputs.h"
 
 bool
-hs_result_init(hs_result *result, PyObject *const *arguments, hs_call *call)
+hs_result_init(hs_result *result, PyObject *const *arguments, hs_py_call *call)
 {
     hs_options *options = &call->options;
     if (!hs_quantities_of(arguments[0], HS_LETTERS, &result->letters, &options->want)) {
@@ -34,7 +34,7 @@ hs_result_is_apart(const hs_result *result, PyObject *input, const char *name)
 }
 
 PyObject *
-hs_result_of(const hs_result *result, hs_pairs *pairs, const hs_call *call)
+hs_result_of(const hs_result *result, hs_pairs *pairs, const hs_py_call *call)
 {
     if (result->out != NULL) {
         return hs_out_filled(result->out, result->letters, hs_pairs_length(pairs));

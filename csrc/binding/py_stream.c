@@ -16,7 +16,7 @@ typedef struct pair_stream {
     PyObject_HEAD
     hs_stream *stream;     /* NULL: over */
     PyObject  *cells;      /* or NULL; as long as there is a stream */
-    hs_call    call;       /* points: their number only */
+    hs_py_call    call;       /* points: their number only */
     PyObject  *progress;   /* or NULL */
     char       letters[8]; /* of the quantities */
     int64_t    max_pairs;
@@ -78,10 +78,10 @@ next_block(pair_stream *self)
     if (self->stream == NULL || PyErr_CheckSignals() != 0) {
         return NULL;
     }
-    hs_call_release(&self->call);
+    hs_py_call_release(&self->call);
     const hs_status status = hs_stream_next(self->stream, self->call.options.poll,
                                             self->call.options.poll_context, &block, &failure);
-    hs_call_acquire(&self->call);
+    hs_py_call_acquire(&self->call);
     if (status == HS_ERR_MEMORY) {
         return raise_block_too_large(self, &failure);
     }
@@ -187,7 +187,7 @@ take_arguments(pair_stream *self, PyObject *const *arguments)
 {
     hs_options *options = &self->call.options;
     const char *letters;
-    if (!hs_call_init(&self->call, arguments) ||
+    if (!hs_py_call_init(&self->call, arguments) ||
         !hs_quantities_of(arguments[HS_CALL_ARGUMENTS], HS_LETTERS, &letters,
                           &options->want)) {
         return false;
@@ -214,15 +214,13 @@ hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
         Py_XDECREF(self);
         return NULL;
     }
-    hs_call *call = &self->call;
+    hs_py_call *call = &self->call;
     self->is_running = true; /* the hook can get hold of it */
-    hs_call_release(call);
+    const hs_among among = hs_py_call_among(call);
+    hs_py_call_release(call);
     const hs_status status =
-        call->cells != NULL
-            ? hs_cells_stream(call->cells, &call->options, self->max_pairs, &self->stream, &failure)
-            : hs_stream_open(&call->points, hs_call_box(call), &call->options, self->max_pairs,
-                             &self->stream, &failure);
-    hs_call_acquire(call);
+        hs_stream_open(&among, &call->options, self->max_pairs, &self->stream, &failure);
+    hs_py_call_acquire(call);
     leave(self);
     if (status != HS_OK) {
         PyObject *nothing = hs_raise(status, &failure, &call->options);

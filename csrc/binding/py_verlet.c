@@ -42,12 +42,12 @@ list_of(PyObject *const *arguments, Py_ssize_t n_arguments, int n, const char *n
 PyObject *
 hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     bool       rebuilt = false;
     (void)module;
     hs_verlet *list = list_of(arguments, n_arguments, HS_CALL_ARGUMENTS + 3, "verlet_update");
-    if (list == NULL || !hs_call_init(&call, arguments + 1)) {
+    if (list == NULL || !hs_py_call_init(&call, arguments + 1)) {
         return NULL;
     }
     const double skin = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS + 1]);
@@ -55,11 +55,11 @@ hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     if (PyErr_Occurred()) {
         return NULL;
     }
-    hs_call_release(&call);
-    const hs_status status = hs_verlet_update(list, &call.points, hs_call_box(&call),
+    hs_py_call_release(&call);
+    const hs_status status = hs_verlet_update(list, &call.points, hs_py_call_box(&call),
                                               &call.options, skin, rebuild != 0, &rebuilt,
                                               &failure);
-    hs_call_acquire(&call);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
     }
@@ -69,13 +69,13 @@ hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
 PyObject *
 hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_result  result;
     hs_failure failure;
     hs_pairs  *pairs = NULL;
     (void)module;
     hs_verlet *list = list_of(arguments, n_arguments, HS_CALL_ARGUMENTS + 5, "verlet_pairs");
-    if (list == NULL || !hs_call_init(&call, arguments + 1)) {
+    if (list == NULL || !hs_py_call_init(&call, arguments + 1)) {
         return NULL;
     }
     const hs_verlet_state state = hs_verlet_look(list);
@@ -90,9 +90,9 @@ hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
     if (!hs_result_init(&result, arguments + HS_CALL_ARGUMENTS + 1, &call)) {
         return NULL;
     }
-    hs_call_release(&call);
+    hs_py_call_release(&call);
     const hs_status status = hs_verlet_find(list, &call.options, &pairs, &failure);
-    hs_call_acquire(&call);
+    hs_py_call_acquire(&call);
     if (status != HS_OK) {
         return hs_raise(status, &failure, &call.options);
     }

@@ -119,7 +119,7 @@ take_function(PyObject *const *arguments, callable *to_call, hs_visit *visit)
 PyObject *
 hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_call    call;
+    hs_py_call    call;
     hs_failure failure;
     callable   to_call = {0};
     hs_visit   visit = {0};
@@ -128,18 +128,16 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     if (!hs_expect_arguments("for_each_pair", n_arguments, HS_CALL_ARGUMENTS + 3)) {
         return NULL;
     }
-    if (!hs_call_init(&call, arguments) ||
+    if (!hs_py_call_init(&call, arguments) ||
         !take_function(arguments + HS_CALL_ARGUMENTS, &to_call, &visit)) {
         return NULL;
     }
     to_call.function = arguments[HS_CALL_ARGUMENTS];
     to_call.ndim = call.points.ndim;
+    const hs_among among = hs_py_call_among(&call);
     call.thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
-    const hs_status status =
-        call.cells != NULL
-            ? hs_cells_visit(call.cells, &call.options, &visit, &n, &failure)
-            : hs_pairs_visit(&call.points, hs_call_box(&call), &call.options, &visit, &n, &failure);
-    hs_call_acquire(&call);
+    const hs_status status = hs_pairs_visit(&among, &call.options, &visit, &n, &failure);
+    hs_py_call_acquire(&call);
     if (to_call.type != NULL && !PyErr_Occurred()) {
         PyErr_Restore(to_call.type, to_call.value, to_call.traceback);
         return NULL;

@@ -40,11 +40,12 @@ make_lattice(int64_t along, double *points)
 static hs_status
 print_pairs(const hs_cells *cells, const hs_options *options, hs_failure *failure)
 {
-    hs_options arrays = *options;
-    hs_pairs  *pairs;
+    hs_options     arrays = *options;
+    hs_pairs      *pairs;
+    const hs_among among = {.cells = cells};
     arrays.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
     arrays.sorted = true;
-    const hs_status status = hs_cells_pairs(cells, &arrays, &pairs, failure);
+    const hs_status status = hs_pairs_find(&among, &arrays, &pairs, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -66,10 +67,11 @@ print_neighbors(const hs_cells *cells, const hs_options *options, hs_failure *fa
 {
     static const double origin[NDIM] = {0.0, 0.0, 0.0};
     const hs_points     query = view_of(origin, 1);
+    const hs_among      among = {.cells = cells, .queries = &query};
     hs_options          list = *options;
     hs_pairs           *rows;
     list.want = HS_WANT_J;
-    const hs_status status = hs_cells_neighbors(cells, &query, &list, &rows, failure);
+    const hs_status status = hs_neighbors_find(&among, &list, &rows, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -100,10 +102,11 @@ add_square(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, v
 static hs_status
 print_sum(const hs_cells *cells, const hs_options *options, hs_failure *failure)
 {
+    const hs_among  among = {.cells = cells};
     double          sum = 0.0;
     int64_t         n;
     const hs_visit  visit = {.pair = add_square, .user = &sum};
-    const hs_status status = hs_cells_visit(cells, options, &visit, &n, failure);
+    const hs_status status = hs_pairs_visit(&among, options, &visit, &n, failure);
     if (status == HS_OK) {
         printf("visited %lld, sum of squares %.9g\n", (long long)n, sum);
     }

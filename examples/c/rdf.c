@@ -76,7 +76,8 @@ count_pairs(const settings *job, const double *points, int64_t n, double *edges,
                                     .counts = counts};
     hs_options options = hs_options_default();
     options.threads = -2; /* two, where that pays */
-    return hs_pairs_histogram(&view, NULL, &box, &options, &histogram, failure);
+    const hs_among among = {.points = &view, .box = &box};
+    return hs_pairs_histogram(&among, &options, &histogram, failure);
 }
 
 /* g(r) is the number of pairs over that of as many points at random. */

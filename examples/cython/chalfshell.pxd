@@ -33,6 +33,15 @@ cdef extern from "halfshell_capi.h" nogil:
         c_bool periodic[8]
         double rows[8][8]
 
+    ctypedef struct hs_cells:
+        pass
+
+    ctypedef struct hs_among:
+        const hs_points *points
+        const hs_box *box
+        const hs_points *queries
+        const hs_cells *cells
+
     ctypedef struct hs_options:
         double cutoff
         unsigned want
@@ -44,8 +53,8 @@ cdef extern from "halfshell_capi.h" nogil:
     ctypedef struct hs_capi:
         const char *(*status_text)(hs_status) noexcept nogil
         hs_options (*options_default)() noexcept nogil
-        hs_status (*pairs_find)(const hs_points *, const hs_box *, const hs_options *,
-                                hs_pairs **, hs_failure *) noexcept nogil
+        hs_status (*pairs_find)(const hs_among *, const hs_options *, hs_pairs **,
+                                hs_failure *) noexcept nogil
         int64_t (*pairs_length)(const hs_pairs *) noexcept nogil
         const void *(*pairs_array)(const hs_pairs *, unsigned) noexcept nogil
         void (*pairs_free)(hs_pairs *) noexcept nogil

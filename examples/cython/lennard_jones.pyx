@@ -3,8 +3,8 @@
 """The Lennard-Jones energy of points in a box, summed in C over pairs that halfshell finds."""
 
 from chalfshell cimport (
-    HS_FLOAT64, HS_OK, HS_WANT_DISTANCE, hs_box, hs_capi, hs_capi_import, hs_failure, hs_options,
-    hs_pairs, hs_points, hs_status,
+    HS_FLOAT64, HS_OK, HS_WANT_DISTANCE, hs_among, hs_box, hs_capi, hs_capi_import, hs_failure,
+    hs_options, hs_pairs, hs_points, hs_status,
 )
 from libc.stdint cimport int64_t
 
@@ -47,6 +47,12 @@ def energy(const double[:, :] points, double cutoff, const double[:] lengths):
         for k in range(ndim):
             box.rows[l][k] = lengths[l] if k == l else 0.0
 
+    cdef hs_among among
+    among.points = &view
+    among.box = &box
+    among.queries = NULL
+    among.cells = NULL
+
     cdef hs_options options = halfshell.options_default()
     options.cutoff = cutoff
     options.want = HS_WANT_DISTANCE
@@ -55,7 +61,7 @@ def energy(const double[:, :] points, double cutoff, const double[:] lengths):
     cdef hs_status status
     cdef double total
     with nogil:  # the search and the sum need no Python
-        status = halfshell.pairs_find(&view, &box, &options, &pairs, &failure)
+        status = halfshell.pairs_find(&among, &options, &pairs, &failure)
     if status != HS_OK:
         raise ValueError(halfshell.status_text(status).decode())
     with nogil:

@@ -14,6 +14,7 @@ count(PyObject *module, PyObject *arguments)
     int        ndim;
     int64_t    n_pairs;
     hs_points  points;
+    hs_among   among = {&points, NULL, NULL, NULL};
     hs_failure failure;
     hs_status  status;
     hs_options options = halfshell->options_default();
@@ -28,7 +29,7 @@ count(PyObject *module, PyObject *arguments)
     points.row_stride = (ptrdiff_t)sizeof(double) * ndim;
     points.column_stride = (ptrdiff_t)sizeof(double);
     Py_BEGIN_ALLOW_THREADS
-    status = halfshell->pairs_count(&points, NULL, &options, &n_pairs, &failure);
+    status = halfshell->pairs_count(&among, &options, &n_pairs, &failure);
     Py_END_ALLOW_THREADS
     PyBuffer_Release(&buffer);
     if (status != HS_OK) {

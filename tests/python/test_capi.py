@@ -66,7 +66,7 @@ def probe(tmp_path_factory):
 
 def test_the_table_has_every_function_of_the_header():
     assert sorted(capi_layout.declared()) == sorted(capi_layout.table())
-    assert len(capi_layout.table()) >= 50
+    assert len(capi_layout.table()) >= 40
 
 
 def test_the_table_says_how_it_is_laid_out():
@@ -144,9 +144,10 @@ def pretend(monkeypatch, name=NAME, **changed):
 
 @needs_c
 def test_another_abi_version_is_refused(probe, monkeypatch):
-    for version in (0, 2, 2**32 - 1):
+    for version in (0, capi_layout.version() + 1, 2**32 - 1):
         copy = pretend(monkeypatch, abi_version=version)
-        message = rf"for version 1 .* has version {version}: compile the module again"
+        wanted = capi_layout.version()
+        message = rf"for version {wanted} .* has version {version}: compile the module again"
         with pytest.raises(ImportError, match=message):
             load(probe)
         assert copy.abi_version == version
@@ -165,7 +166,7 @@ def test_an_older_core_that_lacks_functions_is_refused(probe, monkeypatch):
 def test_a_newer_core_with_more_functions_is_taken(probe, monkeypatch):
     copy = pretend(monkeypatch, size=ctypes.sizeof(Table) + 8)
     assert load(probe).version() > 0
-    assert copy.abi_version == 1
+    assert copy.abi_version == capi_layout.version()
 
 
 @needs_c
@@ -179,7 +180,7 @@ def test_what_is_no_such_capsule_is_refused(probe, monkeypatch):
     monkeypatch.delattr(_core, "_C_API")
     with pytest.raises(AttributeError):
         load(probe)
-    assert copy.abi_version == 1
+    assert copy.abi_version == capi_layout.version()
 
 
 def in_fresh_interpreter(folder, script):

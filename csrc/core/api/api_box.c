@@ -2,7 +2,7 @@
 /* api_box.c: the public functions of a box alone: measure and wrap. */
 #include "../../halfshell.h"
 
-#include "request.h"
+#include "arguments.h"
 #include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../scene/points.h"

@@ -3,7 +3,7 @@
  * api_candidates.c: what cells say without a distance test: where points are, which points the
  * cells around a query hold. See halfshell.h.
  */
-#include "request.h"
+#include "arguments.h"
 #include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
@@ -305,7 +305,10 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
 {
     hs_search search;
     hs_call  *call = &rows->call;
-    hs_sets   sets = hs_cells_sets(cells, queries, true);
+    hs_sets   sets = {.points = &cells->points,
+                      .queries = queries,
+                      .built = &cells->search,
+                      .is_full = true};
     sets.is_untested = true;
     sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);

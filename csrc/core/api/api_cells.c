@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
-#include "request.h"
+#include "arguments.h"
 #include "api_cells.h"
 #include "../base/poll.h"
-#include "api_stream.h"
-#include "api_visit.h"
 #include "../search/search_build.h"
 
 #include <string.h>
@@ -142,73 +140,4 @@ const hs_box *
 hs_cells_box(const hs_cells *cells)
 {
     return cells != NULL && cells->has_box ? &cells->box : NULL;
-}
-
-hs_sets
-hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full)
-{
-    if (cells == NULL) { /* which the search refuses */
-        return (hs_sets){.points = NULL};
-    }
-    return (hs_sets){.points = &cells->points,
-                     .queries = queries,
-                     .is_full = is_full,
-                     .built = &cells->search};
-}
-
-hs_status
-hs_cells_pairs(const hs_cells *cells, const hs_options *options, hs_pairs **pairs,
-               hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, NULL, false);
-    return hs_pairs_find_in(&sets, hs_cells_box(cells), options, pairs, failure);
-}
-
-hs_status
-hs_cells_count(const hs_cells *cells, const hs_points *queries, const hs_options *options,
-               int64_t *count, hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
-    return hs_pairs_count_in(&sets, hs_cells_box(cells), options, count, failure);
-}
-
-hs_status
-hs_cells_neighbors(const hs_cells *cells, const hs_points *queries, const hs_options *options,
-                   hs_pairs **rows, hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, queries, true);
-    return hs_neighbors_find_in(&sets, hs_cells_box(cells), options, rows, failure);
-}
-
-hs_status
-hs_cells_neighbors_count(const hs_cells *cells, const hs_points *queries,
-                         const hs_options *options, int64_t *counts, hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, queries, true);
-    return hs_neighbors_count_in(&sets, hs_cells_box(cells), options, counts, failure);
-}
-
-hs_status
-hs_cells_nearest(const hs_cells *cells, const hs_points *queries, int64_t k,
-                 const hs_options *options, hs_pairs **rows, hs_failure *failure)
-{
-    hs_sets sets = hs_cells_sets(cells, queries, true);
-    sets.trees = cells != NULL ? cells->trees : NULL;
-    return hs_nearest_find_in(&sets, hs_cells_box(cells), k, options, rows, failure);
-}
-
-hs_status
-hs_cells_stream(const hs_cells *cells, const hs_options *options, int64_t max_pairs,
-                hs_stream **stream, hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, NULL, false);
-    return hs_stream_open_in(&sets, hs_cells_box(cells), options, max_pairs, stream, failure);
-}
-
-hs_status
-hs_cells_visit(const hs_cells *cells, const hs_options *options, const hs_visit *visit,
-               int64_t *n_visited, hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, NULL, false);
-    return hs_pairs_visit_in(&sets, hs_cells_box(cells), options, visit, n_visited, failure);
 }

@@ -5,6 +5,7 @@
 
 #include "../nearest/nearest_kept.h"
 #include "../collect/result.h"
+#include "../search/search.h"
 
 struct hs_cells {
     hs_call   call;   /* that built them; its account holds them */
@@ -15,8 +16,5 @@ struct hs_cells {
     double   *copy;   /* owned; points as given, for cutoffs and queries that need other cells */
     hs_near_kept *trees; /* owned; for nearest points, which cells are of no use for */
 };
-
-/* Queries, or NULL, among the points of the cells. cells NULL: there are no points to search. */
-hs_sets hs_cells_sets(const hs_cells *cells, const hs_points *queries, bool is_full);
 
 #endif

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_histogram.c: the public histogram of all pairs, which stores none of them. */
 #include "request.h"
-#include "api_cells.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
@@ -214,53 +213,35 @@ fill_histogram(void *context, hs_search *search, int64_t *n_pairs, hs_failure *f
     return status;
 }
 
-/* The sets of points as a histogram wants them. */
 static hs_status
-fill_sets(const hs_sets *among, const hs_box *box, const hs_options *options,
-          const hs_histogram *histogram, hs_failure *failure)
+find_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
+               hs_failure *failure)
 {
-    hs_sets         sets = *among;
     const hs_status status =
         options != NULL ? check_histogram(histogram, failure) : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         hs_clear_counters(options);
         return status;
     }
-    hs_histogram filled = *histogram;
-    sets.is_plain = true;
-    sets.keeps_none = true;
-    sets.least_cutoff = smallest_edge(histogram);
+    hs_histogram     filled = *histogram;
     const hs_options counting = options_of(histogram, options);
-    const hs_request request = {.sets = &sets, .box = box, .options = &counting};
+    hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
+    request.sets.is_plain = true;
+    request.sets.keeps_none = true;
+    request.sets.least_cutoff = smallest_edge(histogram);
     return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 
 /* Edges are compared before there is a search. */
-static hs_status
-histogram_in(const hs_sets *among, const hs_box *box, const hs_options *options,
-             const hs_histogram *histogram, hs_failure *failure)
+hs_status
+hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
+                   hs_failure *failure)
 {
     hs_failure ignored;
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv  saved = hs_fpenv_enter();
-    const hs_status status = fill_sets(among, box, options, histogram, failure);
+    const hs_status status = find_histogram(among, options, histogram, failure);
     hs_fpenv_leave(saved);
     return status;
-}
-
-hs_status
-hs_pairs_histogram(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, const hs_histogram *histogram, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points, .queries = queries, .is_full = queries != NULL};
-    return histogram_in(&sets, box, options, histogram, failure);
-}
-
-hs_status
-hs_cells_histogram(const hs_cells *cells, const hs_points *queries, const hs_options *options,
-                   const hs_histogram *histogram, hs_failure *failure)
-{
-    const hs_sets sets = hs_cells_sets(cells, queries, queries != NULL);
-    return histogram_in(&sets, hs_cells_box(cells), options, histogram, failure);
 }

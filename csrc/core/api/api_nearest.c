@@ -65,11 +65,12 @@ check_nearest(const hs_sets *sets, const hs_box *box, int64_t k, const hs_option
 }
 
 hs_status
-hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_options *options,
-                   hs_pairs **result, hs_failure *failure)
+hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_pairs **result,
+                hs_failure *failure)
 {
-    hs_search search;
-    hs_sets   sets = *among;
+    hs_search  search;
+    hs_request request = hs_request_among(among, HS_FULL_LIST, options);
+    hs_sets   *sets = &request.sets;
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
@@ -77,7 +78,7 @@ hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_
     if (rows == NULL) {
         return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
-    sets.is_plain = sets.is_wide = true;
+    sets->is_plain = sets->is_wide = true;
     hs_options of_rows = *options;
     of_rows.sorted = false;
     of_rows.out = NULL;
@@ -88,20 +89,12 @@ hs_nearest_find_in(const hs_sets *among, const hs_box *box, int64_t k, const hs_
     hs_near near = {.search = &search,
                     .k = k,
                     .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
-                    .omits_self = sets.queries == NULL,
+                    .omits_self = sets->queries == NULL,
                     .rows = &rows->output};
-    hs_status status = check_nearest(&sets, box, k, &of_rows, failure);
+    hs_status status = check_nearest(sets, request.box, k, &of_rows, failure);
     if (status == HS_OK) {
-        hs_pairs_open(rows, sets.points->ndim);
-        status = find_nearest(&near, &sets, box, failure);
+        hs_pairs_open(rows, sets->points->ndim);
+        status = find_nearest(&near, sets, request.box, failure);
     }
     return hs_pairs_finish(rows, status, rows->output.n_pairs, result);
-}
-
-hs_status
-hs_nearest_find(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
-                const hs_options *options, hs_pairs **result, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    return hs_nearest_find_in(&sets, box, k, options, result, failure);
 }

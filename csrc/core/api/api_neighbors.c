@@ -81,22 +81,14 @@ find_rows(hs_search *search, hs_pairs *rows, hs_failure *failure)
 }
 
 hs_status
-hs_neighbors_find(const hs_points *points, const hs_points *queries, const hs_box *box,
-                  const hs_options *options, hs_pairs **result, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    return hs_neighbors_find_in(&sets, box, options, result, failure);
-}
-
-hs_status
-hs_neighbors_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                     hs_pairs **result, hs_failure *failure)
+hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **result,
+                  hs_failure *failure)
 {
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     const hs_options of_rows = options_of_rows(options);
-    const hs_request request = {.sets = sets, .box = box, .options = &of_rows};
+    const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
     return hs_request_fill(&request, find_rows, result, failure);
 }
 
@@ -114,35 +106,18 @@ count_rows(void *context, hs_search *search, int64_t *n_entries, hs_failure *fai
 }
 
 hs_status
-hs_neighbors_count(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, int64_t *counts, hs_failure *failure)
+hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *counts,
+                   hs_failure *failure)
 {
-    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    return hs_neighbors_count_in(&sets, box, options, counts, failure);
-}
-
-hs_status
-hs_neighbors_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                      int64_t *counts, hs_failure *failure)
-{
+    hs_request       request = hs_request_among(among, HS_FULL_LIST, options);
+    const hs_sets   *sets = &request.sets;
     const hs_points *asking = sets->queries != NULL ? sets->queries : sets->points;
     if (options == NULL || !hs_has_entries(counts, asking)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_options       counting = options_of_rows(options);
-    const hs_request request = {.sets = sets, .box = box, .options = &counting};
+    hs_options counting = options_of_rows(options);
     counting.want = 0;
     counting.out = NULL;
+    request.options = &counting;
     return hs_request_use(&request, count_rows, counts, failure);
-}
-
-hs_status
-hs_between_count(const hs_points *points, const hs_points *queries, const hs_box *box,
-                 const hs_options *options, int64_t *count, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points, .queries = queries, .is_full = true};
-    if (queries == NULL) {
-        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
-    }
-    return hs_pairs_count_in(&sets, box, options, count, failure);
 }

@@ -91,18 +91,10 @@ fill_pairs(hs_search *search, hs_pairs *pairs, hs_failure *failure)
 }
 
 hs_status
-hs_pairs_find(const hs_points *points, const hs_box *box, const hs_options *options,
-              hs_pairs **result, hs_failure *failure)
+hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **result,
+              hs_failure *failure)
 {
-    const hs_sets sets = {.points = points};
-    return hs_pairs_find_in(&sets, box, options, result, failure);
-}
-
-hs_status
-hs_pairs_find_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                 hs_pairs **result, hs_failure *failure)
-{
-    const hs_request request = {.sets = sets, .box = box, .options = options};
+    const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
@@ -121,22 +113,14 @@ count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
 }
 
 hs_status
-hs_pairs_count(const hs_points *points, const hs_box *box, const hs_options *options,
-               int64_t *count, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points};
-    return hs_pairs_count_in(&sets, box, options, count, failure);
-}
-
-hs_status
-hs_pairs_count_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                  int64_t *count, hs_failure *failure)
+hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
+               hs_failure *failure)
 {
     if (count == NULL || options == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_options       counting = *options;
-    const hs_request request = {.sets = sets, .box = box, .options = &counting};
+    const hs_request request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
     counting.want = 0;
     counting.sorted = false;
     counting.out = NULL;

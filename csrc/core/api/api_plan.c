@@ -41,11 +41,10 @@ use_search(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failu
 }
 
 hs_status
-hs_plan_make(const hs_points *points, const hs_box *box, const hs_options *options,
-             hs_plan *plan, hs_failure *failure)
+hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan,
+             hs_failure *failure)
 {
-    const hs_sets    sets = {.points = points};
-    const hs_request request = {.sets = &sets, .box = box, .options = options};
+    const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
     if (options == NULL || plan == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_stream.c: see api_stream.h. */
-#include "api_stream.h"
-
+/* api_stream.c: pairs in blocks. A stream holds a search that is ready to be walked, a bookmark of
+ * how far that has come, and the pairs that were found and not yet handed out. See halfshell.h. */
 #include "request.h"
+
 #include "../base/fpenv.h"
 #include "../collect/result.h"
 #include "../collect/crew.h"
@@ -216,19 +216,18 @@ options_of_stream(const hs_options *options)
 }
 
 hs_status
-hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                  int64_t max_pairs, hs_stream **result, hs_failure *failure)
+hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pairs,
+               hs_stream **result, hs_failure *failure)
 {
-    hs_sets of_pairs = *sets;
     if (result != NULL) {
         *result = NULL;
     }
     if (!hs_can_begin(result, options) || max_pairs < 1) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    of_pairs.keeps_none = true;
     const hs_options of_stream = options_of_stream(options);
-    const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_stream};
+    hs_request       request = hs_request_among(among, HS_HALF_LIST, &of_stream);
+    request.sets.keeps_none = true;
     hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return hs_end_early(HS_ERR_MEMORY, NULL, failure);
@@ -250,14 +249,6 @@ hs_stream_open_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
     stream->told = 0.0;
     *result = stream;
     return HS_OK;
-}
-
-hs_status
-hs_stream_open(const hs_points *points, const hs_box *box, const hs_options *options,
-               int64_t max_pairs, hs_stream **stream, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points};
-    return hs_stream_open_in(&sets, box, options, max_pairs, stream, failure);
 }
 
 void

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_systems.c: the public searches of many systems: find and count. Threads take ranges of
  * them. */
-#include "request.h"
+#include "arguments.h"
 #include "../search/estimate.h"
 #include "../collect/result.h"
 #include "../base/poll.h"

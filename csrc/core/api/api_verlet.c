@@ -3,7 +3,7 @@
 #include "../verlet/pair_list.h"
 #include "../verlet/recheck.h"
 
-#include "request.h"
+#include "arguments.h"
 #include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../memory/account.h"

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_visit.c: see api_visit.h. */
-#include "api_visit.h"
-
+/* api_visit.c: pairs handed to a function as they are found, stored nowhere. See halfshell.h. */
 #include "request.h"
+
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
@@ -89,7 +88,8 @@ static hs_status
 visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
 {
     const int n_threads = hs_team_size(search->call->team);
-    visitor  *visitors = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
+    visitor  *visitors =
+        hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
     hs_status status = visitors != NULL ? HS_OK : HS_ERR_MEMORY;
     int       opened = 0;
     while (status == HS_OK && opened < n_threads) {
@@ -131,11 +131,10 @@ visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
 }
 
 hs_status
-hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *options,
-                  const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
+hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
+               int64_t *n_visited, hs_failure *failure)
 {
     visiting doing = {.visit = visit, .n_visited = n_visited};
-    hs_sets  of_pairs = *sets;
     if (n_visited != NULL) {
         *n_visited = 0;
     }
@@ -144,19 +143,11 @@ hs_pairs_visit_in(const hs_sets *sets, const hs_box *box, const hs_options *opti
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_options of_visit = *options;
+    hs_request request = hs_request_among(among, HS_HALF_LIST, &of_visit);
     of_visit.want = WANTED;
     of_visit.sorted = false;
     of_visit.index_bytes = 8;
     of_visit.out = NULL;
-    of_pairs.keeps_none = true;
-    const hs_request request = {.sets = &of_pairs, .box = box, .options = &of_visit};
+    request.sets.keeps_none = true;
     return hs_request_use(&request, visit_pairs, &doing, failure);
-}
-
-hs_status
-hs_pairs_visit(const hs_points *points, const hs_box *box, const hs_options *options,
-               const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
-{
-    const hs_sets sets = {.points = points};
-    return hs_pairs_visit_in(&sets, box, options, visit, n_visited, failure);
 }

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* request.c: see request.h. */
+/* request.c: the way that all searches go. See request.h. */
 #include "request.h"
 
-#include <limits.h>
-#include <math.h>
+#include "api_cells.h"
 
-#include "../base/poll.h"
-#include "../base/want.h"
 #include "../search/estimate.h"
 #include "../search/search_open.h"
 
@@ -14,17 +11,39 @@
 static void
 tell_shortage(const hs_request *request, const hs_search *search, hs_failure *failure)
 {
-    if (request->sets->keeps_none) {
+    if (request->sets.keeps_none) {
         failure->limit_bytes = search->call->account.limit;
     } else {
-        hs_shortage_of_search(request->sets->points, request->box, search, failure);
+        hs_shortage_of_search(request->sets.points, request->box, search, failure);
     }
+}
+
+hs_request
+hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *options)
+{
+    hs_request request = {.options = options};
+    if (among == NULL || (kind == HS_HALF_LIST && among->queries != NULL)) {
+        return request;
+    }
+    request.sets.queries = among->queries;
+    request.sets.is_full = kind == HS_FULL_LIST || among->queries != NULL;
+    if (among->cells == NULL) {
+        request.sets.points = among->points;
+        request.box = among->box;
+    } else if (among->points == NULL && among->box == NULL) {
+        const hs_cells *cells = among->cells;
+        request.sets.points = &cells->points;
+        request.sets.built = &cells->search;
+        request.sets.trees = cells->trees;
+        request.box = hs_cells_box(cells);
+    }
+    return request;
 }
 
 hs_status
 hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_failure *failure)
 {
-    const hs_sets  *sets = request->sets;
+    const hs_sets  *sets = &request->sets;
     const hs_status sound = hs_check_arguments(sets->points, sets->queries, request->box,
                                                request->options, failure);
     return sound == HS_OK ? hs_search_open(sets, request->box, call, search, failure) : sound;
@@ -71,172 +90,4 @@ hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, h
         tell_shortage(request, &search, failure);
     }
     return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
-}
-
-#define ALL_WANTS 63u /* every HS_WANT_ bit */
-/* Bytes that no array reaches across: a little less than addresses do, for the sum that is compared
- * with it is rounded. */
-#define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
-
-static hs_status
-status_of(bool sound)
-{
-    return sound ? HS_OK : HS_ERR_ARGUMENT;
-}
-
-void
-hs_clear_counters(const hs_options *options)
-{
-    if (options != NULL && options->counters != NULL) {
-        *options->counters = (hs_counters){.pairs = 0};
-    }
-}
-
-hs_status
-hs_end_early(hs_status status, const hs_options *options, hs_failure *failure)
-{
-    if (failure != NULL) {
-        *failure = HS_NO_FAILURE;
-    }
-    hs_clear_counters(options);
-    return status;
-}
-
-bool
-hs_can_return(hs_pairs **result, const hs_options *options)
-{
-    if (result != NULL) {
-        *result = NULL;
-    }
-    return hs_can_begin(result, options);
-}
-
-bool
-hs_can_begin(const void *result, const hs_options *options)
-{
-    return result != NULL && options != NULL;
-}
-
-bool
-hs_has_entries(const void *array, const hs_points *points)
-{
-    return array != NULL || (points != NULL && points->n == 0);
-}
-
-static bool
-is_dimension(int ndim)
-{
-    return ndim >= 1 && ndim <= HS_MAX_DIM;
-}
-
-static bool
-is_index_size(int bytes)
-{
-    return bytes == 4 || bytes == 8;
-}
-
-/* Whether entries are there, if any, no further apart than addresses can be. */
-static bool
-has_coordinates(const hs_points *points)
-{
-    const double rows = (double)(points->n - 1) * (double)points->row_stride;
-    const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
-    return points->n == 0 ||
-           (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT);
-}
-
-hs_status
-hs_check_points(const hs_points *points, hs_failure *failure)
-{
-    if (points == NULL || !is_dimension(points->ndim) || points->n < 0 ||
-        (points->real != HS_FLOAT32 && points->real != HS_FLOAT64)) {
-        return HS_ERR_ARGUMENT;
-    }
-    if (points->n > INT32_MAX) {
-        failure->value = (double)points->n;
-        return HS_ERR_TOO_MANY;
-    }
-    return status_of(has_coordinates(points));
-}
-
-hs_status
-hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failure *failure)
-{
-    if (systems == NULL || systems->n < 0 || (systems->n > 0 && systems->first == NULL)) {
-        return HS_ERR_ARGUMENT;
-    }
-    if (systems->n > INT32_MAX) {
-        failure->value = (double)systems->n;
-        return HS_ERR_TOO_MANY;
-    }
-    for (int64_t s = 0; s < systems->n; s++) {
-        if (systems->first[s + 1] < systems->first[s]) {
-            failure->system = s;
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    return status_of(systems->n == 0 ||
-                     (systems->first[0] == 0 && systems->first[systems->n] == n_points));
-}
-
-hs_status
-hs_check_box(const hs_box *box, int ndim)
-{
-    return status_of(box == NULL || (is_dimension(ndim) && box->ndim == ndim));
-}
-
-static bool
-has_all(const hs_pair_arrays *out, unsigned want)
-{
-    return (!(want & HS_WANT_I) || out->i != NULL) && (!(want & HS_WANT_J) || out->j != NULL) &&
-           (!(want & HS_WANT_BOTH) || out->both != NULL) &&
-           (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
-           (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
-           (!(want & HS_WANT_SHIFT) || out->shift != NULL);
-}
-
-/* Each array that is wanted is there, if anything is to be written to it. */
-static bool
-can_hold(const hs_pair_arrays *out, unsigned want)
-{
-    return is_index_size(out->index_bytes) && out->capacity >= 0 &&
-           (out->capacity == 0 || has_all(out, want));
-}
-
-hs_status
-hs_check_resources(const hs_options *options)
-{
-    return status_of(options->threads > INT_MIN && options->memory_limit >= 0.0);
-}
-
-hs_status
-hs_check_options(const hs_options *options)
-{
-    const unsigned        want = options->want;
-    const hs_pair_arrays *out = options->out;
-    if (hs_check_resources(options) != HS_OK) {
-        return HS_ERR_ARGUMENT;
-    }
-    return status_of((want & ~HS_WANT_ALL) == 0 &&
-                     (want == 0 || is_index_size(options->index_bytes)) &&
-                     (out == NULL || can_hold(out, want)) &&
-                     options->cell_size >= 0.0 &&
-                     (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
-                      options->precision == HS_SINGLE));
-}
-
-hs_status
-hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, hs_failure *failure)
-{
-    hs_status status = hs_check_points(points, failure);
-    if (status == HS_OK) {
-        status = hs_check_box(box, points->ndim);
-    }
-    if (status == HS_OK && queries != NULL) {
-        status = hs_check_points(queries, failure);
-        failure->in_queries = status != HS_OK;
-        status = status == HS_OK ? status_of(queries->ndim == points->ndim) : status;
-    }
-    return status == HS_OK ? hs_check_options(options) : status;
 }

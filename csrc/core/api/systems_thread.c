@@ -95,7 +95,8 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
     if (status != HS_OK) {
         return status;
     }
-    status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits, recorder);
+    status =
+        hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits, recorder);
     if (status == HS_OK) {
         status = hs_walk(&walker, 0, (int32_t)search->bins.n);
     }

@@ -58,9 +58,9 @@ build_tree(hs_near *near, int32_t leaf_points)
     const hs_metric *metric = &scene->metric;
     hs_metric_init(&near->order, scene->ndim, metric->n_rows, metric->rows, 1.0, true);
     hs_near_measure_drift(near);
-    const hs_status status =
-        hs_tree_build(&search->call->account, search->call->team, &search->call->options, scene, leaf_points,
-                      &search->bins, &near->tree);
+    const hs_status status = hs_tree_build(&search->call->account, search->call->team,
+                                           &search->call->options, scene, leaf_points,
+                                           &search->bins, &near->tree);
     if (status == HS_OK) {
         hs_near_measure_layer(near);
     }
@@ -74,9 +74,9 @@ build_asking_tree(hs_near *near, hs_scene *asking)
     hs_search *search = near->search;
     search->has_queries = true;
     near->asking = &near->asking_tree;
-    const hs_status status =
-        hs_tree_build(&search->call->account, search->call->team, &search->call->options, asking, LEAF_POINTS,
-                      &search->query_bins, &near->asking_tree);
+    const hs_status status = hs_tree_build(&search->call->account, search->call->team,
+                                           &search->call->options, asking, LEAF_POINTS,
+                                           &search->query_bins, &near->asking_tree);
     hs_scene_free(&search->call->account, asking);
     return status;
 }
@@ -93,8 +93,8 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
     bounded.within = limit < INFINITY ? limit : 0.0;
     options.cutoff = scene_cutoff(box, limit);
     near->asking = &near->tree;
-    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &bounded, box, &options,
-                                          &search->scene, asking, failure);
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &bounded, box,
+                                          &options, &search->scene, asking, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -127,8 +127,8 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
     hs_call_begin(&options, call);
     hs_search_begin(call, search);
     call->team = near->search->call->team;
-    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &kept, box, &options,
-                                          &search->scene, NULL, failure);
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, &kept, box,
+                                          &options, &search->scene, NULL, failure);
     if (status == HS_OK) {
         status = build_tree(room, LEAF_POINTS);
     }
@@ -189,8 +189,8 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
         return HS_STATUS_END;
     }
     if (sets->queries != NULL) {
-        status = hs_scene_like(&search->call->account, search->call->team, &kept->search->scene, sets->queries,
-                               &search->call->options, &asking, failure);
+        status = hs_scene_like(&search->call->account, search->call->team, &kept->search->scene,
+                               sets->queries, &search->call->options, &asking, failure);
         if (status != HS_OK) {
             failure->in_queries = status != HS_STATUS_END;
             return status;

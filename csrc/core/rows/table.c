@@ -68,8 +68,8 @@ will_keep(hs_table *table)
     hs_search       *search = table->search;
     const hs_output *entries = table->entries;
     const double     n = search->grid.expected_pairs * search->pairs_per_half;
-    hs_output_init(&search->call->account, entries->ndim, (entries->columns & HS_MEASURES) | HS_WANT_J,
-                   4, &table->kept);
+    hs_output_init(&search->call->account, entries->ndim,
+                   (entries->columns & HS_MEASURES) | HS_WANT_J, 4, &table->kept);
     const double bytes = n * (double)hs_output_bytes_per_pair(&table->kept);
     return search->call->team == NULL && bytes < MOST_EXPECTED_KEPT &&
            hs_account_allows(&search->call->account, 2.0 * HS_MOST_KEPT);

@@ -124,7 +124,8 @@ hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_searc
     if (search->is_full) {
         shortage.pairs *= search->pairs_per_half;
     }
-    hs_shortage_tell(&shortage, &search->call->options, points->ndim, search->call->account.limit, failure);
+    hs_shortage_tell(&shortage, &search->call->options, points->ndim, search->call->account.limit,
+                     failure);
 }
 
 static hs_status

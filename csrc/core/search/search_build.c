@@ -35,9 +35,10 @@ static hs_status
 build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
 {
     hs_account *account = &search->call->account;
-    return search->is_sparse
-               ? hs_sparse_build(account, search->call->team, &search->call->options, scene, grid, sparse, bins)
-               : hs_bins_build(account, search->call->team, &search->call->options, scene, grid, bins);
+    return search->is_sparse ? hs_sparse_build(account, search->call->team, &search->call->options,
+                                               scene, grid, sparse, bins)
+                             : hs_bins_build(account, search->call->team, &search->call->options,
+                                             scene, grid, bins);
 }
 
 hs_status
@@ -57,8 +58,8 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
         status = hs_estimate_by_density(search, failure);
     }
     if (status == HS_OK) {
-        status = hs_stencil_build(&search->call->account, &search->call->options, scene, &search->grid,
-                                  search->is_full, &search->stencil);
+        status = hs_stencil_build(&search->call->account, &search->call->options, scene,
+                                  &search->grid, search->is_full, &search->stencil);
         if (status == HS_ERR_MEMORY) {
             failure->search_bytes = hs_stencil_bytes(&search->grid, search->is_full);
         }
@@ -81,8 +82,8 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
         return HS_ERR_KERNEL;
     }
     hs_search_set_asking(sets, search);
-    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box, options,
-                                          &search->scene, asking, failure);
+    hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
+                                          options, &search->scene, asking, failure);
     if (status == HS_OK) {
         status = build_cells(search, asking, failure);
         if (asking != NULL) {

@@ -72,8 +72,8 @@ static hs_status
 take_queries(const hs_points *queries, hs_search *search, hs_failure *failure)
 {
     hs_scene  asking;
-    hs_status status = hs_scene_like(&search->call->account, search->call->team, &search->scene, queries,
-                                     &search->call->options, &asking, failure);
+    hs_status status = hs_scene_like(&search->call->account, search->call->team, &search->scene,
+                                     queries, &search->call->options, &asking, failure);
     if (status == HS_OK) {
         status = hs_search_bin_queries(search, &asking);
         hs_scene_free(&search->call->account, &asking);

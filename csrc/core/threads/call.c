@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* call.c: what a call has and does is kept in one place, so that each part adds to the same sums. */
+/* call.c: what a call has and does is kept in one place: each part adds to the same sums. */
 #include "call.h"
 
 #include "../base/poll.h"

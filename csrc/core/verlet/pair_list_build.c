@@ -282,7 +282,7 @@ build(const hs_frame *frame, building *built, hs_failure *failure)
 {
     hs_call      *call = &built->call;
     const hs_sets sets = {.points = &frame->points, .is_plain = true};
-    hs_status     status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
+    hs_status  status = hs_search_open(&sets, hs_frame_box(frame), call, &built->search, failure);
     const bool opened = status == HS_OK;
     if (status == HS_OK) {
         status = find(built, failure);

@@ -96,7 +96,7 @@ hs_refilter_shift(const hs_refilter *refilter, int64_t e, int64_t *shift)
     }
 }
 
-/* The pairs of the last step, into a result whose call has begun; recheck_find.c. The call's options
+/* The pairs of the last step, into a result whose call has begun; recheck_find.c. Its options
  * are checked and have the cutoff of the list. Fails as hs_verlet_find. */
 hs_status hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure);
 

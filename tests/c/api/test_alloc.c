@@ -3,6 +3,7 @@
 #include "../../../csrc/core/memory/account.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_alloc(void);
 
@@ -26,7 +27,7 @@ count_pairs(const brute_scene *scene)
     const hs_points  points = points_of(scene);
     const hs_options options = options_of(scene);
     int64_t          count = 0;
-    CHECK(hs_pairs_count(&points, scene->box, &options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) == HS_OK);
     return count;
 }
 
@@ -51,7 +52,7 @@ fail_each(const brute_scene *scene, unsigned want, bool sorted, bool into)
         hs_pairs     *pairs = (hs_pairs *)&options;
         hs_failure    failure;
         hs_test_fail_allocation(++nth);
-        status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
+        status = hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, &failure);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);
@@ -121,7 +122,7 @@ count_fails_cleanly(void)
             const int64_t before = hs_test_live_blocks();
             int64_t       count = -7;
             hs_test_fail_allocation(++nth);
-            status = hs_pairs_count(&points, scene->box, &options, &count, NULL);
+            status = hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL);
             ended = hs_test_failure_is_due();
             hs_test_fail_allocation(0);
             CHECK(status == HS_OK || (status == HS_ERR_MEMORY && count == -7));
@@ -147,7 +148,7 @@ plan_fails_cleanly(void)
             memset(&plan, 0x5a, sizeof plan);
             memset(&untouched, 0x5a, sizeof untouched);
             hs_test_fail_allocation(++nth);
-            status = hs_plan_make(&points, scene->box, &options, &plan, NULL);
+            status = hs_plan_make(AMONG(&points, scene->box), &options, &plan, NULL);
             ended = hs_test_failure_is_due();
             hs_test_fail_allocation(0);
             CHECK(status == HS_OK || status == HS_ERR_MEMORY);
@@ -206,10 +207,10 @@ no_failure_leaks(void)
             shared.box.rows[1][1] = INFINITY;
         else
             options.memory_limit = 1000.0;
-        CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) != HS_OK);
+        CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) != HS_OK);
         CHECK(pairs == NULL);
-        CHECK(hs_pairs_count(&points, scene->box, &options, &count, NULL) != HS_OK);
-        CHECK(hs_plan_make(&points, scene->box, &options, &plan, NULL) != HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) != HS_OK);
+        CHECK(hs_plan_make(AMONG(&points, scene->box), &options, &plan, NULL) != HS_OK);
         shared.x[7] = kept;
         shared.box.rows[1][1] = kept_row;
         CHECK(hs_test_live_blocks() == before);

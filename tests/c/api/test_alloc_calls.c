@@ -7,6 +7,7 @@
  */
 #include "../../../csrc/core/memory/account.h"
 #include "../support/call_kinds.h"
+#include "../support/among.h"
 
 void test_alloc_calls(void);
 
@@ -185,7 +186,7 @@ large_tables_fail_cleanly(void)
         const int64_t before = hs_test_live_blocks();
         hs_pairs     *rows = CALL_NOTHING;
         hs_test_fail_allocation(++nth);
-        const hs_status status = hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL);
+        const hs_status status = hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL);
         disturbed = !hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || (disturbed && status == HS_ERR_MEMORY));

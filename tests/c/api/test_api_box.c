@@ -3,6 +3,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_api_box(void);
 
@@ -178,7 +179,8 @@ find_status(const hs_options *options, hs_failure *failure)
 {
     const hs_points points = points_of(&shared.scene);
     hs_pairs       *pairs = (hs_pairs *)failure;
-    const hs_status status = hs_pairs_find(&points, shared.scene.box, options, &pairs, failure);
+    const hs_status status = hs_pairs_find(AMONG(&points, shared.scene.box), options, &pairs,
+                                           failure);
     CHECK((pairs == NULL) == (status != HS_OK));
     hs_pairs_free(pairs);
     return status;
@@ -241,7 +243,7 @@ too_many_points_are_refused_unread(void)
     const hs_options options = hs_options_default();
     int64_t          count = -1;
     hs_failure       failure;
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, &failure) == HS_ERR_TOO_MANY);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, &failure) == HS_ERR_TOO_MANY);
     CHECK(count == -1 && failure.value == 0x1p31);
 }
 
@@ -277,7 +279,7 @@ no_points_are_no_pairs_whatever_the_cutoff(void)
         int64_t         count = -1;
         options.cutoff = cutoff;
         options.memory_limit = 1e6;
-        CHECK(hs_pairs_count(&points, &box, &options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, NULL) == HS_OK);
         CHECK(count == 0);
     }
 }
@@ -298,8 +300,8 @@ plans_describe_the_search(void)
     for (int e = 0; e < 3 * 4000; e++)
         x[e] = 10.0 * random_unit(&random);
     hs_options options = options_of(&scene);
-    CHECK(hs_plan_make(&points, &box, &options, &plan, NULL) == HS_OK);
-    CHECK(hs_pairs_count(&points, &box, &options, &count, NULL) == HS_OK);
+    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, NULL) == HS_OK);
     CHECK(plan.ndim == 3 && plan.n_periodic == 2 && plan.aligned && !plan.reduced);
     CHECK(!plan.keeps_originals && !plan.all_pairs && plan.stencil_rows > 1);
     CHECK(fabs(plan.expected_pairs / (double)count - 1.0) < 0.15);
@@ -310,15 +312,15 @@ plans_describe_the_search(void)
         CHECK(plan.cell_size[k] * (double)plan.reach[k] >= 1.0);
     }
     box.rows[1][0] = 30.0; /* three whole widths: the same lattice */
-    CHECK(hs_plan_make(&points, &box, &options, &plan, NULL) == HS_OK);
+    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
     CHECK(plan.reduced && plan.aligned);
     box.rows[1][0] = 3.0;
-    CHECK(hs_plan_make(&points, &box, &options, &plan, NULL) == HS_OK);
+    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
     CHECK(!plan.aligned && plan.keeps_originals);
     options.cutoff = 100.0;
-    CHECK(hs_plan_make(&points, &box, &options, &plan, NULL) == HS_OK);
+    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
     CHECK(plan.images[0] >= 10 && plan.images[1] >= 10 && plan.images[2] == 0);
-    CHECK(hs_plan_make(&points, NULL, &options, &plan, NULL) == HS_OK);
+    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK);
     CHECK(plan.all_pairs && plan.n_periodic == 0 && plan.images[0] == 0);
 }
 

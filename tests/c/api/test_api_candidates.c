@@ -8,6 +8,7 @@
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/range_checks.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/base/poll.h"
@@ -152,7 +153,7 @@ ranges_of_occupied_cells(void)
         hs_pairs        *ranges = NULL, *rows = NULL;
         options.cutoff = trial & 2 ? 0.1 : 0.4;
         options.want = HS_WANT_J;
-        CHECK(hs_cells_neighbors(cells, asking, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_neighbors_find(QUERIED_CELLS(cells, asking), &options, &rows, NULL) == HS_OK);
         CHECK(hs_cells_candidates(cells, asking, &options, &ranges, NULL) == HS_OK);
         CHECK(ranges_hold_rows(&layout, ranges, rows));
         hs_pairs_free(rows);
@@ -274,7 +275,7 @@ points_of_any_type_and_number(void)
     CHECK(hs_cells_build(&few, NULL, &options, &cells, &failure) == HS_OK);
     hs_cells_points(cells, &kept);
     CHECK(kept.real == HS_FLOAT64 && ((const double *)kept.data)[2] == 0.75);
-    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 2);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 2);
     hs_cells_free(cells);
     CHECK(hs_cells_build(&many, NULL, &options, &cells, &failure) == HS_ERR_TOO_MANY);
     CHECK(cells == NULL && failure.value == 0x1p31);
@@ -306,8 +307,8 @@ scales_that_do_not_serve(void)
             int64_t   expected = 0;
             options.cutoff = ldexp(1.0, call & 1 ? scale : other);
             const hs_points *from = call & 2 ? &queries : NULL;
-            CHECK(hs_cells_neighbors(cells, from, &options, &kept, NULL) == HS_OK);
-            CHECK(hs_neighbors_find(&points, from, NULL, &options, &fresh, NULL) == HS_OK);
+            CHECK(hs_neighbors_find(QUERIED_CELLS(cells, from), &options, &kept, NULL) == HS_OK);
+            CHECK(hs_neighbors_find(QUERIED(&points, from, NULL), &options, &fresh, NULL) == HS_OK);
             CHECK(same_array(kept, fresh, HS_WANT_J, 8));
             CHECK(same_array(kept, fresh, HS_WANT_DISTANCE, 8));
             CHECK(same_array(kept, fresh, HS_WANT_VECTOR, 16));
@@ -341,10 +342,11 @@ cells_for_equal_points(void)
         x[i] = i % 10;
     const hs_points points = {x, 50, 1, HS_FLOAT64, 8, 8};
     CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 100);
-    CHECK(hs_cells_count(cells, &points, &options, &count, NULL) == HS_OK && count == 250);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 100);
+    CHECK(hs_pairs_count(QUERIED_CELLS(cells, &points), &options, &count, NULL) == HS_OK &&
+          count == 250);
     options.cutoff = 1.0;
-    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 325);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 325);
     hs_cells_free(cells);
 }
 

@@ -7,6 +7,7 @@
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/range_checks.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -29,12 +30,12 @@ compare_lists(const hs_cells *cells, const brute_scene *scene, const hs_options 
     hs_pairs       *kept = NULL, *fresh = NULL;
     hs_options      sorted = *options;
     sorted.sorted = true;
-    const hs_status status = hs_pairs_find(&points, scene->box, &sorted, &fresh, NULL);
-    CHECK(hs_cells_pairs(cells, &sorted, &kept, NULL) == status);
+    const hs_status status = hs_pairs_find(AMONG(&points, scene->box), &sorted, &fresh, NULL);
+    CHECK(hs_pairs_find(IN_CELLS(cells), &sorted, &kept, NULL) == status);
     if (status == HS_OK) {
         int64_t count = -1;
         CHECK(same_pairs(kept, fresh, scene->ndim));
-        CHECK(hs_cells_count(cells, NULL, options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(IN_CELLS(cells), options, &count, NULL) == HS_OK);
         CHECK(count == hs_pairs_length(fresh));
     }
     hs_pairs_free(kept);
@@ -48,8 +49,8 @@ compare_rows(const hs_cells *cells, const brute_scene *scene, const hs_points *q
     const hs_points points = points_of(scene);
     hs_pairs       *kept = NULL, *fresh = NULL;
     const hs_status status =
-        hs_neighbors_find(&points, queries, scene->box, options, &fresh, NULL);
-    CHECK(hs_cells_neighbors(cells, queries, options, &kept, NULL) == status);
+        hs_neighbors_find(QUERIED(&points, queries, scene->box), options, &fresh, NULL);
+    CHECK(hs_neighbors_find(QUERIED_CELLS(cells, queries), options, &kept, NULL) == status);
     if (status == HS_OK) {
         const int64_t n = hs_pairs_rows(fresh);
         CHECK(hs_pairs_rows(kept) == n);
@@ -174,7 +175,7 @@ the_layout_is_visible_and_holds_all_neighbours(void)
         hs_cells_layout(cells, &layout);
         check_layout(cells, &points, &layout);
         options.want = HS_WANT_J;
-        CHECK(hs_cells_neighbors(cells, asking, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_neighbors_find(QUERIED_CELLS(cells, asking), &options, &rows, NULL) == HS_OK);
         CHECK(hs_cells_candidates(cells, asking, &options, &ranges, NULL) == HS_OK);
         CHECK(ranges_hold_rows(&layout, ranges, rows));
         hs_pairs_free(rows);
@@ -258,9 +259,9 @@ points_may_change_once_they_are_in_cells(void)
     int64_t     count = -1;
     CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
     x[0] = x[1] = NAN;
-    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 3);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 3);
     options.cutoff = 1.0; /* by cells that are made for this call */
-    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 6);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 6);
     hs_cells_free(cells);
 }
 
@@ -280,7 +281,7 @@ failures_leave_nothing_behind(void)
         hs_test_fail_allocation(nth);
         status = hs_cells_build(&points, s.scene.box, &options, &cells, NULL);
         if (status == HS_OK) {
-            status = hs_cells_neighbors(cells, &points, &options, &rows, NULL);
+            status = hs_neighbors_find(QUERIED_CELLS(cells, &points), &options, &rows, NULL);
         }
         hs_test_fail_allocation(0);
         hs_pairs_free(rows);

@@ -7,6 +7,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_api_histogram(void);
 
@@ -150,9 +151,10 @@ find_in_cells(trial *t, const hs_points *points, const hs_points *queries,
                            : HS_ERR_MEMORY;
     if (status != HS_OK) { /* a box of so many images that no cells are made for them */
         CHECK(status == HS_ERR_MEMORY);
-        return hs_pairs_histogram(points, queries, t->s->scene.box, options, wanted, NULL);
+        return hs_pairs_histogram(QUERIED(points, queries, t->s->scene.box), options, wanted,
+                                  NULL);
     }
-    status = hs_cells_histogram(cells, queries, options, wanted, NULL);
+    status = hs_pairs_histogram(QUERIED_CELLS(cells, queries), options, wanted, NULL);
     hs_cells_free(cells);
     return status;
 }
@@ -181,8 +183,8 @@ find_all(trial *t, bool in_cells, int threads, hs_counters *counters)
     if (in_cells) {
         return find_in_cells(t, &points, t->split < 0 ? NULL : &queries, &options, &wanted);
     }
-    return hs_pairs_histogram(&points, t->split < 0 ? NULL : &queries, scene->box, &options,
-                              &wanted, NULL);
+    return hs_pairs_histogram(QUERIED(&points, t->split < 0 ? NULL : &queries, scene->box),
+                              &options, &wanted, NULL);
 }
 
 /* Returns the pairs that were found. */
@@ -330,14 +332,14 @@ threads_and_kernels_agree(void)
         options.kernel = run < 2 * n_names ? names[run / 2] : NULL;
         options.threads = run < 2 * n_names ? 1 + run % 2 : 2 + run % 2 * 3;
         options.counters = &counters;
-        CHECK(hs_pairs_histogram(&points, NULL, &box, &options, &wanted, NULL) == HS_OK);
+        CHECK(hs_pairs_histogram(AMONG(&points, &box), &options, &wanted, NULL) == HS_OK);
         CHECK(counters.bytes[HS_FOR_INDICES] == 0 && counters.bytes[HS_FOR_DISTANCES] == 0);
         CHECK(counters.bytes_peak < 12 * 1000 * 1000);
         if (run == 0) {
             memcpy(first_counts, counts, sizeof counts);
             memcpy(first_sums, sums, sizeof sums);
             options.inclusive = true;
-            CHECK(hs_pairs_count(&points, &box, &options, &count, NULL) == HS_OK);
+            CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, NULL) == HS_OK);
             for (int k = 0; k < 9 * (BINS + 1); k++) {
                 all += k / (BINS + 1) % 3 >= k / (BINS + 1) / 3 ? counts[k] : 0;
             }
@@ -362,18 +364,18 @@ bad_arguments_are_named(void)
     hs_failure   failure;
     hs_histogram wanted = {.n_edges = 3, .edges = edges, .n_types = 2, .counts = counts};
     static const double bad[][2] = {{1, NAN}, {2, INFINITY}, {0, -1.0}, {1, 2.0}};
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, &failure) == HS_ERR_TYPES);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, &failure) == HS_ERR_TYPES);
     wanted.of_points.types = types;
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, &failure) == HS_ERR_TYPES);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, &failure) == HS_ERR_TYPES);
     CHECK(failure.row == 2 && failure.value == 2.0);
     wanted.n_types = 1;
     wanted.of_points = (hs_marks){NULL, weights};
     wanted.sums = sums;
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, &failure) == HS_ERR_WEIGHTS);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, &failure) == HS_ERR_WEIGHTS);
     CHECK(failure.row == 1 && !failure.in_queries);
     wanted.of_points.weights = NULL;
     wanted.of_queries.weights = weights;
-    CHECK(hs_pairs_histogram(&points, &points, NULL, &options, &wanted, &failure) ==
+    CHECK(hs_pairs_histogram(QUERIED(&points, &points, NULL), &options, &wanted, &failure) ==
           HS_ERR_WEIGHTS);
     CHECK(failure.row == 1 && failure.in_queries);
     wanted.sums = NULL;
@@ -381,13 +383,13 @@ bad_arguments_are_named(void)
     for (int e = 0; e < 4; e++) {
         const double kept = edges[(int)bad[e][0]];
         edges[(int)bad[e][0]] = bad[e][1];
-        CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, &failure) ==
+        CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, &failure) ==
               HS_ERR_EDGES);
         CHECK(failure.row == (e == 3 ? 2 : (int)bad[e][0]));
         edges[(int)bad[e][0]] = kept;
     }
     wanted.n_edges = 0;
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, &failure) == HS_ERR_EDGES);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, &failure) == HS_ERR_EDGES);
 }
 
 /* Whichever allocation fails, nothing leaks. */

@@ -10,6 +10,7 @@
 #include "../support/near_checks.h"
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_api_nearest(void);
 
@@ -150,7 +151,7 @@ whichever_allocation_fails_nothing_is_left(void)
         const int64_t before = hs_test_live_blocks();
         hs_pairs     *rows = NULL;
         hs_test_fail_allocation(++nth);
-        const hs_status status = hs_nearest_find(&points, NULL, s.scene.box, 100, &options, &rows,
+        const hs_status status = hs_nearest_find(AMONG(&points, s.scene.box), 100, &options, &rows,
                                                  NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
@@ -181,10 +182,10 @@ it_can_be_stopped(void)
     options.cutoff = INFINITY;
     options.want = HS_WANT_J;
     options.poll = stop_at_once;
-    CHECK(hs_nearest_find(&points, NULL, NULL, 3, &options, &rows, NULL) == HS_ERR_INTERRUPTED);
+    CHECK(hs_nearest_find(AMONG(&points, NULL), 3, &options, &rows, NULL) == HS_ERR_INTERRUPTED);
     CHECK(rows == NULL);
     options.cutoff = -1.0;
-    CHECK(hs_nearest_find(&points, NULL, NULL, 3, &options, &rows, NULL) == HS_ERR_CUTOFF);
+    CHECK(hs_nearest_find(AMONG(&points, NULL), 3, &options, &rows, NULL) == HS_ERR_CUTOFF);
 }
 
 /* ---- as many as you like, all equally far ---- */
@@ -221,7 +222,8 @@ find_ties(int64_t k, int64_t polls, hs_counters *counters, int64_t *wrong)
     options.poll = stop_after;
     options.poll_context = &polls;
     options.counters = counters;
-    const hs_status status = hs_nearest_find(&points, &query, NULL, k, &options, &rows, NULL);
+    const hs_status status = hs_nearest_find(QUERIED(&points, &query, NULL), k, &options, &rows,
+                                             NULL);
     *wrong = status != HS_OK && rows != NULL;
     for (int64_t e = 0; status == HS_OK && e < k; e++)
         *wrong += ((const int64_t *)hs_pairs_array(rows, HS_WANT_J))[e] != e;

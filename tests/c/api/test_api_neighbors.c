@@ -7,6 +7,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_api_neighbors(void);
 
@@ -137,11 +138,12 @@ bare_rows_agree(const sets_of_scene *sets, const brute_scene *scene, hs_options 
     hs_pairs     *rows = NULL;
     options.want = HS_WANT_J;
     options.index_bytes = 4;
-    bool same = hs_neighbors_find(&sets->points, sets->asking, scene->box, &options, &rows, NULL) ==
+    bool same = hs_neighbors_find(QUERIED(&sets->points, sets->asking, scene->box), &options, &rows,
+                                  NULL) ==
                     HS_OK &&
                 hs_pairs_length(rows) == expected->n &&
-                hs_neighbors_count(&sets->points, sets->asking, scene->box, &options, counts,
-                                   NULL) == HS_OK;
+                hs_neighbors_count(QUERIED(&sets->points, sets->asking, scene->box), &options,
+                                   counts, NULL) == HS_OK;
     const int32_t *j = same ? hs_pairs_array(rows, HS_WANT_J) : NULL;
     const int64_t *offsets = same ? hs_pairs_offsets(rows) : NULL;
     for (int64_t e = 0; same && e < expected->n; e++)
@@ -149,7 +151,8 @@ bare_rows_agree(const sets_of_scene *sets, const brute_scene *scene, hs_options 
     for (int64_t i = 0; same && i < n; i++)
         same = counts[i] == offsets[i + 1] - offsets[i];
     if (same && sets->asking != NULL)
-        same = hs_between_count(&sets->points, sets->asking, scene->box, &options, &total, NULL) ==
+        same = hs_pairs_count(QUERIED(&sets->points, sets->asking, scene->box), &options, &total,
+                              NULL) ==
                    HS_OK &&
                total == expected->n;
     hs_pairs_free(rows);
@@ -173,8 +176,8 @@ compare_rows(const brute_scene *scene, int64_t split, int threads)
     if (search_pairs(&all, scene->box, &options, &half, NULL) != HS_OK)
         return 0;
     const entries expected = expected_entries(&half, split);
-    CHECK(hs_neighbors_find(&sets.points, sets.asking, scene->box, &options, &rows, NULL) ==
-          HS_OK);
+    CHECK(hs_neighbors_find(QUERIED(&sets.points, sets.asking, scene->box), &options, &rows,
+                            NULL) == HS_OK);
     take_all(rows, &found);
     const bool same =
         same_rows(&expected, rows, split < 0 ? scene->n : split, &found) &&
@@ -269,7 +272,7 @@ find_many(int index_bytes, int threads, bool asks, double limit, hs_pairs **rows
     options.index_bytes = index_bytes;
     options.threads = threads;
     options.memory_limit = limit;
-    return hs_neighbors_find(&points, asks ? &queries : NULL, &box, &options, rows, NULL);
+    return hs_neighbors_find(QUERIED(&points, asks ? &queries : NULL, &box), &options, rows, NULL);
 }
 
 static bool
@@ -333,10 +336,10 @@ a_capacity_that_is_too_small_is_named(void)
     hs_pairs      *rows = NULL;
     options.want = HS_WANT_J;
     options.out = &arrays;
-    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, &failure) == HS_ERR_CAPACITY);
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, &failure) == HS_ERR_CAPACITY);
     CHECK(failure.expected_pairs == 12.0 && rows == NULL);
     arrays.capacity = 12;
-    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, &failure) == HS_OK);
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, &failure) == HS_OK);
     CHECK(hs_pairs_length(rows) == 12 && j[0] == 1 && j[3] == 0 && j[11] == 2);
     hs_pairs_free(rows);
 }
@@ -351,10 +354,10 @@ a_bad_query_is_named(void)
     hs_failure  failure;
     int64_t     count = 7;
     queries.n = 3;
-    CHECK(hs_between_count(&points, &queries, NULL, &options, &count, &failure) ==
+    CHECK(hs_pairs_count(QUERIED(&points, &queries, NULL), &options, &count, &failure) ==
           HS_ERR_NOT_FINITE);
     CHECK(failure.in_queries && failure.row == 2);
-    CHECK(hs_between_count(&queries, &points, NULL, &options, &count, &failure) ==
+    CHECK(hs_pairs_count(QUERIED(&queries, &points, NULL), &options, &count, &failure) ==
           HS_ERR_NOT_FINITE);
     CHECK(!failure.in_queries && failure.row == 2);
 }

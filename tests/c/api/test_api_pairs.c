@@ -3,6 +3,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_api_pairs(void);
 
@@ -230,7 +231,7 @@ crowded_cells_and_several_blocks(void)
     hs_options      options = options_of(&open);
     const hs_points points = points_of(&open);
     int64_t         count = 0;
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK);
     CHECK(count == (int64_t)4300 * 4299 / 2);
 }
 
@@ -318,9 +319,9 @@ double_precision_is_the_plain_formula(void)
         brute_free(&candidates);
         hs_options      options = options_of(&s.scene);
         const hs_points points = points_of(&s.scene);
-        CHECK(hs_pairs_count(&points, s.scene.box, &options, &exact, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, s.scene.box), &options, &exact, NULL) == HS_OK);
         options.precision = HS_DOUBLE;
-        CHECK(hs_pairs_count(&points, s.scene.box, &options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, s.scene.box), &options, &count, NULL) == HS_OK);
         CHECK(count == formula);
         unlike_exact += count != exact;
     }

@@ -2,6 +2,7 @@
 /* test_api_stream.c: blocks are the pairs of one search, cut up, whoever looks for them. */
 #include "../support/block_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -33,10 +34,10 @@ compare_stream(const brute_scene *scene, int64_t max_pairs, int threads)
     hs_pairs       *whole = NULL;
     hs_stream      *stream = NULL;
     options.want = WANT_ALL;
-    CHECK(hs_pairs_find(&points, scene->box, &options, &whole, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &whole, NULL) == HS_OK);
     options.threads = threads;
     options.sorted = true; /* ignored */
-    CHECK(hs_stream_open(&points, scene->box, &options, max_pairs, &stream, NULL) == HS_OK);
+    CHECK(hs_stream_open(AMONG(&points, scene->box), &options, max_pairs, &stream, NULL) == HS_OK);
     check_blocks(stream, whole, max_pairs, scene->ndim);
     hs_stream_free(stream);
     hs_pairs_free(whole);
@@ -94,7 +95,7 @@ blocks_without_columns_count_the_pairs(void)
     const hs_points   points = points_of(&scene);
     hs_options        options = options_of(&scene);
     int64_t           count = 0, all = 0;
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK);
     options.want = 0;
     for (int threads = 1; threads <= 3; threads += 2) {
         hs_stream *stream = NULL;
@@ -102,7 +103,7 @@ blocks_without_columns_count_the_pairs(void)
         hs_failure failure;
         options.threads = threads;
         all = 0;
-        CHECK(hs_stream_open(&points, NULL, &options, 10007, &stream, &failure) == HS_OK);
+        CHECK(hs_stream_open(AMONG(&points, NULL), &options, 10007, &stream, &failure) == HS_OK);
         do {
             hs_pairs_free(block);
             CHECK(hs_stream_next(stream, NULL, NULL, &block, &failure) == HS_OK);
@@ -139,7 +140,7 @@ points_may_change_after_the_call(void)
     hs_stream  *stream = NULL;
     hs_pairs   *block = NULL;
     int64_t     n = 0;
-    CHECK(hs_stream_open(&points, NULL, &options, 2, &stream, NULL) == HS_OK);
+    CHECK(hs_stream_open(AMONG(&points, NULL), &options, 2, &stream, NULL) == HS_OK);
     x[0] = x[1] = NAN;
     while (hs_stream_next(stream, NULL, NULL, &block, NULL) == HS_OK && block != NULL) {
         n += hs_pairs_length(block);
@@ -173,8 +174,8 @@ interrupted_calls_can_be_made_again(void)
     int               interruptions = 0;
     options.want = WANT_ALL;
     options.threads = 2;
-    CHECK(hs_pairs_find(&points, NULL, &options, &whole, NULL) == HS_OK);
-    CHECK(hs_stream_open(&points, NULL, &options, 3000000, &stream, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &whole, NULL) == HS_OK);
+    CHECK(hs_stream_open(AMONG(&points, NULL), &options, 3000000, &stream, NULL) == HS_OK);
     for (int patience = 0;; patience++) {
         int             left = patience % 4 == 3 ? -1 : patience % 4;
         const hs_status status = hs_stream_next(stream, count_down, &left, &block, NULL);
@@ -209,7 +210,7 @@ memory_is_bounded(void)
     int64_t           found = 0;
     options.threads = 2;
     options.memory_limit = 32e6; /* the pairs take 3.2 GB */
-    CHECK(hs_stream_open(&points, NULL, &options, 100000, &stream, NULL) == HS_OK);
+    CHECK(hs_stream_open(AMONG(&points, NULL), &options, 100000, &stream, NULL) == HS_OK);
     while (hs_stream_next(stream, NULL, NULL, &block, NULL) == HS_OK && block != NULL) {
         found += hs_pairs_length(block);
         hs_pairs_free(block);
@@ -229,10 +230,11 @@ failures_are_told_and_leave_nothing(void)
     const int64_t   before = hs_test_live_blocks();
     hs_stream      *stream = (hs_stream *)&scene;
     hs_failure      failure;
-    CHECK(hs_stream_open(&points, NULL, &options, 2, &stream, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(hs_stream_open(AMONG(&points, NULL), &options, 2, &stream, &failure) ==
+          HS_ERR_NOT_FINITE);
     CHECK(stream == NULL && failure.row == 1);
     options.kernel = "none";
-    CHECK(hs_stream_open(&points, NULL, &options, 2, &stream, NULL) == HS_ERR_KERNEL);
+    CHECK(hs_stream_open(AMONG(&points, NULL), &options, 2, &stream, NULL) == HS_ERR_KERNEL);
     CHECK(stream == NULL);
     hs_stream_free(NULL);
     CHECK(hs_test_live_blocks() == before);
@@ -251,7 +253,7 @@ any_allocation_may_fail(void)
     bool              ended = false;
     int               failed = 0;
     options.want = WANT_ALL;
-    CHECK(hs_pairs_find(&points, NULL, &options, &whole, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &whole, NULL) == HS_OK);
     const int64_t before = hs_test_live_blocks();
     for (int64_t nth = 1; !ended && nth < 1000; nth++) {
         hs_stream *stream = NULL;
@@ -259,7 +261,7 @@ any_allocation_may_fail(void)
         int64_t    at = 0;
         options.threads = 1 + (int)(nth % 2);
         hs_test_fail_allocation(nth);
-        hs_status status = hs_stream_open(&points, NULL, &options, 90000, &stream, NULL);
+        hs_status status = hs_stream_open(AMONG(&points, NULL), &options, 90000, &stream, NULL);
         CHECK(status == HS_OK || (status == HS_ERR_MEMORY && stream == NULL));
         for (bool more = stream != NULL; more;) {
             status = hs_stream_next(stream, NULL, NULL, &block, NULL);
@@ -298,8 +300,8 @@ cells_stream_too(void)
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
         options.want = WANT_ALL;
         options.cutoff *= kind % 2 ? 0.5 : 1.2;
-        CHECK(hs_cells_pairs(cells, &options, &whole, NULL) == HS_OK);
-        CHECK(hs_cells_stream(cells, &options, 11, &stream, NULL) == HS_OK);
+        CHECK(hs_pairs_find(IN_CELLS(cells), &options, &whole, NULL) == HS_OK);
+        CHECK(hs_stream_open(IN_CELLS(cells), &options, 11, &stream, NULL) == HS_OK);
         check_blocks(stream, whole, 11, 3);
         hs_stream_free(stream);
         hs_pairs_free(whole);
@@ -336,7 +338,7 @@ fractions_never_fall(void)
         hs_pairs  *block = NULL;
         options.threads = threads;
         told_fractions told = {.rises = true};
-        CHECK(hs_stream_open(&points, NULL, &options, 70000, &stream, NULL) == HS_OK);
+        CHECK(hs_stream_open(AMONG(&points, NULL), &options, 70000, &stream, NULL) == HS_OK);
         do {
             hs_pairs_free(block);
             CHECK(hs_stream_next(stream, note_fraction, &told, &block, NULL) == HS_OK);

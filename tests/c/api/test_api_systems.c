@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_api_systems.c: many systems in one call against one call for each. */
 #include "../support/harness.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/halfshell.h"
@@ -79,7 +80,8 @@ compare(const batch *made, hs_options options, bool has_box, int threads)
             box.rows[k / 3][k % 3] = made->rows[9 * s + k];
         }
         options.cutoff = made->cutoffs[s];
-        if (hs_pairs_find(&own, has_box ? &box : NULL, &options, &expected, &failure) != HS_OK) {
+        if (hs_pairs_find(AMONG(&own, has_box ? &box : NULL), &options, &expected, &failure) !=
+            HS_OK) {
             hs_pairs_free(pairs);
             return -1;
         }
@@ -204,7 +206,7 @@ a_shortage_is_told_in_pairs_and_bytes(void)
         CHECK(failure.expected_pairs > 100.0 && failure.expected_pairs < 1e6);
         CHECK(failure.expected_bytes == (kind % 2 ? 16.0 : 0.0) * failure.expected_pairs);
         CHECK(failure.search_bytes > 100.0 && failure.limit_bytes <= 100.0);
-        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, &failure) == HS_ERR_MEMORY);
+        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, &failure) == HS_ERR_MEMORY);
         CHECK(failure.expected_bytes > 0.0 && failure.limit_bytes == 100.0);
     }
 }

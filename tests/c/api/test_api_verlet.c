@@ -5,6 +5,7 @@
 #include "../../../csrc/core/box/strain.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_api_verlet(void);
 
@@ -37,7 +38,7 @@ agree(const hs_verlet *list, const brute_scene *scene, int threads, int64_t *n_p
     hs_pairs       *found = NULL, *expected = NULL;
     options.want = WANT_ALL;
     options.sorted = true;
-    bool same = hs_pairs_find(&points, scene->box, &options, &expected, NULL) == HS_OK;
+    bool same = hs_pairs_find(AMONG(&points, scene->box), &options, &expected, NULL) == HS_OK;
     options.threads = threads;
     same = same && hs_verlet_find(list, &options, &found, NULL) == HS_OK;
     same = same && same_pairs(found, expected, scene->ndim);
@@ -123,7 +124,7 @@ head_on_pairs_are_never_missed(void)
             CHECK(hs_verlet_update(list, &points, NULL, &options, reach, false, &rebuilt, NULL) ==
                   HS_OK);
             CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
-            CHECK(hs_pairs_count(&points, NULL, &options, &expected, NULL) == HS_OK);
+            CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &expected, NULL) == HS_OK);
             CHECK(hs_pairs_length(pairs) == expected);
             n_found += expected;
             n_kept += !rebuilt;

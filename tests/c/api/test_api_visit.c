@@ -2,6 +2,7 @@
 /* test_api_visit.c: a function sees the pairs of one search, each once, and may end it. */
 #include "../support/block_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -59,21 +60,21 @@ compare_visit(const brute_scene *scene, int threads, bool many)
     const hs_points points = points_of(scene);
     hs_options      options = options_of(scene);
     seen            s = {.ndim = scene->ndim};
-    hs_visit        visit = {.pair = many ? NULL : see_pair, .pairs = many ? see_pairs : NULL, .user = &s};
+    hs_visit visit = {.pair = many ? NULL : see_pair, .pairs = many ? see_pairs : NULL, .user = &s};
     hs_pairs       *whole = NULL;
     int64_t         n = -1;
     options.want = WANT_ALL;
     options.threads = threads;
-    CHECK(hs_pairs_find(&points, scene->box, &options, &whole, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &whole, NULL) == HS_OK);
     s.whole = whole;
     options.want = 0;
     options.sorted = true; /* both ignored */
-    CHECK(hs_pairs_visit(&points, scene->box, &options, &visit, &n, NULL) == HS_OK);
+    CHECK(hs_pairs_visit(AMONG(&points, scene->box), &options, &visit, &n, NULL) == HS_OK);
     CHECK(n == hs_pairs_length(whole) && s.n == n);
     if (n > 0) {
         s.stop_at = 1 + n / 2;
         s.n = 0;
-        CHECK(hs_pairs_visit(&points, scene->box, &options, &visit, &n, NULL) == HS_OK);
+        CHECK(hs_pairs_visit(AMONG(&points, scene->box), &options, &visit, &n, NULL) == HS_OK);
         CHECK(n == s.stop_at && s.n == n);
     }
     hs_pairs_free(whole);
@@ -134,13 +135,13 @@ threads_see_each_pair_once(void)
     hs_visit          visit = {.pair = add_up, .user = &t, .thread_safe = true};
     memset(sums, 0, N * sizeof *sums);
     memset(again, 0, N * sizeof *again);
-    CHECK(hs_pairs_visit(&points, NULL, &options, &visit, &n, NULL) == HS_OK);
+    CHECK(hs_pairs_visit(AMONG(&points, NULL), &options, &visit, &n, NULL) == HS_OK);
     t.of = again;
     options.threads = 4;
-    CHECK(hs_pairs_visit(&points, NULL, &options, &visit, &m, NULL) == HS_OK);
+    CHECK(hs_pairs_visit(AMONG(&points, NULL), &options, &visit, &m, NULL) == HS_OK);
     CHECK(n == m && n > 100000 && memcmp(sums, again, N * sizeof *sums) == 0);
     t.stop_point = 17;
-    CHECK(hs_pairs_visit(&points, NULL, &options, &visit, &m, NULL) == HS_OK);
+    CHECK(hs_pairs_visit(AMONG(&points, NULL), &options, &visit, &m, NULL) == HS_OK);
     CHECK(m > 0 && m < n);
     free(x);
     free(sums);
@@ -173,7 +174,7 @@ search_again(int64_t i, int64_t j, const int32_t *S, const double *D, double d2,
     (void)D;
     (void)d2;
     CHECK(i < j && (inner->n_calls++ > 0 || rounds_to_nearest()));
-    CHECK(hs_pairs_find(&points, inner->scene->box, &options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, inner->scene->box), &options, &pairs, NULL) == HS_OK);
     CHECK(hs_pairs_length(pairs) > 0);
     hs_pairs_free(pairs);
     fesetround(FE_UPWARD);
@@ -191,10 +192,11 @@ a_function_may_search_itself(void)
     const hs_visit    visit = {.pair = search_again, .user = &inner};
     int64_t           n = 0, count = 0;
     fesetround(FE_DOWNWARD);
-    (void)hs_pairs_visit(&points, NULL, &options, &visit, &n, NULL);
+    (void)hs_pairs_visit(AMONG(&points, NULL), &options, &visit, &n, NULL);
     CHECK(!rounds_to_nearest());
     fesetround(FE_TONEAREST);
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK && n == count && n > 0);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK && n == count &&
+          n > 0);
     free(x);
 }
 
@@ -221,7 +223,7 @@ it_can_be_interrupted(void)
     int               polls = 0;
     options.poll = say_no;
     options.poll_context = &polls;
-    CHECK(hs_pairs_visit(&points, NULL, &options, &visit, &n, NULL) == HS_ERR_INTERRUPTED);
+    CHECK(hs_pairs_visit(AMONG(&points, NULL), &options, &visit, &n, NULL) == HS_ERR_INTERRUPTED);
     CHECK(polls == 1 && n == s.n && n > 0 && n < 200000);
     free(x);
 }
@@ -242,7 +244,7 @@ any_allocation_may_fail(void)
         int64_t        n = -1;
         options.threads = 1 + (int)(nth % 2);
         hs_test_fail_allocation(nth);
-        const hs_status status = hs_pairs_visit(&points, NULL, &options, &visit, &n, NULL);
+        const hs_status status = hs_pairs_visit(AMONG(&points, NULL), &options, &visit, &n, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);
@@ -269,10 +271,10 @@ cells_are_visited_too(void)
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
         options.want = WANT_ALL;
         options.cutoff *= kind % 2 ? 0.5 : 1.2;
-        CHECK(hs_cells_pairs(cells, &options, &whole, NULL) == HS_OK);
+        CHECK(hs_pairs_find(IN_CELLS(cells), &options, &whole, NULL) == HS_OK);
         seen           by = {.ndim = 3, .whole = whole};
         const hs_visit visit = {.pair = see_pair, .user = &by};
-        CHECK(hs_cells_visit(cells, &options, &visit, &n, NULL) == HS_OK);
+        CHECK(hs_pairs_visit(IN_CELLS(cells), &options, &visit, &n, NULL) == HS_OK);
         CHECK(n == hs_pairs_length(whole));
         hs_pairs_free(whole);
         hs_cells_free(cells);

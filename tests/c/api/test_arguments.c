@@ -2,6 +2,7 @@
 /* test_arguments.c: what would be read or written out of bounds is refused by every function that
  * could, before anything is read. */
 #include "../support/harness.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/base/want.h"
 
@@ -44,28 +45,30 @@ status_of_all(const hs_points *points, const hs_points *queries, const hs_box *b
     hs_plan            plan;
     const hs_histogram histogram = {.n_edges = 2, .edges = edges, .n_types = 1, .counts = counts};
     const hs_visit     visit = {.pair = ignore_pair};
-    const hs_status    status = hs_neighbors_find(points, queries, box, options, &pairs, NULL);
+    const hs_status    status = hs_neighbors_find(QUERIED(points, queries, box), options, &pairs,
+                                                  NULL);
     hs_pairs_free(pairs);
-    CHECK(hs_neighbors_count(points, queries, box, options, counts, NULL) == status);
-    CHECK(hs_pairs_histogram(points, queries, box, options, &histogram, NULL) == status);
-    CHECK(hs_nearest_find(points, queries, box, 1, options, &pairs, NULL) == status);
+    CHECK(hs_neighbors_count(QUERIED(points, queries, box), options, counts, NULL) == status);
+    CHECK(hs_pairs_histogram(QUERIED(points, queries, box), options, &histogram, NULL) == status);
+    CHECK(hs_nearest_find(QUERIED(points, queries, box), 1, options, &pairs, NULL) == status);
     hs_pairs_free(pairs);
-    CHECK(hs_nearest_find(points, queries, box, 0, options, &pairs, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_nearest_find(QUERIED(points, queries, box), 0, options, &pairs, NULL) ==
+          HS_ERR_ARGUMENT);
     if (queries != NULL) {
-        CHECK(hs_between_count(points, queries, box, options, &count, NULL) == status);
+        CHECK(hs_pairs_count(QUERIED(points, queries, box), options, &count, NULL) == status);
         return status;
     }
-    CHECK(hs_pairs_count(points, box, options, &count, NULL) == status);
+    CHECK(hs_pairs_count(AMONG(points, box), options, &count, NULL) == status);
     CHECK((count == -7) == (status != HS_OK));
-    CHECK(hs_pairs_find(points, box, options, &pairs, NULL) == status);
+    CHECK(hs_pairs_find(AMONG(points, box), options, &pairs, NULL) == status);
     CHECK((pairs == NULL) == (status != HS_OK));
     hs_pairs_free(pairs);
-    CHECK(hs_stream_open(points, box, options, 1, &stream, NULL) == status);
+    CHECK(hs_stream_open(AMONG(points, box), options, 1, &stream, NULL) == status);
     hs_stream_free(stream);
-    CHECK(hs_pairs_visit(points, box, options, &visit, &visited, NULL) == status);
+    CHECK(hs_pairs_visit(AMONG(points, box), options, &visit, &visited, NULL) == status);
     CHECK(hs_cells_build(points, box, options, &cells, NULL) == status);
     hs_cells_free(cells);
-    CHECK(hs_plan_make(points, box, options, &plan, NULL) == status);
+    CHECK(hs_plan_make(AMONG(points, box), options, &plan, NULL) == status);
     return status;
 }
 
@@ -137,17 +140,17 @@ bad_options_are_refused(void)
     bad[6].cell_size = -1.0;
     bad[7].memory_limit = NAN;
     for (int b = 0; b < 8; b++) {
-        CHECK(hs_pairs_find(&points, NULL, &bad[b], &pairs, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_pairs_find(AMONG(&points, NULL), &bad[b], &pairs, NULL) == HS_ERR_ARGUMENT);
         CHECK(pairs == NULL);
     }
     bad[2].want = HS_WANT_I;
-    CHECK(hs_pairs_find(&points, NULL, &bad[2], &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &bad[2], &pairs, NULL) == HS_OK);
     hs_pairs_free(pairs);
     out.index_bytes = 1;
-    CHECK(hs_pairs_find(&points, NULL, &bad[2], &pairs, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &bad[2], &pairs, NULL) == HS_ERR_ARGUMENT);
     out.index_bytes = 8;
     out.capacity = -1;
-    CHECK(hs_pairs_find(&points, NULL, &bad[2], &pairs, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &bad[2], &pairs, NULL) == HS_ERR_ARGUMENT);
 }
 
 /* What single functions have beside these. */
@@ -161,11 +164,12 @@ other_arguments_are_refused(void)
     hs_stream       *stream;
     const hs_visit   nothing = {.pair = NULL};
     hs_histogram     histogram = {.n_edges = 1, .edges = edges, .counts = counts};
-    CHECK(hs_stream_open(&points, NULL, &options, 0, &stream, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_stream_open(AMONG(&points, NULL), &options, 0, &stream, NULL) == HS_ERR_ARGUMENT);
     CHECK(stream == NULL);
-    CHECK(hs_pairs_visit(&points, NULL, &options, &nothing, &visited, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_visit(AMONG(&points, NULL), &options, &nothing, &visited, NULL) ==
+          HS_ERR_ARGUMENT);
     CHECK(visited == 0);
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &histogram, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &histogram, NULL) == HS_ERR_ARGUMENT);
     const hs_systems systems = {.n = -1};
     CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_ERR_ARGUMENT);
 }
@@ -185,10 +189,11 @@ cells_and_lists_are_asked_the_right_way(void)
     flat.ndim = 2;
     wide.index_bytes = 16;
     CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
-    CHECK(hs_cells_neighbors(cells, &flat, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_neighbors_find(QUERIED_CELLS(cells, &flat), &options, &pairs, NULL) ==
+          HS_ERR_ARGUMENT);
     CHECK(hs_cells_candidates(cells, &flat, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_cells_find(cells, &flat, cell, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_cells_pairs(cells, &wide, &pairs, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_find(IN_CELLS(cells), &wide, &pairs, NULL) == HS_ERR_ARGUMENT);
     hs_cells_free(cells);
     hs_verlet *list = hs_verlet_new();
     flat.ndim = 9;
@@ -214,7 +219,7 @@ each_array_that_is_wanted_must_be_there(void)
                               .distance = distance, .vector = vector, .shift = shift};
         options.out = &out;
         options.want = bit;
-        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
         CHECK(hs_pairs_length(pairs) == 1);
         hs_pairs_free(pairs);
         switch (bit) {
@@ -225,9 +230,9 @@ each_array_that_is_wanted_must_be_there(void)
         case HS_WANT_SHIFT: out.shift = NULL; break;
         default: out.both = NULL;
         }
-        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_ERR_ARGUMENT);
         options.want = HS_WANT_ALL & ~bit;
-        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
         hs_pairs_free(pairs);
     }
 }
@@ -238,7 +243,7 @@ nothing_at_all_is_refused(void)
 {
     const hs_points  points = good_points();
     const hs_options options = good_options();
-    CHECK(hs_neighbors_count(NULL, NULL, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_neighbors_count(AMONG(NULL, NULL), &options, NULL, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_systems_count(&points, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
 }
 

@@ -6,6 +6,7 @@
  */
 #include "../../../csrc/core/search/search.h"
 #include "../support/call_scene.h"
+#include "../support/among.h"
 
 #include <limits.h>
 
@@ -273,10 +274,11 @@ arrays_without_entries_may_be_missing(void)
     call_make_objects(&s.c, USES_CELLS);
     const hs_points  none = {.ndim = 3};
     const hs_systems empty = {.n = 0};
-    CHECK(hs_neighbors_count(&none, NULL, &s.box, &s.options, NULL, NULL) == HS_OK);
-    CHECK(hs_neighbors_count(&s.points, &none, &s.box, &s.options, NULL, NULL) == HS_OK);
-    CHECK(hs_neighbors_count(&none, &s.points, &s.box, &s.options, NULL, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_cells_neighbors_count(s.c.cells, &none, &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(AMONG(&none, &s.box), &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(QUERIED(&s.points, &none, &s.box), &s.options, NULL, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(QUERIED(&none, &s.points, &s.box), &s.options, NULL, NULL) ==
+          HS_ERR_ARGUMENT);
+    CHECK(hs_neighbors_count(QUERIED_CELLS(s.c.cells, &none), &s.options, NULL, NULL) == HS_OK);
     CHECK(hs_cells_find(s.c.cells, &none, NULL, NULL) == HS_OK);
     CHECK(hs_box_wrap(&s.box, &none, NULL, NULL, NULL) == HS_OK);
     CHECK(hs_systems_count(&none, &empty, &s.options, NULL, NULL) == HS_OK);
@@ -286,6 +288,41 @@ arrays_without_entries_may_be_missing(void)
     s.histogram.counts = NULL;
     s.histogram.sums = NULL;
     CHECK(call_histogram(&s.c, NULL) == HS_OK);
+    call_free_objects(&s.c);
+}
+
+/* Cells and points at once, queries where each pair is found once, or nothing at all. */
+static void
+what_is_searched_cannot_contradict_itself(void)
+{
+    static call_scene s;
+    hs_pairs         *pairs;
+    hs_stream        *stream;
+    hs_plan           plan;
+    int64_t           n;
+    call_fill_scene(&s);
+    call_make_objects(&s.c, USES_CELLS);
+    const hs_options *options = &s.options;
+    const hs_among    bad[] = {{.points = NULL},
+                               {.cells = s.c.cells, .points = &s.points},
+                               {.cells = s.c.cells, .box = &s.box}};
+    for (size_t b = 0; b <= sizeof bad / sizeof *bad; b++) {
+        const hs_among *among = b < sizeof bad / sizeof *bad ? &bad[b] : NULL;
+        CHECK(hs_pairs_find(among, options, &pairs, NULL) == HS_ERR_ARGUMENT && pairs == NULL);
+        CHECK(hs_pairs_count(among, options, &n, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_neighbors_find(among, options, &pairs, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_neighbors_count(among, options, &n, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_pairs_histogram(among, options, &s.histogram, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_nearest_find(among, 1, options, &pairs, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_stream_open(among, options, 1, &stream, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_pairs_visit(among, options, &s.visit, &n, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_plan_make(among, options, &plan, NULL) == HS_ERR_ARGUMENT);
+    }
+    const hs_among *queried = QUERIED(&s.points, &s.points, &s.box);
+    CHECK(hs_pairs_find(queried, options, &pairs, NULL) == HS_ERR_ARGUMENT && pairs == NULL);
+    CHECK(hs_stream_open(queried, options, 1, &stream, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_pairs_visit(queried, options, &s.visit, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_plan_make(queried, options, &plan, NULL) == HS_ERR_ARGUMENT);
     call_free_objects(&s.c);
 }
 
@@ -341,7 +378,7 @@ only_one_bit_names_an_array(void)
     hs_pairs         *pairs;
     call_fill_scene(&s);
     s.options.want = 63;
-    CHECK(hs_pairs_find(&s.points, &s.box, &s.options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&s.points, &s.box), &s.options, &pairs, NULL) == HS_OK);
     for (int b = 0; b < 8; b++) {
         CHECK(hs_pairs_array(pairs, bad[b]) == NULL);
         CHECK(hs_pairs_take(pairs, bad[b]) == NULL);
@@ -381,6 +418,7 @@ test_bad_arguments(void)
     RUN(each_spoilt_argument_is_refused);
     RUN(numbers_that_are_only_large_are_fine);
     RUN(arrays_without_entries_may_be_missing);
+    RUN(what_is_searched_cannot_contradict_itself);
     RUN(systems_that_descend_are_named);
     RUN(objects_that_are_null_hold_nothing);
     RUN(only_one_bit_names_an_array);

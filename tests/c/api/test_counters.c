@@ -5,6 +5,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_counters(void);
 
@@ -30,7 +31,7 @@ counters_of(const brute_scene *scene, unsigned want, bool sorted)
     options.want = want;
     options.sorted = sorted;
     options.counters = &counters;
-    CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_OK);
     CHECK(counters.pairs == hs_pairs_length(pairs));
     hs_pairs_free(pairs);
     return counters;
@@ -133,7 +134,7 @@ counting_keeps_no_pairs(void)
         options.want = WANT_ALL | HS_WANT_BOTH; /* ignored */
         options.sorted = true;
         options.counters = &c;
-        CHECK(hs_pairs_count(&points, scene->box, &options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) == HS_OK);
         CHECK(c.pairs == count && count > 100);
         for (int purpose = HS_FOR_INDICES; purpose <= HS_FOR_SORTING; purpose++) {
             CHECK(c.bytes[purpose] == 0);

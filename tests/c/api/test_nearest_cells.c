@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -32,8 +33,8 @@ compare(const hs_cells *cells, const brute_scene *scene, const hs_points *querie
     options.cutoff = limit;
     options.want = WANT_ALL & ~HS_WANT_I;
     const hs_status status =
-        hs_nearest_find(&points, queries, scene->box, k, &options, &fresh, NULL);
-    bool right = hs_cells_nearest(cells, queries, k, &options, &kept, NULL) == status;
+        hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, &fresh, NULL);
+    bool right = hs_nearest_find(QUERIED_CELLS(cells, queries), k, &options, &kept, NULL) == status;
     right = right && (status != HS_OK || same_rows(kept, fresh, scene->ndim));
     hs_pairs_free(kept);
     hs_pairs_free(fresh);
@@ -88,7 +89,8 @@ failures_leave_nothing_behind(void)
         hs_pairs *rows = NULL;
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
         hs_test_fail_allocation(nth + 1);
-        const hs_status status = hs_cells_nearest(cells, &points, 5, &options, &rows, NULL);
+        const hs_status status = hs_nearest_find(QUERIED_CELLS(cells, &points), 5, &options, &rows,
+                                                 NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);
@@ -121,7 +123,7 @@ whoever_stops_the_first_leaves_it_to_the_next(void)
     CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
     options.poll = stop_at_once;
     options.want = HS_WANT_J;
-    CHECK(hs_cells_nearest(cells, NULL, 3, &options, &rows, NULL) == HS_ERR_INTERRUPTED);
+    CHECK(hs_nearest_find(IN_CELLS(cells), 3, &options, &rows, NULL) == HS_ERR_INTERRUPTED);
     CHECK(rows == NULL);
     CHECK(compare(cells, &s.scene, &points, 3, INFINITY));
     hs_cells_free(cells);

@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_precision(void);
 
@@ -27,7 +28,7 @@ is_like_brute_force(const brute_scene *scene, hs_precision precision, const char
                  found.n == expected.n;
     for (int64_t e = 0; right && e < found.n; e++)
         right = pair_matches(scene, &expected.pairs[e], &found, e);
-    right = right && hs_pairs_count(&points, scene->box, &options, &count, NULL) == HS_OK &&
+    right = right && hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) == HS_OK &&
             count == expected.n;
     found_free(&found);
     brute_free(&expected);
@@ -117,19 +118,21 @@ double_names_the_farthest(void)
     int64_t      count = -1;
     options.cutoff = 0.25;
     options.precision = HS_DOUBLE;
-    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_ERR_ROUNDING);
     CHECK(failure.row == 1 && !failure.in_queries && count == -1);
-    CHECK(hs_between_count(&points, &queries, &box, &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(hs_pairs_count(QUERIED(&points, &queries, &box), &options, &count, &failure) ==
+          HS_ERR_ROUNDING);
     CHECK(failure.row == 1 && failure.in_queries);
     q[2] = 1.0;
-    CHECK(hs_between_count(&points, &queries, &box, &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(hs_pairs_count(QUERIED(&points, &queries, &box), &options, &count, &failure) ==
+          HS_ERR_ROUNDING);
     CHECK(failure.row == 1 && !failure.in_queries);
     x[0] = 0x1p60; /* as far as the next two: the first is named */
-    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_ERR_ROUNDING);
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_ERR_ROUNDING);
     CHECK(failure.row == 0);
     x[0] = 0.5;
     options.precision = HS_EXACT;
-    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_OK && count == 3);
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_OK && count == 3);
 }
 
 /* Whole numbers: in each neighbourhood hundreds of pairs are exactly as far as the cutoff. */
@@ -159,7 +162,7 @@ many_ties_are_decided(void)
             const int square = a * a + b * b + e * e;
             expected += square > 0 && square < 25 + options.inclusive;
         }
-        CHECK(hs_pairs_count(&points, &box, &options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, NULL) == HS_OK);
         CHECK(count == expected / 2 * N);
     }
 }

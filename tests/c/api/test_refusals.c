@@ -3,6 +3,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
+#include "../support/among.h"
 
 void test_refusals(void);
 
@@ -36,12 +37,12 @@ search(int kind, int how, refusal *once)
     options.poll = refuse_once;
     options.poll_context = once;
     switch (kind) {
-    case 0: status = hs_pairs_find(&points, NULL, &options, &found, NULL); break;
-    case 1: status = hs_pairs_count(&points, NULL, &options, &n, NULL); break;
-    case 2: status = hs_neighbors_count(&points, NULL, NULL, &options, counts, NULL); break;
-    case 3: status = hs_between_count(&points, &points, NULL, &options, &n, NULL); break;
-    case 4: status = hs_nearest_find(&points, NULL, NULL, 5, &options, &found, NULL); break;
-    default: status = hs_neighbors_find(&points, NULL, NULL, &options, &found, NULL);
+    case 0: status = hs_pairs_find(AMONG(&points, NULL), &options, &found, NULL); break;
+    case 1: status = hs_pairs_count(AMONG(&points, NULL), &options, &n, NULL); break;
+    case 2: status = hs_neighbors_count(AMONG(&points, NULL), &options, counts, NULL); break;
+    case 3: status = hs_pairs_count(QUERIED(&points, &points, NULL), &options, &n, NULL); break;
+    case 4: status = hs_nearest_find(AMONG(&points, NULL), 5, &options, &found, NULL); break;
+    default: status = hs_neighbors_find(AMONG(&points, NULL), &options, &found, NULL);
     }
     CHECK(found == NULL || status == HS_OK);
     hs_pairs_free(found);

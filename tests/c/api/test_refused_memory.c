@@ -5,6 +5,7 @@
 #include "../../../csrc/core/search/neighbourhood.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/among.h"
 
 void test_refused_memory(void);
 
@@ -26,7 +27,7 @@ rows_that_just_miss_their_limit_say_so(void)
     for (int k = 0; k < 3; k++)
         box.rows[k][k] = 10.0;
     options.cutoff = 2.0;
-    CHECK(hs_neighbors_count(&points, NULL, &box, &options, counts, NULL) == HS_OK);
+    CHECK(hs_neighbors_count(AMONG(&points, &box), &options, counts, NULL) == HS_OK);
     for (int i = 0; i < N; i++)
         n_entries += (double)counts[i];
     options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
@@ -35,7 +36,7 @@ rows_that_just_miss_their_limit_say_so(void)
         hs_pairs  *rows = NULL;
         hs_failure failure;
         options.memory_limit = part * bytes;
-        CHECK(hs_neighbors_find(&points, NULL, &box, &options, &rows, &failure) == HS_ERR_MEMORY);
+        CHECK(hs_neighbors_find(AMONG(&points, &box), &options, &rows, &failure) == HS_ERR_MEMORY);
         CHECK(failure.search_bytes == 0.0 && failure.limit_bytes == options.memory_limit);
         missed += failure.expected_pairs == n_entries && failure.expected_bytes == bytes;
     }
@@ -56,7 +57,7 @@ limits_are_heeded_before_anything_is_reserved(void)
     options.memory_limit = 1e6;
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
-    const hs_status status = hs_nearest_find(&points, NULL, NULL, INT64_C(1) << 41, &options,
+    const hs_status status = hs_nearest_find(AMONG(&points, NULL), INT64_C(1) << 41, &options,
                                              &rows, &failure);
     CHECK(status == HS_ERR_MEMORY && failure.limit_bytes == 1e6);
     CHECK(failure.expected_pairs == 0x1p42 && failure.expected_bytes == 0x1p46);
@@ -91,7 +92,7 @@ rows_of_many_points_survive_each_failure(void)
     while (!ended && nth < 200) {
         hs_pairs *rows = NULL;
         hs_test_fail_allocation(++nth);
-        const hs_status status = hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL);
+        const hs_status status = hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK ? hs_pairs_length(rows) == 2 * (N - 1) : status == HS_ERR_MEMORY);

@@ -7,6 +7,7 @@
 
 #include "../../../csrc/core/exact/metric.h"
 #include "../support/harness.h"
+#include "../support/among.h"
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
@@ -235,22 +236,25 @@ search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
     const hs_histogram histogram = {.n_edges = 3, .edges = edges, .last_inclusive = true,
                                     .n_types = 1, .counts = bins};
     switch (family) {
-    case 0: status = hs_pairs_find(&s->points, &s->box, &s->options, &pairs, NULL); break;
-    case 1: status = hs_pairs_count(&s->points, &s->box, &s->options, &count, NULL); break;
+    case 0: status = hs_pairs_find(AMONG(&s->points, &s->box), &s->options, &pairs, NULL); break;
+    case 1: status = hs_pairs_count(AMONG(&s->points, &s->box), &s->options, &count, NULL); break;
     case 2:
-        status = hs_neighbors_find(&s->points, &s->points, &s->box, &s->options, &pairs, NULL);
+        status = hs_neighbors_find(QUERIED(&s->points, &s->points, &s->box), &s->options, &pairs,
+                                   NULL);
         break;
-    case 3: status = hs_neighbors_count(&s->points, NULL, &s->box, &s->options, rows, NULL); break;
+    case 3: status = hs_neighbors_count(AMONG(&s->points, &s->box), &s->options, rows, NULL); break;
     case 4:
-        status = hs_pairs_histogram(&s->points, NULL, &s->box, &s->options, &histogram, NULL);
+        status = hs_pairs_histogram(AMONG(&s->points, &s->box), &s->options, &histogram, NULL);
         count = bins[0] + bins[1] + bins[2];
         break;
     case 5:
-        status = hs_nearest_find(&s->points, NULL, &s->box, 3, &s->options, &pairs, NULL);
+        status = hs_nearest_find(AMONG(&s->points, &s->box), 3, &s->options, &pairs, NULL);
         break;
-    case 6: status = hs_cells_pairs(cells, &s->options, &pairs, NULL); break;
-    case 7: status = hs_cells_neighbors(cells, &s->points, &s->options, &pairs, NULL); break;
-    case 8: status = hs_cells_nearest(cells, &s->points, 2, &s->options, &pairs, NULL); break;
+    case 6: status = hs_pairs_find(IN_CELLS(cells), &s->options, &pairs, NULL); break;
+    case 7: status = hs_neighbors_find(QUERIED_CELLS(cells, &s->points), &s->options, &pairs,
+                                       NULL); break;
+    case 8: status = hs_nearest_find(QUERIED_CELLS(cells, &s->points), 2, &s->options, &pairs,
+                                     NULL); break;
     case 9: status = hs_cells_find(cells, &s->points, rows, NULL); break;
     case 10: status = hs_cells_candidates(cells, NULL, &s->options, &pairs, NULL); break;
     case 11: hs_cells_layout(cells, &layout); count = layout.n_cells; break;
@@ -259,12 +263,12 @@ search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
                                   NULL);
         break;
     case 13: status = hs_verlet_find(list, &s->options, &pairs, NULL); break;
-    case 14: status = hs_plan_make(&s->points, &s->box, &s->options, &plan, NULL); break;
+    case 14: status = hs_plan_make(AMONG(&s->points, &s->box), &s->options, &plan, NULL); break;
     case 15: status = hs_box_measure(&s->box, NULL, NULL, NULL); break;
     case 16: status = hs_box_wrap(&s->box, &s->points, NULL, NULL, NULL); break;
     default: {
         hs_stream *stream = NULL;
-        status = hs_stream_open(&s->points, &s->box, &s->options, 50, &stream, NULL);
+        status = hs_stream_open(AMONG(&s->points, &s->box), &s->options, 50, &stream, NULL);
         if (status == HS_OK)
             status = hs_stream_next(stream, NULL, NULL, &pairs, NULL);
         hs_stream_free(stream);

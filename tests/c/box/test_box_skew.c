@@ -7,6 +7,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_box_skew(void);
 
@@ -52,8 +53,9 @@ check_pairs(const brute_scene *scene, const hs_box *upright, double times, bool 
     found_pairs     found = {0}, expected = {0};
     hs_failure      failure;
     int64_t         count = -1, expected_count = -2;
-    CHECK(hs_pairs_count(&points, upright, &options, &expected_count, NULL) == HS_OK);
-    const hs_status counted = hs_pairs_count(&points, scene->box, &options, &count, &failure);
+    CHECK(hs_pairs_count(AMONG(&points, upright), &options, &expected_count, NULL) == HS_OK);
+    const hs_status counted = hs_pairs_count(AMONG(&points, scene->box), &options, &count,
+                                             &failure);
     CHECK(counted == HS_OK ? count == expected_count : is_refusal(counted));
     options.sorted = sorted;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR;
@@ -92,18 +94,20 @@ check_rows(const brute_scene *scene, const hs_box *upright)
     for (int queries = 0; queries < 2; queries++) {
         const hs_points *asking = queries ? &points : NULL;
         hs_status        status =
-            hs_neighbors_find(&points, asking, scene->box, &options, &rows, NULL);
+            hs_neighbors_find(QUERIED(&points, asking, scene->box), &options, &rows, NULL);
         CHECK(status == HS_OK || is_refusal(status));
         if (status == HS_OK) {
-            CHECK(hs_neighbors_find(&points, asking, upright, &options, &expected, NULL) == HS_OK);
+            CHECK(hs_neighbors_find(QUERIED(&points, asking, upright), &options, &expected, NULL) ==
+                  HS_OK);
             CHECK(same_array(rows, expected, HS_WANT_J, 8));
             hs_pairs_free(expected);
         }
         hs_pairs_free(rows);
-        status = hs_nearest_find(&points, asking, scene->box, 70, &options, &rows, NULL);
+        status = hs_nearest_find(QUERIED(&points, asking, scene->box), 70, &options, &rows, NULL);
         CHECK(status == HS_OK || is_refusal(status));
         if (status == HS_OK) {
-            CHECK(hs_nearest_find(&points, asking, upright, 70, &options, &expected, NULL) ==
+            CHECK(hs_nearest_find(QUERIED(&points, asking, upright), 70, &options, &expected,
+                                  NULL) ==
                   HS_OK);
             CHECK(same_array(rows, expected, HS_WANT_J, 8));
             hs_pairs_free(expected);
@@ -153,13 +157,13 @@ far_points_pass_the_range(void)
         int64_t      count = -1;
         x[5] = ldexp(1.0, exponent);
         x[6] = -ldexp(1.0, exponent);
-        const hs_status status = hs_pairs_count(&points, &box, &options, &count, &failure);
+        const hs_status status = hs_pairs_count(AMONG(&points, &box), &options, &count, &failure);
         CHECK(status == HS_OK || is_refusal(status));
         CHECK(exponent > 12 || status == HS_OK);
         CHECK(exponent < 30 || is_refusal(status));
         options.want = HS_WANT_J;
         const hs_status nearest =
-            hs_nearest_find(&points, NULL, &box, 3, &options, &rows, &failure);
+            hs_nearest_find(AMONG(&points, &box), 3, &options, &rows, &failure);
         CHECK(nearest == HS_OK || is_refusal(nearest));
         hs_pairs_free(rows);
     }
@@ -203,8 +207,8 @@ shifts_beyond_float64(void)
                 const hs_box *in = of ? &box : &upright;
                 hs_pairs    **rows = of ? &skew : &expected;
                 const hs_status status =
-                    full ? hs_neighbors_find(&points, NULL, in, &options, rows, NULL)
-                         : hs_nearest_find(&points, NULL, in, 25, &options, rows, NULL);
+                    full ? hs_neighbors_find(AMONG(&points, in), &options, rows, NULL)
+                         : hs_nearest_find(AMONG(&points, in), 25, &options, rows, NULL);
                 CHECK(status == HS_OK);
             }
             CHECK(same_array(skew, expected, HS_WANT_J, 8));
@@ -231,15 +235,15 @@ differences_pass_the_range(void)
         int64_t         count = -1;
         options.cutoff = trial == 1 ? 0.25 : 0.75; /* 1: some pairs are exactly as far */
         options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
-        hs_status status = hs_pairs_find(&points, &box, &options, &rows, &failure);
+        hs_status status = hs_pairs_find(AMONG(&points, &box), &options, &rows, &failure);
         CHECK(status == HS_OK ? hs_pairs_length(rows) == 6 : is_refusal(status));
         hs_pairs_free(rows);
-        status = hs_pairs_count(&points, &box, &options, &count, &failure);
+        status = hs_pairs_count(AMONG(&points, &box), &options, &count, &failure);
         CHECK(status == HS_OK ? count == 6 : is_refusal(status));
         for (int64_t k = 1; k < 200; k = 3 * k + 1) {
             options.cutoff = k == 4 ? 0.25 : INFINITY;
             options.want = HS_WANT_J | HS_WANT_DISTANCE;
-            status = hs_nearest_find(&points, NULL, &box, k, &options, &rows, &failure);
+            status = hs_nearest_find(AMONG(&points, &box), k, &options, &rows, &failure);
             CHECK(status == HS_OK || is_refusal(status));
             CHECK(trial == 2 || status != HS_OK);
             hs_pairs_free(rows);
@@ -272,10 +276,10 @@ nearly_flat_boxes(void)
         options.memory_limit = 1e8;
         if (!brute_find(&scene, 1e5, &expected)) {
             hs_plan plan; /* more pairs than are counted here: not refused, or for a reason */
-            (void)hs_plan_make(&points, &box, &options, &plan, NULL);
+            (void)hs_plan_make(AMONG(&points, &box), &options, &plan, NULL);
             continue;
         }
-        const hs_status status = hs_pairs_count(&points, &box, &options, &count, NULL);
+        const hs_status status = hs_pairs_count(AMONG(&points, &box), &options, &count, NULL);
         CHECK(status == HS_OK ? count == expected.n
                               : status == HS_ERR_BOX_SKEWED || status == HS_ERR_BOX_DEPENDENT);
         brute_free(&expected);

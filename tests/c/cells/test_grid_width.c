@@ -3,6 +3,7 @@
 #include "../support/harness.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_grid_width(void);
 
@@ -17,7 +18,7 @@ find(const brute_scene *scene, double cell_size, hs_pairs **pairs)
     options.want = HS_WANT_BOTH | HS_WANT_SHIFT;
     options.sorted = true;
     options.cell_size = cell_size;
-    return hs_pairs_find(&points, scene->box, &options, pairs, NULL);
+    return hs_pairs_find(AMONG(&points, scene->box), &options, pairs, NULL);
 }
 
 /* Whether all sizes of cells give the same pairs; *n_pairs becomes more by them. */
@@ -102,9 +103,9 @@ endless_images_are_refused_with_any_cells(void)
             hs_options      options = options_of(&scene);
             hs_plan         plan;
             options.cell_size = 0.0;
-            const hs_status without = hs_plan_make(&points, &box, &options, &plan, NULL);
+            const hs_status without = hs_plan_make(AMONG(&points, &box), &options, &plan, NULL);
             options.cell_size = size;
-            CHECK(hs_plan_make(&points, &box, &options, &plan, NULL) == without);
+            CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == without);
             CHECK(without == HS_OK || without == HS_ERR_MEMORY);
             CHECK(l == 0 || without == HS_ERR_MEMORY);
         }
@@ -160,9 +161,11 @@ few_points_are_not_worth_a_thread(void)
         const int few = threads > 1 ? threads : 1, many = threads < -1 ? -threads : few;
         options.threads = threads;
         points.n = HS_POINTS_FOR_THREADS;
-        CHECK(hs_plan_make(&points, NULL, &options, &plan, NULL) == HS_OK && plan.threads == many);
+        CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK &&
+              plan.threads == many);
         points.n--;
-        CHECK(hs_plan_make(&points, NULL, &options, &plan, NULL) == HS_OK && plan.threads == few);
+        CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK &&
+              plan.threads == few);
     }
 }
 

@@ -7,6 +7,7 @@
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -23,7 +24,7 @@ count_images(double tilt, double cutoff, hs_options *options, int64_t *count)
     const hs_points points = {one_point, 1, 3, HS_FLOAT64, 24, 8};
     *count = -1;
     options->cutoff = cutoff;
-    return hs_pairs_count(&points, &box, options, count, NULL);
+    return hs_pairs_count(AMONG(&points, &box), options, count, NULL);
 }
 
 /* Whole numbers x, y, z with x^2 + y^2 + z^2 <= R^2, but for 0, half of them. */
@@ -122,10 +123,11 @@ narrow_cells_are_widened(void)
         hs_options      options = options_of(&scene);
         hs_cells       *cells = NULL;
         int64_t         count = -1, expected = -2;
-        CHECK(hs_pairs_count(&points, scene.box, &options, &expected, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, scene.box), &options, &expected, NULL) == HS_OK);
         options.cell_size = ldexp(1.0, -trial % 9);
         CHECK(hs_cells_build(&points, scene.box, &options, &cells, NULL) == HS_OK);
-        CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == expected);
+        CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK &&
+              count == expected);
         hs_cells_free(cells);
     }
 }
@@ -140,7 +142,7 @@ cutoffs_beyond_everything(void)
     int64_t         count = -1;
     for (int exponent = 1017; exponent <= 1023; exponent++) {
         options.cutoff = ldexp(1.5, exponent);
-        CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK && count == 6);
+        CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK && count == 6);
     }
 }
 

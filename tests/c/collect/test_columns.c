@@ -3,6 +3,7 @@
 #include "../../../csrc/core/collect/columns.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_columns(void);
 
@@ -28,7 +29,7 @@ find_into(const brute_scene *scene, hs_options options, int64_t capacity, int64_
     make_arrays(options.want, scene->ndim, options.index_bytes, room, c);
     c->arrays.capacity = capacity;
     options.out = &c->arrays;
-    const hs_status status = hs_pairs_find(&points, scene->box, &options, &pairs, failure);
+    const hs_status status = hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, failure);
     CHECK((status == HS_OK) == (pairs != NULL));
     *n = status == HS_OK ? hs_pairs_length(pairs) : -1;
     for (unsigned bit = 1; status == HS_OK && bit < 64; bit <<= 1) {
@@ -44,7 +45,7 @@ find_anew(const brute_scene *scene, const hs_options *options)
 {
     const hs_points points = points_of(scene);
     hs_pairs       *pairs = NULL;
-    CHECK(hs_pairs_find(&points, scene->box, options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, scene->box), options, &pairs, NULL) == HS_OK);
     return pairs;
 }
 
@@ -118,17 +119,18 @@ no_room_asks_for_the_number(void)
     const hs_pair_arrays nothing = {.index_bytes = 8};
     hs_options           options = options_of(scene);
     int64_t              count = -1;
-    CHECK(hs_pairs_count(&points, scene->box, &options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL) == HS_OK);
     for (int sorted = 0; sorted < 2; sorted++) {
         hs_pairs  *pairs = (hs_pairs *)&options;
         hs_failure failure;
         options.sorted = sorted;
         options.want = WANT_ALL | HS_WANT_BOTH;
         options.out = &nothing;
-        CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, &failure) == HS_ERR_CAPACITY);
+        CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, &failure) ==
+              HS_ERR_CAPACITY);
         CHECK(pairs == NULL);
         CHECK(failure.expected_pairs == (double)count);
-        CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) == HS_ERR_CAPACITY);
+        CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_ERR_CAPACITY);
     }
 }
 
@@ -147,7 +149,7 @@ no_pairs_need_no_room(void)
         options.want = WANT_ALL | HS_WANT_BOTH;
         options.out = &nothing;
         points.n = trial & 2 ? 0 : points.n;
-        CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
         CHECK(pairs != NULL && hs_pairs_length(pairs) == 0);
         hs_pairs_free(pairs);
     }

@@ -8,6 +8,7 @@
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/thread_limit.h"
+#include "../support/among.h"
 
 void test_crew(void);
 
@@ -84,7 +85,7 @@ find(const hs_options *options)
 {
     const hs_points points = points_of(&scene);
     hs_pairs       *pairs = NULL;
-    CHECK(hs_pairs_find(&points, scene.box, options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, scene.box), options, &pairs, NULL) == HS_OK);
     return pairs;
 }
 
@@ -113,7 +114,7 @@ check_out(hs_options options, const hs_pairs *expected, int64_t room)
     caller_arrays   c;
     make_arrays(options.want, scene.ndim, options.index_bytes, room, &c);
     options.out = &c.arrays;
-    const hs_status status = hs_pairs_find(&points, scene.box, &options, &pairs, &failure);
+    const hs_status status = hs_pairs_find(AMONG(&points, scene.box), &options, &pairs, &failure);
     if (room < n) {
         CHECK(status == HS_ERR_CAPACITY && failure.expected_pairs == (double)n);
         CHECK(untouched_from(&c, room));
@@ -142,7 +143,8 @@ check_crowd(hs_options options)
         if (n > 0) {
             check_out(options, alone, threads % 2 ? n - 1 : n / 3);
         }
-        CHECK(hs_pairs_count(&points, scene.box, &options, &count, NULL) == HS_OK && count == n);
+        CHECK(hs_pairs_count(AMONG(&points, scene.box), &options, &count, NULL) == HS_OK &&
+              count == n);
     }
     hs_pairs_free(alone);
 }
@@ -227,8 +229,8 @@ an_interrupt_ends_all_threads(void)
         options.sorted = trial % 3 == 1;
         options.poll_context = &left;
         const hs_status status =
-            trial % 3 == 2 ? hs_pairs_count(&points, NULL, &options, &count, NULL)
-                           : hs_pairs_find(&points, NULL, &options, &pairs, NULL);
+            trial % 3 == 2 ? hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL)
+                           : hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL);
         CHECK(status == (left <= 0 ? HS_ERR_INTERRUPTED : HS_OK) && left >= 0);
         CHECK((pairs != NULL) == (status == HS_OK && trial % 3 != 2));
         CHECK((count == -1) == (status != HS_OK || trial % 3 != 2));
@@ -254,7 +256,7 @@ fail_each(const hs_options *options, const hs_pairs *expected)
         hs_pairs     *pairs = NULL;
         nth += IS_SLOW ? 5 : 1;
         hs_test_fail_allocation(nth);
-        const hs_status status = hs_pairs_find(&points, scene.box, options, &pairs, NULL);
+        const hs_status status = hs_pairs_find(AMONG(&points, scene.box), options, &pairs, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));
@@ -303,7 +305,7 @@ a_memory_limit_ends_all_threads(void)
         hs_pairs     *pairs = NULL;
         options.threads = 2 + trial % 4;
         options.memory_limit = ldexp(1.0, 14 + trial / 2);
-        const hs_status status = hs_pairs_find(&points, NULL, &options, &pairs, NULL);
+        const hs_status status = hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);
         refused += status == HS_ERR_MEMORY;
         hs_pairs_free(pairs);

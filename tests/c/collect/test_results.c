@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_results(void);
 
@@ -79,11 +80,11 @@ zero_strides_repeat_a_number(void)
     hs_options   options = hs_options_default();
     int64_t      count = -1;
     hs_points    points = {.data = x, .n = 50, .ndim = 3, .real = HS_FLOAT64, .column_stride = 8};
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK);
     CHECK(count == 50 * 49 / 2);
     points = (hs_points){.data = x, .n = 3, .ndim = 4, .real = HS_FLOAT64, .row_stride = 8};
     options.cutoff = 2.0; /* steps of (1, 1, 1, 1) */
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK);
     CHECK(count == 2);
 }
 
@@ -145,7 +146,7 @@ each_want_returns_the_same_numbers(void)
             options.want = want;
             const size_t size = (size_t)options.index_bytes;
             narrow_indices(&all, options.index_bytes, i, j, both);
-            CHECK(hs_pairs_find(&points, scene->box, &options, &pairs, NULL) == HS_OK);
+            CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_OK);
             CHECK(hs_pairs_length(pairs) == all.n);
             check_array(pairs, &options, HS_WANT_I, i, n * size);
             check_array(pairs, &options, HS_WANT_BOTH, both, n * 2 * size);
@@ -175,7 +176,7 @@ empty_results_have_arrays(void)
         options.cutoff = 1.0;
         options.sorted = trial & 1;
         options.want = WANT_ALL | HS_WANT_BOTH;
-        CHECK(hs_pairs_find(&some, NULL, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&some, NULL), &options, &pairs, NULL) == HS_OK);
         CHECK(hs_pairs_length(pairs) == 0);
         for (unsigned bit = 1; bit < 64; bit <<= 1) {
             void *taken = hs_pairs_take(pairs, bit);
@@ -245,7 +246,7 @@ polled_search(const brute_scene *scene, bool sorted, poll_state *state, hs_count
     options.poll = poll;
     options.poll_context = state;
     options.counters = counters;
-    const hs_status status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
+    const hs_status status = hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, &failure);
     CHECK((status == HS_OK) == (pairs != NULL));
     CHECK(counters->polls == state->calls);
     CHECK(status != HS_OK || counters->pairs == hs_pairs_length(pairs));
@@ -348,12 +349,12 @@ a_slab_with_too_many_images_is_refused_at_once(void)
     const hs_points points = points_of(&scene);
     options.find_limit = find_limit; /* 2 * pi * 1e10 pairs */
     options.find_context = &state;
-    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_ERR_MEMORY);
     CHECK(failure.expected_pairs > 6.2e10 && failure.expected_pairs < 6.3e10);
     CHECK(failure.limit_bytes > 0.9e9 && failure.limit_bytes < 1.1e9);
-    CHECK(hs_plan_make(&points, &box, &options, &plan, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, &failure) == HS_ERR_MEMORY);
     options.cutoff = 30.0; /* few images, and the points span a part of the radius */
-    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_OK);
     hs_pairs_free(pairs);
 }
 
@@ -370,14 +371,14 @@ a_result_too_large_is_refused_before_it_is_found(void)
     const hs_points points = points_of(&scene);
     options.find_limit = find_limit; /* 1.6e10 pairs */
     options.find_context = &state;
-    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_ERR_MEMORY);
     CHECK(pairs == NULL);
     CHECK(state.calls == 1);
     CHECK(failure.expected_pairs > 1e10 && failure.expected_pairs < 2e10);
     CHECK(failure.expected_bytes >= 16.0 * failure.expected_pairs);
     CHECK(failure.limit_bytes > 0.9e9 && failure.limit_bytes < 1.1e9);
     options.cutoff = 10.0; /* small: nobody asks */
-    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_OK);
     CHECK(state.calls == 1);
     hs_pairs_free(pairs);
     hs_pairs_free(NULL);

@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "../support/pair_checks.h"
+#include "../support/among.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -173,7 +174,7 @@ only_plan(const fuzz_scene *f, hs_status valid)
     double          wrapped[8 * 4];
     int64_t         shift[8 * 4];
     options.memory_limit = PLAN_LIMIT;
-    const hs_status status = hs_plan_make(&points, f->scene.box, &options, &plan, &failure);
+    const hs_status status = hs_plan_make(AMONG(&points, f->scene.box), &options, &plan, &failure);
     if (valid != HS_OK && status != valid &&
         !(valid == HS_ERR_NOT_FINITE && status == HS_ERR_BOX_DEPENDENT))
         fail(f, "an invalid scene was not refused as it should be");

@@ -9,6 +9,7 @@
  */
 #include "../../../csrc/halfshell.h"
 #include "../support/harness.h"
+#include "../support/among.h"
 
 #define FNV_START UINT64_C(0xcbf29ce484222325)
 
@@ -115,7 +116,7 @@ hash_search(const hs_points *points, const hs_box *box, const hs_options *option
                              2 * index};
     uint64_t     hash = FNV_START;
     hs_pairs    *pairs;
-    const hs_status status = hs_pairs_find(points, box, options, &pairs, NULL);
+    const hs_status status = hs_pairs_find(AMONG(points, box), options, &pairs, NULL);
     if (status != HS_OK) {
         fprintf(stderr, "golden: %s\n", hs_status_text(status));
         exit(1);
@@ -176,7 +177,8 @@ hash_scene(const hs_points *points, const hs_box *box, double cutoff, const char
         options.precision = searches[s].precision;
         const uint64_t part = hash_search(points, box, &options, n_pairs);
         hash = hash_words(hash, &part, sizeof part);
-        if (hs_pairs_count(points, box, &options, &count, NULL) != HS_OK || count != *n_pairs) {
+        if (hs_pairs_count(AMONG(points, box), &options, &count, NULL) != HS_OK ||
+            count != *n_pairs) {
             fprintf(stderr, "golden: %lld pairs were counted, %lld found\n", (long long)count,
                     (long long)*n_pairs);
             exit(1);

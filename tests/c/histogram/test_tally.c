@@ -5,6 +5,7 @@
 #include "../../../csrc/core/histogram/tally.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/among.h"
 
 #include <math.h>
 
@@ -65,7 +66,7 @@ find_line(line *made, int split, hs_failure *failure)
     if (weights != NULL) {
         made->wanted.of_points.weights += split;
     }
-    const hs_status status = hs_pairs_histogram(&points, split > 0 ? &queries : NULL, NULL,
+    const hs_status status = hs_pairs_histogram(QUERIED(&points, split > 0 ? &queries : NULL, NULL),
                                                 &options, &made->wanted, failure);
     made->wanted.of_points = (hs_marks){types, weights};
     return status;
@@ -135,7 +136,8 @@ either_side_may_have_the_odd_weights(void)
                                .of_points.weights = side ? far : plain,
                                .of_queries.weights = side ? plain : far,
                                .sums = &sum};
-        CHECK(hs_pairs_histogram(&points, &points, NULL, &options, &wanted, NULL) == HS_OK);
+        CHECK(hs_pairs_histogram(QUERIED(&points, &points, NULL), &options, &wanted, NULL) ==
+              HS_OK);
         CHECK(sum == 0x1.8p401); /* and five times 2^-400, which rounding takes */
     }
 }
@@ -164,11 +166,11 @@ types_out_of_range_are_named(void)
     make_line(&random, 0, &made);
     made.wanted.n_types = TYPES;
     made.wanted.of_points.types = made.types; /* and none for the queries */
-    CHECK(hs_pairs_histogram(&points, &points, NULL, &options, &made.wanted, &failure) ==
+    CHECK(hs_pairs_histogram(QUERIED(&points, &points, NULL), &options, &made.wanted, &failure) ==
           HS_ERR_TYPES);
     made.wanted.n_types = 1 << 16; /* more pairs of them than int32 numbers */
     made.wanted.of_queries.types = made.types;
-    CHECK(hs_pairs_histogram(&points, &points, NULL, &options, &made.wanted, &failure) ==
+    CHECK(hs_pairs_histogram(QUERIED(&points, &points, NULL), &options, &made.wanted, &failure) ==
           HS_ERR_MEMORY);
     made.wanted.n_edges = INT64_C(1) << 30; /* more than slots can number */
     CHECK(find_line(&made, 0, &failure) == HS_ERR_EDGES);
@@ -198,7 +200,7 @@ lattice_pairs_are_all_at_an_edge(void)
             hs_histogram wanted = {.n_edges = n_edges, .edges = edges, .inclusive = inclusive,
                                    .last_inclusive = inclusive, .n_types = 1, .counts = counts};
             options.threads = 1 + inclusive;
-            CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, NULL) == HS_OK);
+            CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
             CHECK(counters.ambiguous > 4000);
             for (int k = 0; k < n_edges; k++) { /* N - t pairs at distance t */
                 const int     t = few ? k : k / 7, at = few ? 0 : k % 7;
@@ -228,7 +230,7 @@ pairs_of_two_spots_are_all_at_the_edge(void)
     for (int inclusive = 0; inclusive < 2; inclusive++) {
         const hs_histogram wanted = {.n_edges = 2, .edges = edges, .inclusive = inclusive,
                                      .last_inclusive = inclusive, .n_types = 1, .counts = counts};
-        CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, NULL) == HS_OK);
+        CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
         CHECK(counts[0] == close && counts[1] == (inclusive ? HERE * THERE : 0));
     }
 }
@@ -246,10 +248,10 @@ points_on_one_spot_are_in_the_first_bin(void)
     for (int e = 0; e < 2 * N; e++) {
         x[e] = 0.7;
     }
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, NULL) == HS_OK);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
     CHECK(counts[0] == 0 && counts[1] == N * (N - 1) / 2 && counts[2] == 0);
     wanted.inclusive = true;
-    CHECK(hs_pairs_histogram(&points, NULL, NULL, &options, &wanted, NULL) == HS_OK);
+    CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
     CHECK(counts[0] == N * (N - 1) / 2 && counts[1] == 0 && counts[2] == 0);
     hs_tally none = {.plan = NULL};
     hs_tally_free(&none);

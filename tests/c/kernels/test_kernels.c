@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "../support/scan_checks.h"
+#include "../support/among.h"
 
 void test_kernels(void);
 
@@ -192,7 +193,7 @@ kernels_are_known_by_their_names(void)
     const hs_points points = {.data = &x, .n = 1, .ndim = 1, .real = HS_FLOAT64};
     int64_t         count = -1;
     options.kernel = "abacus";
-    CHECK(hs_pairs_count(&points, NULL, &options, &count, NULL) == HS_ERR_KERNEL);
+    CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_ERR_KERNEL);
     CHECK(count == -1);
 }
 

@@ -4,6 +4,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_account(void);
 
@@ -144,14 +145,14 @@ searches_are_the_same(void)
         CHECK(found[0].n == found[1].n);
         CHECK(memcmp(found[0].i, found[1].i, (size_t)found[0].n * sizeof(int64_t)) == 0);
         CHECK(memcmp(found[0].j, found[1].j, (size_t)found[0].n * sizeof(int64_t)) == 0);
-        CHECK(hs_pairs_count(&points, shared.scene.box, &options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, shared.scene.box), &options, &count, NULL) == HS_OK);
         CHECK(count == found[0].n);
-        CHECK(hs_plan_make(&points, shared.scene.box, &options, &plan, NULL) == HS_OK);
+        CHECK(hs_plan_make(AMONG(&points, shared.scene.box), &options, &plan, NULL) == HS_OK);
         for (int nth = 1; nth < 12; nth++) {
             hs_pairs *pairs = NULL;
             hs_test_fail_allocation(nth);
             const hs_status status =
-                hs_pairs_find(&points, shared.scene.box, &options, &pairs, NULL);
+                hs_pairs_find(AMONG(&points, shared.scene.box), &options, &pairs, NULL);
             hs_test_fail_allocation(0);
             CHECK(status == HS_OK || status == HS_ERR_MEMORY);
             hs_pairs_free(pairs);

@@ -3,6 +3,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
+#include "../support/among.h"
 
 #include <math.h>
 
@@ -35,7 +36,7 @@ find_hollow(refusal *once, hs_pairs **rows)
     options.want = HS_WANT_J;
     options.poll = refuse_once;
     options.poll_context = once;
-    return hs_nearest_find(&points, &queries, NULL, K, &options, rows, NULL);
+    return hs_nearest_find(QUERIED(&points, &queries, NULL), K, &options, rows, NULL);
 }
 
 static void

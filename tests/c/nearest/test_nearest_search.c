@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/near_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_nearest_search(void);
 
@@ -25,7 +26,7 @@ spots_are_searched_in_parts(void)
     }
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
-    CHECK(hs_nearest_find(&points, NULL, NULL, 2, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(AMONG(&points, NULL), 2, &options, &rows, NULL) == HS_OK);
     const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
     const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
     for (int64_t i = 0; i < N; i++) {
@@ -72,7 +73,7 @@ too_many_images_are_refused(void)
         const hs_points query = {far, 1, 2, HS_FLOAT64, 16, 8};
         hs_pairs       *rows = NULL;
         const hs_status status =
-            hs_nearest_find(&points, &query, &box, 1, &options, &rows, NULL);
+            hs_nearest_find(QUERIED(&points, &query, &box), 1, &options, &rows, NULL);
         CHECK(status == (exponent <= 20 ? HS_OK : HS_ERR_MEMORY));
         if (status == HS_OK) {
             CHECK(((const int64_t *)hs_pairs_array(rows, HS_WANT_J))[0] == 0);
@@ -95,10 +96,10 @@ too_many_neighbours_are_refused(void)
     options.want = HS_WANT_J;
     options.memory_limit = 1e6;
     for (int exponent = 20; exponent <= 62; exponent += 42)
-        CHECK(hs_nearest_find(&points, NULL, &box, INT64_C(1) << exponent, &options, &rows, NULL) ==
-              HS_ERR_MEMORY);
+        CHECK(hs_nearest_find(AMONG(&points, &box), INT64_C(1) << exponent, &options, &rows,
+                              NULL) == HS_ERR_MEMORY);
     options.kernel = "none";
-    CHECK(hs_nearest_find(&points, NULL, &box, 1, &options, &rows, NULL) == HS_ERR_KERNEL);
+    CHECK(hs_nearest_find(AMONG(&points, &box), 1, &options, &rows, NULL) == HS_ERR_KERNEL);
     CHECK(rows == NULL);
 }
 
@@ -130,9 +131,9 @@ check_unlimited(const brute_scene *scene, int64_t k)
     hs_options      options = options_of(scene);
     hs_pairs       *limited = NULL, *unlimited = NULL;
     options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
-    CHECK(hs_nearest_find(&points, NULL, scene->box, k, &options, &limited, NULL) == HS_OK);
+    CHECK(hs_nearest_find(AMONG(&points, scene->box), k, &options, &limited, NULL) == HS_OK);
     options.cutoff = INFINITY;
-    CHECK(hs_nearest_find(&points, NULL, scene->box, k, &options, &unlimited, NULL) == HS_OK);
+    CHECK(hs_nearest_find(AMONG(&points, scene->box), k, &options, &unlimited, NULL) == HS_OK);
     const int64_t *j = hs_pairs_array(limited, HS_WANT_J);
     const int64_t *of = hs_pairs_array(unlimited, HS_WANT_J);
     const double  *d = hs_pairs_array(limited, HS_WANT_DISTANCE);
@@ -190,7 +191,7 @@ many_points_on_a_lattice(void)
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
     options.threads = 2;
-    CHECK(hs_nearest_find(&points, NULL, NULL, K, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(AMONG(&points, NULL), K, &options, &rows, NULL) == HS_OK);
     const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
     const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
     for (int64_t i = 0; i < N; i++) {
@@ -230,7 +231,7 @@ many_leaves_and_few(void)
         const hs_points queries = {x, few ? 3000 : 700, D, HS_FLOAT64, 8 * D, 8};
         options.cutoff = INFINITY;
         options.want = HS_WANT_J | HS_WANT_DISTANCE;
-        CHECK(hs_nearest_find(&points, &queries, NULL, 2, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_nearest_find(QUERIED(&points, &queries, NULL), 2, &options, &rows, NULL) == HS_OK);
         const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
         for (int64_t i = 0; i < queries.n; i += few ? 37 : 23) {
             double  least = INFINITY; /* of all but the point itself */

@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/poll_checks.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
@@ -24,7 +25,7 @@ find_until(const brute_scene *scene, const hs_points *queries, int64_t k, int64_
     options.poll = stop_after;
     options.poll_context = &polls;
     options.counters = counters;
-    return hs_nearest_find(&points, queries, scene->box, k, &options, rows, NULL);
+    return hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, rows, NULL);
 }
 
 /* Stops at `tries` of its polls, evenly picked, and at the last one. Returns how many there are. */
@@ -111,8 +112,8 @@ many_images_can_be_stopped(void)
     CHECK(stop_everywhere(&scene, &query, 3, 3) >= 1);
 }
 
-/* Rows are written in the order of the tree, to pages all over the result: these are cleared before,
- * by parts, between which there is a poll. */
+/* Rows are written in the order of the tree, to pages all over the result: these are cleared
+ * before, by parts, between which there is a poll. */
 static void
 clearing_the_result_polls(void)
 {

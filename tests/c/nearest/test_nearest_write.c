@@ -7,6 +7,7 @@
 #include "../support/harness.h"
 #include "../support/near_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_nearest_write(void);
 
@@ -44,12 +45,13 @@ check_columns(const brute_scene *scene, const hs_points *queries, int64_t k, dou
     hs_pairs       *all = NULL;
     options.cutoff = limit;
     options.want = WANT_ALL & ~HS_WANT_I;
-    CHECK(hs_nearest_find(&points, queries, scene->box, k, &options, &all, NULL) == HS_OK);
+    CHECK(hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, &all, NULL) == HS_OK);
     for (int c = 0; c < 14; c++) {
         hs_pairs *one = NULL;
         options.want = choices[c % 7];
         options.index_bytes = c < 7 ? 8 : 4;
-        CHECK(hs_nearest_find(&points, queries, scene->box, k, &options, &one, NULL) == HS_OK);
+        CHECK(hs_nearest_find(QUERIED(&points, queries, scene->box), k, &options, &one, NULL) ==
+              HS_OK);
         CHECK(hs_pairs_length(one) == hs_pairs_length(all));
         CHECK(same_bits(one, all, HS_WANT_DISTANCE, 8));
         CHECK(same_bits(one, all, HS_WANT_VECTOR, 8 * d));
@@ -143,7 +145,7 @@ tiny_boxes_are_scaled_ones(void)
             hs_options      options = options_of(&scene);
             options.cutoff = INFINITY;
             options.want = WANT_ALL & ~HS_WANT_I;
-            CHECK(hs_nearest_find(&points, NULL, &box, 30, &options, &rows[tiny], NULL) == HS_OK);
+            CHECK(hs_nearest_find(AMONG(&points, &box), 30, &options, &rows[tiny], NULL) == HS_OK);
         }
         CHECK(same_array(rows[0], rows[1], HS_WANT_J, 8));
         CHECK(same_array(rows[0], rows[1], HS_WANT_SHIFT, 12));
@@ -188,7 +190,8 @@ find_far(double away, unsigned want, double *distance, int32_t *shift, hs_failur
     hs_pairs       *rows = NULL;
     options.cutoff = INFINITY;
     options.want = want | HS_WANT_DISTANCE;
-    const hs_status status = hs_nearest_find(&point, &query, &box, 1, &options, &rows, failure);
+    const hs_status status = hs_nearest_find(QUERIED(&point, &query, &box), 1, &options, &rows,
+                                             failure);
     if (status == HS_OK) {
         *distance = ((const double *)hs_pairs_array(rows, HS_WANT_DISTANCE))[0];
         *shift = want != 0 ? ((const int32_t *)hs_pairs_array(rows, HS_WANT_SHIFT))[0] : 0;

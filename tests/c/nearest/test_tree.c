@@ -6,6 +6,7 @@
 #include "../support/harness.h"
 #include "../support/near_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -50,7 +51,7 @@ whichever_allocation_fails_nothing_is_left(void)
     while (!ended && nth < 200) {
         hs_pairs *rows = NULL;
         hs_test_fail_allocation(++nth);
-        const hs_status status = hs_nearest_find(&points, NULL, NULL, 2, &options, &rows, NULL);
+        const hs_status status = hs_nearest_find(AMONG(&points, NULL), 2, &options, &rows, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));

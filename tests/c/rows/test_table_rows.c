@@ -4,6 +4,7 @@
 #include "../support/harness.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_table_rows(void);
 
@@ -57,14 +58,16 @@ every_shape_of_columns_has_the_same_rows(void)
             options.index_bytes = shape & 2 ? 4 : 8;
             options.threads = 1 + trial % 2;
             options.out = NULL;
-            CHECK(hs_neighbors_find(&points, asking, shared.scene.box, &options, &rows, NULL) ==
+            CHECK(hs_neighbors_find(QUERIED(&points, asking, shared.scene.box), &options, &rows,
+                                    NULL) ==
                   HS_OK);
             const int64_t n = hs_pairs_length(rows);
             CHECK(hs_pairs_rows(rows) == (asking != NULL ? queries.n : points.n));
             CHECK(rows_are_consistent(rows, options.index_bytes));
             make_arrays(options.want, points.ndim, options.index_bytes, n, &c);
             options.out = &c.arrays;
-            CHECK(hs_neighbors_find(&points, asking, shared.scene.box, &options, &full, NULL) ==
+            CHECK(hs_neighbors_find(QUERIED(&points, asking, shared.scene.box), &options, &full,
+                                    NULL) ==
                   HS_OK);
             CHECK(same_as_result(&c, rows, n) && untouched_from(&c, n));
             hs_array_free(hs_pairs_take_offsets(rows));
@@ -93,8 +96,8 @@ crowds_are_counted_when_they_cannot_be_kept(void)
     hs_pairs       *rows = NULL, *pairs = NULL;
     options.cutoff = 2.0;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_BOTH | HS_WANT_DISTANCE | HS_WANT_VECTOR;
-    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL) == HS_OK);
-    CHECK(hs_pairs_find(&points, NULL, &options, &pairs, NULL) == HS_OK);
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL) == HS_OK);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
     CHECK(hs_pairs_length(rows) == 2 * hs_pairs_length(pairs));
     CHECK(hs_pairs_length(rows) >= (int64_t)(N - 10) * (N - 11) && rows_are_consistent(rows, 8));
     hs_pairs_free(pairs);
@@ -115,12 +118,12 @@ shifts_that_do_not_fit_name_a_point(void)
         hs_pairs  *rows = NULL;
         hs_failure failure;
         options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
-        CHECK(hs_neighbors_find(&points, queries ? &points : NULL, &box, &options, &rows,
+        CHECK(hs_neighbors_find(QUERIED(&points, queries ? &points : NULL, &box), &options, &rows,
                                 &failure) == HS_OK);
         CHECK(hs_pairs_length(rows) == (queries ? 4 : 2));
         hs_pairs_free(rows);
         options.want |= HS_WANT_SHIFT;
-        CHECK(hs_neighbors_find(&points, queries ? &points : NULL, &box, &options, &rows,
+        CHECK(hs_neighbors_find(QUERIED(&points, queries ? &points : NULL, &box), &options, &rows,
                                 &failure) == HS_ERR_SHIFT_RANGE);
         CHECK(rows == NULL && failure.row >= 0 && failure.row < 2);
         CHECK(failure.in_queries == (queries == 1));
@@ -158,7 +161,7 @@ long_rows_are_the_same_by_one_walk(void)
     for (int polls = 0; status != HS_OK && polls < 1000; polls += 1 + polls / 4) {
         int left = polls;
         options.poll_context = &left;
-        status = hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL);
+        status = hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL);
         CHECK(status == HS_OK || (status == HS_ERR_INTERRUPTED && rows == NULL));
         n_stopped += status != HS_OK;
     }
@@ -166,7 +169,7 @@ long_rows_are_the_same_by_one_walk(void)
     options.poll = NULL;
     make_arrays(options.want, 3, 8, hs_pairs_length(rows), &c);
     options.out = &c.arrays;
-    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &into, NULL) == HS_OK);
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &into, NULL) == HS_OK);
     CHECK(same_as_result(&c, rows, hs_pairs_length(rows)));
     free_arrays(&c);
     hs_pairs_free(into);
@@ -183,11 +186,11 @@ nothing_is_nearer_than_nothing(void)
     hs_pairs       *rows = NULL;
     options.cutoff = 0.0;
     options.inclusive = false;
-    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL) == HS_OK);
     CHECK(hs_pairs_length(rows) == 0 && hs_pairs_offsets(rows)[3] == 0);
     hs_pairs_free(rows);
     options.inclusive = true;
-    CHECK(hs_neighbors_find(&points, NULL, NULL, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_neighbors_find(AMONG(&points, NULL), &options, &rows, NULL) == HS_OK);
     CHECK(hs_pairs_length(rows) == 2 && hs_pairs_offsets(rows)[3] == 2);
     hs_pairs_free(rows);
 }

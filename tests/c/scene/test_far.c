@@ -7,6 +7,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_far(void);
 
@@ -89,16 +90,16 @@ check_rows(const far_scene *s, hs_options options, int64_t half)
 {
     int64_t   count = -1, counts[N_FAR], bins[2] = {-1, -1}, sum = 0;
     hs_status status =
-        hs_between_count(&s->points, &s->points, &s->box, &options, &count, NULL);
+        hs_pairs_count(QUERIED(&s->points, &s->points, &s->box), &options, &count, NULL);
     CHECK(status == HS_OK ? count == 2 * half + N_FAR : is_refusal(status));
-    status = hs_neighbors_count(&s->points, NULL, &s->box, &options, counts, NULL);
+    status = hs_neighbors_count(AMONG(&s->points, &s->box), &options, counts, NULL);
     for (int i = 0; i < N_FAR && status == HS_OK; i++)
         sum += counts[i];
     CHECK(status == HS_OK ? sum == 2 * half : is_refusal(status));
     const double       edges[] = {0.0, s->cutoff};
     const hs_histogram histogram = {.edges = edges, .n_edges = 2, .last_inclusive = true,
                                     .n_types = 1, .counts = bins};
-    status = hs_pairs_histogram(&s->points, NULL, &s->box, &options, &histogram, NULL);
+    status = hs_pairs_histogram(AMONG(&s->points, &s->box), &options, &histogram, NULL);
     CHECK(status == HS_OK ? bins[0] + bins[1] == half : is_refusal(status));
 }
 
@@ -113,16 +114,16 @@ check_kept(const far_scene *s, hs_options options, int64_t half)
         CHECK(is_refusal(status));
         return;
     }
-    status = hs_cells_count(cells, NULL, &options, &count, NULL);
+    status = hs_pairs_count(IN_CELLS(cells), &options, &count, NULL);
     CHECK(status == HS_OK ? count == half : is_refusal(status));
-    status = hs_cells_count(cells, &s->points, &options, &count, NULL);
+    status = hs_pairs_count(QUERIED_CELLS(cells, &s->points), &options, &count, NULL);
     CHECK(status == HS_OK ? count == 2 * half + N_FAR : is_refusal(status));
     status = hs_cells_find(cells, &s->points, cell, NULL);
     CHECK(status == HS_OK || is_refusal(status));
     status = hs_cells_candidates(cells, &s->points, &options, &rows, NULL);
     CHECK(status == HS_OK || status == HS_ERR_FAR || is_refusal(status));
     hs_pairs_free(rows);
-    status = hs_cells_nearest(cells, &s->points, 2, &options, &rows, NULL);
+    status = hs_nearest_find(QUERIED_CELLS(cells, &s->points), 2, &options, &rows, NULL);
     CHECK(status == HS_OK || is_refusal(status));
     hs_pairs_free(rows);
     hs_cells_free(cells);
@@ -157,7 +158,7 @@ every_search_counts_the_same(void)
         options.threads = 1;
         options.precision = trial % 7 == 0 ? HS_DOUBLE : HS_EXACT;
         options.want = trial % 2 ? HS_WANT_I | HS_WANT_J : WANT_ALL;
-        const hs_status status = hs_pairs_count(&s.points, &s.box, &options, &half, NULL);
+        const hs_status status = hs_pairs_count(AMONG(&s.points, &s.box), &options, &half, NULL);
         if (status != HS_OK) {
             CHECK(is_refusal(status));
             continue;
@@ -185,9 +186,9 @@ subnormal_numbers_in_a_long_box(void)
         hs_options options = hs_options_default();
         options.cutoff = s.cutoff;
         options.threads = 1;
-        CHECK(hs_pairs_count(&s.points, &s.box, &options, &half, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&s.points, &s.box), &options, &half, NULL) == HS_OK);
         options.want = WANT_ALL;
-        CHECK(hs_pairs_find(&s.points, &s.box, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&s.points, &s.box), &options, &pairs, NULL) == HS_OK);
         CHECK(hs_pairs_length(pairs) == half);
         hs_pairs_free(pairs);
         check_rows(&s, options, half);
@@ -201,7 +202,7 @@ subnormal_numbers_in_a_long_box(void)
     hs_options      options = hs_options_default();
     int64_t         half = -1;
     options.cutoff = 0x1p25;
-    CHECK(hs_pairs_count(&two, &box, &options, &half, NULL) == HS_OK && half == 4);
+    CHECK(hs_pairs_count(AMONG(&two, &box), &options, &half, NULL) == HS_OK && half == 4);
 }
 
 void

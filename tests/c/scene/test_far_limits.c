@@ -8,6 +8,7 @@
 #include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/among.h"
 
 #include <math.h>
 
@@ -34,8 +35,8 @@ search_ends(double z, bool keeps_tree, hs_counters *counters, int64_t *j, double
         status = hs_cells_build(&points, &box, &options, &cells, NULL);
     options.counters = counters;
     if (status == HS_OK)
-        status = keeps_tree ? hs_cells_nearest(cells, NULL, K, &options, &rows, NULL)
-                            : hs_nearest_find(&points, NULL, &box, K, &options, &rows, NULL);
+        status = keeps_tree ? hs_nearest_find(IN_CELLS(cells), K, &options, &rows, NULL)
+                            : hs_nearest_find(AMONG(&points, &box), K, &options, &rows, NULL);
     if (status == HS_OK) {
         memcpy(j, hs_pairs_array(rows, HS_WANT_J), N * K * sizeof *j);
         memcpy(d, hs_pairs_array(rows, HS_WANT_DISTANCE), N * K * sizeof *d);
@@ -76,10 +77,10 @@ images_of_one_point_are_found_on_a_long_axis(void)
         hs_pairs       *rows = NULL;
         options.cutoff = 2.0 * period;
         options.want = HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT;
-        CHECK(hs_neighbors_find(&points, NULL, &box, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_neighbors_find(AMONG(&points, &box), &options, &rows, NULL) == HS_OK);
         CHECK(hs_pairs_length(rows) == 4);
         hs_pairs_free(rows);
-        CHECK(hs_nearest_find(&points, NULL, &box, 3, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_nearest_find(AMONG(&points, &box), 3, &options, &rows, NULL) == HS_OK);
         const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
         const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
         const int32_t *shift = hs_pairs_array(rows, HS_WANT_SHIFT);
@@ -106,7 +107,7 @@ endless_images_are_refused_as_such(void)
             hs_pairs  *pairs = NULL;
             hs_failure failure;
             options.cutoff = ldexp(1.0, exponent);
-            CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_MEMORY);
+            CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_ERR_MEMORY);
             CHECK(failure.expected_pairs > 1e50);
         }
     }
@@ -137,7 +138,7 @@ one_cell_with_everything_says_so(void)
     CHECK(!failure.in_queries && ranges == NULL);
     CHECK(hs_cells_candidates(cells, &points, &options, &ranges, &failure) == HS_ERR_FAR);
     CHECK(!failure.in_queries && ranges == NULL);
-    CHECK(hs_cells_count(cells, NULL, &options, &count, NULL) == HS_OK && count == 4);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK && count == 4);
     hs_cells_free(cells);
 }
 

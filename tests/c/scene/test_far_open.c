@@ -3,6 +3,7 @@
  * than their last digits: along open axes, and along those that repeat. */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/among.h"
 
 void test_far_open(void);
 
@@ -13,10 +14,11 @@ check_queries(const hs_points *points, const hs_box *box, const hs_options *opti
 {
     int64_t   count = -1, kept = -2;
     hs_pairs *rows = NULL, *of_cells = NULL;
-    CHECK(hs_between_count(points, points, box, options, &count, NULL) == HS_OK);
-    CHECK(hs_cells_count(cells, points, options, &kept, NULL) == HS_OK && kept == count);
-    CHECK(hs_nearest_find(points, NULL, box, 2, options, &rows, NULL) == HS_OK);
-    CHECK(hs_cells_nearest(cells, NULL, 2, options, &of_cells, NULL) == HS_OK);
+    CHECK(hs_pairs_count(QUERIED(points, points, box), options, &count, NULL) == HS_OK);
+    CHECK(hs_pairs_count(QUERIED_CELLS(cells, points), options, &kept, NULL) == HS_OK &&
+          kept == count);
+    CHECK(hs_nearest_find(AMONG(points, box), 2, options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(IN_CELLS(cells), 2, options, &of_cells, NULL) == HS_OK);
     CHECK(rows != NULL && of_cells != NULL && hs_pairs_length(rows) == hs_pairs_length(of_cells) &&
           memcmp(hs_pairs_array(rows, HS_WANT_DISTANCE), hs_pairs_array(of_cells, HS_WANT_DISTANCE),
                  (size_t)hs_pairs_length(rows) * sizeof(double)) == 0);
@@ -40,8 +42,8 @@ check_pairs(const hs_points *points, const hs_box *box, double cutoff, int64_t n
     CHECK(hs_cells_build(points, box, &options, &cells, NULL) ==
           (keeps ? HS_OK : HS_ERR_SHIFT_RANGE));
     for (int kept = 0; kept < 1 + keeps; kept++) {
-        CHECK((kept ? hs_cells_pairs(cells, &options, &pairs, NULL)
-                    : hs_pairs_find(points, box, &options, &pairs, NULL)) == HS_OK);
+        CHECK((kept ? hs_pairs_find(IN_CELLS(cells), &options, &pairs, NULL)
+                    : hs_pairs_find(AMONG(points, box), &options, &pairs, NULL)) == HS_OK);
         CHECK(hs_pairs_length(pairs) == n);
         for (int64_t e = 0; e < n && hs_pairs_length(pairs) == n; e++)
             CHECK(((const double *)hs_pairs_array(pairs, HS_WANT_DISTANCE))[e] == d[e]);
@@ -61,7 +63,7 @@ check_nearest(const hs_points *points, const hs_box *box, double unit)
     hs_pairs    *rows = NULL;
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
-    CHECK(hs_nearest_find(points, NULL, box, 1, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(AMONG(points, box), 1, &options, &rows, NULL) == HS_OK);
     CHECK(hs_pairs_length(rows) == 3);
     if (hs_pairs_length(rows) == 3)
         CHECK(memcmp(hs_pairs_array(rows, HS_WANT_DISTANCE), expected, sizeof expected) == 0);

@@ -4,6 +4,7 @@
 #include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
+#include "../support/among.h"
 
 #include "../../../csrc/halfshell.h"
 
@@ -29,7 +30,7 @@ any_allocation_may_fail(void)
         const int64_t before = hs_test_live_blocks();
         hs_pairs     *pairs = NULL;
         hs_test_fail_allocation(++nth);
-        status = hs_pairs_find(&points, &box, &options, &pairs, NULL);
+        status = hs_pairs_find(AMONG(&points, &box), &options, &pairs, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || (status == HS_ERR_MEMORY && pairs == NULL));
@@ -76,7 +77,7 @@ any_poll_may_end_it(void)
         refusal once = {0, ++nth};
         options.poll = refuse_once;
         options.poll_context = &once;
-        status = hs_pairs_count(&points, NULL, &options, &count, NULL);
+        status = hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL);
         CHECK(status == (once.n == nth ? HS_ERR_INTERRUPTED : HS_OK));
     }
     CHECK(nth > 2 && nth < 50 && count == 2);

@@ -3,6 +3,7 @@
 #include "../../../csrc/core/scene/points.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_points(void);
 
@@ -40,7 +41,7 @@ every_layout_is_the_same_points(void)
         hs_pairs       *expected = NULL;
         double          least[HS_MAX_DIM], most[HS_MAX_DIM];
         options.want = HS_WANT_BOTH | HS_WANT_DISTANCE;
-        CHECK(hs_pairs_find(&plain, shared.scene.box, &options, &expected, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&plain, shared.scene.box), &options, &expected, NULL) == HS_OK);
         hs_points_range(&plain, least, most);
         for (int layout = 0; layout < 4; layout++) {
             const hs_real   real = layout & 1 ? HS_FLOAT32 : HS_FLOAT64;
@@ -48,7 +49,7 @@ every_layout_is_the_same_points(void)
             const hs_points points = written_points(&shared.scene, real, pitch, buffer);
             double          lower[HS_MAX_DIM], upper[HS_MAX_DIM];
             hs_pairs       *found = NULL;
-            CHECK(hs_pairs_find(&points, shared.scene.box, &options, &found, NULL) == HS_OK);
+            CHECK(hs_pairs_find(AMONG(&points, shared.scene.box), &options, &found, NULL) == HS_OK);
             CHECK(same_array(expected, found, HS_WANT_BOTH, 16));
             CHECK(same_array(expected, found, HS_WANT_DISTANCE, 8));
             hs_points_range(&points, lower, upper);
@@ -83,11 +84,11 @@ precisions_agree_where_nothing_is_rounded(void)
         hs_options      options = options_of(&shared.scene);
         options.want = HS_WANT_BOTH;
         options.sorted = true;
-        CHECK(hs_pairs_find(&points, shared.scene.box, &options, &expected, NULL) == HS_OK);
+        CHECK(hs_pairs_find(AMONG(&points, shared.scene.box), &options, &expected, NULL) == HS_OK);
         for (int precision = HS_DOUBLE; precision <= HS_SINGLE; precision++) {
             hs_pairs *found = NULL;
             options.precision = (hs_precision)precision;
-            CHECK(hs_pairs_find(&points, shared.scene.box, &options, &found, NULL) == HS_OK);
+            CHECK(hs_pairs_find(AMONG(&points, shared.scene.box), &options, &found, NULL) == HS_OK);
             CHECK(same_array(expected, found, HS_WANT_BOTH, 16));
             hs_pairs_free(found);
         }

@@ -3,6 +3,7 @@
  * says so, and may be interrupted before. */
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/among.h"
 
 void test_endless(void);
 
@@ -29,7 +30,8 @@ too_many_images_are_refused(void)
             options.cell_size = trial / 4 * 0.1;
             options.want = HS_WANT_I | HS_WANT_J;
             options.memory_limit = 1e9;
-            const hs_status status = hs_pairs_find(&points, &box, &options, &pairs, &failure);
+            const hs_status status = hs_pairs_find(AMONG(&points, &box), &options, &pairs,
+                                                   &failure);
             CHECK(status == HS_ERR_MEMORY);
             CHECK(pairs == NULL && failure.row == -1);
         }
@@ -63,13 +65,13 @@ a_crowd_is_refused_by_a_small_sample(void)
         options.memory_limit = 1e8;
         options.poll = refuse;
         options.poll_context = &polls;
-        CHECK(hs_pairs_find(&points, images ? &box : NULL, &options, &pairs, &failure) ==
+        CHECK(hs_pairs_find(AMONG(&points, images ? &box : NULL), &options, &pairs, &failure) ==
               HS_ERR_MEMORY);
         CHECK(pairs == NULL && failure.expected_pairs > 1e9);
         const int most = -polls;
         for (int n = 1; n <= most; n++) {
             polls = n;
-            CHECK(hs_pairs_find(&points, images ? &box : NULL, &options, &pairs, &failure) ==
+            CHECK(hs_pairs_find(AMONG(&points, images ? &box : NULL), &options, &pairs, &failure) ==
                   HS_ERR_INTERRUPTED);
         }
     }

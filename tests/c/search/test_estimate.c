@@ -5,6 +5,7 @@
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_estimate(void);
 
@@ -40,12 +41,12 @@ expectations_are_near_the_truth(void)
             scatter(&random, 1.0, N / 3, x);
         }
         scene.box = kind % 2 ? &box : NULL;
-        CHECK(hs_pairs_count(&points, scene.box, &options, &count, NULL) == HS_OK);
+        CHECK(hs_pairs_count(AMONG(&points, scene.box), &options, &count, NULL) == HS_OK);
         for (double limit = 1e5; status != HS_OK && limit < 1e9; limit *= 1.3) {
             hs_pairs  *pairs = NULL;
             hs_failure failure;
             options.memory_limit = limit;
-            status = hs_pairs_find(&points, scene.box, &options, &pairs, &failure);
+            status = hs_pairs_find(AMONG(&points, scene.box), &options, &pairs, &failure);
             CHECK(status == HS_OK || status == HS_ERR_MEMORY);
             CHECK(status == HS_OK || limit < 16.0 * (double)count + 4e6);
             if (status != HS_OK) {
@@ -76,7 +77,7 @@ samples_end_early_in_a_crowd(void)
     scatter(&random, 1.0, N, x);
     options.cutoff = 2.0;
     options.memory_limit = 1e8;
-    CHECK(hs_pairs_find(&points, NULL, &options, &pairs, &failure) == HS_ERR_MEMORY);
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, &failure) == HS_ERR_MEMORY);
     CHECK(pairs == NULL && failure.expected_pairs > 0.01 * all);
     CHECK(failure.expected_pairs < 1.01 * all);
 }
@@ -96,12 +97,12 @@ endless_pairs_are_not_counted(void)
     for (int k = 0; k < 3; k++) {
         box.rows[k][k] = 1e-7;
     }
-    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_ERR_TOO_MANY);
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_ERR_TOO_MANY);
     CHECK(count == -5 && failure.value > 0x1p62);
-    CHECK(hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_MEMORY ||
-          hs_pairs_find(&points, &box, &options, &pairs, &failure) == HS_ERR_TOO_MANY);
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_ERR_MEMORY ||
+          hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure) == HS_ERR_TOO_MANY);
     points.n = 0;
-    CHECK(hs_pairs_count(&points, &box, &options, &count, &failure) == HS_OK && count == 0);
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, &failure) == HS_OK && count == 0);
 }
 
 /* A shortage is that of the systems that can be searched at all. */

@@ -3,6 +3,7 @@
  * them whether to go on: any of these polls ends it, and the last answer is right. */
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
+#include "../support/among.h"
 
 #include "../../../csrc/halfshell.h"
 
@@ -42,7 +43,7 @@ search(bool sorted, int threads, refusal *once, int64_t *found)
     options.poll = refuse_once;
     options.poll_context = once;
     const hs_status status =
-        hs_neighbors_find(&points, &query, &box, &options, &rows, NULL);
+        hs_neighbors_find(QUERIED(&points, &query, &box), &options, &rows, NULL);
     CHECK((status == HS_OK) == (rows != NULL));
     *found = status == HS_OK ? hs_pairs_length(rows) : 0;
     hs_pairs_free(rows);

@@ -3,6 +3,7 @@
  * built for. */
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
+#include "../support/among.h"
 
 void test_search_reuse(void);
 
@@ -30,8 +31,8 @@ cells_for_another_precision_or_cutoff_serve(void)
             options.want = HS_WANT_BOTH;
             options.sorted = true;
             const hs_status status =
-                hs_pairs_find(&points, shared.scene.box, &options, &own, NULL);
-            CHECK(hs_cells_pairs(cells, &options, &kept, NULL) == status);
+                hs_pairs_find(AMONG(&points, shared.scene.box), &options, &own, NULL);
+            CHECK(hs_pairs_find(IN_CELLS(cells), &options, &kept, NULL) == status);
             CHECK(status != HS_OK || same_array(own, kept, HS_WANT_BOTH, 16));
             n_pairs += status == HS_OK ? hs_pairs_length(own) : 0;
             hs_pairs_free(own);
@@ -56,12 +57,13 @@ bad_options_are_refused_in_cells_too(void)
     CHECK(hs_cells_build(&points, shared.scene.box, &options, &cells, NULL) == HS_OK);
     for (int b = 0; b < 3; b++) {
         options.cutoff = bad[b];
-        CHECK(hs_cells_pairs(cells, &options, &pairs, &failure) == HS_ERR_CUTOFF);
+        CHECK(hs_pairs_find(IN_CELLS(cells), &options, &pairs, &failure) == HS_ERR_CUTOFF);
         CHECK(pairs == NULL && memcmp(&failure.value, &bad[b], sizeof failure.value) == 0);
     }
     options.cutoff = shared.scene.cutoff;
     options.kernel = "none of that name";
-    CHECK(hs_cells_pairs(cells, &options, &pairs, &failure) == HS_ERR_KERNEL && pairs == NULL);
+    CHECK(hs_pairs_find(IN_CELLS(cells), &options, &pairs, &failure) == HS_ERR_KERNEL &&
+          pairs == NULL);
     hs_cells_free(cells);
 }
 

@@ -11,6 +11,7 @@
 
 #include "../../../csrc/halfshell.h"
 #include "harness.h"
+#include "among.h"
 
 enum { CALL_ROOM = 1024 }; /* entries of counts, and of what histograms write */
 
@@ -58,6 +59,7 @@ typedef struct call {
     const hs_systems   *systems;
     const hs_visit     *visit; /* of call_note_pair */
     hs_cells           *cells;
+    bool                in_cells; /* these are searched, not the points */
     hs_verlet          *list;
     hs_stream          *stream;
     int64_t             k, max_pairs;
@@ -173,49 +175,53 @@ call_take_counts(call *c, hs_status status, const int64_t *counts, int64_t n)
 
 #define RESULT(result) (c->has_result ? &(result) : NULL)
 
+/* Among what the call searches, with these queries. */
+static inline hs_among
+call_among(const call *c, const hs_points *queries)
+{
+    return c->in_cells ? (hs_among){.cells = c->cells, .queries = queries}
+                       : (hs_among){.points = c->points, .box = c->box, .queries = queries};
+}
+
 static inline hs_status
 call_find(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, NULL);
     hs_pairs       *pairs = CALL_NOTHING;
     const hs_status status =
-        hs_pairs_find(c->points, c->box, c->options, RESULT(pairs), failure);
+        hs_pairs_find(&among, c->options, RESULT(pairs), failure);
     return call_take_pairs(c, status, pairs);
 }
 
 static inline hs_status
 call_count(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, c->queries);
     int64_t         count = -7;
     const hs_status status =
-        hs_pairs_count(c->points, c->box, c->options, RESULT(count), failure);
+        hs_pairs_count(&among, c->options, RESULT(count), failure);
     return call_take_count(c, status, count);
 }
 
 static inline hs_status
 call_neighbors(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, c->queries);
     hs_pairs       *rows = CALL_NOTHING;
     const hs_status status =
-        hs_neighbors_find(c->points, c->queries, c->box, c->options, RESULT(rows), failure);
+        hs_neighbors_find(&among, c->options, RESULT(rows),
+                          failure);
     return call_take_pairs(c, status, rows);
 }
 
 static inline hs_status
 call_neighbors_count(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, c->queries);
     int64_t         counts[CALL_ROOM];
-    const hs_status status = hs_neighbors_count(c->points, c->queries, c->box, c->options,
+    const hs_status status = hs_neighbors_count(&among, c->options,
                                                 RESULT(counts[0]), failure);
     return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
-}
-
-static inline hs_status
-call_between(call *c, hs_failure *failure)
-{
-    int64_t         count = -7;
-    const hs_status status =
-        hs_between_count(c->points, c->queries, c->box, c->options, RESULT(count), failure);
-    return call_take_count(c, status, count);
 }
 
 /* Of a histogram whose arrays have CALL_ROOM entries, or are NULL. */
@@ -235,16 +241,18 @@ call_take_histogram(call *c, hs_status status)
 static inline hs_status
 call_histogram(call *c, hs_failure *failure)
 {
-    return call_take_histogram(c, hs_pairs_histogram(c->points, c->queries, c->box, c->options,
-                                                     c->histogram, failure));
+    const hs_among among = call_among(c, c->queries);
+    return call_take_histogram(c, hs_pairs_histogram(&among,
+                                                     c->options, c->histogram, failure));
 }
 
 static inline hs_status
 call_nearest(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, c->queries);
     hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status = hs_nearest_find(c->points, c->queries, c->box, c->k, c->options,
-                                             RESULT(rows), failure);
+    const hs_status status = hs_nearest_find(&among, c->k,
+                                             c->options, RESULT(rows), failure);
     return call_take_pairs(c, status, rows);
 }
 
@@ -294,8 +302,9 @@ call_take_stream(call *c, hs_status status, hs_stream *stream, hs_failure *failu
 static inline hs_status
 call_stream(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, NULL);
     hs_stream      *stream = CALL_NOTHING;
-    const hs_status status = hs_stream_open(c->points, c->box, c->options, c->max_pairs,
+    const hs_status status = hs_stream_open(&among, c->options, c->max_pairs,
                                             RESULT(stream), failure);
     return call_take_stream(c, status, stream, failure);
 }
@@ -318,9 +327,10 @@ call_take_visits(call *c, hs_status status, int64_t n_visited)
 static inline hs_status
 call_visit(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, NULL);
     int64_t n_visited = -7;
     call_visited = 0;
-    const hs_status status = hs_pairs_visit(c->points, c->box, c->options, c->visit,
+    const hs_status status = hs_pairs_visit(&among, c->options, c->visit,
                                             RESULT(n_visited), failure);
     return call_take_visits(c, status, n_visited);
 }
@@ -346,10 +356,12 @@ call_systems_count(call *c, hs_failure *failure)
 static inline hs_status
 call_plan(call *c, hs_failure *failure)
 {
+    const hs_among among = call_among(c, NULL);
     hs_plan plan, untouched;
     memset(&plan, 0x5a, sizeof plan);
     memcpy(&untouched, &plan, sizeof plan);
-    const hs_status status = hs_plan_make(c->points, c->box, c->options, RESULT(plan), failure);
+    const hs_status status = hs_plan_make(&among, c->options, RESULT(plan),
+                                          failure);
     CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
     c->answer = status == HS_OK ? call_hash(9, plan.shape, sizeof plan.shape) : c->answer;
     return status;

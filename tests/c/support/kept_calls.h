@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* kept_calls.h: as calls.h, the functions of objects that are kept: cells and Verlet lists; and the
- * table of all. */
+/* kept_calls.h: as calls.h, the functions that make or need objects that are kept: cells and Verlet
+ * lists; and the table of all. */
 #ifndef HS_KEPT_CALLS_H
 #define HS_KEPT_CALLS_H
 
 #include "calls.h"
+#include "among.h"
 
 static inline hs_status
 call_cells_build(call *c, hs_failure *failure)
@@ -27,76 +28,6 @@ call_cells_build(call *c, hs_failure *failure)
         hs_cells_free(cells);
     }
     return status;
-}
-
-static inline hs_status
-call_cells_pairs(call *c, hs_failure *failure)
-{
-    hs_pairs       *pairs = CALL_NOTHING;
-    const hs_status status = hs_cells_pairs(c->cells, c->options, RESULT(pairs), failure);
-    return call_take_pairs(c, status, pairs);
-}
-
-static inline hs_status
-call_cells_count(call *c, hs_failure *failure)
-{
-    int64_t         count = -7;
-    const hs_status status =
-        hs_cells_count(c->cells, c->queries, c->options, RESULT(count), failure);
-    return call_take_count(c, status, count);
-}
-
-static inline hs_status
-call_cells_neighbors(call *c, hs_failure *failure)
-{
-    hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status =
-        hs_cells_neighbors(c->cells, c->queries, c->options, RESULT(rows), failure);
-    return call_take_pairs(c, status, rows);
-}
-
-static inline hs_status
-call_cells_neighbors_count(call *c, hs_failure *failure)
-{
-    int64_t         counts[CALL_ROOM];
-    const hs_status status = hs_cells_neighbors_count(c->cells, c->queries, c->options,
-                                                      RESULT(counts[0]), failure);
-    return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
-}
-
-static inline hs_status
-call_cells_histogram(call *c, hs_failure *failure)
-{
-    return call_take_histogram(
-        c, hs_cells_histogram(c->cells, c->queries, c->options, c->histogram, failure));
-}
-
-static inline hs_status
-call_cells_nearest(call *c, hs_failure *failure)
-{
-    hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status =
-        hs_cells_nearest(c->cells, c->queries, c->k, c->options, RESULT(rows), failure);
-    return call_take_pairs(c, status, rows);
-}
-
-static inline hs_status
-call_cells_stream(call *c, hs_failure *failure)
-{
-    hs_stream      *stream = CALL_NOTHING;
-    const hs_status status =
-        hs_cells_stream(c->cells, c->options, c->max_pairs, RESULT(stream), failure);
-    return call_take_stream(c, status, stream, failure);
-}
-
-static inline hs_status
-call_cells_visit(call *c, hs_failure *failure)
-{
-    int64_t n_visited = -7;
-    call_visited = 0;
-    const hs_status status =
-        hs_cells_visit(c->cells, c->options, c->visit, RESULT(n_visited), failure);
-    return call_take_visits(c, status, n_visited);
 }
 
 static inline hs_status
@@ -150,11 +81,12 @@ static inline void
 call_make_objects(call *c, unsigned uses)
 {
     bool rebuilt;
+    c->in_cells = uses & USES_CELLS;
     if (uses & USES_CELLS)
         CHECK(hs_cells_build(c->points, c->box, c->options, &c->cells, NULL) == HS_OK);
     if (uses & USES_STREAM)
-        CHECK(hs_stream_open(c->points, c->box, c->options, c->max_pairs, &c->stream, NULL) ==
-              HS_OK);
+        CHECK(hs_stream_open(AMONG(c->points, c->box), c->options, c->max_pairs, &c->stream,
+                             NULL) == HS_OK);
     if (uses & USES_LIST)
         c->list = hs_verlet_new();
     if ((uses & USES_LIST) && !(uses & USES_SKIN))
@@ -178,10 +110,9 @@ call_free_objects(call *c)
 
 static const call_kind call_kinds[] = {
     {"pairs_find", call_find, OF_SCENE | OF_SEARCH | OF_ARRAYS},
-    {"pairs_count", call_count, OF_SCENE | OF_SEARCH},
+    {"pairs_count", call_count, OF_SCENE | USES_QUERIES | OF_SEARCH},
     {"neighbors_find", call_neighbors, OF_SCENE | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
     {"neighbors_count", call_neighbors_count, OF_SCENE | USES_QUERIES | OF_SEARCH},
-    {"between_count", call_between, OF_SCENE | USES_QUERIES | NEEDS_QUERIES | OF_SEARCH},
     {"pairs_histogram", call_histogram,
      OF_SCENE | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL | USES_COUNTERS |
          USES_HISTOGRAM},
@@ -193,19 +124,19 @@ static const call_kind call_kinds[] = {
     {"stream_next", call_stream_next, USES_STREAM | USES_RESULT},
     {"pairs_visit", call_visit, OF_SCENE | OF_SEARCH | USES_VISIT},
     {"cells_build", call_cells_build, OF_SCENE | OF_SEARCH | USES_INDEX_BYTES},
-    {"cells_pairs", call_cells_pairs, USES_CELLS | OF_SEARCH | OF_ARRAYS},
-    {"cells_count", call_cells_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
-    {"cells_neighbors", call_cells_neighbors, USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
-    {"cells_neighbors_count", call_cells_neighbors_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
-    {"cells_histogram", call_cells_histogram,
+    {"pairs_find in cells", call_find, USES_CELLS | OF_SEARCH | OF_ARRAYS},
+    {"pairs_count in cells", call_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
+    {"neighbors_find in cells", call_neighbors, USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
+    {"neighbors_count in cells", call_neighbors_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
+    {"pairs_histogram in cells", call_histogram,
      USES_CELLS | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL | USES_COUNTERS |
          USES_HISTOGRAM},
-    {"cells_nearest", call_cells_nearest,
+    {"nearest_find in cells", call_nearest,
      USES_CELLS | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) |
          USES_INDEX_BYTES | USES_K},
-    {"cells_stream", call_cells_stream,
+    {"stream_open in cells", call_stream,
      USES_CELLS | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES | USES_MAX_PAIRS},
-    {"cells_visit", call_cells_visit, USES_CELLS | OF_SEARCH | USES_VISIT},
+    {"pairs_visit in cells", call_visit, USES_CELLS | OF_SEARCH | USES_VISIT},
     {"cells_find", call_cells_find, USES_CELLS | USES_QUERIES | NEEDS_QUERIES | USES_RESULT},
     {"cells_candidates", call_cells_candidates,
      USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},

@@ -4,6 +4,7 @@
 #define HS_LIST_CHECKS_H
 
 #include "output_checks.h"
+#include "among.h"
 
 /* Both results, column by column. */
 static inline bool
@@ -58,7 +59,7 @@ sorted_list_difference(const hs_verlet *list, const hs_points *points, const hs_
 {
     const char *difference = NULL;
     hs_pairs   *found = NULL, *expected = NULL;
-    if (hs_pairs_find(points, box, options, &expected, NULL) != HS_OK) {
+    if (hs_pairs_find(AMONG(points, box), options, &expected, NULL) != HS_OK) {
         return "no search";
     }
     *n_pairs = hs_pairs_length(expected);

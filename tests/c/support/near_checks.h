@@ -6,6 +6,7 @@
 
 #include "harness.h"
 #include "pair_checks.h"
+#include "among.h"
 
 static const brute_scene *of_rows; /* what the entries that are put in order belong to */
 static const double      *origin, *targets;
@@ -107,13 +108,13 @@ compare_rows(brute_scene *scene, int64_t split, int64_t k, int threads)
         points.data = targets = scene->x + split * scene->ndim;
     }
     const hs_points *asking = split >= 0 ? &queries : NULL;
-    if (hs_neighbors_find(&points, asking, scene->box, &options, &rows, NULL) != HS_OK)
+    if (hs_neighbors_find(QUERIED(&points, asking, scene->box), &options, &rows, NULL) != HS_OK)
         return 0;
     const int64_t n_rows = hs_pairs_rows(rows);
     int64_t      *offsets = hs_pairs_take_offsets(rows), most = 1;
     take_rows(rows, &all);
     hs_pairs_free(rows);
-    CHECK(hs_nearest_find(&points, asking, scene->box, k, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(QUERIED(&points, asking, scene->box), k, &options, &rows, NULL) == HS_OK);
     CHECK(hs_pairs_length(rows) == n_rows * k);
     take_rows(rows, &found);
     hs_pairs_free(rows);

@@ -4,6 +4,7 @@
 #define HS_PAIR_CHECKS_H
 
 #include "brute_force.h"
+#include "among.h"
 
 #define WANT_ALL \
     (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
@@ -76,7 +77,7 @@ search_pairs(const hs_points *points, const hs_box *box, const hs_options *optio
 {
     hs_pairs *pairs = NULL;
     memset(found, 0, sizeof *found);
-    const hs_status status = hs_pairs_find(points, box, options, &pairs, failure);
+    const hs_status status = hs_pairs_find(AMONG(points, box), options, &pairs, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -196,7 +197,7 @@ plain_difference(const brute_scene *scene, const brute_list *expected)
         free(keys);
     }
     found_free(&found);
-    status = hs_pairs_count(&points, scene->box, &options, &count, NULL);
+    status = hs_pairs_count(AMONG(&points, scene->box), &options, &count, NULL);
     if (difference == NULL && status != HS_OK)
         difference = hs_status_text(status);
     if (difference == NULL && count != expected->n)
@@ -221,7 +222,8 @@ into_difference(const brute_scene *scene, const brute_list *expected)
         hs_failure     failure;
         options.out = &out;
         options.sorted = trial & 2;
-        const hs_status status = hs_pairs_find(&points, scene->box, &options, &pairs, &failure);
+        const hs_status status = hs_pairs_find(AMONG(&points, scene->box), &options, &pairs,
+                                               &failure);
         if (status != (trial & 1 ? HS_ERR_CAPACITY : HS_OK))
             difference = hs_status_text(status);
         else if (trial & 1 && failure.expected_pairs != (double)expected->n)
