@@ -5,6 +5,7 @@
  */
 #include "arguments.h"
 #include "api_cells.h"
+#include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
 #include "../search/cell_rows.h"
@@ -321,7 +322,7 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
         hs_output_init(&call->account, d, HS_WANT_I, 8, &rows->offsets);
         status = list_ranges(&search, rows, failure);
         hs_search_close(&search);
-    } else if (status == HS_STATUS_END) {
+    } else if (status == HS_UNSERVED) {
         status = tell_unserved(cells, queries, call->options.cutoff, failure);
     }
     if (status != HS_OK) {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_neighbors.c: the public searches for all neighbours of each point, or of each query. */
 #include "request.h"
+#include "../base/outcome.h"
 #include "../search/estimate.h"
 #include "../search/walk.h"
 #include "../rows/once.h"
@@ -40,8 +41,8 @@ static hs_status
 find_entries(hs_pairs *rows, hs_table *table, hs_failure *failure)
 {
     hs_search *search = table->search;
-    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_STATUS_END;
-    if (status != HS_STATUS_END) {
+    hs_status  status = hs_once_applies(table) ? hs_once_find(table, failure) : HS_TOO_MUCH;
+    if (status != HS_TOO_MUCH) {
         return status;
     }
     status = hs_table_measure(table, failure);

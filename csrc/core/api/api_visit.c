@@ -2,16 +2,13 @@
 /* api_visit.c: pairs handed to a function as they are found, stored nowhere. See halfshell.h. */
 #include "request.h"
 
+#include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
 #include "../base/poll.h"
 #include "../collect/record.h"
 
 #define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
-
-/* A function that wants to stop: a status that nothing else here has. It stops all threads, as any
- * failure does, and the caller is told that all went well. */
-#define STOPPED HS_ERR_CAPACITY
 
 /* Work of a call in candidates, for polling: functions take tens of nanoseconds and more. */
 #define CALL_WORK 32
@@ -65,7 +62,7 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
     (void)hs_fpenv_enter(); /* whatever the function has done to it */
     doing->n_visited += n_taken;
     scanner->work_since_poll += CALL_WORK * part->n_pairs;
-    return stops != 0 ? STOPPED : HS_OK;
+    return stops != 0 ? HS_ENOUGH : HS_OK;
 }
 
 static hs_status
@@ -108,7 +105,7 @@ visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failu
         close_visitor(search, &visitors[opened]);
     }
     hs_free(&search->call->account, visitors);
-    return status == STOPPED ? HS_OK : status;
+    return status == HS_ENOUGH ? HS_OK : status;
 }
 
 /* What one search calls, and how many pairs it has handed over. */

@@ -34,7 +34,7 @@ hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure
 
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
- * there would be too many of them, or too many around each. HS_STATUS_END where there can be none.
+ * there would be too many of them, or too many around each. HS_TOO_MUCH where there can be none.
  * grid_width.c.
  */
 hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,

@@ -5,6 +5,8 @@
  */
 #include "stencil.h"
 
+#include "../base/outcome.h"
+
 #include <math.h>
 
 /* Rows around a cell, the forward half of them, at most: each takes room, and a look for each group
@@ -52,7 +54,7 @@ hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_w
     while (hs_grid_set_shape(scene, counts, grid) != HS_OK || hs_stencil_bound(grid) > MOST_ROWS) {
         *is_wider = true;
         if (!halve_counts(scene->ndim, counts)) {
-            return HS_STATUS_END;
+            return HS_TOO_MUCH;
         }
     }
     return HS_OK;

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "../base/outcome.h"
 #include "../base/poll.h"
 #include "../threads/team.h"
 
@@ -48,7 +49,7 @@ leave_range(hs_worker *worker)
     }
     crew->left = (hs_bookmark){.point = scanner->group.first, .blocks = scanner->blocks};
     crew->is_left = true;
-    return HS_STATUS_END;
+    return HS_STOPPED;
 }
 
 /* A hs_range_fn. */
@@ -63,7 +64,7 @@ search_range(void *context, int64_t range)
     worker->walker.scanner.blocks_to_skip = range == 0 ? crew->start.blocks : 0;
     hs_status status =
         hs_walk_or_tell(&worker->walker, (int32_t)first, (int32_t)end, &worker->failure);
-    if (status == HS_STATUS_END && worker->walker.scanner.leaves) {
+    if (status == HS_STOPPED && worker->walker.scanner.leaves) {
         return leave_range(worker);
     }
     if (status == HS_OK && crew->output != NULL) {

@@ -5,6 +5,7 @@
 #endif
 #include "in_turn.h"
 
+#include "../base/outcome.h"
 #include "../base/poll.h"
 #include "../base/os_thread.h"
 
@@ -144,7 +145,7 @@ static void
 fail(hs_committer *committer, hs_status status, const hs_failure *failure)
 {
     hs_commits *commits = committer->commits;
-    const bool  stopped = status == HS_STATUS_END ||
+    const bool  stopped = status == HS_STOPPED ||
                           (status == HS_ERR_INTERRUPTED && committer->options->poll == goes_on);
     hs_mutex_lock(&commits->mutex);
     if (!stopped && (commits->status == HS_OK || committer->range < commits->failed_range)) {
@@ -244,7 +245,7 @@ write_parts(hs_committer *committer, bool waits)
     while (done < committer->n_parts && status == HS_OK) {
         const hs_commit_part *part = &committer->parts[done];
         if (commits->status != HS_OK || part->range > commits->full_range) {
-            status = HS_STATUS_END; /* somebody else has failed, or has filled the output */
+            status = HS_STOPPED; /* somebody else has failed, or has filled the output */
         } else if (commits->due == part->range) {
             status = write_part(committer, part);
             done++;

@@ -79,7 +79,7 @@ void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *wo
  * What has been collected of this range is all of it, or with `ends` false all but what comes:
  * writes it if the earlier ranges have been written, and waits for these only when the range goes
  * on or much is held back. What is written leaves the collected pairs, sooner or later.
- * HS_STATUS_END: somebody else has failed.
+ * HS_STOPPED: somebody else has failed.
  */
 hs_status hs_commit(hs_committer *committer, double fraction, bool ends);
 

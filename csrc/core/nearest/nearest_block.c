@@ -3,6 +3,7 @@
 #include "nearest_block.h"
 
 #include "../exact/bounds.h"
+#include "../base/outcome.h"
 #include "../base/poll.h"
 
 #include <math.h>
@@ -181,7 +182,7 @@ choose_squares(const hs_near *near, const hs_near_group *group, hs_near_block *b
     block->square_error = hs_larger(square - in, out - square) * (1.0 + ROOM);
 }
 
-/* Unit, errors and extent; HS_STATUS_END: the group is too wide. */
+/* Unit, errors and extent; HS_TOO_MUCH: the group is too wide. */
 static hs_status
 settle_frame(const hs_near *near, const hs_near_group *group, double error, hs_near_block *block)
 {
@@ -192,7 +193,7 @@ settle_frame(const hs_near *near, const hs_near_group *group, double error, hs_n
     }
     /* Beyond the group and the radius, by more than roundings take. */
     block->extent = 0.5 * widest + 4.0;
-    return widest > WIDEST ? HS_STATUS_END : HS_OK;
+    return widest > WIDEST ? HS_TOO_MUCH : HS_OK;
 }
 
 /* Runs and images. */
@@ -207,7 +208,7 @@ find(const hs_near *near, const hs_options *options, hs_near_group *group, doubl
         return status == HS_OK ? hs_near_runs_take(near, group, most, leaves, block) : status;
     }
     if (start_images(near, group, &images) != HS_OK || images.count > most) {
-        return most < INFINITY ? HS_STATUS_END : HS_ERR_MEMORY;
+        return most < INFINITY ? HS_TOO_MUCH : HS_ERR_MEMORY;
     }
     const hs_status status = settle_frame(near, group, images.error, block);
     return status == HS_OK ? hs_near_runs_find(near, options, group, most, &images, block) : status;

@@ -35,7 +35,7 @@ typedef struct hs_near_block {
 } hs_near_block;
 
 /* Sets runs and images, by walking down the tree: what is within the radius of the group and a
- * little more. HS_STATUS_END: more than `most` candidates. */
+ * little more. HS_TOO_MUCH: more than `most` candidates. */
 hs_status hs_near_runs_find(const hs_near *near, const hs_options *options,
                             const hs_near_group *group, double most, hs_near_images *images,
                             hs_near_block *block);
@@ -48,7 +48,7 @@ hs_status hs_near_block_init(const hs_near *near, hs_near_block *block);
 void      hs_near_block_free(const hs_near *near, hs_near_block *block);
 
 /* Fills the block for a group with its radius, which may be raised a little. leaves: for some
- * groups, this among them, or NULL. HS_STATUS_END: there are more than `most` candidates or images,
+ * groups, this among them, or NULL. HS_TOO_MUCH: there are more than `most` candidates or images,
  * or the group is far wider than its radius. */
 hs_status hs_near_block_fill(const hs_near *near, const hs_options *options,
                              hs_near_group *group, double most, hs_near_leaves *leaves,

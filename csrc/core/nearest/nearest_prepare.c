@@ -3,6 +3,7 @@
 #include "nearest_prepare.h"
 
 #include "nearest_kept.h"
+#include "../base/outcome.h"
 #include "../scene/unit.h"
 
 #include <math.h>
@@ -160,7 +161,7 @@ borrow(const hs_near *kept, hs_near *near)
     memcpy(near->layer_upper, kept->layer_upper, sizeof near->layer_upper);
 }
 
-/* HS_STATUS_END when what is kept does not serve: bounds that do not hold for the queries, a scale
+/* HS_UNSERVED when what is kept does not serve: bounds that do not hold for the queries, a scale
  * that would lose digits of the largest distance; or another thread is building it. */
 static hs_status
 prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
@@ -171,7 +172,7 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
     hs_scene       asking;
     hs_status      status = HS_OK;
     if (limit_is_small(limit)) {
-        return HS_STATUS_END;
+        return HS_UNSERVED;
     }
     const hs_near *kept = hs_near_kept_get(sets->trees, &room);
     if (room != NULL) {
@@ -180,19 +181,19 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
         kept = room;
     }
     if (kept == NULL || status != HS_OK) {
-        return kept == NULL ? HS_STATUS_END : status;
+        return kept == NULL ? HS_UNSERVED : status;
     }
     const hs_scene *scene = &kept->search->scene;
     const int       unit = hs_exponent_of(hs_scale_apply(scene->scale, limit));
     /* What is far is drawn together, which a tree that is kept is not. */
     if (scene->in_one_cell || hs_is_far(scene->cloud.largest, unit, HS_FAR_BOUNDED_EXPONENT)) {
-        return HS_STATUS_END;
+        return HS_UNSERVED;
     }
     if (sets->queries != NULL) {
         status = hs_scene_like(&search->call->account, search->call->team, &kept->search->scene,
                                sets->queries, &search->call->options, &asking, failure);
         if (status != HS_OK) {
-            failure->in_queries = status != HS_STATUS_END;
+            failure->in_queries = status != HS_UNSERVED;
             return status;
         }
     }
@@ -212,11 +213,11 @@ hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double li
     }
     hs_call_gather(search->call, sets->points->n + n_asking);
     search->is_full = true;
-    hs_status status = HS_STATUS_END;
+    hs_status status = HS_UNSERVED;
     if (sets->trees != NULL) {
         status = prepare_from_kept(near, sets, box, limit, failure);
     }
-    return status == HS_STATUS_END ? prepare_anew(near, sets, box, limit, failure) : status;
+    return status == HS_UNSERVED ? prepare_anew(near, sets, box, limit, failure) : status;
 }
 
 void

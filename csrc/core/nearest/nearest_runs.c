@@ -2,6 +2,7 @@
 /* nearest_runs.c: which leaves a group may be near to, as runs of points. See nearest_block.h. */
 #include "nearest_block.h"
 
+#include "../base/outcome.h"
 #include "../base/poll.h"
 
 #include <math.h>
@@ -78,7 +79,7 @@ find_runs(const hs_near *near, const double *low, const double *high, double mos
         } else if (!add_leaf(near, node, block) || block->n >= INT32_MAX / 8) {
             return HS_ERR_MEMORY;
         } else if (block->n > most) {
-            return HS_STATUS_END;
+            return HS_TOO_MUCH;
         }
         if (!hs_tree_step(left, gap, limit, block->stack, &n_waiting, &number)) {
             return HS_OK;
@@ -155,5 +156,5 @@ hs_near_runs_take(const hs_near *near, const hs_near_group *group, double most,
     for (int32_t r = 0; is_one && r < block->n_runs; r++) {
         block->runs[r].image = 0;
     }
-    return block->n > most ? HS_STATUS_END : HS_OK;
+    return block->n > most ? HS_TOO_MUCH : HS_OK;
 }

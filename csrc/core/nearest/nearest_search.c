@@ -11,6 +11,7 @@
 
 #include "../collect/in_turn.h"
 #include "nearest_write.h"
+#include "../base/outcome.h"
 #include "../base/poll.h"
 
 #include <math.h>
@@ -153,7 +154,7 @@ search_group(near_worker *worker, hs_near_group *group)
                                           &worker->leaves, &worker->block);
     if (status == HS_OK) {
         status = finish_block(worker, group, &left);
-    } else if (status == HS_STATUS_END) {
+    } else if (status == HS_TOO_MUCH) {
         status = HS_OK;
     }
     for (int32_t t = 0; t < n_points && status == HS_OK && left != 0; t++) {

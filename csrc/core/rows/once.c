@@ -3,6 +3,7 @@
 #include "once.h"
 
 #include "table_rows.h"
+#include "../base/outcome.h"
 #include "../base/poll.h"
 #include "../search/walk.h"
 #include "put_column.h"
@@ -149,7 +150,7 @@ hs_once_find(hs_table *table, hs_failure *failure)
     hs_free(&search->call->account, doing.where);
     if (status == HS_ERR_MEMORY) {
         give_up(table->entries);
-        return HS_STATUS_END;
+        return HS_TOO_MUCH;
     }
     return status;
 }

@@ -2,6 +2,7 @@
 /* table.c: see table.h. */
 #include "table.h"
 
+#include "../base/outcome.h"
 #include "../collect/crew.h"
 
 #include <string.h>
@@ -75,7 +76,7 @@ will_keep(hs_table *table)
            hs_account_allows(&search->call->account, 2.0 * HS_MOST_KEPT);
 }
 
-/* HS_STATUS_END: there were too many entries, and none is kept. */
+/* HS_TOO_MUCH: there were too many entries, and none is kept. */
 static hs_status
 keep_all(hs_table *table, hs_failure *failure)
 {
@@ -100,8 +101,8 @@ keep_all(hs_table *table, hs_failure *failure)
 hs_status
 hs_table_measure(hs_table *table, hs_failure *failure)
 {
-    hs_status status = will_keep(table) ? keep_all(table, failure) : HS_STATUS_END;
-    if (status == HS_STATUS_END) {
+    hs_status status = will_keep(table) ? keep_all(table, failure) : HS_TOO_MUCH;
+    if (status == HS_TOO_MUCH) {
         hs_table_free(table);
         status = hs_table_count(table->search, table->offsets, failure);
     }

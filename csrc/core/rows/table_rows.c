@@ -2,6 +2,7 @@
 /* table_rows.c: see table_rows.h. */
 #include "table_rows.h"
 
+#include "../base/outcome.h"
 #include "../collect/record_measures.h"
 
 #include <string.h>
@@ -256,7 +257,7 @@ hs_keep_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *h
     }
     keep_visit(fill, scanner, hits, own, NULL);
     const bool is_much = kept->n_pairs * hs_output_bytes_per_pair(kept) > HS_MOST_KEPT;
-    return is_much ? HS_STATUS_END : HS_OK;
+    return is_much ? HS_TOO_MUCH : HS_OK;
 }
 
 hs_status

@@ -39,7 +39,7 @@ void      hs_filler_close(hs_filler *fill);
 /* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
 hs_status hs_fill_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
-/* The same: whole rows, one behind another, and their lengths as offsets. HS_STATUS_END when they
+/* The same: whole rows, one behind another, and their lengths as offsets. HS_TOO_MUCH when they
  * are more than HS_MOST_KEPT. */
 hs_status hs_keep_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 

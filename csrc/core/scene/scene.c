@@ -4,6 +4,7 @@
 
 #include "close_gaps.h"
 #include "unit.h"
+#include "../base/outcome.h"
 #include "../threads/passes.h"
 
 #include <math.h>
@@ -170,20 +171,20 @@ hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs
     hs_status status =
         hs_cloud_load(account, team, queries, options, &asking->cloud, failure);
     if (status == HS_OK && !hs_scene_takes(kept, &asking->cloud)) {
-        status = HS_STATUS_END;
+        status = HS_UNSERVED;
     }
     if (status == HS_OK) {
         hs_scene_share(kept, asking);
         status = wrap_points(account, team, &as_kept, asking, &magnitude, failure);
     }
     if (status == HS_ERR_SHIFT_RANGE && !(options->want & HS_WANT_SHIFT)) {
-        status = HS_STATUS_END; /* a scene without turns will do */
+        status = HS_UNSERVED; /* a scene without turns will do */
     }
     failure->in_queries = status != HS_OK;
     if (status == HS_OK) {
         hs_scene_bound_errors(asking, magnitude);
         hs_scene_settle_ranges(asking);
-        status = hs_scene_covers(kept, asking) ? HS_OK : HS_STATUS_END;
+        status = hs_scene_covers(kept, asking) ? HS_OK : HS_UNSERVED;
     }
     if (status != HS_OK) {
         hs_scene_free(account, asking);

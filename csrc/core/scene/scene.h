@@ -138,7 +138,7 @@ void hs_scene_widen_errors(hs_scene *scene);
 
 /*
  * Queries that meet the points of a scene that was made to be kept, as a scene of their own.
- * HS_STATUS_END when its bounds do not hold for them: they need another one. On failure it holds
+ * HS_UNSERVED when its bounds do not hold for them: they need another one. On failure it holds
  * nothing.
  */
 hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept,

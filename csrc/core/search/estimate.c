@@ -2,6 +2,7 @@
 /* estimate.c: see estimate.h. */
 #include "estimate.h"
 
+#include "../base/outcome.h"
 #include "../base/want.h"
 #include "walk.h"
 
@@ -219,7 +220,7 @@ take_sample(hs_walker *walker, int64_t n, sample *taken)
         walker->scanner.n_found = 0;
         walker->scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
         const hs_status status = hs_walk_point(walker, (int32_t)si);
-        if (status != HS_OK && status != HS_STATUS_END) {
+        if (status != HS_OK && status != HS_STOPPED) {
             return status;
         }
         taken->sum += (double)walker->scanner.n_found;

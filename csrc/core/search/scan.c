@@ -3,6 +3,7 @@
 #include "scan.h"
 
 #include "decide.h"
+#include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
 
@@ -210,7 +211,7 @@ static hs_status
 end_block(hs_scanner *scanner)
 {
     if (scanner->n_candidates > scanner->candidate_limit || scanner->leaves) {
-        return HS_STATUS_END;
+        return HS_STOPPED;
     }
     return poll_sometimes(scanner);
 }

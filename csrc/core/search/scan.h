@@ -31,7 +31,7 @@ hs_status hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const 
 
 /*
  * Tests every point of the group against what has been appended to the block, unless it is one to
- * skip, then empties it. HS_STATUS_END past the candidate limit, or when a visitor leaves; what the
+ * skip, then empties it. HS_STOPPED past the candidate limit, or when a visitor leaves; what the
  * visitor or the poll say.
  */
 hs_status hs_scan_block(hs_scanner *scanner);

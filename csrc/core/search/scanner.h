@@ -48,10 +48,10 @@ struct hs_scanner {
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;
-    bool             leaves;         /* set by a visitor: HS_STATUS_END once the block is done */
+    bool             leaves;         /* set by a visitor: HS_STOPPED once the block is done */
     int32_t          blocks;         /* of the present group, scanned or skipped so far */
     int32_t          blocks_to_skip; /* of the next group; they were scanned before */
-    int64_t          candidate_limit; /* the walk ends with HS_STATUS_END when it has tested more */
+    int64_t          candidate_limit; /* the walk ends with HS_STOPPED when it has tested more */
     int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
     hs_stages        stages;
     int64_t          n_groups, n_blocks, n_candidates, n_ambiguous;

@@ -2,6 +2,8 @@
 /* search_build.c: see search_build.h. */
 #include "search_build.h"
 
+#include "../base/outcome.h"
+
 #include "estimate.h"
 
 /* The dense grid, with cells as wide as the caller wants them or as is best. Where points crowd in
@@ -10,13 +12,13 @@ static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {
     const double wanted = search->call->options.cell_size;
-    hs_status    status = HS_STATUS_END;
+    hs_status    status = HS_TOO_MUCH;
     bool         may_be_sparse = true;
     if (wanted > 0.0) {
         status = hs_grid_init_wide(&search->scene, hs_scale_apply(search->scene.scale, wanted),
                                    &search->grid, &may_be_sparse, failure);
     }
-    if (status == HS_STATUS_END) {
+    if (status == HS_TOO_MUCH) {
         status = hs_grid_init(&search->scene, &search->grid, failure);
     }
     if (status == HS_OK && may_be_sparse) {

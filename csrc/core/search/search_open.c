@@ -2,6 +2,8 @@
 /* search_open.c: cells that were kept, where they serve, or new ones. See search_open.h. */
 #include "search_open.h"
 
+#include "../base/outcome.h"
+
 #include "search_build.h"
 #include "search_reuse.h"
 
@@ -21,7 +23,7 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
 {
     if (sets->built != NULL) {
         const hs_status status = hs_search_reuse(sets, call, search, failure);
-        if (status != HS_STATUS_END) {
+        if (status != HS_UNSERVED) {
             return tell_limit(call, status, failure);
         }
     }

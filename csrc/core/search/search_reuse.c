@@ -2,6 +2,8 @@
 /* search_reuse.c: see search_reuse.h. */
 #include "search_reuse.h"
 
+#include "../base/outcome.h"
+
 #include "estimate.h"
 #include "search_build.h"
 
@@ -87,7 +89,7 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     const hs_search *built = sets->built;
     const int64_t    n_queries = sets->queries != NULL ? sets->queries->n : 0;
     if (!serves(built, &call->options, sets->least_cutoff)) {
-        return HS_STATUS_END;
+        return HS_UNSERVED;
     }
     hs_search_begin(call, search);
     borrow(built, sets->is_untested, search);
@@ -98,7 +100,7 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     }
     if (status != HS_OK) {
         hs_search_close(search);
-        if (status == HS_STATUS_END) {
+        if (status == HS_UNSERVED) {
             hs_call_restart(call);
             failure->in_queries = false;
         }

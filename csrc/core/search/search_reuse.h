@@ -11,7 +11,7 @@
 
 /*
  * A search among the points of another one, which was made to be kept, stays as it is and must
- * outlive this one. The queries of the sets ask, or the points. HS_STATUS_END when
+ * outlive this one. The queries of the sets ask, or the points. HS_UNSERVED when
  * it cannot serve them: the cutoff is larger than its own, or its bounds do not hold for the
  * queries. Else as hs_search_open.
  */

@@ -7,6 +7,7 @@
  */
 #include "motion.h"
 
+#include "../base/outcome.h"
 #include "../base/poll.h"
 #include "../exact/doubleword.h"
 #include "../box/strain.h"
@@ -120,7 +121,7 @@ start_jumps(tracking *track)
     return track->jump_of != NULL;
 }
 
-/* Looks for jumps among the points of a tile. HS_STATUS_END: some point went too far to tell. */
+/* Looks for jumps among the points of a tile. HS_UNSERVED: some point went too far to tell. */
 static hs_status
 take_jumps(tracking *track, tile *t)
 {
@@ -136,7 +137,7 @@ take_jumps(tracking *track, tile *t)
             continue;
         }
         if (!take_jump(track, t, p, given)) {
-            return HS_STATUS_END;
+            return HS_UNSERVED;
         }
         for (int r = 0; r < m; r++) {
             any |= (uint64_t)given[r];
@@ -340,7 +341,7 @@ start(const hs_motion *motion, hs_store *jumps, tracking *track)
     track->deformed = !hs_frames_share_box(motion->built, motion->now);
     if (track->deformed &&
         !hs_strain_find(&motion->built->box, &motion->now->box, &track->strain)) {
-        return HS_STATUS_END;
+        return HS_UNSERVED;
     }
     hs_lattice_init(&motion->now->box, motion->now->points.ndim, hs_scale_of(0), &track->lattice);
     for (int k = 0; k < track->lattice.ndim; k++) {
@@ -348,7 +349,7 @@ start(const hs_motion *motion, hs_store *jumps, tracking *track)
             track->jump = hs_smaller(JUMP * track->lattice.period[k], track->jump);
         }
     }
-    return track->jump > 0.0 ? HS_OK : HS_STATUS_END;
+    return track->jump > 0.0 ? HS_OK : HS_UNSERVED;
 }
 
 static hs_status
@@ -390,5 +391,5 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
         *margin = found == found ? found : -INFINITY;
         *jumped = track.jump_of != NULL;
     }
-    return status == HS_STATUS_END ? HS_OK : status;
+    return status == HS_UNSERVED ? HS_OK : status;
 }

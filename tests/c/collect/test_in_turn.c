@@ -203,7 +203,7 @@ fail_in_turn(void *worker, int64_t range)
 static void
 the_earliest_failure_is_told(void)
 {
-    static const hs_status later[] = {HS_ERR_INTERRUPTED, HS_STATUS_END, HS_ERR_MEMORY};
+    static const hs_status later[] = {HS_ERR_INTERRUPTED, HS_STOPPED, HS_ERR_MEMORY};
     for (int trial = 0; trial < 12; trial++) {
         static crew all;
         hs_failure  failure = HS_NO_FAILURE;

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * outcome.h: how a step inside the core can end besides with a status of halfshell.h. Each function
+ * that returns one of these says so; none reaches the caller of the library.
+ */
+#ifndef HS_OUTCOME_H
+#define HS_OUTCOME_H
+
+#include "../../halfshell.h"
+
+/* What was kept (cells, a tree, a list) does not serve: it is to be made anew. */
+#define HS_UNSERVED ((hs_status)(HS_STATUS_END + 1))
+
+/* More than this way is made for: another one is to be taken. */
+#define HS_TOO_MUCH ((hs_status)(HS_STATUS_END + 2))
+
+/* The work ended here because something else did: a visitor left, or another thread has failed. */
+#define HS_STOPPED ((hs_status)(HS_STATUS_END + 3))
+
+/* The caller's function has seen enough pairs: all threads stop, and that is no failure. */
+#define HS_ENOUGH ((hs_status)(HS_STATUS_END + 4))
+
+#endif
