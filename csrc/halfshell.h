@@ -39,7 +39,7 @@ extern "C" {
 #define HS_VERSION_MAJOR 0
 #define HS_VERSION_MINOR 1
 #define HS_VERSION_PATCH 0
-#define HS_VERSION (HS_VERSION_MAJOR * 10000 + HS_VERSION_MINOR * 100 + HS_VERSION_PATCH)
+#define HS_VERSION       (HS_VERSION_MAJOR * 10000 + HS_VERSION_MINOR * 100 + HS_VERSION_PATCH)
 
 /* HS_VERSION of the core as it was compiled: not that of the caller's header, if they differ. */
 int hs_version(void);
@@ -93,8 +93,8 @@ typedef enum hs_real { HS_FLOAT32, HS_FLOAT64 } hs_real;
  * can reach are refused. */
 typedef struct hs_points {
     const void *data;
-    int64_t     n;      /* 0 <= n < 2^31 */
-    int         ndim;   /* 1 <= ndim <= HS_MAX_DIM */
+    int64_t     n;    /* 0 <= n < 2^31 */
+    int         ndim; /* 1 <= ndim <= HS_MAX_DIM */
     hs_real     real;
     ptrdiff_t   row_stride;
     ptrdiff_t   column_stride;
@@ -116,12 +116,12 @@ typedef enum hs_precision {
 
 /* What to return for each pair: a union of these bits. */
 enum {
-    HS_WANT_I        = 1, /* lower point number */
-    HS_WANT_J        = 2, /* higher (or, for an image of the point itself, equal) number */
+    HS_WANT_I = 1,        /* lower point number */
+    HS_WANT_J = 2,        /* higher (or, for an image of the point itself, equal) number */
     HS_WANT_DISTANCE = 4, /* |D|, float64, within 1 ulp, never on the wrong side of the cutoff */
-    HS_WANT_VECTOR   = 8, /* D, float64, each component within 1 ulp of |D| */
-    HS_WANT_SHIFT    = 16, /* S, int32 */
-    HS_WANT_BOTH     = 32  /* i and j side by side */
+    HS_WANT_VECTOR = 8,   /* D, float64, each component within 1 ulp of |D| */
+    HS_WANT_SHIFT = 16,   /* S, int32 */
+    HS_WANT_BOTH = 32     /* i and j side by side */
 };
 
 /* Bytes are accounted by what they are for. */
@@ -163,14 +163,14 @@ typedef bool (*hs_poll_fn)(void *context, double fraction);
 
 /* One array for each quantity; NULL for those that are not there. */
 typedef struct hs_pair_arrays {
-    int64_t  capacity;     /* pairs that fit */
-    int      index_bytes;  /* 4 or 8: int32 or int64 elements of the next three */
-    void    *i;            /* m */
-    void    *j;            /* m */
-    void    *both;         /* m * 2: i and j side by side */
-    double  *distance;     /* m */
-    double  *vector;       /* m * ndim */
-    int32_t *shift;        /* m * ndim */
+    int64_t  capacity;    /* pairs that fit */
+    int      index_bytes; /* 4 or 8: int32 or int64 elements of the next three */
+    void    *i;           /* m */
+    void    *j;           /* m */
+    void    *both;        /* m * 2: i and j side by side */
+    double  *distance;    /* m */
+    double  *vector;      /* m * ndim */
+    int32_t *shift;       /* m * ndim */
 } hs_pair_arrays;
 
 /* Called at most once per call, when the result may be large: bytes that may still be used. */
@@ -184,23 +184,23 @@ typedef double (*hs_limit_fn)(void *context);
 #define HS_MOST_THREADS 1024
 
 typedef struct hs_options {
-    double       cutoff;       /* finite, not negative; same unit as the points */
-    bool         inclusive;    /* whether |D| == cutoff counts */
-    bool         sorted;       /* ascending (i, j, S) */
+    double       cutoff;    /* finite, not negative; same unit as the points */
+    bool         inclusive; /* whether |D| == cutoff counts */
+    bool         sorted;    /* ascending (i, j, S) */
     hs_precision precision;
     unsigned     want;         /* HS_WANT_ bits */
     int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
     double       cell_size;    /* least width of cells, as far as possible; 0: what is quick */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
-    const char  *kernel;       /* borrowed; NULL: the best of this CPU */
-    int          threads;      /* so many, 0 as 1, at most HS_MOST_THREADS; -n: n from
+    const char           *kernel;  /* borrowed; NULL: the best of this CPU */
+    int                   threads; /* so many, 0 as 1, at most HS_MOST_THREADS; -n: n from
                                   HS_POINTS_FOR_THREADS on, else 1 */
-    double       memory_limit; /* bytes that result and search may take; infinity: no limit */
-    hs_limit_fn  find_limit;   /* NULL, or asked for a further limit beyond 64 MB */
+    double       memory_limit;     /* bytes that result and search may take; infinity: no limit */
+    hs_limit_fn  find_limit;       /* NULL, or asked for a further limit beyond 64 MB */
     void        *find_context;
-    hs_poll_fn   poll;         /* NULL: never */
+    hs_poll_fn   poll; /* NULL: never */
     void        *poll_context;
-    hs_counters *counters;     /* borrowed, filled also on failure; NULL: not wanted */
+    hs_counters *counters; /* borrowed, filled also on failure; NULL: not wanted */
 } hs_options;
 
 /* Defaults: cutoff 0, inclusive, unsorted, exact, i and j of 8 bytes, no limit, no poll. */
@@ -267,15 +267,15 @@ typedef struct hs_marks {
 
 /* Pairs by distance, and where the numbers go. Everything is borrowed. */
 typedef struct hs_histogram {
-    int64_t       n_edges;       /* at least 1, less than 2^30 */
-    const double *edges;         /* finite, not negative, not descending */
-    bool          inclusive;     /* a pair at exactly an edge counts below it, not from it on ... */
-    bool          last_inclusive;/* ... and at the last one, the cutoff; if inclusive, this too */
-    int32_t       n_types;       /* at least 1 */
+    int64_t       n_edges;   /* at least 1, less than 2^30 */
+    const double *edges;     /* finite, not negative, not descending */
+    bool          inclusive; /* a pair at exactly an edge counts below it, not from it on ... */
+    bool          last_inclusive; /* ... and at the last one, the cutoff; if inclusive, this too */
+    int32_t       n_types;        /* at least 1 */
     hs_marks      of_points;
     hs_marks      of_queries;
-    int64_t      *counts;        /* n_types * n_types * n_edges, or NULL */
-    double       *sums;          /* the same, or NULL */
+    int64_t      *counts; /* n_types * n_types * n_edges, or NULL */
+    double       *sums;   /* the same, or NULL */
 } hs_histogram;
 
 /*
@@ -370,7 +370,7 @@ typedef int (*hs_pair_fn)(int64_t i, int64_t j, const int32_t *S, const double *
 typedef int (*hs_pairs_fn)(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user);
 typedef struct hs_visit {
     hs_pair_fn  pair;
-    hs_pairs_fn pairs;       /* in place of `pair`, or NULL */
+    hs_pairs_fn pairs; /* in place of `pair`, or NULL */
     void       *user;
     bool        thread_safe; /* several threads may call it at once, in no order */
 } hs_visit;
@@ -512,9 +512,9 @@ typedef struct hs_verlet_state {
     int64_t n_points;
     int64_t n_listed; /* pairs within `radius` when the list was built */
     double  cutoff;
-    double  radius;   /* cutoff + skin, rounded up */
-    double  margin;   /* by how much pairs may yet come closer before the list is built again */
-    double  tried;    /* the margin of the last step with the list of the one before; -infinity:
+    double  radius; /* cutoff + skin, rounded up */
+    double  margin; /* by how much pairs may yet come closer before the list is built again */
+    double  tried;  /* the margin of the last step with the list of the one before; -infinity:
                          unknown. Below 0: the list was built again */
 } hs_verlet_state;
 
@@ -527,18 +527,18 @@ void hs_verlet_free(hs_verlet *list);
 typedef struct hs_plan {
     int         ndim;
     int         n_periodic;
-    bool        aligned;              /* every periodic box vector lies along one coordinate axis */
-    bool        reduced;              /* the box was replaced by an equivalent, less skewed one */
-    bool        keeps_originals;      /* coordinates as given are kept beside the wrapped */
-    bool        all_pairs;            /* one cell: every point meets every point */
-    int64_t     shape[HS_MAX_DIM];    /* cells along each grid axis */
-    double      cell_size[HS_MAX_DIM];/* extent of a cell along each grid axis */
-    int64_t     reach[HS_MAX_DIM];    /* cells to look at on either side */
-    int64_t     images[HS_MAX_DIM];   /* periods that a pair can be apart; 0 on open axes */
-    int64_t     stencil_rows;         /* neighbouring rows of cells, own row included */
-    double      expected_pairs;       /* from the density; NaN where there is none */
-    int         threads;              /* that the walk would be shared by */
-    const char *kernel;               /* static storage */
+    bool        aligned;           /* every periodic box vector lies along one coordinate axis */
+    bool        reduced;           /* the box was replaced by an equivalent, less skewed one */
+    bool        keeps_originals;   /* coordinates as given are kept beside the wrapped */
+    bool        all_pairs;         /* one cell: every point meets every point */
+    int64_t     shape[HS_MAX_DIM]; /* cells along each grid axis */
+    double      cell_size[HS_MAX_DIM]; /* extent of a cell along each grid axis */
+    int64_t     reach[HS_MAX_DIM];     /* cells to look at on either side */
+    int64_t     images[HS_MAX_DIM];    /* periods that a pair can be apart; 0 on open axes */
+    int64_t     stencil_rows;          /* neighbouring rows of cells, own row included */
+    double      expected_pairs;        /* from the density; NaN where there is none */
+    int         threads;               /* that the walk would be shared by */
+    const char *kernel;                /* static storage */
 } hs_plan;
 
 hs_status hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan,
@@ -555,8 +555,8 @@ hs_status hs_box_measure(const hs_box *box, double *heights, double *volume, hs_
  * never equal to its length. shift: n * ndim; either may be NULL. Returns HS_ERR_SHIFT_RANGE for a
  * shift beyond 2^51.
  */
-hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped,
-                      int64_t *shift, hs_failure *failure);
+hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t *shift,
+                      hs_failure *failure);
 
 /*
  * Memory of results that are gone is kept for the next ones, up to a limit: the one thing that

@@ -90,8 +90,8 @@ find_differences(differences *d, const hs_metric *metric, const hs_batch *batch,
             }
             const truth  resting = moving->resting[m];
             const dwords product = two_product(moving->times[m], broadcast(entry));
-            const dwords moved =
-                watched ? dw_add_watched(sum, product, &d->lost) : dw_add(sum, product);
+            const dwords moved = watched ? dw_add_watched(sum, product, &d->lost)
+                                         : dw_add(sum, product);
             sum.hi = choose(resting, sum.hi, moved.hi);
             sum.lo = choose(resting, sum.lo, moved.lo);
             size = add(size, magnitude(product.hi));
@@ -136,16 +136,16 @@ judge_in_double_words(const hs_metric *metric, const differences *d, const int n
     }
     const dwords limit = {broadcast(-metric->square_hi), broadcast(-metric->square_lo)};
     const reals  excess = dw_add(square, limit).hi;
-    const double unit = (HS_DW_SQUARE_ERROR + HS_DW_ADD_ERROR * (ndim - 1)) *
-                        (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT);
-    const reals  twice = add(square_root(square.hi), square_root(square.hi));
-    reals        bound = multiply(broadcast(unit), square.hi);
+    const double unit =
+        (HS_DW_SQUARE_ERROR + HS_DW_ADD_ERROR * (ndim - 1)) * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT);
+    const reals twice = add(square_root(square.hi), square_root(square.hi));
+    reals       bound = multiply(broadcast(unit), square.hi);
     if (shifted) {
         bound = add(bound, multiply(d->error, add(twice, d->error)));
     }
-    const truth  decided = either(is_below(bound, magnitude(excess)), is_equal(lost, zero));
-    const truth  inside = metric->inclusive ? is_at_least(zero, excess) : is_below(excess, zero);
-    const truth  outside = metric->inclusive ? is_below(zero, excess) : is_at_least(excess, zero);
+    const truth decided = either(is_below(bound, magnitude(excess)), is_equal(lost, zero));
+    const truth inside = metric->inclusive ? is_at_least(zero, excess) : is_below(excess, zero);
+    const truth outside = metric->inclusive ? is_below(zero, excess) : is_at_least(excess, zero);
     *within = bits(both(decided, inside));
     *beyond = bits(both(decided, outside));
 }
@@ -167,15 +167,14 @@ judge_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, const
         for (int k = 1; k < ndim; k++) {
             square = add(square, multiply(d.component[k].hi, d.component[k].hi));
         }
-        const reals slack =
-            multiply(multiply(broadcast(2.0), d.error), add(cutoff, d.error));
-        unsigned usable = bits(d.usable);
+        const reals slack = multiply(multiply(broadcast(2.0), d.error), add(cutoff, d.error));
+        unsigned    usable = bits(d.usable);
         if (shifted && HS_UNLIKELY((usable & present) != present)) {
             usable |= resting_pairs(&moving);
         }
         usable &= present;
-        unsigned within = bits(is_at_least(subtract(sure_in, square), slack)) & usable;
-        unsigned beyond = bits(is_at_least(subtract(square, sure_out), slack)) & usable;
+        unsigned       within = bits(is_at_least(subtract(sure_in, square), slack)) & usable;
+        unsigned       beyond = bits(is_at_least(subtract(square, sure_out), slack)) & usable;
         const unsigned open = usable & ~(within | beyond);
         stages->by_float64 += count(within | beyond);
         if (HS_UNLIKELY(open != 0)) {
@@ -230,24 +229,23 @@ measure_loop(const hs_metric *metric, const hs_batch *batch, const int ndim, con
              double *distance, double *const *vector, uint8_t *done)
 {
     for (int32_t e = 0; e < batch->n; e += LANES) {
-        put_bytes(done + e,
-                  measure_group(metric, batch, e, ndim, shifted, distance, vector), 0);
+        put_bytes(done + e, measure_group(metric, batch, e, ndim, shifted, distance, vector), 0);
     }
 }
 
 /* loop(ndim, shifted, arguments) with constants. */
-#define DISPATCH(loop, ...)                                                        \
-    do {                                                                           \
-        const bool shifted = metric->n_rows > 0 && batch->shift[0] != NULL;        \
-        switch (2 * metric->ndim + shifted) {                                      \
-        case 2: loop(metric, batch, 1, false, __VA_ARGS__); break;                 \
-        case 3: loop(metric, batch, 1, true, __VA_ARGS__); break;                  \
-        case 4: loop(metric, batch, 2, false, __VA_ARGS__); break;                 \
-        case 5: loop(metric, batch, 2, true, __VA_ARGS__); break;                  \
-        case 6: loop(metric, batch, 3, false, __VA_ARGS__); break;                 \
-        case 7: loop(metric, batch, 3, true, __VA_ARGS__); break;                  \
-        default: loop(metric, batch, metric->ndim, shifted, __VA_ARGS__);          \
-        }                                                                          \
+#define DISPATCH(loop, ...)                                                 \
+    do {                                                                    \
+        const bool shifted = metric->n_rows > 0 && batch->shift[0] != NULL; \
+        switch (2 * metric->ndim + shifted) {                               \
+        case 2: loop(metric, batch, 1, false, __VA_ARGS__); break;          \
+        case 3: loop(metric, batch, 1, true, __VA_ARGS__); break;           \
+        case 4: loop(metric, batch, 2, false, __VA_ARGS__); break;          \
+        case 5: loop(metric, batch, 2, true, __VA_ARGS__); break;           \
+        case 6: loop(metric, batch, 3, false, __VA_ARGS__); break;          \
+        case 7: loop(metric, batch, 3, true, __VA_ARGS__); break;           \
+        default: loop(metric, batch, metric->ndim, shifted, __VA_ARGS__);   \
+        }                                                                   \
     } while (0)
 
 void

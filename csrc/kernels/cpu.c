@@ -70,9 +70,9 @@ has_bits(uint64_t word, uint64_t bits)
 static int
 detect_features(void)
 {
-    const uint32_t fma_popcnt_avx = 1u << 12 | 1u << 23 | 1u << 28;             /* leaf 1, ecx */
-    const uint32_t avx2 = 1u << 5;                                              /* leaf 7, ebx */
-    const uint32_t f_dq_bw_vl = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31;      /* leaf 7, ebx */
+    const uint32_t fma_popcnt_avx = 1u << 12 | 1u << 23 | 1u << 28;        /* leaf 1, ecx */
+    const uint32_t avx2 = 1u << 5;                                         /* leaf 7, ebx */
+    const uint32_t f_dq_bw_vl = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31; /* leaf 7, ebx */
     const uint64_t saved = saved_registers();
     const uint32_t extended = cpuid(7).b;
     int            found = DETECTED;

@@ -34,7 +34,7 @@
  * last one of their outputs: twice the widest vector. */
 #define HS_PADDING 32
 
-#define HS_GROUP_POINTS 64       /* points tested against one neighbourhood, at most */
+#define HS_GROUP_POINTS     64   /* points tested against one neighbourhood, at most */
 #define HS_BLOCK_CANDIDATES 4096 /* candidates held at a time, at most: 80 kB in 3-D */
 
 /* Zeros where scans read behind the last of n candidates. What is there does not count, but takes a
@@ -140,7 +140,7 @@ typedef struct hs_relate {
     const double        *x[HS_MAX_DIM]; /* points in tree order; HS_PADDING more may be read */
     const hs_near_image *images;
     double               centre[HS_MAX_DIM];
-    double               unit;          /* a power of two: lengths times this */
+    double               unit; /* a power of two: lengths times this */
     double               extent;
     float               *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
     float               *norm;          /* the same */
@@ -158,10 +158,10 @@ typedef struct hs_boxes {
     const float   *low[HS_MAX_DIM];  /* n + HS_PADDING each */
     const float   *high[HS_MAX_DIM]; /* the same */
     float          from[HS_MAX_DIM], to[HS_MAX_DIM];
-    float          out;              /* largest square of the distance */
-    const int32_t *label;            /* n + HS_PADDING */
+    float          out;   /* largest square of the distance */
+    const int32_t *label; /* n + HS_PADDING */
     int32_t        n;
-    int32_t       *hits;             /* receives labels; n + HS_PADDING */
+    int32_t       *hits; /* receives labels; n + HS_PADDING */
 } hs_boxes;
 
 /* Lists label[c] for every box c with !(s > out), ascending, and returns their number:
@@ -209,11 +209,10 @@ typedef struct hs_kernel {
 } hs_kernel;
 
 /* The fields for which every kernel's file has functions of its own, of these names. */
-#define HS_KERNEL_LOOPS                                                                          \
-    .gather = gather, .list = list, .count = count, .list_direct = list_direct,                  \
-    .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32,                  \
-    .emit_int64 = emit_int64, .relate = relate, .order = order,     \
-    .near_boxes = near_boxes
+#define HS_KERNEL_LOOPS                                                         \
+    .gather = gather, .list = list, .count = count, .list_direct = list_direct, \
+    .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32, \
+    .emit_int64 = emit_int64, .relate = relate, .order = order, .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

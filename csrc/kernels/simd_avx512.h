@@ -5,6 +5,9 @@
 
 #include "../core/base/base.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 16 };
 typedef __m512   floats;
 typedef __m512i  integers; /* int32 */

@@ -12,6 +12,9 @@
 
 #include "../core/base/base.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 4 };
 typedef float32x4_t floats;
 typedef int32x4_t   integers;

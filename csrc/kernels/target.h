@@ -30,7 +30,7 @@
 #define HS_TARGET_END HS_PRAGMA(clang attribute pop)
 #elif defined(__GNUC__)
 #define HS_TARGET_BEGIN(features) HS_PRAGMA(GCC push_options) HS_PRAGMA(GCC target(features))
-#define HS_TARGET_END HS_PRAGMA(GCC pop_options)
+#define HS_TARGET_END             HS_PRAGMA(GCC pop_options)
 #else
 #define HS_TARGET_BEGIN(features)
 #define HS_TARGET_END

@@ -5,6 +5,9 @@
 
 #include "../core/base/base.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 4 };
 typedef __m256d reals;
 typedef __m256d truth; /* all bits of a lane */

@@ -5,6 +5,9 @@
 
 #include "../core/base/base.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 8 };
 typedef __m512d  reals;
 typedef __mmask8 truth;

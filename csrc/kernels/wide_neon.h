@@ -5,6 +5,9 @@
 
 #include "../core/base/base.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 2 };
 typedef float64x2_t reals;
 typedef uint64x2_t  truth; /* all bits of a lane */

@@ -7,6 +7,9 @@
 
 #include "../core/exact/doubleword.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 1 };
 typedef double reals;
 typedef bool   truth;

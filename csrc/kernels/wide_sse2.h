@@ -5,6 +5,9 @@
 
 #include "../core/base/base.h"
 
+/* One operation a line. */
+/* clang-format off */
+
 enum { LANES = 2 };
 typedef __m128d reals;
 typedef __m128d truth; /* all bits of a lane */

@@ -139,8 +139,7 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
         (void)hs_lattice_shift(lattice, turns, given); /* these fit: wrap_row found it */
         for (int k = 0; wrapped != NULL && k < d; k++) {
             const bool stays = inside[k] == x[k]; /* scaling may have lost its last digits */
-            wrapped[i * d + k] =
-                stays ? cloud->x[k][i] : hs_scale_apply(back, inside[k]);
+            wrapped[i * d + k] = stays ? cloud->x[k][i] : hs_scale_apply(back, inside[k]);
         }
         if (shift != NULL) {
             memset(shift + i * d, 0, (size_t)d * sizeof(int64_t));
@@ -163,8 +162,8 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     *failure = HS_NO_FAILURE;
     const hs_options options = hs_options_default();
     const hs_fpenv   saved = hs_fpenv_enter();
-    hs_status        status =
-        box != NULL ? hs_check_arguments(points, NULL, box, &options, failure) : HS_ERR_ARGUMENT;
+    hs_status        status = box != NULL ? hs_check_arguments(points, NULL, box, &options, failure)
+                                          : HS_ERR_ARGUMENT;
     if (status == HS_OK) {
         status = hs_box_check(box, failure);
     }

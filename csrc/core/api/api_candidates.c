@@ -306,10 +306,8 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
 {
     hs_search search;
     hs_call  *call = &rows->call;
-    hs_sets   sets = {.points = &cells->points,
-                      .queries = queries,
-                      .built = &cells->search,
-                      .is_full = true};
+    hs_sets   sets = {
+          .points = &cells->points, .queries = queries, .built = &cells->search, .is_full = true};
     sets.is_untested = true;
     sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);

@@ -63,8 +63,8 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     hs_call         *call = &cells->call;
     failure = hs_call_enter(&of_cells, failure, call);
     hs_search_begin(call, &cells->search);
-    hs_status status = hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL,
-                                          &of_cells, failure);
+    hs_status status =
+        hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells, failure);
     if (status == HS_OK) {
         status = keep_points(points, cells);
     }
@@ -72,8 +72,8 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
         /* Pairs are for later calls to keep, or only to count. */
         const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
         hs_call_gather(call, points->n);
-        status = hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search,
-                                 failure);
+        status =
+            hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search, failure);
     }
     if (status == HS_OK && cells->trees == NULL) {
         status = HS_ERR_MEMORY;

@@ -79,11 +79,11 @@ open_plan(hs_search *search, const hs_histogram *histogram, hs_tally_plan *plan,
     plan->n_types = histogram->n_types;
     plan->sums = histogram->sums != NULL;
     plan->asking = search->has_queries ? &plan->queries : &plan->points;
-    hs_status status = hs_edges_init(account, &search->scene, search->filter_error, histogram,
-                                     &plan->edges);
+    hs_status status =
+        hs_edges_init(account, &search->scene, search->filter_error, histogram, &plan->edges);
     if (status == HS_OK) {
-        status = hs_marked_init(account, &histogram->of_points, search->bins.order,
-                                search->bins.n, plan->n_types, &plan->points, failure);
+        status = hs_marked_init(account, &histogram->of_points, search->bins.order, search->bins.n,
+                                plan->n_types, &plan->points, failure);
     }
     if (status == HS_OK && search->has_queries) {
         status = hs_marked_init(account, &histogram->of_queries, search->query_bins.order,
@@ -158,12 +158,12 @@ static hs_status
 count_pairs(hs_search *search, const hs_tally_plan *plan, const hs_histogram *histogram,
             int64_t *n_pairs, hs_failure *failure)
 {
-    const int        n = hs_team_size(search->call->team);
-    const int32_t    capacity = hs_walker_capacity(search);
-    hs_account      *account = &search->call->account;
-    hs_tally        *tallies = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(hs_tally));
-    hs_status        status = tallies != NULL ? HS_OK : HS_ERR_MEMORY;
-    int              opened = 0;
+    const int         n = hs_team_size(search->call->team);
+    const int32_t     capacity = hs_walker_capacity(search);
+    hs_account       *account = &search->call->account;
+    hs_tally         *tallies = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(hs_tally));
+    hs_status         status = tallies != NULL ? HS_OK : HS_ERR_MEMORY;
+    int               opened = 0;
     const hs_visitors visitors = {.use = HS_BLOCK_LISTS_SQUARES,
                                   .visit = hs_tally_hits,
                                   .contexts = tallies,
@@ -217,8 +217,8 @@ static hs_status
 find_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                hs_failure *failure)
 {
-    const hs_status status =
-        options != NULL ? check_histogram(histogram, failure) : HS_ERR_ARGUMENT;
+    const hs_status status = options != NULL ? check_histogram(histogram, failure)
+                                             : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         hs_clear_counters(options);
         return status;

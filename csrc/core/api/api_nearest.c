@@ -52,8 +52,7 @@ static hs_status
 check_nearest(const hs_sets *sets, const hs_box *box, int64_t k, const hs_options *options,
               hs_failure *failure)
 {
-    const hs_status status =
-        hs_check_arguments(sets->points, sets->queries, box, options, failure);
+    const hs_status status = hs_check_arguments(sets->points, sets->queries, box, options, failure);
     if (status != HS_OK || k < 1) {
         return status != HS_OK ? status : HS_ERR_ARGUMENT;
     }
@@ -86,11 +85,11 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
     of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
     failure = hs_call_enter(&of_rows, failure, &rows->call);
     hs_search_begin(&rows->call, &search);
-    hs_near near = {.search = &search,
-                    .k = k,
-                    .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
-                    .omits_self = sets->queries == NULL,
-                    .rows = &rows->output};
+    hs_near   near = {.search = &search,
+                      .k = k,
+                      .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
+                      .omits_self = sets->queries == NULL,
+                      .rows = &rows->output};
     hs_status status = check_nearest(sets, request.box, k, &of_rows, failure);
     if (status == HS_OK) {
         hs_pairs_open(rows, sets->points->ndim);

@@ -28,8 +28,8 @@ make_room(hs_pairs *rows, int64_t n_entries, hs_failure *failure)
     }
     if (!output->fixed && hs_output_reserve(output, n_entries, 0.0) != HS_OK) {
         failure->expected_pairs = (double)n_entries;
-        failure->expected_bytes = failure->expected_pairs *
-                                  (double)hs_output_bytes_per_pair(output);
+        failure->expected_bytes =
+            failure->expected_pairs * (double)hs_output_bytes_per_pair(output);
         return HS_ERR_MEMORY;
     }
     output->n_pairs = n_entries;
@@ -62,7 +62,7 @@ find_rows(hs_search *search, hs_pairs *rows, hs_failure *failure)
     const int64_t n = hs_search_asking(search)->n;
     hs_table      table = {.search = search, .entries = &rows->output};
     hs_output_init(&search->call->account, search->scene.ndim, HS_WANT_I, 8, &rows->offsets);
-    hs_status     status = hs_estimate_by_sample(search, failure);
+    hs_status status = hs_estimate_by_sample(search, failure);
     if (status == HS_OK) {
         status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
     }

@@ -27,8 +27,8 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_recorder recorder = {0};
     hs_walker   walker;
-    hs_status   status = hs_walker_init(search, hs_record_use(output->columns), hs_record_hits,
-                                        &recorder, &walker);
+    hs_status   status =
+        hs_walker_init(search, hs_record_use(output->columns), hs_record_hits, &recorder, &walker);
     if (status == HS_OK) {
         status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits,
                                   &recorder);
@@ -50,7 +50,7 @@ record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     }
     hs_output_expect(output, search->grid.expected_pairs);
     return search->call->team != NULL ? hs_parallel_record(search, output, failure)
-                                : record_alone(search, output, failure);
+                                      : record_alone(search, output, failure);
 }
 
 /* As the output, but first into one of its own, with what else tells pairs apart. */

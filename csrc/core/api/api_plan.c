@@ -41,8 +41,7 @@ use_search(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failu
 }
 
 hs_status
-hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan,
-             hs_failure *failure)
+hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs_failure *failure)
 {
     const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
     if (options == NULL || plan == NULL) {

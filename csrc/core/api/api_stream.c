@@ -18,14 +18,14 @@
 #define MOST_EXPECTED 0x1p24
 
 struct hs_stream {
-    hs_call     call;      /* that opened it; it has threads only while it looks for pairs */
-    hs_search   search;    /* open */
-    hs_output   held;      /* pairs from `begin` on wait to be handed out */
+    hs_call     call;   /* that opened it; it has threads only while it looks for pairs */
+    hs_search   search; /* open */
+    hs_output   held;   /* pairs from `begin` on wait to be handed out */
     int64_t     begin;
     int64_t     max_pairs;
-    hs_bookmark next;      /* where to go on looking */
-    double      told;      /* the largest fraction that poll has been called with */
-    hs_poll_fn  poll;      /* of the caller, during hs_stream_next */
+    hs_bookmark next; /* where to go on looking */
+    double      told; /* the largest fraction that poll has been called with */
+    hs_poll_fn  poll; /* of the caller, during hs_stream_next */
     void       *context;
 };
 
@@ -46,8 +46,7 @@ static void
 open_output(const hs_stream *stream, hs_account *account, hs_output *output)
 {
     const hs_options *options = &stream->call.options;
-    hs_output_init(account, stream->search.scene.ndim, options->want, options->index_bytes,
-                   output);
+    hs_output_init(account, stream->search.scene.ndim, options->want, options->index_bytes, output);
 }
 
 /* Appends the first n pairs that wait. */
@@ -99,8 +98,8 @@ fill(hs_stream *stream, hs_failure *failure)
     }
     const int64_t before = stream->held.n_pairs;
     hs_call_gather(search->call, search->bins.n);
-    const hs_status status = hs_parallel_record_on(search, &stream->held, fill_of(stream),
-                                                   &stream->next, failure);
+    const hs_status status =
+        hs_parallel_record_on(search, &stream->held, fill_of(stream), &stream->next, failure);
     hs_call_dismiss(search->call);
     if (status != HS_OK) {
         stream->held.n_pairs = before;
@@ -228,7 +227,7 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     const hs_options of_stream = options_of_stream(options);
     hs_request       request = hs_request_among(among, HS_HALF_LIST, &of_stream);
     request.sets.keeps_none = true;
-    hs_stream       *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
+    hs_stream *stream = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *stream);
     if (stream == NULL) {
         return hs_end_early(HS_ERR_MEMORY, NULL, failure);
     }

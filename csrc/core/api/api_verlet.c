@@ -10,7 +10,6 @@
 #include "../base/poll.h"
 #include "../exact/doubleword.h"
 
-
 #include <math.h>
 #include <string.h>
 
@@ -168,8 +167,7 @@ hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
     failure = failure != NULL ? failure : &ignored;
     *failure = HS_NO_FAILURE;
     const hs_fpenv  saved = hs_fpenv_enter();
-    const hs_status status =
-        update(list, points, box, options, skin, rebuild, rebuilt, failure);
+    const hs_status status = update(list, points, box, options, skin, rebuild, rebuilt, failure);
     hs_fpenv_leave(saved);
     return status;
 }

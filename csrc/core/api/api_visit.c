@@ -15,9 +15,9 @@
 
 /* What one thread works with. */
 typedef struct visitor {
-    const hs_visit *visit;     /* borrowed */
-    hs_output       part;      /* owned; the pairs that are being visited */
-    hs_recorder     recorder;  /* owned; of the part */
+    const hs_visit *visit;    /* borrowed */
+    hs_output       part;     /* owned; the pairs that are being visited */
+    hs_recorder     recorder; /* owned; of the part */
     int64_t         n_visited;
 } visitor;
 
@@ -55,10 +55,10 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
                                   .distance = hs_output_column(part, HS_WANT_DISTANCE),
                                   .vector = hs_output_column(part, HS_WANT_VECTOR),
                                   .shift = hs_output_column(part, HS_WANT_SHIFT)};
-    int64_t   n_taken = part->n_pairs;
-    const int stops = visit->pairs != NULL
-                          ? visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user)
-                          : call_each(visit, &pairs, part->ndim, &n_taken);
+    int64_t              n_taken = part->n_pairs;
+    const int            stops = visit->pairs != NULL
+                                     ? visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user)
+                                     : call_each(visit, &pairs, part->ndim, &n_taken);
     (void)hs_fpenv_enter(); /* whatever the function has done to it */
     doing->n_visited += n_taken;
     scanner->work_since_poll += CALL_WORK * part->n_pairs;

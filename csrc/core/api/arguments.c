@@ -75,8 +75,7 @@ has_coordinates(const hs_points *points)
 {
     const double rows = (double)(points->n - 1) * (double)points->row_stride;
     const double columns = (double)(points->ndim - 1) * (double)points->column_stride;
-    return points->n == 0 ||
-           (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT);
+    return points->n == 0 || (points->data != NULL && fabs(rows) + fabs(columns) <= MOST_EXTENT);
 }
 
 hs_status
@@ -153,8 +152,7 @@ hs_check_options(const hs_options *options)
     }
     return status_of((want & ~HS_WANT_ALL) == 0 &&
                      (want == 0 || is_index_size(options->index_bytes)) &&
-                     (out == NULL || can_hold(out, want)) &&
-                     options->cell_size >= 0.0 &&
+                     (out == NULL || can_hold(out, want)) && options->cell_size >= 0.0 &&
                      (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
                       options->precision == HS_SINGLE));
 }

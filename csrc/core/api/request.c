@@ -44,8 +44,8 @@ hs_status
 hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_failure *failure)
 {
     const hs_sets  *sets = &request->sets;
-    const hs_status sound = hs_check_arguments(sets->points, sets->queries, request->box,
-                                               request->options, failure);
+    const hs_status sound =
+        hs_check_arguments(sets->points, sets->queries, request->box, request->options, failure);
     return sound == HS_OK ? hs_search_open(sets, request->box, call, search, failure) : sound;
 }
 

@@ -47,8 +47,8 @@ build_system(hs_systems_worker *worker, int64_t s)
     if (systems->cutoffs != NULL) {
         worker->call.options.cutoff = systems->cutoffs[s];
     }
-    const hs_status status = hs_search_build(&(hs_sets){.points = &points}, box, &worker->search,
-                                             &worker->failure);
+    const hs_status status =
+        hs_search_build(&(hs_sets){.points = &points}, box, &worker->search, &worker->failure);
     if (status == HS_OK) {
         hs_search_renumber(first, crew->points->n, &worker->search);
     } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE ||

@@ -14,15 +14,15 @@ typedef struct hs_systems_crew hs_systems_crew;
 /* What one thread works with. */
 typedef struct hs_systems_worker {
     hs_systems_crew *crew;
-    hs_call          call;    /* with this thread's poll */
+    hs_call          call; /* with this thread's poll */
     hs_committer     committer;
-    hs_search        search;  /* of one system after the other */
-    hs_box           box;     /* of the present system, where each has its own */
-    hs_output       *target;  /* the crew's output, or the backlog's */
+    hs_search        search; /* of one system after the other */
+    hs_box           box;    /* of the present system, where each has its own */
+    hs_output       *target; /* the crew's output, or the backlog's */
     hs_backlog       backlog;
-    hs_output        found;   /* pairs of one system before they are sorted */
+    hs_output        found; /* pairs of one system before they are sorted */
     hs_failure       failure;
-    int64_t          work;    /* since the last poll */
+    int64_t          work; /* since the last poll */
 } hs_systems_worker;
 
 struct hs_systems_crew {
@@ -30,7 +30,7 @@ struct hs_systems_crew {
     const hs_systems  *systems;
     hs_systems_worker *workers;
     hs_commits        *commits;
-    hs_output         *output;    /* NULL: only counting, into ... */
+    hs_output         *output; /* NULL: only counting, into ... */
     int64_t           *counts;
     int64_t            in_range;  /* systems of a range */
     bool               is_direct; /* the one thread writes to the output itself */

@@ -31,19 +31,19 @@
 #endif
 
 #if defined(_MSC_VER)
-#define HS_ALWAYS_INLINE static __forceinline
-#define HS_NO_INLINE __declspec(noinline)
-#define HS_RESTRICT __restrict
-#define HS_UNLIKELY(x) (x)
+#define HS_ALWAYS_INLINE           static __forceinline
+#define HS_NO_INLINE               __declspec(noinline)
+#define HS_RESTRICT                __restrict
+#define HS_UNLIKELY(x)             (x)
 #define HS_PREFETCH_WRITE(address) ((void)(address))
-#define HS_PREFETCH(address) ((void)(address))
+#define HS_PREFETCH(address)       ((void)(address))
 #else
-#define HS_ALWAYS_INLINE static inline __attribute__((always_inline))
-#define HS_NO_INLINE __attribute__((noinline))
-#define HS_RESTRICT restrict
-#define HS_UNLIKELY(x) __builtin_expect(!!(x), 0)
+#define HS_ALWAYS_INLINE           static inline __attribute__((always_inline))
+#define HS_NO_INLINE               __attribute__((noinline))
+#define HS_RESTRICT                restrict
+#define HS_UNLIKELY(x)             __builtin_expect(!!(x), 0)
 #define HS_PREFETCH_WRITE(address) __builtin_prefetch(address, 1)
-#define HS_PREFETCH(address) __builtin_prefetch(address) /* harmless for any address */
+#define HS_PREFETCH(address)       __builtin_prefetch(address) /* harmless for any address */
 #endif
 
 /* -DHS_HAVE_INT128=0 builds what compilers without a 128-bit integer build. */
@@ -55,7 +55,7 @@
 #endif
 #endif
 #if HS_HAVE_INT128
-__extension__ typedef __int128 hs_int128;
+__extension__ typedef __int128          hs_int128;
 __extension__ typedef unsigned __int128 hs_uint128;
 #endif
 

@@ -7,15 +7,15 @@
 #include <xmmintrin.h>
 
 /* Power-on value: round to nearest, every exception masked, no flag set, no flushing. */
-#define MXCSR_DEFAULT 0x1f80u
-#define MXCSR_FLUSH 0x8040u     /* results and operands that are subnormal count as zero */
+#define MXCSR_DEFAULT   0x1f80u
+#define MXCSR_FLUSH     0x8040u /* results and operands that are subnormal count as zero */
 #define MXCSR_SUBNORMAL 0x0012u /* flags: an operand was subnormal, a result was too small */
-#define CAN_FLUSH 1
+#define CAN_FLUSH       1
 
 /* The C library of MinGW computes with the x87 unit, whose rounding is its own: the control word
  * stands above the 32 bits of MXCSR. */
 #if defined(__MINGW32__)
-#define X87_ROUNDING 0x0c00u
+#define X87_ROUNDING   0x0c00u
 #define X87_EXCEPTIONS 0x003fu /* masks in the control word, flags in the status word */
 
 /* What fnstenv stores: the control word and the status word are the lower halves of the first two.
@@ -46,7 +46,7 @@ leave_x87(uint64_t saved)
     __asm__ __volatile__("fnclex\n\tfldenv %0" : : "m"(state));
 }
 #else
-#define enter_x87() UINT64_C(0)
+#define enter_x87()      UINT64_C(0)
 #define leave_x87(saved) ((void)(saved))
 #endif
 

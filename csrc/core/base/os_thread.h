@@ -24,16 +24,16 @@ typedef unsigned           hs_thread_result;
 #define HS_THREAD_CALL __stdcall
 typedef hs_thread_result(HS_THREAD_CALL *hs_thread_fn)(void *);
 
-#define hs_mutex_init(mutex) InitializeSRWLock(mutex)
-#define hs_mutex_lock(mutex) AcquireSRWLockExclusive(mutex)
-#define hs_mutex_unlock(mutex) ReleaseSRWLockExclusive(mutex)
-#define hs_mutex_destroy(mutex) ((void)(mutex))
+#define hs_mutex_init(mutex)         InitializeSRWLock(mutex)
+#define hs_mutex_lock(mutex)         AcquireSRWLockExclusive(mutex)
+#define hs_mutex_unlock(mutex)       ReleaseSRWLockExclusive(mutex)
+#define hs_mutex_destroy(mutex)      ((void)(mutex))
 #define hs_condition_init(condition) InitializeConditionVariable(condition)
 #define hs_condition_wait(condition, mutex) \
     ((void)SleepConditionVariableSRW(condition, mutex, INFINITE, 0))
 #define hs_condition_wait_briefly(condition, mutex) \
     ((void)SleepConditionVariableSRW(condition, mutex, HS_BRIEFLY_MS, 0))
-#define hs_condition_wake(condition) WakeAllConditionVariable(condition)
+#define hs_condition_wake(condition)    WakeAllConditionVariable(condition)
 #define hs_condition_destroy(condition) ((void)(condition))
 
 HS_ALWAYS_INLINE bool
@@ -55,7 +55,7 @@ hs_thread_join(hs_thread thread)
 
 /* There are no signals to block. */
 typedef int hs_signals;
-#define hs_signals_block(saved) ((void)(*(saved) = 0))
+#define hs_signals_block(saved)   ((void)(*(saved) = 0))
 #define hs_signals_restore(saved) ((void)(saved))
 
 #else
@@ -72,14 +72,14 @@ typedef void           *hs_thread_result;
 #define HS_THREAD_CALL
 typedef hs_thread_result (*hs_thread_fn)(void *);
 
-#define hs_mutex_init(mutex) ((void)pthread_mutex_init(mutex, NULL))
-#define hs_mutex_lock(mutex) ((void)pthread_mutex_lock(mutex))
-#define hs_mutex_unlock(mutex) ((void)pthread_mutex_unlock(mutex))
-#define hs_mutex_destroy(mutex) ((void)pthread_mutex_destroy(mutex))
-#define hs_condition_init(condition) ((void)pthread_cond_init(condition, NULL))
+#define hs_mutex_init(mutex)                ((void)pthread_mutex_init(mutex, NULL))
+#define hs_mutex_lock(mutex)                ((void)pthread_mutex_lock(mutex))
+#define hs_mutex_unlock(mutex)              ((void)pthread_mutex_unlock(mutex))
+#define hs_mutex_destroy(mutex)             ((void)pthread_mutex_destroy(mutex))
+#define hs_condition_init(condition)        ((void)pthread_cond_init(condition, NULL))
 #define hs_condition_wait(condition, mutex) ((void)pthread_cond_wait(condition, mutex))
-#define hs_condition_wake(condition) ((void)pthread_cond_broadcast(condition))
-#define hs_condition_destroy(condition) ((void)pthread_cond_destroy(condition))
+#define hs_condition_wake(condition)        ((void)pthread_cond_broadcast(condition))
+#define hs_condition_destroy(condition)     ((void)pthread_cond_destroy(condition))
 
 HS_ALWAYS_INLINE bool
 hs_thread_start(hs_thread *thread, hs_thread_fn run, void *context)

@@ -10,12 +10,12 @@ typedef struct quantity {
 } quantity;
 
 static const quantity quantities[HS_QUANTITIES] = {
-    {HS_FOR_INDICES, 0, 1},                 /* HS_WANT_I */
-    {HS_FOR_INDICES, 0, 1},                 /* HS_WANT_J */
-    {HS_FOR_DISTANCES, sizeof(double), 1},  /* HS_WANT_DISTANCE */
-    {HS_FOR_VECTORS, sizeof(double), 0},    /* HS_WANT_VECTOR */
-    {HS_FOR_SHIFTS, sizeof(int32_t), 0},    /* HS_WANT_SHIFT */
-    {HS_FOR_INDICES, 0, 2},                 /* HS_WANT_BOTH */
+    {HS_FOR_INDICES, 0, 1},                /* HS_WANT_I */
+    {HS_FOR_INDICES, 0, 1},                /* HS_WANT_J */
+    {HS_FOR_DISTANCES, sizeof(double), 1}, /* HS_WANT_DISTANCE */
+    {HS_FOR_VECTORS, sizeof(double), 0},   /* HS_WANT_VECTOR */
+    {HS_FOR_SHIFTS, sizeof(int32_t), 0},   /* HS_WANT_SHIFT */
+    {HS_FOR_INDICES, 0, 2},                /* HS_WANT_BOTH */
 };
 
 static size_t

@@ -380,7 +380,7 @@ hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *giv
 {
     for (int l = 0; l < lattice->n_periodic; l++) {
         double   rough = 0.0, size = 0.0; /* the sum, and what its rounding is relative to */
-        uint64_t sum = 0; /* modulo 2^64: exact once the sum is known to be small */
+        uint64_t sum = 0;                 /* modulo 2^64: exact once the sum is known to be small */
         for (int r = 0; r < lattice->n_periodic; r++) {
             const double term = (double)reduced[r] * (double)lattice->U[r][l];
             rough += term;

@@ -32,18 +32,18 @@ hs_scale_apply(hs_scale scale, double value)
 typedef struct hs_lattice {
     int     ndim;
     int     n_periodic;
-    bool    aligned;                         /* B is diagonal: t_k is coordinate k itself */
-    bool    reduced;                         /* B is not the given rows (up to sign) */
-    int     vector_of_row[HS_MAX_DIM];         /* box vector that periodic row r is */
-    int     row_of_axis[HS_MAX_DIM];         /* row of B along grid axis k, or -1: open */
-    double  given[HS_MAX_DIM][HS_MAX_DIM];   /* periodic rows as given, not scaled */
-    double  scaled[HS_MAX_DIM][HS_MAX_DIM];  /* the same, scaled */
-    int64_t U[HS_MAX_DIM][HS_MAX_DIM];       /* B = U * scaled */
-    double  rows[HS_MAX_DIM][HS_MAX_DIM];    /* B, scaled, rounded to float64 ... */
-    double  row_error[HS_MAX_DIM];           /* ... each entry within this; 0 when aligned */
-    double  normal[HS_MAX_DIM][HS_MAX_DIM];  /* unit vectors */
-    double  period[HS_MAX_DIM];              /* normal[k] . B along k: the height; 0 when open */
-    double  volume_mantissa; /* the volume of the periodic rows, scaled, ... */
+    bool    aligned;                        /* B is diagonal: t_k is coordinate k itself */
+    bool    reduced;                        /* B is not the given rows (up to sign) */
+    int     vector_of_row[HS_MAX_DIM];      /* box vector that periodic row r is */
+    int     row_of_axis[HS_MAX_DIM];        /* row of B along grid axis k, or -1: open */
+    double  given[HS_MAX_DIM][HS_MAX_DIM];  /* periodic rows as given, not scaled */
+    double  scaled[HS_MAX_DIM][HS_MAX_DIM]; /* the same, scaled */
+    int64_t U[HS_MAX_DIM][HS_MAX_DIM];      /* B = U * scaled */
+    double  rows[HS_MAX_DIM][HS_MAX_DIM];   /* B, scaled, rounded to float64 ... */
+    double  row_error[HS_MAX_DIM];          /* ... each entry within this; 0 when aligned */
+    double  normal[HS_MAX_DIM][HS_MAX_DIM]; /* unit vectors */
+    double  period[HS_MAX_DIM];             /* normal[k] . B along k: the height; 0 when open */
+    double  volume_mantissa;                /* the volume of the periodic rows, scaled, ... */
     int     volume_exponent; /* ... is mantissa * 2^exponent: products of lengths overflow */
     double  direction[HS_MAX_DIM][HS_MAX_DIM]; /* D = sum_k (normal[k] . D) direction[k] */
 } hs_lattice;

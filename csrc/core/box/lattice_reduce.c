@@ -21,7 +21,7 @@
 
 #include "../exact/doubleword.h"
 
-#define MAX_COEFFICIENT (INT64_C(1) << 61)
+#define MAX_COEFFICIENT  (INT64_C(1) << 61)
 #define COEFFICIENT_TAIL (INT64_C(1) << 26) /* splits them into 35 and 26 bits, exact as doubles */
 
 #define LOVASZ 0.99 /* the factor that each exchange of rows must gain, so that they end */
@@ -40,7 +40,7 @@ typedef struct scaled_row {
 
 typedef struct basis {
     int        ndim, n_rows;
-    int        n_refused;         /* steps that were not taken for their size */
+    int        n_refused; /* steps that were not taken for their size */
     bool       changed;
     int        order[HS_MAX_DIM]; /* row order[k] is the k-th to the algorithm */
     scaled_row row[HS_MAX_DIM];   /* B = U A, rounded */
@@ -210,7 +210,7 @@ project(basis *b, int k)
     memcpy(x, row->x, sizeof x);
     for (int j = 0; j < k; j++) {
         const scaled_row *star = &b->star[j];
-        double along = star->norm2 > 0.0 ? dot(b->ndim, x, star->x) / star->norm2 : 0.0;
+        double            along = star->norm2 > 0.0 ? dot(b->ndim, x, star->x) / star->norm2 : 0.0;
         for (int c = 0; c < b->ndim; c++) {
             x[c] -= along * star->x[c];
         }
@@ -223,7 +223,7 @@ static double
 coefficient(const basis *b, int k, int j)
 {
     const scaled_row *row = &b->row[b->order[k]], *star = &b->star[j];
-    double mu = star->norm2 > 0.0 ? dot(b->ndim, row->x, star->x) / star->norm2 : 0.0;
+    double            mu = star->norm2 > 0.0 ? dot(b->ndim, row->x, star->x) / star->norm2 : 0.0;
     return ldexp(mu, row->exponent - star->exponent);
 }
 

@@ -14,10 +14,10 @@
  * determinant +1 or -1, so both bases span the same lattice. */
 typedef struct hs_reduction {
     int     n_rows;
-    bool    changed;                       /* U is not the identity */
-    int64_t U[HS_MAX_DIM][HS_MAX_DIM];     /* |U[k][l]| <= 2^61 */
-    double  rows[HS_MAX_DIM][HS_MAX_DIM];  /* B rounded to float64 ... */
-    double  error[HS_MAX_DIM];             /* ... each entry of row k within this */
+    bool    changed;                      /* U is not the identity */
+    int64_t U[HS_MAX_DIM][HS_MAX_DIM];    /* |U[k][l]| <= 2^61 */
+    double  rows[HS_MAX_DIM][HS_MAX_DIM]; /* B rounded to float64 ... */
+    double  error[HS_MAX_DIM];            /* ... each entry of row k within this */
 } hs_reduction;
 
 /*

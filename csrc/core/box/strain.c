@@ -172,8 +172,8 @@ bound_inverse(const hs_lattice *lattice)
 static double
 bound_residual(const hs_lattice *lattice, const double now[][HS_MAX_DIM], const hs_strain *strain)
 {
-    const int d = lattice->ndim, m = lattice->n_periodic;
-    double    product[HS_MAX_DIM][HS_MAX_DIM], sum = 0.0;
+    const int    d = lattice->ndim, m = lattice->n_periodic;
+    double       product[HS_MAX_DIM][HS_MAX_DIM], sum = 0.0;
     const double off = multiply(m, d, d, lattice->given, strain->F, product);
     for (int r = 0; r < m; r++) {
         for (int k = 0; k < d; k++) {
@@ -205,9 +205,8 @@ hs_strain_find(const hs_box *before, const hs_box *now, hs_strain *strain)
     }
     strain->residual = bound_inverse(&lattice) *
                        bound_residual(&lattice, (const double(*)[HS_MAX_DIM])rows, strain) * GROW;
-    strain->shrink =
-        hs_smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) -
-        strain->residual;
+    strain->shrink = hs_smallest_stretch(before->ndim, (const double(*)[HS_MAX_DIM])strain->F) -
+                     strain->residual;
     /* The difference is rounded by at most 2^-53 of the larger. */
     strain->shrink -= 0x1p-52 * fabs(strain->shrink) + 0x1p-53 * strain->residual + 0x1p-1060;
     strain->shrink = hs_smaller(strain->shrink, 1.0);

@@ -14,9 +14,9 @@
  */
 typedef struct hs_strain {
     double F[HS_MAX_DIM][HS_MAX_DIM]; /* a row vector x goes to x F */
-    double column_sum; /* at least the largest sum over |F| of a column */
-    double shrink;     /* |x F| >= shrink |x|, at most 1, rounded down; 0 or less: nothing known */
-    double residual;   /* |S (h0 F - h)| <= residual |S h0| for every S; taken off `shrink` too */
+    double column_sum;                /* at least the largest sum over |F| of a column */
+    double shrink;   /* |x F| >= shrink |x|, at most 1, rounded down; 0 or less: nothing known */
+    double residual; /* |S (h0 F - h)| <= residual |S h0| for every S; taken off `shrink` too */
 } hs_strain;
 
 /* False where a bound cannot be had: too large a change, or numbers near the ends of the range. */

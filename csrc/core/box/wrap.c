@@ -6,7 +6,7 @@
 
 #include "../exact/doubleword.h"
 
-#define TURNS_TAIL (INT64_C(1) << 26) /* splits 62 bits into 36 and 26, both exact as doubles */
+#define TURNS_TAIL  (INT64_C(1) << 26) /* splits 62 bits into 36 and 26, both exact as doubles */
 #define WRAP_PASSES 4 /* each pass gains 50 bits; from 2^51 turns two are enough, two are spare */
 
 /* Numbers beyond this are taken smaller, exactly, before they are split into halves: splitting
@@ -18,7 +18,7 @@
 /* Entries of a box by so much, and their products back again: what is below 2^1024 comes below
  * 2^960, and stays above 2^836, far from the smallest numbers. */
 #define SHRINK 0x1p-64
-#define GROW 0x1p64
+#define GROW   0x1p64
 
 /*
  * x - n * length, which must be a double, for an integer 1 <= |n| < 2^52 within 3/4 of x / length.
@@ -153,8 +153,8 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
  * of 0.5 too large), and to +-1 beyond; x - n L is the expression of wrap.c.
  */
 
-#define TILE 256 /* points at a time: they stay in the nearest cache */
-#define LANES 8  /* maxima kept side by side, so that the loops over them can be vectors */
+#define TILE  256 /* points at a time: they stay in the nearest cache */
+#define LANES 8   /* maxima kept side by side, so that the loops over them can be vectors */
 /* Up to here, in periods, x is wrapped by one turn at most; below 1.5 with room for rounding. */
 #define ONE_TURN 1.25
 

@@ -8,7 +8,7 @@
 
 #include "lattice.h"
 
-#define HS_WRAP_LIMIT 0x1p51     /* turns beyond this are not known exactly */
+#define HS_WRAP_LIMIT   0x1p51    /* turns beyond this are not known exactly */
 #define HS_WRAP_UNKNOWN INT64_MIN /* stands for such a number of turns */
 
 /*
@@ -67,8 +67,8 @@ typedef struct hs_folded {
     double  x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
     double  lower[HS_MAX_DIM];     /* range of t_k of X; not set in aligned lattices */
     double  upper[HS_MAX_DIM];
-    double  magnitude;             /* as hs_wrap_point says */
-    int64_t failed;                /* lowest point that could not be wrapped, or -1 */
+    double  magnitude; /* as hs_wrap_point says */
+    int64_t failed;    /* lowest point that could not be wrapped, or -1 */
 } hs_folded;
 
 /* Nothing yet. */

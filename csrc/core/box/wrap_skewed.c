@@ -13,8 +13,8 @@
 #include <math.h>
 #include <string.h>
 
-#define TILE 256 /* points at a time: all work arrays together fit the nearest cache */
-#define LANES 8  /* extremes kept side by side, so that the loops over them can be vectors */
+#define TILE  256 /* points at a time: all work arrays together fit the nearest cache */
+#define LANES 8   /* extremes kept side by side, so that the loops over them can be vectors */
 /* Adding and subtracting this rounds any |x| < 2^51 to an integer, ties to even, as rint() does. */
 #define ROUNDER 0x1.8p52
 
@@ -22,9 +22,9 @@
 typedef struct tile {
     int    n;
     double inside[HS_MAX_DIM][TILE];
-    double given[HS_MAX_DIM][TILE]; /* turns over the rows as given, as doubles */
+    double given[HS_MAX_DIM][TILE];  /* turns over the rows as given, as doubles */
     double turned[HS_MAX_DIM][TILE]; /* turns over B */
-    double moved[TILE];             /* 0 where no turn is needed */
+    double moved[TILE];              /* 0 where no turn is needed */
     double t[TILE], sum[TILE], low[TILE], absolute[TILE];
 } tile;
 
@@ -100,9 +100,8 @@ subtract_terms(const term *terms, int n_terms, tile *work)
         for (int e = 0; e < n_terms; e++) {
             const double factor = -each[e].turns[i];
             const double product = factor * each[e].entry;
-            const double error =
-                (factor * each[e].high_part - product) + factor * each[e].low_part;
-            const hs_dw partial = hs_two_sum(sum, product);
+            const double error = (factor * each[e].high_part - product) + factor * each[e].low_part;
+            const hs_dw  partial = hs_two_sum(sum, product);
             sum = partial.hi;
             low += partial.lo + error;
             absolute += fabs(product);

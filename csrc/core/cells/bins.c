@@ -26,9 +26,9 @@ typedef struct sorting {
     const hs_lattice *lattice;
     const hs_bins    *bins;
     double *const    *x;
-    uint32_t         *cells;             /* cell of every point */
+    uint32_t         *cells; /* cell of every point */
     int               n_strips;
-    int32_t          *counts[HS_SLABS];  /* of each strip: points in each cell, then the place of
+    int32_t          *counts[HS_SLABS]; /* of each strip: points in each cell, then the place of
                                           * its next point there */
 } sorting;
 
@@ -112,10 +112,10 @@ accumulate(const sorting *sort)
 static hs_status
 order_strip(void *context, int strip, int64_t first, int64_t last)
 {
-    const sorting            *sort = context;
-    int32_t *HS_RESTRICT      next = sort->counts[strip];
-    const uint32_t           *cells = sort->cells;
-    int32_t *HS_RESTRICT      order = sort->bins->order;
+    const sorting       *sort = context;
+    int32_t *HS_RESTRICT next = sort->counts[strip];
+    const uint32_t      *cells = sort->cells;
+    int32_t *HS_RESTRICT order = sort->bins->order;
     for (int64_t i = first; i < last; i++) {
         order[next[cells[i]]++] = (int32_t)i;
     }
@@ -168,8 +168,8 @@ hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                 const hs_scene *scene, hs_bins *bins)
 {
     char           *end = NULL;
-    const hs_status status = hs_columns_gather(team, options, scene->x_is_beside, bins,
-                                               scene->cloud.spare, &end);
+    const hs_status status =
+        hs_columns_gather(team, options, scene->x_is_beside, bins, scene->cloud.spare, &end);
     if (status == HS_OK) {
         void *last = bins->beside != NULL ? bins->beside : bins->points;
         hs_trim(account, last, (size_t)(end - (char *)last) + HS_COLUMN_PADDING);
@@ -178,8 +178,8 @@ hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
 }
 
 static hs_status
-sort_points(hs_account *account, hs_team *team, const hs_options *options,
-            const hs_scene *scene, const hs_grid *grid, hs_bins *bins)
+sort_points(hs_account *account, hs_team *team, const hs_options *options, const hs_scene *scene,
+            const hs_grid *grid, hs_bins *bins)
 {
     sorting         sort = {.grid = grid,
                             .lattice = &scene->lattice,
@@ -193,9 +193,7 @@ sort_points(hs_account *account, hs_team *team, const hs_options *options,
 void
 hs_bins_take(hs_scene *scene, hs_bins *bins)
 {
-    *bins = (hs_bins){.n = scene->n,
-                      .ndim = scene->ndim,
-                      .n_periodic = scene->lattice.n_periodic};
+    *bins = (hs_bins){.n = scene->n, .ndim = scene->ndim, .n_periodic = scene->lattice.n_periodic};
     bins->points = scene->cloud.block;
     bins->beside = scene->beside;
     bins->order = scene->cloud.order;

@@ -19,8 +19,8 @@ typedef struct hs_bins {
     bool     keeps_originals;
     double  *originals[HS_MAX_DIM]; /* the points as given, n each, if they are kept */
     hs_turns turns;
-    void    *points;        /* owned; the columns above lie in these two: the scene's blocks */
-    void    *beside;        /* owned or NULL */
+    void    *points; /* owned; the columns above lie in these two: the scene's blocks */
+    void    *beside; /* owned or NULL */
 } hs_bins;
 
 /*

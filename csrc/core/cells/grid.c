@@ -13,8 +13,8 @@
 #include <math.h>
 #include <string.h>
 
-#define UNIT 0x1p-53
-#define SLACK HS_GRID_SLACK
+#define UNIT                0x1p-53
+#define SLACK               HS_GRID_SLACK
 #define MOST_CELLS_PER_AXIS HS_GRID_CELLS_PER_AXIS
 /* In all: cell ids are uint32. */
 #define MOST_CELLS 4294967295.0
@@ -23,7 +23,7 @@
 #define POINTS_PER_CELL 12.0
 /* Where cells are wider than need be, rows of few cells hold so many points at least: there is
  * nothing to put together along them. */
-#define FEW_CELLS 4.0
+#define FEW_CELLS      4.0
 #define POINTS_PER_ROW 8.0
 /* Of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
@@ -37,7 +37,8 @@ bound_images(const hs_scene *scene, const double *drift, double *images)
         const int r = lattice->row_of_axis[k];
         if (r >= 0) {
             images[r] = ceil((scene->radius * (1.0 + SLACK) + drift[k] + 2.0 * scene->t_error[k]) /
-                             lattice->period[k]) + 2.0;
+                             lattice->period[k]) +
+                        2.0;
         }
     }
 }
@@ -107,7 +108,8 @@ bound_shift_error(const hs_scene *scene, const double *images)
         }
         if (moved > 0.0) {
             error = hs_larger((2 * lattice->n_periodic + 3) * UNIT *
-                                      (moved + 2.0 * scene->x_largest[c]) + row_errors,
+                                      (moved + 2.0 * scene->x_largest[c]) +
+                                  row_errors,
                               error);
         }
     }
@@ -127,8 +129,8 @@ hs_ball_volume(int ndim, double radius)
 /* Cells along each axis for a pitch of radius / finer, and for about POINTS_PER_CELL along the
  * first. parts: cells that shall reach as far as the range. */
 static void
-choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
-              double *counts, double *parts)
+choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density, double *counts,
+              double *parts)
 {
     double area = 1.0; /* of one row's cross-section */
     for (int k = scene->ndim - 1; k >= 0; k--) {
@@ -239,8 +241,7 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
         candidates *= cells / (double)grid->shape[k];
         rows *= k > 0 ? cells : 1.0;
     }
-    const double group =
-        hs_smaller(hs_larger((double)scene->n / (double)grid->n_cells, 1.0), 64.0);
+    const double group = hs_smaller(hs_larger((double)scene->n / (double)grid->n_cells, 1.0), 64.0);
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
@@ -272,8 +273,7 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
         hs_grid_cut_by_faces(scene, parts, most_cells(scene), grid);
     }
-    if (single_cost < INFINITY &&
-        (status != HS_OK || single_cost <= cost_per_point(scene, grid))) {
+    if (single_cost < INFINITY && (status != HS_OK || single_cost <= cost_per_point(scene, grid))) {
         *grid = single;
         status = HS_OK;
     }
@@ -370,7 +370,7 @@ hs_status
 hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before, hs_grid *grid)
 {
     HS_ASSERT(cutoff_before > 0.0 && cutoff_before >= scene->cutoff);
-    const double ratio = scene->cutoff / cutoff_before;
+    const double    ratio = scene->cutoff / cutoff_before;
     const hs_status status = set_ranges(scene, grid);
     for (int k = 0; status == HS_OK && k < scene->ndim; k++) {
         HS_ASSERT(!grid->by_faces[k]);

@@ -9,19 +9,19 @@
 #include "../scene/scene.h"
 
 typedef struct hs_grid {
-    int      ndim;
-    int64_t  n_cells;             /* product of shape, at most 2 n + HS_GRID_SPARE_CELLS */
-    int64_t  shape[HS_MAX_DIM];   /* cells along each axis, at least 1 */
-    int64_t  stride[HS_MAX_DIM];  /* cell id = sum of index * stride; the first axis is fastest */
-    double   lower[HS_MAX_DIM];   /* t of the first face; of place 0 in a sparse grid */
-    int64_t  skipped[HS_MAX_DIM]; /* sparse grids: cells before the first that holds points */
-    double   cell_size[HS_MAX_DIM];
-    double   cells_per_length[HS_MAX_DIM];
-    bool     by_faces[HS_MAX_DIM]; /* cells begin at the numbers hs_grid_face() gives, exactly */
-    double   range[HS_MAX_DIM];   /* largest |difference of computed t_k| of a pair */
-    int64_t  reach[HS_MAX_DIM];   /* the same in cells, images counted on */
-    double   shift_error;         /* bound on the error of a shifted coordinate minus a centre */
-    double   expected_pairs;      /* if the points were spread evenly over the region they occupy */
+    int     ndim;
+    int64_t n_cells;             /* product of shape, at most 2 n + HS_GRID_SPARE_CELLS */
+    int64_t shape[HS_MAX_DIM];   /* cells along each axis, at least 1 */
+    int64_t stride[HS_MAX_DIM];  /* cell id = sum of index * stride; the first axis is fastest */
+    double  lower[HS_MAX_DIM];   /* t of the first face; of place 0 in a sparse grid */
+    int64_t skipped[HS_MAX_DIM]; /* sparse grids: cells before the first that holds points */
+    double  cell_size[HS_MAX_DIM];
+    double  cells_per_length[HS_MAX_DIM];
+    bool    by_faces[HS_MAX_DIM]; /* cells begin at the numbers hs_grid_face() gives, exactly */
+    double  range[HS_MAX_DIM];    /* largest |difference of computed t_k| of a pair */
+    int64_t reach[HS_MAX_DIM];    /* the same in cells, images counted on */
+    double  shift_error;          /* bound on the error of a shifted coordinate minus a centre */
+    double  expected_pairs;       /* if the points were spread evenly over the region they occupy */
 } hs_grid;
 
 #define HS_GRID_SPARE_CELLS 64
@@ -42,8 +42,7 @@ hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, 
 
 /* Steps of both. Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the
  * volume that they are in. */
-hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid,
-                        hs_failure *failure);
+hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
 
 /* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
  * whether it had to. */

@@ -16,7 +16,7 @@ faces_hold(const hs_scene *scene, const hs_grid *grid, int k, double least)
     double from = scene->lower[k]; /* where cell 0 begins */
     for (int64_t cell = 0; cell < grid->shape[k]; cell++) {
         const double to = cell + 1 < grid->shape[k] ? hs_grid_face(grid, k, (double)(cell + 1))
-                                                     : scene->upper[k];
+                                                    : scene->upper[k];
         const hs_dw  width = hs_two_difference(to, from);
         if (!(width.hi > least || (width.hi == least && width.lo >= 0.0))) {
             return false;

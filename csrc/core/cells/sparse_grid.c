@@ -48,7 +48,7 @@ choose_pitch(const hs_grid *grid, int k, double extent, double width)
 static void
 set_open_axis(const hs_scene *scene, int k, double pitch, int64_t reach, hs_grid *grid)
 {
-    const double  lower = scene->lower[k], upper = scene->upper[k];
+    const double lower = scene->lower[k], upper = scene->upper[k];
     grid->lower[k] = lower > 0.0 ? lower : upper < 0.0 ? upper : 0.0;
     grid->cell_size[k] = pitch;
     grid->cells_per_length[k] = 1.0 / pitch;
@@ -99,10 +99,10 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
 #define TESTS_PER_POINT 130.0
 /* In cells so much larger than the cutoff float32 does not tell neighbours from others, and pairs
  * are decided one by one: some 12 ns each. */
-#define FILTER_FAILS 0x1p18
+#define FILTER_FAILS       0x1p18
 #define TESTS_PER_DECISION 40.0
-#define WIDEST 256.0 /* ranges */
-#define MOST_SAMPLES 4096 /* 32 kB of stack */
+#define WIDEST             256.0 /* ranges */
+#define MOST_SAMPLES       4096  /* 32 kB of stack */
 
 /* A bijection of 64 bits that spreads every bit over all others (the finaliser of MurmurHash3). */
 static uint64_t

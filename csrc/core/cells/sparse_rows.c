@@ -221,7 +221,7 @@ list_cells(const build *b, int64_t n, int32_t *start, hs_sparse *sparse)
     int64_t *keys = sparse->cell_x; /* read ahead of where it is written */
     int64_t  row = 0, cell = 0, x = 0;
     for (int64_t si = 0; si < n; si++) {
-        const bool begins_row = keys[si] < 0;
+        const bool    begins_row = keys[si] < 0;
         const int64_t own = begins_row ? ~keys[si] : keys[si];
         if (begins_row) {
             const int64_t i = b->sort.ids[si];
@@ -245,8 +245,8 @@ make_rows(build *b, hs_sparse *sparse, hs_bins *bins)
 {
     hs_account *account = b->account;
     count_cells(sparse->cell_x, bins->n, sparse);
-    sparse->row_index = hs_alloc(account, HS_FOR_CELLS, sparse->n_rows * (sparse->ndim - 1),
-                                 sizeof(int64_t));
+    sparse->row_index =
+        hs_alloc(account, HS_FOR_CELLS, sparse->n_rows * (sparse->ndim - 1), sizeof(int64_t));
     sparse->row_cell = hs_alloc(account, HS_FOR_CELLS, sparse->n_rows + 1, sizeof(int32_t));
     bins->start = hs_alloc(account, HS_FOR_CELLS, sparse->n_cells + 1, sizeof(int32_t));
     if (sparse->row_index == NULL || sparse->row_cell == NULL || bins->start == NULL) {

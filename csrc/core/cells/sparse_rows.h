@@ -31,12 +31,12 @@
 #include "sparse_grid.h"
 
 typedef struct hs_sparse {
-    int      ndim;
-    int64_t  n_rows;
-    int64_t  n_cells;   /* occupied ones */
-    int64_t *row_index; /* owned; (ndim - 1) per row: its index along axes 1, 2 ... */
-    int32_t *row_cell;  /* owned; n_rows + 1: its first cell */
-    int64_t *cell_x;    /* owned; index of each cell along the first axis */
+    int            ndim;
+    int64_t        n_rows;
+    int64_t        n_cells;    /* occupied ones */
+    int64_t       *row_index;  /* owned; (ndim - 1) per row: its index along axes 1, 2 ... */
+    int32_t       *row_cell;   /* owned; n_rows + 1: its first cell */
+    int64_t       *cell_x;     /* owned; index of each cell along the first axis */
     const int32_t *cell_start; /* bins->start: n_cells + 1, each cell's first point */
 } hs_sparse;
 

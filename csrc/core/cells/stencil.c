@@ -15,15 +15,15 @@
 #include <math.h>
 #include <string.h>
 
-#define DUALITY_DEFECT 1e-9 /* normals and directions further from dual than this are not used */
-#define FIRST_CAPACITY 1024 /* rows; doubled as needed: most of a wide block is out of reach */
-#define MOST_UNPRUNED 0x1p22 /* rows, in a box too flat to tell which of them are out of reach */
-#define POLL_ROWS (1 << 16)
-#define FRAME_SLACK 1e-6    /* relative; covers the defect in 8 dimensions many times */
+#define DUALITY_DEFECT 1e-9   /* normals and directions further from dual than this are not used */
+#define FIRST_CAPACITY 1024   /* rows; doubled as needed: most of a wide block is out of reach */
+#define MOST_UNPRUNED  0x1p22 /* rows, in a box too flat to tell which of them are out of reach */
+#define POLL_ROWS      (1 << 16)
+#define FRAME_SLACK    1e-6 /* relative; covers the defect in 8 dimensions many times */
 
 typedef struct frame {
     bool   usable;
-    bool   diagonal; /* no entry but lower[k][k] differs from zero */
+    bool   diagonal;                      /* no entry but lower[k][k] differs from zero */
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
 
@@ -129,8 +129,7 @@ set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, dou
 
 /* Range of component c of D; of the first one, what the later axes add to it. */
 static void
-range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least,
-                   double *most)
+range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least, double *most)
 {
     const int last = axes->diagonal ? c : ndim - 1;
     *least = *most = 0.0;
@@ -174,8 +173,7 @@ narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
  * are none.
  */
 static bool
-reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes,
-                hs_stencil_row *row)
+reach_along_row(const hs_scene *scene, const hs_grid *grid, const frame *axes, hs_stencil_row *row)
 {
     double low = -grid->range[0], high = grid->range[0];
     if (axes->usable && grid->ndim > 1 &&
@@ -233,8 +231,7 @@ hs_stencil_bytes(const hs_grid *grid, bool is_full)
 static bool
 grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
 {
-    hs_stencil_row *more =
-        hs_alloc(account, HS_FOR_STENCIL, 2 * *capacity, sizeof(hs_stencil_row));
+    hs_stencil_row *more = hs_alloc(account, HS_FOR_STENCIL, 2 * *capacity, sizeof(hs_stencil_row));
     if (more == NULL) {
         hs_stencil_free(account, stencil);
         return false;

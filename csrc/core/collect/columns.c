@@ -12,7 +12,7 @@
 /* A guess of the number of pairs is made this much larger, so that most of the time one
  * reservation is enough. Room that is not written to costs nothing. */
 #define GUESS_MARGIN 1.06
-#define MOST_GROWTH 8.0
+#define MOST_GROWTH  8.0
 /* Pairs that the account is charged for at a time. */
 #define CHARGE_STEP (INT64_C(1) << 20)
 /* Of one column: half the address space. */
@@ -38,7 +38,7 @@ void
 hs_output_fix(hs_output *output, const hs_pair_arrays *arrays)
 {
     void *const data[HS_QUANTITIES] = {arrays->i,      arrays->j,     arrays->distance,
-                                    arrays->vector, arrays->shift, arrays->both};
+                                       arrays->vector, arrays->shift, arrays->both};
     for (int k = 0; k < HS_QUANTITIES; k++) {
         output->column[k] = (hs_region){.data = data[k]};
     }
@@ -57,9 +57,7 @@ void *
 hs_output_next(const hs_output *output, unsigned bit)
 {
     char *column = hs_output_column(output, bit);
-    return column == NULL
-               ? NULL
-               : column + (size_t)output->n_pairs * hs_output_width(output, bit);
+    return column == NULL ? NULL : column + (size_t)output->n_pairs * hs_output_width(output, bit);
 }
 
 /* What some columns got is of no use where another was refused, and may be what that one lacks. */
@@ -163,8 +161,8 @@ hs_output_reserve(hs_output *output, int64_t n, double fraction)
         /* What is needed now, half as much again, or the whole as far as it can be foreseen. */
         const double least = (double)needed + FIRST_CAPACITY;
         const double grown = fmax(least, 1.5 * (double)output->capacity);
-        const double guess =
-            fraction > 0.0 ? GUESS_MARGIN * (double)output->n_pairs / fraction : 0.0;
+        const double guess = fraction > 0.0 ? GUESS_MARGIN * (double)output->n_pairs / fraction
+                                            : 0.0;
         const double bold = fmin(guess, MOST_GROWTH * least); /* early fractions tell little */
         if (!resize(output, fmax(grown, bold)) && !resize(output, grown) &&
             !resize(output, least)) {

@@ -13,7 +13,7 @@
 #include "../threads/team.h"
 
 typedef struct hs_output {
-    hs_account *account;     /* borrowed; NULL: neither counted nor limited */
+    hs_account *account; /* borrowed; NULL: neither counted nor limited */
     int         ndim;
     int         index_bytes; /* 4 or 8, of i, j and both */
     unsigned    columns;     /* HS_WANT_ bits that are kept */

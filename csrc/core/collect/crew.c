@@ -25,15 +25,15 @@ typedef struct hs_worker {
 
 struct hs_crew {
     hs_search         *search;
-    hs_output         *output;   /* NULL: nothing is recorded */
-    int64_t            enough;   /* pairs in it; 0: all */
-    hs_bookmark        start;    /* where the first range begins */
-    hs_bookmark        left;     /* set by the worker that has left its range */
+    hs_output         *output; /* NULL: nothing is recorded */
+    int64_t            enough; /* pairs in it; 0: all */
+    hs_bookmark        start;  /* where the first range begins */
+    hs_bookmark        left;   /* set by the worker that has left its range */
     bool               is_left;
     const hs_visitors *visitors; /* NULL: hits are recorded, or only counted */
     hs_worker         *workers;
     hs_commits        *commits;
-    hs_neighbourhood   most;     /* set at the end, as the next */
+    hs_neighbourhood   most; /* set at the end, as the next */
     int64_t            n_found;
 };
 
@@ -110,8 +110,8 @@ open_worker(hs_crew *crew, int w)
         return hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &worker->walker);
     }
     hs_backlog_init(crew->output, &worker->committer, &worker->backlog);
-    hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns),
-                                      hs_backlog_hits, &worker->backlog, &worker->walker);
+    hs_status status = hs_walker_init(search, hs_record_use(crew->output->columns), hs_backlog_hits,
+                                      &worker->backlog, &worker->walker);
     if (status == HS_OK) {
         status = hs_recorder_init(&search->call->account, &worker->backlog.pairs,
                                   worker->walker.scanner.block.most_hits,
@@ -127,9 +127,8 @@ limit_crew(const hs_crew *crew)
     const int64_t bytes = hs_output_bytes_per_pair(crew->output);
     const int64_t slack =
         hs_team_size(crew->search->call->team) * (int64_t)HS_COMMIT_BYTES / (bytes > 0 ? bytes : 1);
-    const bool    is_bounded = crew->enough <= INT64_MAX - slack;
-    hs_commits_limit(crew->commits, crew->enough,
-                     is_bounded ? crew->enough + slack : INT64_MAX);
+    const bool is_bounded = crew->enough <= INT64_MAX - slack;
+    hs_commits_limit(crew->commits, crew->enough, is_bounded ? crew->enough + slack : INT64_MAX);
 }
 
 static hs_status
@@ -255,8 +254,7 @@ hs_backlog_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits
     hs_backlog      *backlog = context;
     const hs_output *pairs = &backlog->pairs;
     const hs_status  status = hs_record_hits(&backlog->recorder, scanner, first, hits);
-    if (status == HS_OK &&
-        pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
+    if (status == HS_OK && pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
         const hs_status committed =
             hs_commit(backlog->committer, hs_scanner_fraction(scanner), false);
         scanner->leaves = backlog->committer->is_full;

@@ -15,7 +15,7 @@
 /* What each thread's walker shall do with its hits, in place of recording them. */
 typedef struct hs_visitors {
     hs_block_use            use;
-    const hs_neighbourhood *most;  /* NULL, or for hs_walker_init_ordered */
+    const hs_neighbourhood *most; /* NULL, or for hs_walker_init_ordered */
     hs_visit_fn             visit;
     void                   *contexts; /* borrowed; of each thread, one behind another */
     size_t                  context_size;
@@ -33,8 +33,8 @@ hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t en
                                 hs_bookmark *bookmark, hs_failure *failure);
 
 /* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
-hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors,
-                            hs_neighbourhood *most, hs_failure *failure);
+hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
+                            hs_failure *failure);
 
 /* Counts them. */
 hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure);
@@ -57,7 +57,6 @@ void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlo
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
 /* A hs_visit_fn. */
-hs_status hs_backlog_hits(void *backlog, hs_scanner *scanner, int32_t first,
-                          const hs_hits *hits);
+hs_status hs_backlog_hits(void *backlog, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 #endif

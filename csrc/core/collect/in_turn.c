@@ -102,8 +102,7 @@ ask_caller(void *context, double fraction)
 }
 
 void
-hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
-                hs_committer *committer)
+hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs, hs_committer *committer)
 {
     *committer = (hs_committer){.commits = commits,
                                 .options = options,
@@ -146,7 +145,7 @@ fail(hs_committer *committer, hs_status status, const hs_failure *failure)
 {
     hs_commits *commits = committer->commits;
     const bool  stopped = status == HS_STOPPED ||
-                          (status == HS_ERR_INTERRUPTED && committer->options->poll == goes_on);
+                         (status == HS_ERR_INTERRUPTED && committer->options->poll == goes_on);
     hs_mutex_lock(&commits->mutex);
     if (!stopped && (commits->status == HS_OK || committer->range < commits->failed_range)) {
         commits->status = status;
@@ -270,10 +269,8 @@ hs_commit(hs_committer *committer, double fraction, bool ends)
 {
     const hs_output *pairs = committer->pairs;
     const int64_t    bytes = pairs->n_pairs * hs_output_bytes_per_pair(pairs);
-    committer->parts[committer->n_parts++] = (hs_commit_part){.range = committer->range,
-                                                              .end = pairs->n_pairs,
-                                                              .fraction = fraction,
-                                                              .is_last = ends};
+    committer->parts[committer->n_parts++] = (hs_commit_part){
+        .range = committer->range, .end = pairs->n_pairs, .fraction = fraction, .is_last = ends};
     return write_parts(committer,
                        !ends || committer->n_parts == HS_COMMIT_PARTS || bytes >= HS_COMMIT_BYTES);
 }

@@ -7,8 +7,8 @@
 
 /* Hits of the batch that is being written. */
 typedef struct batch_part {
-    int32_t first;            /* its first hit */
-    int32_t point[HS_BATCH];  /* number of the point whose hit each one is */
+    int32_t first;           /* its first hit */
+    int32_t point[HS_BATCH]; /* number of the point whose hit each one is */
 } batch_part;
 
 /* The first nonzero component of S is negative. */
@@ -81,8 +81,8 @@ put_distances(hs_recorder *recorder, const hs_search *search, int32_t first, int
 }
 
 static void
-put_vectors(const hs_recorder *recorder, const hs_search *search, const double *sign,
-            int32_t first, int32_t n)
+put_vectors(const hs_recorder *recorder, const hs_search *search, const double *sign, int32_t first,
+            int32_t n)
 {
     const hs_scale same = {.exponent = 0, .first = 1.0, .second = 1.0};
     const int      d = recorder->output->ndim;
@@ -216,13 +216,12 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 hs_status
 hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    hs_trace *trace = &scanner->trace;
+    hs_trace  *trace = &scanner->trace;
     batch_part part = {.first = 0};
     hs_trace_clear(trace);
     for (int32_t t = 0, h = 0; t < hits->n; t++) {
         while (h < hits->end[t]) {
-            const int32_t taken =
-                hs_trace_add(trace, first + t, hits->label + h, hits->end[t] - h);
+            const int32_t taken = hs_trace_add(trace, first + t, hits->label + h, hits->end[t] - h);
             for (int32_t e = trace->n - taken; e < trace->n; e++) {
                 part.point[e] = hits->point[t];
             }

@@ -10,8 +10,7 @@ hs_record_use(unsigned columns)
 }
 
 hs_status
-hs_recorder_init(hs_account *account, hs_output *output, int32_t most_hits,
-                 hs_recorder *recorder)
+hs_recorder_init(hs_account *account, hs_output *output, int32_t most_hits, hs_recorder *recorder)
 {
     const int64_t  n = most_hits + HS_PADDING, in_batch = HS_BATCH + HS_PADDING;
     const unsigned columns = output->columns;

@@ -21,8 +21,7 @@ void
 hs_pairs_open(hs_pairs *pairs, int ndim)
 {
     const hs_options *options = &pairs->call.options;
-    hs_output_init(&pairs->call.account, ndim, options->want, options->index_bytes,
-                   &pairs->output);
+    hs_output_init(&pairs->call.account, ndim, options->want, options->index_bytes, &pairs->output);
     if (options->out != NULL) {
         hs_output_fix(&pairs->output, options->out);
     }

@@ -7,7 +7,7 @@
 #include "../threads/call.h"
 
 struct hs_pairs {
-    hs_call   call;    /* which has ended: kept for its account */
+    hs_call   call; /* which has ended: kept for its account */
     hs_output output;
     hs_output offsets; /* int64, where the rows of hs_neighbors_find begin; else nothing */
 };

@@ -80,8 +80,7 @@ images_repeat(const hs_search *search)
 {
     const hs_lattice *lattice = &search->scene.lattice;
     for (int k = 0; k < lattice->ndim; k++) {
-        if (lattice->row_of_axis[k] >= 0 &&
-            2.0 * search->grid.range[k] >= lattice->period[k]) {
+        if (lattice->row_of_axis[k] >= 0 && 2.0 * search->grid.range[k] >= lattice->period[k]) {
             return true;
         }
     }
@@ -136,9 +135,9 @@ static hs_status
 find_order(const sorting *all)
 {
     const hs_output *found = all->found;
-    const keys key = {hs_output_column(found, HS_WANT_I), hs_output_column(found, HS_WANT_J),
-                      hs_output_column(found, HS_WANT_SHIFT)};
-    hs_status  status = sort_by_first(all, key.i);
+    const keys       key = {hs_output_column(found, HS_WANT_I), hs_output_column(found, HS_WANT_J),
+                            hs_output_column(found, HS_WANT_SHIFT)};
+    hs_status        status = sort_by_first(all, key.i);
     for (int64_t i = 0, first = 0, work = 0; i < all->n_points && status == HS_OK;
          first = all->start[i++]) {
         const int64_t n = all->start[i] - first;
@@ -217,13 +216,9 @@ hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points, const hs_out
 {
     hs_account *account = &call->account;
     hs_status   status = HS_ERR_MEMORY;
-    sorting     all = {.call = call,
-                       .first_point = first_point,
-                       .n_points = n_points,
-                       .found = found,
-                       .start = hs_alloc(account, HS_FOR_SORTING, n_points + 1, sizeof *all.start),
-                       .order = hs_alloc(account, HS_FOR_SORTING, found->n_pairs,
-                                         sizeof *all.order)};
+    sorting all = {.call = call, .first_point = first_point, .n_points = n_points, .found = found};
+    all.start = hs_alloc(account, HS_FOR_SORTING, n_points + 1, sizeof *all.start);
+    all.order = hs_alloc(account, HS_FOR_SORTING, found->n_pairs, sizeof *all.order);
     if (all.start != NULL && all.order != NULL) {
         status = found->n_pairs > 0 ? find_order(&all) : HS_OK;
         hs_free(account, all.start);

@@ -35,15 +35,15 @@ static double
 input_error(int ndim, double extent, double error, double unit, double tiny)
 {
     const double rounding = multiply_up(HS_FILTER_INPUT_ROUNDINGS + HS_FILTER_SLACK, unit);
-    const double component = add_up(multiply_up(rounding, extent),
-                                    add_up(multiply_up(HS_FILTER_ERRORS, error),
-                                           multiply_up(HS_FILTER_FLUSHES, tiny)));
+    const double component =
+        add_up(multiply_up(rounding, extent),
+               add_up(multiply_up(HS_FILTER_ERRORS, error), multiply_up(HS_FILTER_FLUSHES, tiny)));
     return multiply_up(hs_next_up(sqrt((double)ndim)), component);
 }
 
 void
-hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
-                    double tiny, double *in, double *out)
+hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit, double tiny,
+                    double *in, double *out)
 {
     const double a = input_error(ndim, extent, error, unit, tiny);
     const double difference = multiply_up(HS_FILTER_DIFFERENCE_ROUNDINGS, unit);

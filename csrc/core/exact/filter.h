@@ -42,8 +42,8 @@ void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, d
 
 /* The same for the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
 hs_expanded hs_expanded_of(int ndim, double cutoff, double extent, double error);
-void hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,
-                        double tiny, double *in, double *out);
+void        hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,
+                               double tiny, double *in, double *out);
 
 /* Errors of the expanded form grow with extent^2, those of the direct form with extent * cutoff:
  * worth it where this holds, which is wherever cells have the size that the cutoff asks for. */

@@ -43,8 +43,8 @@ typedef struct hs_stages {
 } hs_stages;
 
 /* rows: n_rows rows of HS_MAX_DIM doubles, borrowed for the call; may be NULL when n_rows is 0. */
-void hs_metric_init(hs_metric *metric, int ndim, int n_rows,
-                    const double rows[][HS_MAX_DIM], double cutoff, bool inclusive);
+void hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_MAX_DIM],
+                    double cutoff, bool inclusive);
 
 /* p, q: ndim finite doubles. shift: n_rows integers, or NULL for all zero. */
 bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,

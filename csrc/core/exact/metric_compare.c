@@ -8,7 +8,7 @@
 /* Squares in this range are far from overflow, and what their terms lose to underflow, 2^-1074
  * each, is nothing beside 2^-106 of them. */
 #define LEAST_SQUARE 0x1p-800
-#define MOST_SQUARE 0x1p800
+#define MOST_SQUARE  0x1p800
 
 /* D in double-words, watched. False where floats cannot hold it. */
 static bool

@@ -96,14 +96,9 @@ hs_metric_within(const hs_metric *metric, const double *p, const double *q, cons
     if (metric->floats_usable) {
         hs_verdict verdict;
         switch (metric->ndim) {
-        case 2:
-            verdict = judge_in_floats(metric, p, q, shift, 2, stages);
-            break;
-        case 3:
-            verdict = judge_in_floats(metric, p, q, shift, 3, stages);
-            break;
-        default:
-            verdict = judge_in_floats(metric, p, q, shift, metric->ndim, stages);
+        case 2: verdict = judge_in_floats(metric, p, q, shift, 2, stages); break;
+        case 3: verdict = judge_in_floats(metric, p, q, shift, 3, stages); break;
+        default: verdict = judge_in_floats(metric, p, q, shift, metric->ndim, stages);
         }
         if (verdict != HS_UNDECIDED) {
             return verdict == HS_WITHIN;

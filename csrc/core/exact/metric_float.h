@@ -186,7 +186,7 @@ hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference,
 
 /* Of the cutoff: components below this are a hair, and what their squares sum to, of its square:
  * eight of them are below 2^-125. */
-#define HS_HAIR 0x1p-64
+#define HS_HAIR         0x1p-64
 #define HS_HAIR_SQUARES 0x1p-120
 
 /*

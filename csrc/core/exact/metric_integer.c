@@ -44,9 +44,9 @@ decompose(double x)
     const uint64_t significand = fraction | (uint64_t)(field != 0) << 52;
     const int      zeros = hs_trailing_zeros(significand);
     return (exact_term){.low = significand >> zeros,
-                  .high = 0,
-                  .exponent = field + (field == 0) - 1075 + zeros,
-                  .negative = bits >> 63};
+                        .high = 0,
+                        .exponent = field + (field == 0) - 1075 + zeros,
+                        .negative = bits >> 63};
 }
 
 /* Widen the range to hold this term. */
@@ -88,8 +88,7 @@ set_sums(exact_sums *sums, const hs_metric *metric, double cutoff, const hs_span
             if (shift[l] == 0 || entry == 0.0) {
                 continue;
             }
-            const uint64_t times =
-                shift[l] < 0 ? ~(uint64_t)shift[l] + 1 : (uint64_t)shift[l];
+            const uint64_t times = shift[l] < 0 ? ~(uint64_t)shift[l] + 1 : (uint64_t)shift[l];
             *next = decompose(entry);
             next->low = hs_multiply_add(next->low, times, 0, &next->high);
             next->negative = next->negative != (shift[l] < 0);
@@ -108,8 +107,7 @@ count_limbs(const exact_sums *sums)
     if (sums->lowest > sums->highest) {
         return 0;
     }
-    const int bits =
-        sums->highest - sums->lowest + hs_bit_length((uint64_t)sums->most_terms - 1);
+    const int bits = sums->highest - sums->lowest + hs_bit_length((uint64_t)sums->most_terms - 1);
     const int n = (bits + 2 + 63) / 64;
     HS_ASSERT(n >= 1 && n <= MAX_LIMBS);
     return n;
@@ -217,7 +215,7 @@ compare_small(const exact_sums *sums, int ndim)
         int64_t value = 0;
         for (int t = 0; t < sums->n_terms[k]; t++) {
             const exact_term *term = &sums->terms[k][t];
-            const int64_t size = (int64_t)(term->low << (term->exponent - sums->lowest));
+            const int64_t     size = (int64_t)(term->low << (term->exponent - sums->lowest));
             value += term->negative ? -size : size;
         }
         const uint64_t size = (uint64_t)(value < 0 ? -value : value);
@@ -249,21 +247,16 @@ compare_large(const exact_sums *sums, int ndim, int n)
 }
 
 int
-hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
-                   const int64_t *shift)
+hs_integer_compare(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
 {
     exact_sums sums;
     set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
     const int n = count_limbs(&sums);
     switch (n) {
-    case 0:
-        return 0;
-    case 1:
-        return compare_small(&sums, metric->ndim);
-    case 2:
-        return compare_medium(&sums, metric->ndim);
-    default:
-        return compare_large(&sums, metric->ndim, n);
+    case 0: return 0;
+    case 1: return compare_small(&sums, metric->ndim);
+    case 2: return compare_medium(&sums, metric->ndim);
+    default: return compare_large(&sums, metric->ndim, n);
     }
 }
 
@@ -343,9 +336,9 @@ hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_dw *value, int *exponent)
 {
     exact_sums sums;
-    uint64_t  component[HS_MAX_DIM][MAX_LIMBS];
-    bool      negative[HS_MAX_DIM];
-    int       top = -1; /* highest limb in use */
+    uint64_t   component[HS_MAX_DIM][MAX_LIMBS];
+    bool       negative[HS_MAX_DIM];
+    int        top = -1; /* highest limb in use */
     set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
     const int n = count_limbs(&sums);
     for (int k = 0; k < metric->ndim; k++) {

@@ -54,8 +54,8 @@ measure_in_floats(const hs_metric *metric, const double *p, const double *q, con
 
 /* By integers: D scaled to where nothing overflows, and scaled back. */
 static HS_NO_INLINE double
-measure_in_integers(const hs_metric *metric, const double *p, const double *q,
-                    const int64_t *shift, double *vector)
+measure_in_integers(const hs_metric *metric, const double *p, const double *q, const int64_t *shift,
+                    double *vector)
 {
     hs_difference difference;
     int           exponent;
@@ -79,14 +79,9 @@ hs_metric_measure(const hs_metric *metric, const double *p, const double *q, con
     double distance;
     bool   done;
     switch (metric->ndim) {
-    case 2:
-        done = measure_in_floats(metric, p, q, shift, 2, vector, &distance);
-        break;
-    case 3:
-        done = measure_in_floats(metric, p, q, shift, 3, vector, &distance);
-        break;
-    default:
-        done = measure_in_floats(metric, p, q, shift, metric->ndim, vector, &distance);
+    case 2: done = measure_in_floats(metric, p, q, shift, 2, vector, &distance); break;
+    case 3: done = measure_in_floats(metric, p, q, shift, 3, vector, &distance); break;
+    default: done = measure_in_floats(metric, p, q, shift, metric->ndim, vector, &distance);
     }
     return done ? distance : measure_in_integers(metric, p, q, shift, vector);
 }

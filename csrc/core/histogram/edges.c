@@ -67,9 +67,9 @@ set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
         table->out[k] = near.out;
         table->in[k] = near.in;
         if (lower != upper) {
-            table->in[k] = lower > 0.0 ? hs_thresholds_of(edges->ndim, lower, extent,
-                                                          edges->filter_error).in
-                                       : -1.0f;
+            table->in[k] =
+                lower > 0.0 ? hs_thresholds_of(edges->ndim, lower, extent, edges->filter_error).in
+                            : -1.0f;
         }
     }
 }
@@ -238,7 +238,7 @@ hs_edge_range(const hs_edge_table *table, const hs_edges *edges, float square, i
         return;
     }
     const hs_edge_cell *cell = &table->cells[cell_of(table, square)];
-    const int32_t first = cell->slot / 2, end = first + cell->n_bands;
+    const int32_t       first = cell->slot / 2, end = first + cell->n_bands;
     *low = first_not_below(table->out, first, end, square);
     /* Edges with in <= s: up to the first with in > s. */
     *high = first_not_below(table->in, *low, end, nextafterf(square, INFINITY));

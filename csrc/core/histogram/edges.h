@@ -15,9 +15,9 @@
 typedef struct hs_edges {
     int64_t n;
     bool    inclusive, last_inclusive; /* as hs_histogram */
-    double *at;           /* owned; as the scene's metric takes them; n */
-    double *lower;        /* at most, ... */
-    double *upper;        /* ... and at least the scaled edge; in the same block, or `at` itself */
+    double *at;                        /* owned; as the scene's metric takes them; n */
+    double *lower;                     /* at most, ... */
+    double *upper; /* ... and at least the scaled edge; in the same block, or `at` itself */
     int     ndim;
     double  filter_error; /* as hs_search */
 } hs_edges;

@@ -38,8 +38,7 @@ allocate(hs_tally *tally, int32_t block_capacity, int32_t most_hits)
 }
 
 hs_status
-hs_tally_init(const hs_tally_plan *plan, int32_t block_capacity, int32_t most_hits,
-              hs_tally *tally)
+hs_tally_init(const hs_tally_plan *plan, int32_t block_capacity, int32_t most_hits, hs_tally *tally)
 {
     *tally = (hs_tally){.plan = plan, .n_slots = 2 * plan->edges.n + 1, .block = -1};
     tally->n_copies = !plan->has_types && tally->n_slots <= FEW_SLOTS ? HS_TALLY_COPIES : 1;

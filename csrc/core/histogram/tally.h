@@ -13,15 +13,15 @@
 
 /* What all threads count by; only read. */
 typedef struct hs_tally_plan {
-    hs_account *account;   /* borrowed */
-    hs_edges    edges;     /* owned */
-    hs_marked   points;    /* owned */
-    hs_marked   queries;   /* owned */
-    const hs_marked *asking; /* one of these two */
-    bool        has_types, sums; /* whether types matter; whether weights are summed */
-    int32_t     n_types;
-    int64_t     n_groups;  /* pairs of types that are told apart */
-    int32_t    *group;     /* owned; n_types * n_types; when has_types */
+    hs_account      *account;         /* borrowed */
+    hs_edges         edges;           /* owned */
+    hs_marked        points;          /* owned */
+    hs_marked        queries;         /* owned */
+    const hs_marked *asking;          /* one of these two */
+    bool             has_types, sums; /* whether types matter; whether weights are summed */
+    int32_t          n_types;
+    int64_t          n_groups; /* pairs of types that are told apart */
+    int32_t         *group;    /* owned; n_types * n_types; when has_types */
 } hs_tally_plan;
 
 #define HS_TALLY_TABLES 4 /* extents that a walk may come back to; each a power of two */
@@ -41,14 +41,14 @@ typedef struct hs_tally {
     hs_edge_table        tables[HS_TALLY_TABLES]; /* owned; place: exponent of the extent */
     int64_t              n_slots;                 /* of one group */
     int                  n_copies;
-    int64_t             *counts;  /* owned; n_copies * n_groups * n_slots */
-    hs_sums              sums;    /* owned; n_groups * (edges + 1) */
-    int32_t             *slots;   /* owned; of the hits of a visit */
-    int32_t             *type;    /* owned; of each candidate of the block; or NULL */
-    int64_t             *value;   /* owned; the same: its weight, as hs_weights; or NULL */
-    int32_t             *place;   /* owned; or NULL */
-    int64_t              block;   /* number of the block that these are of */
-    hs_tally_open       *open;    /* owned; HS_TALLY_OPEN */
+    int64_t             *counts; /* owned; n_copies * n_groups * n_slots */
+    hs_sums              sums;   /* owned; n_groups * (edges + 1) */
+    int32_t             *slots;  /* owned; of the hits of a visit */
+    int32_t             *type;   /* owned; of each candidate of the block; or NULL */
+    int64_t             *value;  /* owned; the same: its weight, as hs_weights; or NULL */
+    int32_t             *place;  /* owned; or NULL */
+    int64_t              block;  /* number of the block that these are of */
+    hs_tally_open       *open;   /* owned; HS_TALLY_OPEN */
     int32_t              n_open;
     int32_t             *waiting; /* owned; for each edge the first open pair, or -1 */
     int32_t             *asked;   /* owned; edges that pairs wait for, HS_TALLY_OPEN */

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-#define VALUE_BITS 62  /* of a weight, at most */
-#define SUM_BITS   64  /* that 2^62 terms and a sign add to those of a term */
+#define VALUE_BITS 62    /* of a weight, at most */
+#define SUM_BITS   64    /* that 2^62 terms and a sign add to those of a term */
 #define LOWEST     -1074 /* exponent of the smallest float64 */
 
 /* A float64 that is not zero as an odd integer times a power of two. */
@@ -227,8 +227,8 @@ hs_marked_init(hs_account *account, const hs_marks *marks, const int32_t *order,
                int32_t n_types, hs_marked *marked, hs_failure *failure)
 {
     *marked = (hs_marked){.type = NULL};
-    hs_status status = hs_weights_init(account, marks->weights, order, n, &marked->weights,
-                                       failure);
+    hs_status status =
+        hs_weights_init(account, marks->weights, order, n, &marked->weights, failure);
     if (status != HS_OK || marks->types == NULL) {
         return status;
     }

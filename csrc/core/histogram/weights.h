@@ -14,10 +14,10 @@
 
 /* The weights of a set of points: value[i] * 2^(place[i] + exponent). */
 typedef struct hs_weights {
-    int64_t *value;    /* owned, n; below 2^62 in size. NULL: all weights are 1 */
-    int32_t *place;    /* owned, n; from 0 on. NULL: all 0 */
+    int64_t *value; /* owned, n; below 2^62 in size. NULL: all weights are 1 */
+    int32_t *place; /* owned, n; from 0 on. NULL: all 0 */
     int      exponent;
-    int      bits;     /* at least the number of bits of every value, ... */
+    int      bits;       /* at least the number of bits of every value, ... */
     int      most_place; /* ... and the largest place */
 } hs_weights;
 
@@ -88,7 +88,7 @@ hs_sums_add(int64_t *limbs, int64_t a, int64_t b, const int32_t place)
 
 /* Types and weights of one set of points, in cell order. */
 typedef struct hs_marked {
-    int32_t   *type;  /* owned; NULL: all 0 */
+    int32_t   *type; /* owned; NULL: all 0 */
     hs_weights weights;
 } hs_marked;
 

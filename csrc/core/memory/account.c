@@ -14,7 +14,7 @@ typedef struct block_header {
     void   *raw;    /* what malloc returned, or the mapping */
     size_t  length; /* of the mapping; 0 for malloc and for the arena */
     int64_t bytes;  /* what the caller asked for */
-} block_header; /* raw == NULL: in the arena */
+} block_header;     /* raw == NULL: in the arena */
 
 _Static_assert(sizeof(block_header) <= HS_PAGES_HEADROOM, "the header lies in the headroom");
 _Static_assert(sizeof(block_header) <= HS_ALIGNMENT, "and in front of an aligned block");

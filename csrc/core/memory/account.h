@@ -35,13 +35,13 @@
  * machine has left costs more than a small search.
  */
 typedef struct hs_account {
-    hs_counters  total;       /* bytes[] and bytes_peak are kept here */
-    int64_t      held;        /* bytes held now */
-    double       limit;       /* bytes allowed */
-    hs_limit_fn  find_limit;  /* asked once, when held first passes HS_LIMIT_FREE; or NULL */
-    void        *find_context;
-    char        *arena;       /* owned, taken with the first small block; or NULL */
-    char        *arena_next;  /* where its next block begins */
+    hs_counters total;      /* bytes[] and bytes_peak are kept here */
+    int64_t     held;       /* bytes held now */
+    double      limit;      /* bytes allowed */
+    hs_limit_fn find_limit; /* asked once, when held first passes HS_LIMIT_FREE; or NULL */
+    void       *find_context;
+    char       *arena;      /* owned, taken with the first small block; or NULL */
+    char       *arena_next; /* where its next block begins */
 } hs_account;
 
 #define HS_LIMIT_FREE (64 << 20) /* bytes that are handed out without asking for the limit */

@@ -25,16 +25,16 @@ map_aligned(size_t bytes, int flags, void **mapping, size_t *length)
     }
     const size_t rounded = round_up(bytes);
     const size_t reserved = rounded + HS_PAGES_FROM + HS_PAGES_STEP;
-    char        *start = mmap(NULL, reserved, PROT_READ | PROT_WRITE,
-                              MAP_PRIVATE | MAP_ANONYMOUS | flags, -1, 0);
+    char        *start =
+        mmap(NULL, reserved, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | flags, -1, 0);
     if (start == MAP_FAILED) {
         return NULL;
     }
     /* The first huge-page boundary that leaves a step for the headroom; the rest goes back. */
     const uintptr_t boundary =
         ((uintptr_t)start + HS_PAGES_STEP + HS_PAGES_FROM - 1) / HS_PAGES_FROM * HS_PAGES_FROM;
-    char  *block = (char *)boundary;
-    char  *first = block - HS_PAGES_STEP;
+    char        *block = (char *)boundary;
+    char        *first = block - HS_PAGES_STEP;
     const size_t before = (size_t)(first - start); /* less than a huge page: the rest lies behind */
     if (before > 0) {
         munmap(start, before);

@@ -183,9 +183,8 @@ hs_pool_clear(void)
 static bool
 suits(const hs_chunk *chunk, size_t expected)
 {
-    return chunk->length > 0 ||
-           (chunk->capacity >= expected &&
-            (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected));
+    return chunk->length > 0 || (chunk->capacity >= expected &&
+                                 (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected));
 }
 
 /* Bytes that a request would waste, or twice those that it would lack. Lists are expected to be a

@@ -27,7 +27,6 @@
 
 enum { HS_POOL_CHUNKS = 16 }; /* chunks kept; few, since all are looked at for each request */
 
-
 /*
  * A chunk (chunk.h) for a request of `expected` bytes, with recycled memory in it; owned by the
  * caller. It may have less room than that if it can be grown. NULL: there is none.

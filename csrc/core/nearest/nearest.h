@@ -24,23 +24,23 @@ typedef struct hs_near {
     hs_metric      order;       /* decides which is nearer */
     double         drift[HS_MAX_DIM][HS_MAX_DIM]; /* [k][r]: how far row r of B moves t_k beyond
                                                    * whole periods */
-    double         smallest_period; /* infinity without one */
-    bool           has_layer;   /* some axes repeat, others, upright on them, are open: */
+    double         smallest_period;               /* infinity without one */
+    bool           has_layer; /* some axes repeat, others, upright on them, are open: */
     double         layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
-    hs_output     *rows;        /* borrowed */
-    hs_shared     *shared;      /* owned; for what threads need more of */
+    hs_output     *rows;                                             /* borrowed */
+    hs_shared     *shared; /* owned; for what threads need more of */
 } hs_near;
 
 /* Points that ask, or one of them, and how far they look. Lengths are the scene's. */
 typedef struct hs_near_group {
-    int32_t first, last;        /* in the order of their tree */
-    double  lower[HS_MAX_DIM];  /* range of X */
+    int32_t first, last;       /* in the order of their tree */
+    double  lower[HS_MAX_DIM]; /* range of X */
     double  upper[HS_MAX_DIM];
     double  t_lower[HS_MAX_DIM]; /* range of t_k along periodic axes */
     double  t_upper[HS_MAX_DIM];
-    double  away;               /* no point is nearer than this, for the open axes alone */
-    double  radius;             /* everything up to here is looked at */
-    bool    is_complete;        /* and beyond there is nothing that could be wanted */
+    double  away;        /* no point is nearer than this, for the open axes alone */
+    double  radius;      /* everything up to here is looked at */
+    bool    is_complete; /* and beyond there is nothing that could be wanted */
 } hs_near_group;
 
 /* Images of all points, within `reach` of a group along each periodic axis. */
@@ -99,12 +99,12 @@ void hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_nea
 
 /* Owned by a thread: the least squares found so far, and what is left to look at. */
 typedef struct hs_near_bounder {
-    double  *least;    /* a heap, the largest first */
+    double  *least; /* a heap, the largest first */
     int64_t  n, capacity;
     int32_t *stack;
-    double  *gaps;     /* of the nodes on the stack */
-    int64_t  depth;    /* room there */
-    int64_t  work;     /* since the last poll */
+    double  *gaps;  /* of the nodes on the stack */
+    int64_t  depth; /* room there */
+    int64_t  work;  /* since the last poll */
 } hs_near_bounder;
 
 hs_status hs_near_bounder_init(const hs_near *near, hs_near_bounder *bounder);

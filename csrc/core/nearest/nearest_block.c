@@ -19,7 +19,7 @@
 #define FIRST_CAPACITY 1024
 /* With more to be found there are more hits than a kernel puts in order. */
 #define MOST_BY_SQUARES (HS_ORDER_MOST / 2)
-#define LARGEST_SQUARE 0x1p60 /* far from where float32 ends */
+#define LARGEST_SQUARE  0x1p60 /* far from where float32 ends */
 
 /* After a step that every candidate took part in. */
 static hs_status

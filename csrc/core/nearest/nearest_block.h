@@ -17,21 +17,21 @@ typedef struct hs_near_block {
     int32_t       *image_of;      /* where there are several images */
     int32_t       *place;         /* 0, 1, 2, ... */
     int32_t       *hits;
-    float         *squares;       /* of the hits, in float32; where has_squares */
+    float         *squares; /* of the hits, in float32; where has_squares */
     hs_unsure     *unsure;
     hs_near_run   *runs;
     hs_near_image *images;
     int32_t        n_runs, run_capacity, n_images, image_capacity;
     int32_t       *stack;
-    int64_t        depth;         /* room on it */
+    int64_t        depth; /* room on it */
     float          q[HS_MAX_DIM][HS_GROUP_POINTS];
-    double         unit;          /* lengths times this: the radius is between 1 and 2 */
-    double         reach;         /* the radius, times it */
-    double         extent;        /* largest |y| and |q| */
-    double         error;         /* of each component of X, moved, times it */
-    double         flat_error;    /* of any |D|^2 from X, beside its relative rounding */
-    bool           has_squares;   /* for points with few hits, which float32 may put in order */
-    double         square_error;  /* of these, up to the radius */
+    double         unit;         /* lengths times this: the radius is between 1 and 2 */
+    double         reach;        /* the radius, times it */
+    double         extent;       /* largest |y| and |q| */
+    double         error;        /* of each component of X, moved, times it */
+    double         flat_error;   /* of any |D|^2 from X, beside its relative rounding */
+    bool           has_squares;  /* for points with few hits, which float32 may put in order */
+    double         square_error; /* of these, up to the radius */
 } hs_near_block;
 
 /* Sets runs and images, by walking down the tree: what is within the radius of the group and a
@@ -50,9 +50,8 @@ void      hs_near_block_free(const hs_near *near, hs_near_block *block);
 /* Fills the block for a group with its radius, which may be raised a little. leaves: for some
  * groups, this among them, or NULL. HS_TOO_MUCH: there are more than `most` candidates or images,
  * or the group is far wider than its radius. */
-hs_status hs_near_block_fill(const hs_near *near, const hs_options *options,
-                             hs_near_group *group, double most, hs_near_leaves *leaves,
-                             hs_near_block *block);
+hs_status hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group *group,
+                             double most, hs_near_leaves *leaves, hs_near_block *block);
 
 /* The image of the candidate at a place. */
 HS_ALWAYS_INLINE const hs_near_image *

@@ -15,14 +15,14 @@
 #define POLL_WORK (INT64_C(1) << 20)
 /* Squares outside this are near underflow or overflow: another unit is needed. */
 #define LEAST_SQUARE 0x1p-600
-#define MOST_SQUARE 0x1p600
-#define UNIT_STEP 400
+#define MOST_SQUARE  0x1p600
+#define UNIT_STEP    400
 
 /* A point that asks, in one image and unit. */
 typedef struct near_probe {
     const hs_near   *near;
     hs_near_bounder *bounder;
-    int32_t          self;   /* the point itself is left out; -1 in other images */
+    int32_t          self;           /* the point itself is left out; -1 in other images */
     double           at[HS_MAX_DIM]; /* its X less the image's displacement */
     double           unit;
 } near_probe;

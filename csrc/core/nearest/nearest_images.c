@@ -11,13 +11,13 @@
 /* ... and of the quotient itself where it is large. */
 #define RELATIVE_SLACK 0x1p-40
 /* Products of unit vectors at right angles, and the room that this takes beside squares. */
-#define UPRIGHT 0x1p-40
-#define LAYER_ROOM 0x1p-36
+#define UPRIGHT     0x1p-40
+#define LAYER_ROOM  0x1p-36
 #define MOST_SHIFTS 0x1p30 /* they are int32, with room for sums of two */
 /* More images than these take minutes: they are refused, but where so many neighbours are asked
  * for that all of them may be images of one point. A box around a ball in 8 dimensions is 63 times
  * as large. */
-#define MOST_IMAGES 0x1p24
+#define MOST_IMAGES        0x1p24
 #define IMAGES_A_NEIGHBOUR 1024.0
 
 void
@@ -104,7 +104,7 @@ set_range(const hs_near *near, const hs_near_group *group, int k, const double *
     const hs_scene   *scene = &near->search->scene;
     const hs_lattice *lattice = &scene->lattice;
     const double      period = lattice->period[k];
-    double reach = reach_along(group) * (1.0 + RELATIVE_SLACK) + 2.0 * scene->t_error[k];
+    double            reach = reach_along(group) * (1.0 + RELATIVE_SLACK) + 2.0 * scene->t_error[k];
     for (int r = 0; r < lattice->n_periodic; r++) {
         reach += (most[r] + 1.0) * near->drift[k][r];
     }
@@ -135,8 +135,8 @@ bound_error(const hs_scene *scene, const double *most)
         }
         if (moved > 0.0) {
             const double roundings = 2 * lattice->n_periodic + 4;
-            error = hs_larger(
-                roundings * UNIT * (moved + 2.0 * scene->x_largest[c]) + row_errors, error);
+            error = hs_larger(roundings * UNIT * (moved + 2.0 * scene->x_largest[c]) + row_errors,
+                              error);
         }
     }
     return error + 2.0 * scene->x_error;
@@ -165,9 +165,8 @@ hs_near_images_start(const hs_near *near, const hs_near_group *group, hs_near_im
         images->count *= hs_larger((double)(images->high[r] - images->low[r] + 1), 0.0);
     }
     images->error = bound_error(&near->search->scene, most);
-    return images->count < fmax(MOST_IMAGES, IMAGES_A_NEIGHBOUR * (double)near->k)
-               ? HS_OK
-               : HS_ERR_MEMORY;
+    return images->count < fmax(MOST_IMAGES, IMAGES_A_NEIGHBOUR * (double)near->k) ? HS_OK
+                                                                                   : HS_ERR_MEMORY;
 }
 
 bool

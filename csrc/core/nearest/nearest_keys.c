@@ -42,8 +42,7 @@ sort_by_counting(hs_near_key **keys, hs_near_key **spare, int64_t n, double larg
 }
 
 void
-hs_near_sort(hs_near_pace *pace, hs_near_key **keys, hs_near_key **spare, int64_t n,
-             double largest)
+hs_near_sort(hs_near_pace *pace, hs_near_key **keys, hs_near_key **spare, int64_t n, double largest)
 {
     if (n <= HS_NEAR_COUNTED) {
         sort_by_counting(keys, spare, n, largest);

@@ -14,7 +14,7 @@ typedef struct hs_near_key {
 /* Whether b must come before a. */
 typedef bool (*hs_near_before_fn)(void *context, const hs_near_key *b, const hs_near_key *a);
 
-#define HS_NEAR_FEW 24     /* up to here keys are sorted by insertion */
+#define HS_NEAR_FEW     24 /* up to here keys are sorted by insertion */
 #define HS_NEAR_COUNTED 64 /* up to here each key's place is counted, without a branch */
 
 /* Steps between two polls: some milliseconds, even of exact comparisons. */
@@ -68,14 +68,12 @@ HS_ALWAYS_INLINE void
 hs_near_merge(hs_near_pace *pace, void *context, hs_near_key *keys, hs_near_key *left, int64_t n,
               hs_near_before_fn before)
 {
-    for (int64_t begin = 0; begin < n && hs_near_goes_on(pace, HS_NEAR_FEW);
-         begin += HS_NEAR_FEW) {
-        hs_near_insert(context, keys + begin,
-                       n - begin < HS_NEAR_FEW ? n - begin : HS_NEAR_FEW, before);
+    for (int64_t begin = 0; begin < n && hs_near_goes_on(pace, HS_NEAR_FEW); begin += HS_NEAR_FEW) {
+        hs_near_insert(context, keys + begin, n - begin < HS_NEAR_FEW ? n - begin : HS_NEAR_FEW,
+                       before);
     }
     for (int64_t width = HS_NEAR_FEW; width < n; width *= 2) {
-        for (int64_t begin = 0; begin + width < n && hs_near_goes_on(pace, 1);
-             begin += 2 * width) {
+        for (int64_t begin = 0; begin + width < n && hs_near_goes_on(pace, 1); begin += 2 * width) {
             hs_near_key  *to = keys + begin, *right = to + width;
             const int64_t n_right = n - begin - width < width ? n - begin - width : width;
             if (!before(context, right, right - 1)) {

@@ -5,7 +5,7 @@
 #include <math.h>
 
 /* Beyond these each group walks down the tree by itself: it is far smaller than all together. */
-#define MOST_LEAVES 2048
+#define MOST_LEAVES        2048
 #define MOST_SHARED_IMAGES 64
 /* Groups that look so many times as far as others do walk by themselves. */
 #define FARTHEST 2.0
@@ -27,14 +27,13 @@ hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves)
         done = hs_shared_resize(shared, (void **)&leaves->low[k], 0, room, sizeof(float)) &&
                hs_shared_resize(shared, (void **)&leaves->high[k], 0, room, sizeof(float));
     }
-    done = done &&
-           hs_shared_resize(shared, (void **)&leaves->runs, 0, room, sizeof *leaves->runs) &&
-           hs_shared_resize(shared, (void **)&leaves->label, 0, room, sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&leaves->hits, 0, room, sizeof(int32_t)) &&
-           hs_shared_resize(shared, (void **)&leaves->images, 0, MOST_SHARED_IMAGES,
-                            sizeof *leaves->images) &&
-           hs_shared_resize(shared, (void **)&leaves->stack, 0, near->tree.depth + 2,
-                            sizeof(int32_t));
+    done =
+        done && hs_shared_resize(shared, (void **)&leaves->runs, 0, room, sizeof *leaves->runs) &&
+        hs_shared_resize(shared, (void **)&leaves->label, 0, room, sizeof(int32_t)) &&
+        hs_shared_resize(shared, (void **)&leaves->hits, 0, room, sizeof(int32_t)) &&
+        hs_shared_resize(shared, (void **)&leaves->images, 0, MOST_SHARED_IMAGES,
+                         sizeof *leaves->images) &&
+        hs_shared_resize(shared, (void **)&leaves->stack, 0, near->tree.depth + 2, sizeof(int32_t));
     for (int32_t c = 0; done && c < room; c++) {
         leaves->label[c] = c;
     }
@@ -74,10 +73,10 @@ unite(const hs_near_group *groups, int32_t n, int ndim)
         for (int k = 0; k < ndim; k++) {
             all.lower[k] = is_first ? one->lower[k] : hs_smaller(one->lower[k], all.lower[k]);
             all.upper[k] = is_first ? one->upper[k] : hs_larger(one->upper[k], all.upper[k]);
-            all.t_lower[k] =
-                is_first ? one->t_lower[k] : hs_smaller(one->t_lower[k], all.t_lower[k]);
-            all.t_upper[k] =
-                is_first ? one->t_upper[k] : hs_larger(one->t_upper[k], all.t_upper[k]);
+            all.t_lower[k] = is_first ? one->t_lower[k]
+                                      : hs_smaller(one->t_lower[k], all.t_lower[k]);
+            all.t_upper[k] = is_first ? one->t_upper[k]
+                                      : hs_larger(one->t_upper[k], all.t_upper[k]);
         }
         all.first = is_first ? one->first : all.first;
         all.last = one->last;
@@ -106,8 +105,7 @@ add_leaf(const hs_near *near, int32_t number, hs_near_leaves *leaves)
         leaves->low[k][leaves->n] = relative(leaves, k, bounds[4 * k + side] + moved[k]);
         leaves->high[k][leaves->n] = relative(leaves, k, bounds[4 * k + 2 + side] + moved[k]);
     }
-    leaves->runs[leaves->n++] =
-        (hs_near_run){0, hs_near_of_leaf(near, node), node->first, image};
+    leaves->runs[leaves->n++] = (hs_near_run){0, hs_near_of_leaf(near, node), node->first, image};
 }
 
 /* Leaves of the last image within reach, squared: false when there are too many. */
@@ -149,8 +147,8 @@ find_leaves(const hs_near *near, const hs_near_group *all, hs_near_images *image
             hs_near_leaves *leaves)
 {
     const int    d = near->tree.ndim;
-    const double reach = all->radius * leaves->unit * (1.0 + ROOM) +
-                         4.0 * sqrt(d) * images->error * leaves->unit;
+    const double reach =
+        all->radius * leaves->unit * (1.0 + ROOM) + 4.0 * sqrt(d) * images->error * leaves->unit;
     const double limit = reach * reach;
     bool         fit = true;
     leaves->n = leaves->n_images = 0;
@@ -202,14 +200,14 @@ hs_near_leaves_list(const hs_near *near, const hs_near_group *group, double radi
                     hs_near_leaves *leaves)
 {
     const int    d = near->tree.ndim;
-    const double reach = radius * leaves->unit * (1.0 + ROOM) +
-                         sqrt(d) * (4.0 * leaves->error * leaves->unit +
-                                    AXIS_ERROR * leaves->extent);
-    hs_boxes     boxes = {.ndim = d,
-                          .n = leaves->n,
-                          .label = leaves->label,
-                          .hits = leaves->hits,
-                          .out = (float)(reach * reach * (1.0 + ROOM))};
+    const double reach =
+        radius * leaves->unit * (1.0 + ROOM) +
+        sqrt(d) * (4.0 * leaves->error * leaves->unit + AXIS_ERROR * leaves->extent);
+    hs_boxes boxes = {.ndim = d,
+                      .n = leaves->n,
+                      .label = leaves->label,
+                      .hits = leaves->hits,
+                      .out = (float)(reach * reach * (1.0 + ROOM))};
     for (int k = 0; k < d; k++) {
         boxes.low[k] = leaves->low[k];
         boxes.high[k] = leaves->high[k];

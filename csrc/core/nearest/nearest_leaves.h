@@ -13,17 +13,17 @@ typedef struct hs_near_leaves {
     int32_t        n;
     float         *low[HS_MAX_DIM]; /* ranges of X, moved, less the centre, in units; clamped */
     float         *high[HS_MAX_DIM];
-    hs_near_run   *runs;            /* their points; places are of no meaning */
-    int32_t       *label;           /* 0, 1, 2, ... */
+    hs_near_run   *runs;  /* their points; places are of no meaning */
+    int32_t       *label; /* 0, 1, 2, ... */
     int32_t       *hits;
     hs_near_image *images;
     int32_t        n_images;
     int32_t       *stack;
     double         centre[HS_MAX_DIM];
-    double         unit;            /* a power of two: lengths times this */
-    double         extent;          /* largest number of any range */
-    double         error;           /* of the images, as hs_near_images has it */
-    double         radius;          /* for groups up to this one; 0: for none */
+    double         unit;   /* a power of two: lengths times this */
+    double         extent; /* largest number of any range */
+    double         error;  /* of the images, as hs_near_images has it */
+    double         radius; /* for groups up to this one; 0: for none */
 } hs_near_leaves;
 
 hs_status hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves);

@@ -124,7 +124,7 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
     options.cutoff = scene_cutoff(box, INFINITY);
     options.want = HS_WANT_SHIFT;
     options.counters = NULL;
-    hs_call      *call = search->call;
+    hs_call *call = search->call;
     hs_call_begin(&options, call);
     hs_search_begin(call, search);
     call->team = near->search->call->team;
@@ -167,10 +167,10 @@ static hs_status
 prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
                   hs_failure *failure)
 {
-    hs_search     *search = near->search;
-    hs_near       *room;
-    hs_scene       asking;
-    hs_status      status = HS_OK;
+    hs_search *search = near->search;
+    hs_near   *room;
+    hs_scene   asking;
+    hs_status  status = HS_OK;
     if (limit_is_small(limit)) {
         return HS_UNSERVED;
     }

@@ -53,8 +53,8 @@ hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_grou
         if (lattice->row_of_axis[k] < 0) {
             const double apart = hs_larger(near->layer_lower[k] - group->t_upper[k],
                                            group->t_lower[k] - near->layer_upper[k]);
-            group->away = hs_larger(apart * (1.0 - ROOM) - 4.0 * near->search->scene.t_error[k],
-                                    group->away);
+            group->away =
+                hs_larger(apart * (1.0 - ROOM) - 4.0 * near->search->scene.t_error[k], group->away);
         }
     }
 }
@@ -189,8 +189,8 @@ widen_at_edges(const hs_near *near, const hs_near_group *group, double radius)
         const double middle = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
         const double below = hs_smaller(middle - tree->lower[k], radius);
         const double above = hs_smaller(tree->upper[k] - middle, radius);
-        const bool   repeats =
-            near->search->scene.lattice.aligned && near->search->scene.lattice.row_of_axis[k] >= 0;
+        const bool   repeats = near->search->scene.lattice.aligned &&
+                             near->search->scene.lattice.row_of_axis[k] >= 0;
         part *= repeats ? 1.0 : fmin(fmax((below + above) / (2.0 * radius), 0.5), 1.0);
     }
     return part < 1.0 ? radius * pow(part, -1.0 / tree->ndim) : radius;

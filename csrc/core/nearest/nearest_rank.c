@@ -118,18 +118,17 @@ static bool
 is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
 {
     const hs_near_ranker *ranker = context;
-    const hs_search     *search = ranker->near->search;
-    const hs_near_block *block = ranker->block;
-    const int32_t        j = search->bins.order[block->number[b->place]];
-    const int32_t        other = search->bins.order[block->number[a->place]];
-    int64_t              difference[HS_MAX_DIM] = {0}, given[HS_MAX_DIM];
+    const hs_search      *search = ranker->near->search;
+    const hs_near_block  *block = ranker->block;
+    const int32_t         j = search->bins.order[block->number[b->place]];
+    const int32_t         other = search->bins.order[block->number[a->place]];
+    int64_t               difference[HS_MAX_DIM] = {0}, given[HS_MAX_DIM];
     if (j != other) {
         return j < other;
     }
     for (int r = 0; r < search->bins.n_periodic; r++) {
-        difference[r] =
-            (int64_t)hs_near_image_of(block, b->place)->shift[r] -
-            hs_near_image_of(block, a->place)->shift[r];
+        difference[r] = (int64_t)hs_near_image_of(block, b->place)->shift[r] -
+                        hs_near_image_of(block, a->place)->shift[r];
     }
     if (!hs_lattice_shift(&search->scene.lattice, difference, given)) {
         return false;
@@ -175,8 +174,8 @@ settle_order(hs_near_ranker *ranker, int64_t n, int64_t wanted)
     hs_near_key *const all = ranker->keys;
     for (int64_t begin = 0, end; begin < wanted; begin = end) {
         end = begin + 1;
-        while (end < n && all[end].square - all[end - 1].square <=
-                              closeness(ranker, all[end].square)) {
+        while (end < n &&
+               all[end].square - all[end - 1].square <= closeness(ranker, all[end].square)) {
             end++;
         }
         if (end - begin > 1) {
@@ -189,8 +188,8 @@ settle_order(hs_near_ranker *ranker, int64_t n, int64_t wanted)
 HS_ALWAYS_INLINE int64_t
 fill_keys(hs_near_ranker *ranker, const int32_t *hits, int64_t n, double limit, const int ndim)
 {
-    const hs_near_block *block = ranker->block;
-    const hs_bins       *asking = hs_search_asking(ranker->near->search);
+    const hs_near_block     *block = ranker->block;
+    const hs_bins           *asking = hs_search_asking(ranker->near->search);
     hs_near_key *HS_RESTRICT keys = ranker->keys;
     const double            *x[HS_MAX_DIM], unit = block->unit;
     double                   at[HS_MAX_DIM];
@@ -221,8 +220,7 @@ drop_self(hs_near_ranker *ranker, int64_t n)
     const hs_near_block *block = ranker->block;
     for (int64_t e = 0; e < n; e++) {
         const int32_t place = ranker->keys[e].place;
-        if (ranker->keys[e].square <= block->flat_error &&
-            block->number[place] == ranker->si &&
+        if (ranker->keys[e].square <= block->flat_error && block->number[place] == ranker->si &&
             hs_near_image_of(block, place)->is_home) {
             ranker->keys[e] = ranker->keys[n - 1];
             return n - 1;
@@ -268,8 +266,8 @@ hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits, const
     const int64_t        wanted = ranker->near->k + omits_self;
     const double         reach = block->reach * block->reach;
     /* Of two squares, and of two keys. */
-    const double         least = 2.0 * block->square_error + KEY_ERROR * reach;
-    int32_t              keys[HS_ORDER_MOST + 1];
+    const double least = 2.0 * block->square_error + KEY_ERROR * reach;
+    int32_t      keys[HS_ORDER_MOST + 1];
     *count = -1;
     if (n < wanted || n > HS_ORDER_MOST) {
         return n < wanted;

@@ -17,7 +17,7 @@ typedef struct hs_near_ranker {
     hs_near_key         *keys;  /* those that count come first */
     hs_near_key         *spare;
     int64_t              capacity;
-    int32_t              si;    /* the point that asks */
+    int32_t              si; /* the point that asks */
     hs_near_pace         pace;
     hs_stages            stages;
     int64_t              n_compared;

@@ -107,10 +107,9 @@ hs_status
 hs_near_runs_find(const hs_near *near, const hs_options *options, const hs_near_group *group,
                   double most, hs_near_images *images, hs_near_block *block)
 {
-    const double reach =
-        block->reach * (1.0 + ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
-    int       since_poll = 0;
-    hs_status status = HS_OK;
+    const double reach = block->reach * (1.0 + ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
+    int          since_poll = 0;
+    hs_status    status = HS_OK;
     block->n = block->n_runs = block->n_images = 0;
     while (status == HS_OK && hs_near_images_next(images)) {
         const int32_t n = block->n;

@@ -20,13 +20,13 @@
 /* Points of a group. Measured: from 32 to 64 the time falls by some 10 %,
  * where vectors are wide. */
 #define GROUP_POINTS 48
-#define AHEAD 8 /* points between asking for a row's memory and writing to it */
+#define AHEAD        8 /* points between asking for a row's memory and writing to it */
 /* A thread takes subtrees at a time whose groups share a walk down the tree: at most a so many-th
  * part of all points, so that there is enough for all threads, within these bounds. Measured: with
  * more points the walk is a smaller part of the work. */
-#define RANGES 32
-#define LEAST_RANGE 640
-#define MOST_RANGE 2560
+#define RANGES       32
+#define LEAST_RANGE  640
+#define MOST_RANGE   2560
 #define RANGE_GROUPS 160 /* groups of one, at most; three times as many as there usually are */
 /* Candidates of a group, in points of the group and wanted ones, beyond which the guess was bad:
  * some three times as many as there are where points are evenly spread, ... */
@@ -40,12 +40,12 @@ typedef struct near_part {
 } near_part;
 
 typedef struct near_crew {
-    hs_near   *near;
-    near_part *parts;
-    int64_t    n_parts;
-    int64_t   *ranges; /* the first part of each, and behind the last one n_parts */
-    int64_t    n_ranges;
-    hs_commits *commits;
+    hs_near            *near;
+    near_part          *parts;
+    int64_t             n_parts;
+    int64_t            *ranges; /* the first part of each, and behind the last one n_parts */
+    int64_t             n_ranges;
+    hs_commits         *commits;
     struct near_worker *workers;
 } near_crew;
 
@@ -82,8 +82,8 @@ finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_
     const int32_t       *hits = block->hits + begin;
     int64_t              count;
     hs_status            status = HS_OK;
-    if (!block->has_squares || !hs_near_rank_fast(&worker->ranker, si, hits,
-                                                  block->squares + begin, end - begin, &count)) {
+    if (!block->has_squares || !hs_near_rank_fast(&worker->ranker, si, hits, block->squares + begin,
+                                                  end - begin, &count)) {
         status = hs_near_rank(&worker->ranker, group, si, hits, end - begin, &count);
     }
     *done = count >= 0;
@@ -112,7 +112,7 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
             if (t + AHEAD < n_points) {
                 hs_near_expect(&worker->writer, group->first + t + AHEAD);
             }
-            bool          done = false;
+            bool done = false;
             status = finish_point(worker, group, group->first + t, begin, end[t], &done);
             *left |= (uint64_t)!done << t;
         }
@@ -131,8 +131,7 @@ search_point(near_worker *worker, int32_t si, double guess)
     alone.radius = guess;
     hs_status status = hs_near_bound(near, &worker->options, &worker->bounder, &alone);
     while (status == HS_OK && left != 0) {
-        status = hs_near_block_fill(near, &worker->options, &alone, INFINITY, NULL,
-                                    &worker->block);
+        status = hs_near_block_fill(near, &worker->options, &alone, INFINITY, NULL, &worker->block);
         if (status == HS_OK) {
             status = finish_block(worker, &alone, &left);
         }
@@ -149,9 +148,9 @@ search_group(near_worker *worker, hs_near_group *group)
     const double   more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
     const double   most = more * MOST_CANDIDATES * ((double)near->k + n_points) + 64.0;
     uint64_t       left = UINT64_MAX;
-    hs_status status = hs_near_block_fill(near, &worker->options, group,
+    hs_status      status = hs_near_block_fill(near, &worker->options, group,
                                           n_points == 1 && group->is_complete ? INFINITY : most,
-                                          &worker->leaves, &worker->block);
+                                               &worker->leaves, &worker->block);
     if (status == HS_OK) {
         status = finish_block(worker, group, &left);
     } else if (status == HS_TOO_MUCH) {
@@ -256,8 +255,8 @@ list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
     const int32_t n = tree->nodes[0].end;
     const int32_t part = n / RANGES < MOST_RANGE ? n / RANGES : MOST_RANGE;
     const int32_t range_points = part > LEAST_RANGE ? part : LEAST_RANGE;
-    int32_t number = 0, range_end = 0;
-    int64_t n_waiting = 1; /* a node that is not looked at, for the end */
+    int32_t       number = 0, range_end = 0;
+    int64_t       n_waiting = 1; /* a node that is not looked at, for the end */
     stack[0] = 0;
     while (n_waiting > 0) {
         const hs_tree_node *node = &tree->nodes[number];
@@ -322,8 +321,7 @@ hs_near_search(hs_near *near, hs_failure *failure)
         return HS_OK;
     }
     const int64_t most_parts = near->asking->n_nodes + n / GROUP_POINTS + 1;
-    int32_t      *stack =
-        hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
+    int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
     crew.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *crew.parts);
     crew.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *crew.ranges);
     near->shared = hs_shared_new(account);

@@ -7,10 +7,10 @@
 #include <math.h>
 #include <string.h>
 
-#define WIDEST_SHIFT (INT64_C(1) << 53) /* what the batch kernels take */
-#define LINE 64           /* bytes that are fetched at once, */
-#define MOST_EXPECTED 512 /* and of a row */
-#define MOST_SQUARE 0x1p1000
+#define WIDEST_SHIFT  (INT64_C(1) << 53) /* what the batch kernels take */
+#define LINE          64                 /* bytes that are fetched at once, */
+#define MOST_EXPECTED 512                /* and of a row */
+#define MOST_SQUARE   0x1p1000
 
 void
 hs_near_writer_init(const hs_near *near, hs_near_writer *writer)
@@ -28,9 +28,8 @@ hs_near_expect(const hs_near_writer *writer, int32_t si)
 {
     const hs_near *near = writer->near;
     const int64_t  row = hs_search_asking(near->search)->order[si];
-    const int64_t  bytes[2] = {near->k * near->rows->index_bytes,
-                               near->k * (int64_t)sizeof(double)};
-    char *const    column[2] = {writer->j, (char *)writer->d};
+    const int64_t bytes[2] = {near->k * near->rows->index_bytes, near->k * (int64_t)sizeof(double)};
+    char *const   column[2] = {writer->j, (char *)writer->d};
     for (int c = 0; c < 2; c++) {
         char *line = column[c] != NULL ? column[c] + row * bytes[c] : NULL;
         for (int64_t at = 0; line != NULL && at < bytes[c] && at < MOST_EXPECTED; at += LINE) {
@@ -184,8 +183,8 @@ put_shift(const hs_near *near, const int64_t *given, int32_t *to)
 /* The metric's shifts, and S where that is wanted, of n entries from place `at` of the output and
  * from the batch's next entry on: where they follow from the points' turns. */
 static hs_status
-put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
-          int32_t n, int64_t at)
+put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n,
+          int64_t at)
 {
     const hs_near *near = writer->near;
     const hs_bins *asking = hs_search_asking(near->search);
@@ -194,16 +193,15 @@ put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_ke
         double   q[HS_MAX_DIM];
         int64_t  given[HS_MAX_DIM];
         if (!hs_near_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
-            (writer->S != NULL &&
-             !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
+            (writer->S != NULL && !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
             writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
         }
         for (int r = 0; r < asking->n_periodic; r++) {
             writer->times[r][writer->n + e] = (double)shift[r];
             writer->is_shifted = writer->is_shifted || shift[r] != 0;
-            writer->is_wide =
-                writer->is_wide || shift[r] > WIDEST_SHIFT || shift[r] < -WIDEST_SHIFT;
+            writer->is_wide = writer->is_wide || shift[r] > WIDEST_SHIFT ||
+                              shift[r] < -WIDEST_SHIFT;
         }
     }
     return HS_OK;
@@ -277,10 +275,10 @@ count_within(hs_near_ranker *ranker, int64_t count)
     }
     while (count > 0) {
         const hs_near_key *key = &ranker->keys[count - 1];
-        const double error = 2.0 * hs_near_error(ranker->block, near->tree.ndim,
-                                                 hs_larger(square, key->square));
-        double       p[HS_MAX_DIM], q[HS_MAX_DIM];
-        int64_t      shift[HS_MAX_DIM];
+        const double       error =
+            2.0 * hs_near_error(ranker->block, near->tree.ndim, hs_larger(square, key->square));
+        double  p[HS_MAX_DIM], q[HS_MAX_DIM];
+        int64_t shift[HS_MAX_DIM];
         if (key->square + error < square) {
             break;
         }
@@ -305,8 +303,8 @@ hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
     const int64_t  row = hs_search_asking(near->search)->order[ranker->si];
     count = count_within(ranker, count);
     for (int64_t e = 0; e < count;) {
-        const int64_t room = HS_BATCH - writer->n;
-        const int32_t n = (int32_t)(count - e < room ? count - e : room);
+        const int64_t   room = HS_BATCH - writer->n;
+        const int32_t   n = (int32_t)(count - e < room ? count - e : room);
         const hs_status status =
             put_entries(writer, ranker, ranker->keys + e, n, row * near->k + e, e == 0);
         if (status != HS_OK) {

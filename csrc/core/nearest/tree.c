@@ -7,9 +7,9 @@
 #include <string.h>
 
 /* Points that say where a node is split: enough for halves of 35 to 65 of 100. */
-#define SAMPLE 15
+#define SAMPLE       15
 #define LARGE_SAMPLE 63
-#define FEW_SAMPLE 7
+#define FEW_SAMPLE   7
 /* Nodes with more points than this are worth a larger sample, with fewer a smaller one. */
 #define LARGE_NODE 4096
 #define SMALL_NODE 32
@@ -25,7 +25,7 @@ typedef struct tree_builder {
     int32_t          *order;
     int32_t          *aside; /* room for n numbers */
     int32_t           leaf_points;
-    int64_t           work;  /* points that were moved since the last poll */
+    int64_t           work; /* points that were moved since the last poll */
 } tree_builder;
 
 /* Where a node is split: what is below the pivot goes left. */

@@ -19,14 +19,14 @@ typedef struct hs_tree_node {
 
 typedef struct hs_tree {
     int           ndim;
-    int32_t       n_nodes;  /* the first one holds all points; 0 without points */
+    int32_t       n_nodes; /* the first one holds all points; 0 without points */
     int32_t       capacity;
-    int           depth;    /* most steps from the first node to a leaf */
-    hs_tree_node *nodes;    /* owned; children come after their parent */
+    int           depth; /* most steps from the first node to a leaf */
+    hs_tree_node *nodes; /* owned; children come after their parent */
     /* Range of X: of the first node, and of each pair of children, for every axis: lowest of left
      * and right, largest of left and right. */
-    double        lower[HS_MAX_DIM], upper[HS_MAX_DIM];
-    double       *bounds;   /* owned */
+    double  lower[HS_MAX_DIM], upper[HS_MAX_DIM];
+    double *bounds; /* owned */
 } hs_tree;
 
 /*
@@ -65,8 +65,9 @@ hs_tree_gaps(const double *bounds, const double *low, const double *high, double
     for (int k = 0; k < ndim; k++) {
         double apart[2];
         for (int side = 0; side < 2; side++) {
-            apart[side] = hs_tree_apart(bounds[4 * k + side], bounds[4 * k + 2 + side], low[k],
-                                        high[k]) * (0.5 * unit);
+            apart[side] =
+                hs_tree_apart(bounds[4 * k + side], bounds[4 * k + 2 + side], low[k], high[k]) *
+                (0.5 * unit);
         }
         sum[0] += apart[0] * apart[0];
         sum[1] += apart[1] * apart[1];

@@ -37,9 +37,9 @@ hs_once_applies(const hs_table *table)
 static hs_status
 keep_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    once           *doing = context;
-    hs_output      *entries = doing->table->entries;
-    const int32_t   n = hits->end[hits->n - 1];
+    once         *doing = context;
+    hs_output    *entries = doing->table->entries;
+    const int32_t n = hits->end[hits->n - 1];
     (void)first;
     const hs_status status = hs_output_reserve(entries, n, hs_scanner_fraction(scanner));
     if (status != HS_OK) {
@@ -60,8 +60,8 @@ walk_once(once *doing, hs_failure *failure)
     hs_walker     walker;
     memset(table->offsets, 0, (size_t)n * sizeof *table->offsets);
     hs_output_expect(table->entries, search->grid.expected_pairs * search->pairs_per_half);
-    hs_status status = hs_walker_init_ordered(search, HS_BLOCK_LISTS_IDS, &table->most, keep_hits,
-                                              doing, &walker);
+    hs_status status =
+        hs_walker_init_ordered(search, HS_BLOCK_LISTS_IDS, &table->most, keep_hits, doing, &walker);
     if (status == HS_OK) {
         status = hs_walk_or_tell(&walker, 0, (int32_t)n, failure);
         hs_walker_close(search, &walker);

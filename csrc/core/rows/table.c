@@ -27,8 +27,7 @@ hs_status
 hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
 {
     const int64_t     n = hs_search_asking(search)->n;
-    const hs_visitors visitors = {
-        .use = HS_BLOCK_COUNTS, .visit = count_hits, .contexts = counts};
+    const hs_visitors visitors = {.use = HS_BLOCK_COUNTS, .visit = count_hits, .contexts = counts};
     if (n > 0) { /* otherwise counts may be NULL */
         memset(counts, 0, (size_t)n * sizeof *counts);
     }

@@ -7,14 +7,15 @@
 
 #include <string.h>
 
-#define AHEAD         32   /* points between asking for a row and writing it; twice that for where
+#define AHEAD \
+    32                     /* points between asking for a row and writing it; twice that for where
                             * it is */
 #define MOST_EXPECTED 2048 /* bytes of a row that are asked for */
 #define NO_POINT      INT32_MAX /* more than any point's number */
 
 /* The row of one point. */
 typedef struct table_row {
-    int64_t        at;      /* entries [at, at + n) of the table */
+    int64_t        at; /* entries [at, at + n) of the table */
     int32_t        n;
     int32_t        point;
     int32_t        itself;  /* what is left out once: the point's number, or NO_POINT */
@@ -266,8 +267,8 @@ hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
     hs_account *account = &table->search->call->account;
     *fill = (hs_filler){.table = table, .to = to};
     hs_output_init(NULL, to->ndim, to->columns & HS_MEASURES, to->index_bytes, &fill->part);
-    fill->numbers = hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1,
-                             sizeof *fill->numbers);
+    fill->numbers =
+        hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1, sizeof *fill->numbers);
     /* It keeps no numbers of hits: there are none to be turned round. */
     const hs_status status = hs_recorder_init(account, &fill->part, 0, &fill->recorder);
     return fill->numbers == NULL ? HS_ERR_MEMORY : status;
@@ -284,10 +285,10 @@ hs_filler_close(hs_filler *fill)
 void
 hs_move_rows(hs_table *table)
 {
-    const hs_bins *asking = hs_search_asking(table->search);
-    const int32_t *numbers = hs_output_column(&table->kept, HS_WANT_J);
+    const hs_bins  *asking = hs_search_asking(table->search);
+    const int32_t  *numbers = hs_output_column(&table->kept, HS_WANT_J);
     const hs_filler fill = {.table = table, .to = table->entries, .part = table->kept};
-    int64_t        from = 0;
+    int64_t         from = 0;
     for (int64_t si = 0; si < asking->n; si++) {
         const int64_t *place = table->offsets + asking->order[si];
         table_row      of = {.at = place[0], .n = (int32_t)(place[1] - place[0])};

@@ -44,14 +44,14 @@ typedef struct condensing {
     const hs_options *options;
     hs_cloud         *of[HS_CONDENSED_SETS]; /* points, and queries if there are any */
     int               n_sets;
-    int64_t           n;            /* of both together */
+    int64_t           n; /* of both together */
     hs_condensed     *condensed;
     bool              changes_rows; /* boxes may be condensed as well */
     bool              keeps_given;  /* columns that are wrapped, as they were before */
     hs_scale          to_units, from_units;
-    double            far;          /* drawn together from here on, in the caller's unit */
-    double            coarse;       /* 2^54 u, the same */
-    hs_keys           keys;         /* room for n + 1 */
+    double            far;    /* drawn together from here on, in the caller's unit */
+    double            coarse; /* 2^54 u, the same */
+    hs_keys           keys;   /* room for n + 1 */
 } condensing;
 
 /* The number that stands for entry i of a set among the keys. */
@@ -99,7 +99,7 @@ keep_given(const condensing *doing, int k)
 {
     for (int set = 0; set < doing->n_sets; set++) {
         const hs_cloud *cloud = doing->of[set];
-        double **given = &doing->condensed->given[set][k];
+        double        **given = &doing->condensed->given[set][k];
         *given = hs_alloc(doing->account, HS_FOR_ORIGINALS, cloud->n, sizeof **given);
         if (*given == NULL) {
             return HS_ERR_MEMORY;
@@ -298,8 +298,8 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     }
     const bool condenses = is_far && (row < 0 || half > hs_larger(far, LEAST_HALF));
     /* What is dense enough already is left alone, so that one outlier costs no sorting. */
-    const double dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)doing->n);
-    const double from = condenses ? hs_smaller(dense, far) : INFINITY;
+    const double    dense = hs_scale_apply(doing->from_units, UNITS_PER_POINT * (double)doing->n);
+    const double    from = condenses ? hs_smaller(dense, far) : INFINITY;
     const hs_status status = condense_numbers(doing, k, from, &half);
     if (row >= 0 && condenses) {
         *entry = copysign(2.0 * half, *entry);
@@ -315,8 +315,7 @@ static bool
 allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
 {
     keys->options = options;
-    keys->keys =
-        hs_alloc(account, HS_FOR_ORDER, n, 2 * (sizeof(int64_t) + sizeof(int32_t)));
+    keys->keys = hs_alloc(account, HS_FOR_ORDER, n, 2 * (sizeof(int64_t) + sizeof(int32_t)));
     if (keys->keys != NULL) {
         keys->spare_keys = keys->keys + n;
         keys->ids = (int32_t *)(void *)(keys->spare_keys + n);
@@ -348,9 +347,8 @@ condense_columns(condensing *doing, hs_failure *failure)
 }
 
 hs_status
-hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit,
-            int powers, hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed,
-            hs_failure *failure)
+hs_condense(hs_account *account, const hs_options *options, const hs_box *box, int unit, int powers,
+            hs_cloud *cloud, hs_cloud *asking, hs_condensed *condensed, hs_failure *failure)
 {
     condensed->box = condensed->given_box = box;
     condensed->is_scaled = condensed->has_turns = false;

@@ -15,16 +15,16 @@
 #define HS_CONDENSED_SETS 2
 
 typedef struct hs_condensed {
-    const hs_box *box;               /* in place of the caller's: borrowed, or `rows` */
-    const hs_box *given_box;         /* the caller's */
+    const hs_box *box;       /* in place of the caller's: borrowed, or `rows` */
+    const hs_box *given_box; /* the caller's */
     hs_box        rows;
-    bool          is_scaled;         /* points and rows are in units of 2^unit now */
-    bool          has_turns;         /* something was wrapped into the box, and S is wanted: */
+    bool          is_scaled; /* points and rows are in units of 2^unit now */
+    bool          has_turns; /* something was wrapped into the box, and S is wanted: */
     /* Owned, of points and of queries; n each for a column where some were, else NULL. */
-    int64_t      *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
+    int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
     /* And where scaling may lose digits these columns of both sets, if either has turns, as they
      * were given: S with all its turns is that of those numbers and of the box as given. */
-    double       *given[HS_CONDENSED_SETS][HS_MAX_DIM];
+    double *given[HS_CONDENSED_SETS][HS_MAX_DIM];
 } hs_condensed;
 
 /*

@@ -213,8 +213,8 @@ hs_points_range(const hs_points *points, double *lower, double *upper)
         lower[k] = INFINITY;
         upper[k] = -INFINITY;
         for (int64_t i = 0; i < points->n; i++) {
-            const char *entry = (const char *)points->data + i * points->row_stride +
-                                k * points->column_stride;
+            const char *entry =
+                (const char *)points->data + i * points->row_stride + k * points->column_stride;
             float  narrow;
             double x;
             if (points->real == HS_FLOAT32) {

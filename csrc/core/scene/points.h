@@ -18,15 +18,15 @@
  *     order | spare | x[0] | x[1] | ...
  */
 typedef struct hs_cloud {
-    void    *block;             /* owned */
-    int32_t *order;             /* room for n */
-    double  *spare;             /* room for n */
-    double  *x[HS_MAX_DIM];     /* n each: coordinate k of every point */
+    void    *block;         /* owned */
+    int32_t *order;         /* room for n */
+    double  *spare;         /* room for n */
+    double  *x[HS_MAX_DIM]; /* n each: coordinate k of every point */
     int64_t  n;
     int      ndim;
     double   lower[HS_MAX_DIM]; /* range of coordinate k; +infinity, -infinity without points */
     double   upper[HS_MAX_DIM];
-    double   largest;           /* largest |x|, 0 without points */
+    double   largest; /* largest |x|, 0 without points */
 } hs_cloud;
 
 /* Bytes behind the last column of a block that may be read: kernels work in whole vectors. */

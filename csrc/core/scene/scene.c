@@ -23,8 +23,8 @@ allocate_beside(hs_account *account, hs_scene *scene)
     if (d + m == 0) {
         return true;
     }
-    scene->beside = hs_alloc(account, HS_FOR_ORIGINALS,
-                             d * pitch + m * turns_pitch + HS_COLUMN_PADDING, 1);
+    scene->beside =
+        hs_alloc(account, HS_FOR_ORIGINALS, d * pitch + m * turns_pitch + HS_COLUMN_PADDING, 1);
     if (scene->beside == NULL) {
         return false;
     }
@@ -168,8 +168,7 @@ hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept, const hs
     } else if (kept->turns.known) {
         as_kept.want |= HS_WANT_SHIFT;
     }
-    hs_status status =
-        hs_cloud_load(account, team, queries, options, &asking->cloud, failure);
+    hs_status status = hs_cloud_load(account, team, queries, options, &asking->cloud, failure);
     if (status == HS_OK && !hs_scene_takes(kept, &asking->cloud)) {
         status = HS_UNSERVED;
     }
@@ -214,8 +213,7 @@ static hs_status
 load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_options *options,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
-    hs_status status =
-        hs_cloud_load(account, team, sets->points, options, &scene->cloud, failure);
+    hs_status status = hs_cloud_load(account, team, sets->points, options, &scene->cloud, failure);
     if (status == HS_OK && asking != NULL) {
         status = hs_cloud_load(account, team, sets->queries, options, &asking->cloud, failure);
         failure->in_queries = status != HS_OK;

@@ -20,55 +20,55 @@ typedef struct hs_scene {
     int        ndim;
     int64_t    n;
     hs_scale   scale;
-    hs_scale   unscale;       /* the way back */
-    hs_scale   pending;       /* scale, but for what condensing the points has done of it */
+    hs_scale   unscale; /* the way back */
+    hs_scale   pending; /* scale, but for what condensing the points has done of it */
     hs_lattice lattice;
-    double     sought;        /* the caller's cutoff, not scaled; less if no two points are so far
+    double     sought;          /* the caller's cutoff, not scaled; less if no two points are so far
                                * apart */
-    double     cutoff;        /* scaled; the true one, or an upper bound when `extreme` */
-    double     cutoff_low;    /* at most the true one */
-    double     radius;        /* candidates are sought up to here; cutoff, or a little more */
-    bool       extreme;       /* scaling lost digits: pairs are decided on the originals */
-    hs_metric  metric;        /* decides on X, or on the originals if there are any */
-    hs_cloud   cloud;         /* its columns are X, in the caller's order, once that is known */
+    double     cutoff;          /* scaled; the true one, or an upper bound when `extreme` */
+    double     cutoff_low;      /* at most the true one */
+    double     radius;          /* candidates are sought up to here; cutoff, or a little more */
+    bool       extreme;         /* scaling lost digits: pairs are decided on the originals */
+    hs_metric  metric;          /* decides on X, or on the originals if there are any */
+    hs_cloud   cloud;           /* its columns are X, in the caller's order, once that is known */
     bool       keeps_originals; /* X does not hold every digit */
     double    *originals[HS_MAX_DIM]; /* n each: the points as given */
-    bool       x_is_beside;   /* the originals stayed in the cloud's block, X is in the other */
-    hs_turns   turns;         /* known if shifts or originals need them */
-    void      *beside;        /* owned; the columns of originals and turns, one behind another */
+    bool       x_is_beside; /* the originals stayed in the cloud's block, X is in the other */
+    hs_turns   turns;       /* known if shifts or originals need them */
+    void      *beside;      /* owned; the columns of originals and turns, one behind another */
     double     lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
     double     upper[HS_MAX_DIM];
     double     x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
-    double     x_error;       /* each component of X is within this of r - w B */
-    double     t_error[HS_MAX_DIM]; /* and each computed t_k of the true one, clamping included */
-    double     formula_error; /* precision="double": its |D| against the true one */
-    bool       is_asked;      /* by queries: the bounds above hold for these too */
-    bool       is_kept;       /* and for others that come later */
-    bool       in_one_cell;   /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
-    bool       is_untested;   /* as hs_sets says: bounds for the cells alone will do */
-    bool       is_plain;      /* the same */
-    bool       is_wide;       /* the same */
-    double     least_cutoff;  /* the same */
-    double     within;        /* the same */
+    double     x_error;               /* each component of X is within this of r - w B */
+    double     t_error[HS_MAX_DIM];   /* and each computed t_k of the true one, clamping included */
+    double     formula_error;         /* precision="double": its |D| against the true one */
+    bool       is_asked;              /* by queries: the bounds above hold for these too */
+    bool       is_kept;               /* and for others that come later */
+    bool       in_one_cell;           /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
+    bool       is_untested;           /* as hs_sets says: bounds for the cells alone will do */
+    bool       is_plain;              /* the same */
+    bool       is_wide;               /* the same */
+    double     least_cutoff;          /* the same */
+    double     within;                /* the same */
 } hs_scene;
 
 /* Who looks for neighbours among whom; borrowed. */
 typedef struct hs_sets {
     const hs_points *points;
-    const hs_points *queries; /* NULL: the points themselves; else of the same dimension */
-    bool             is_kept; /* queries come later: bounds with room for them */
+    const hs_points *queries;  /* NULL: the points themselves; else of the same dimension */
+    bool             is_kept;  /* queries come later: bounds with room for them */
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
                                 * and points are drawn together (close_gaps.h) only if need be */
-    bool             is_wide; /* X is not made float32: it may be larger than that holds */
+    bool             is_wide;  /* X is not made float32: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
-    struct hs_near_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
-    bool             is_untested; /* cells are all that is wanted, no distance is computed */
-    bool             keeps_none; /* pairs are handed on and not kept: any number will fit */
-    bool             is_full; /* each asking point meets all its neighbours, not the half list that
+    struct hs_near_kept    *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
+    bool                    is_untested; /* cells are all that is wanted, no distance is computed */
+    bool                    keeps_none;  /* pairs are handed on and not kept: any number will fit */
+    bool   is_full;      /* each asking point meets all its neighbours, not the half list that
                                * has each pair once; always so with queries */
-    double           least_cutoff; /* the smallest positive length that pairs are compared with,
+    double least_cutoff; /* the smallest positive length that pairs are compared with,
                                     * where there are several; 0: the cutoff alone */
-    double           within;  /* where is_wide: no pair further apart than this matters; 0: any */
+    double within;       /* where is_wide: no pair further apart than this matters; 0: any */
 } hs_sets;
 
 /*
@@ -89,8 +89,7 @@ hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *
                              hs_scene *asking, hs_failure *failure);
 
 /* Steps of that; scene_scale.c. The cutoff that scale and condensing go by. */
-double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size,
-                              double cutoff);
+double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
 
 /* Whether points and queries are drawn together where they are far. Others that come later may be
  * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
@@ -147,9 +146,8 @@ hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept
 
 /* Points wrapped as those of a scene that was kept, however far away they are: for their cells
  * alone. On failure it holds nothing. */
-hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept,
-                                const hs_points *points, const hs_options *options,
-                                hs_scene *scene, hs_failure *failure);
+hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
+                                const hs_options *options, hs_scene *scene, hs_failure *failure);
 
 /* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);

@@ -18,8 +18,8 @@ hs_scene_settle_ranges(hs_scene *scene)
         if (scene->lattice.row_of_axis[k] >= 0) {
             const double half = 0.5 * scene->lattice.period[k];
             /* Points that rounding left outside are binned on the face: an error of t. */
-            scene->t_error[k] += hs_larger(
-                hs_larger(scene->upper[k] - half, -half - scene->lower[k]), 0.0);
+            scene->t_error[k] +=
+                hs_larger(hs_larger(scene->upper[k] - half, -half - scene->lower[k]), 0.0);
             scene->lower[k] = -half;
             scene->upper[k] = half;
         }

@@ -11,7 +11,7 @@
 /* How much further from the box than the points queries may be that come later, and how many box
  * vectors at least, before they need bounds of their own. Bounds that are so much wider cost next
  * to nothing: they are some units in the last place. */
-#define FURTHER 4.0
+#define FURTHER     4.0
 #define BOX_VECTORS 1024.0
 /* Along coordinate axes cells are found for any number, as long as sums of a few are finite. */
 #define MOST_FOR_CELLS 0x1p900
@@ -51,10 +51,10 @@ hs_scene_join_wrapped(hs_scene *scene, const hs_scene *asking)
     for (int k = 0; k < scene->ndim; k++) {
         scene->x_largest[k] = hs_larger(scene->x_largest[k], asking->x_largest[k]);
         if (queries) { /* otherwise its range is that of nothing */
-            scene->lower[k] =
-                points ? hs_smaller(scene->lower[k], asking->lower[k]) : asking->lower[k];
-            scene->upper[k] =
-                points ? hs_larger(scene->upper[k], asking->upper[k]) : asking->upper[k];
+            scene->lower[k] = points ? hs_smaller(scene->lower[k], asking->lower[k])
+                                     : asking->lower[k];
+            scene->upper[k] = points ? hs_larger(scene->upper[k], asking->upper[k])
+                                     : asking->upper[k];
         }
     }
 }

@@ -41,14 +41,12 @@ hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
     int               exponent = unit;
     bool              also_extreme = false;
     /* The smallest length that pairs are compared with. */
-    const double      least = scene->least_cutoff > 0.0
-                                  ? hs_smaller(scene->least_cutoff, scene->sought)
-                                  : scene->sought;
+    const double least = scene->least_cutoff > 0.0 ? hs_smaller(scene->least_cutoff, scene->sought)
+                                                   : scene->sought;
     scene->extreme = false;
     if (!is_scaled) {
         const int largest = scene->is_wide ? HS_LARGEST_WIDE_EXPONENT : HS_LARGEST_EXPONENT;
-        exponent =
-            hs_choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
+        exponent = hs_choose_exponent(&scene->cloud, &size, least, unit, largest, &scene->extreme);
         if (asking != NULL) { /* the same exponent: the clouds' ranges are joined */
             (void)hs_choose_exponent(&asking->cloud, &size, least, unit, largest, &also_extreme);
         }
@@ -96,8 +94,7 @@ hs_scene_has_no_scale(const hs_scene *scene, const hs_condensed *condensed)
 }
 
 hs_status
-hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed,
-                          hs_failure *failure)
+hs_scene_refuse_vanishing(const hs_scene *scene, const hs_condensed *condensed, hs_failure *failure)
 {
     if (!scene->lattice.aligned && !has_endless_images(scene, condensed)) {
         return HS_ERR_BOX_SKEWED;

@@ -30,8 +30,8 @@ static double
 given_length(const hs_scene *scene, int k)
 {
     const hs_lattice *lattice = &scene->lattice;
-    const int own = hs_mover_among((const double(*)[HS_MAX_DIM])lattice->given, NULL,
-                                   lattice->n_periodic, lattice->ndim, k);
+    const int         own = hs_mover_among((const double(*)[HS_MAX_DIM])lattice->given, NULL,
+                                           lattice->n_periodic, lattice->ndim, k);
     if (own >= 0) {
         return fabs(lattice->given[own][k]);
     }

@@ -78,10 +78,9 @@ take_points(const hs_points *points, const hs_options *options, hs_frame *frame,
         const int64_t left = points->n - first;
         const int64_t last = first + (left < HS_POLL_POINTS ? left : HS_POLL_POINTS);
         copy_rows(points, first, last, frame->rows);
-        const double largest =
-            points->real == HS_FLOAT32
-                ? find_largest(frame->rows, HS_FLOAT32, first * d, last * d)
-                : find_largest(frame->rows, HS_FLOAT64, first * d, last * d);
+        const double largest = points->real == HS_FLOAT32
+                                   ? find_largest(frame->rows, HS_FLOAT32, first * d, last * d)
+                                   : find_largest(frame->rows, HS_FLOAT64, first * d, last * d);
         if (!isfinite(largest)) {
             return name_first_bad(frame, first * d, last * d, failure);
         }
@@ -120,7 +119,7 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
 bool
 hs_frames_match(const hs_frame *one, const hs_frame *other)
 {
-    int rows[HS_MAX_DIM], others[HS_MAX_DIM];
+    int       rows[HS_MAX_DIM], others[HS_MAX_DIM];
     const int m = hs_frame_periodic(one, rows);
     return one->points.n == other->points.n && one->points.ndim == other->points.ndim &&
            one->points.real == other->points.real && m == hs_frame_periodic(other, others) &&

@@ -94,8 +94,8 @@ int
 hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 {
     return hs_exponent_of(cutoff > 0.0                 ? cutoff
-                       : box->short_row != INFINITY ? box->short_row
-                                                    : cloud->largest);
+                          : box->short_row != INFINITY ? box->short_row
+                                                       : cloud->largest);
 }
 
 bool
@@ -130,10 +130,10 @@ int
 hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
                    int largest, bool *extreme)
 {
-    int       exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
+    int          exponent = unit == NO_EXPONENT || abs(unit) <= ORDINARY_EXPONENT ? 0 : unit;
     const double turned = ldexp(box->largest, HS_FAR_TURNS_EXPONENT);
     const double reach = turned > 0.0 ? hs_smaller(turned, cloud->largest) : cloud->largest;
-    const int found = hs_exponent_of(hs_larger(box->largest, reach));
+    const int    found = hs_exponent_of(hs_larger(box->largest, reach));
     if (found - exponent > largest) {
         exponent = found - largest;
     }

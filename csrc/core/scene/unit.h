@@ -52,7 +52,7 @@ typedef struct hs_box_size {
 hs_box_size hs_box_size_of(const hs_box *box);
 
 /* What moves a column of coordinates besides the points' own values. */
-#define HS_OPEN (-1)    /* nothing */
+#define HS_OPEN    (-1) /* nothing */
 #define HS_COUPLED (-2) /* rows that have entries in other columns as well */
 
 /* HS_OPEN, HS_COUPLED, or the row that alone has an entry in this column, and no other entry.

@@ -18,7 +18,7 @@
  * 250 tests more for one group of a row, w p is best at the root of 90 p + 250.
  */
 #define SHARED_PER_POINT 90.0
-#define SHARED 250.0
+#define SHARED           250.0
 
 /* The rows and cells of the points that ask, in a sparse grid. */
 static const hs_sparse *
@@ -141,8 +141,8 @@ hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *
 
 /* The row at this offset from a row, wrapped into the box; false when there is none. */
 static bool
-settle_link(const hs_search *search, const hs_row *row, const hs_stencil_row *offset,
-            hs_link *link, int64_t *target)
+settle_link(const hs_search *search, const hs_row *row, const hs_stencil_row *offset, hs_link *link,
+            int64_t *target)
 {
     const hs_lattice *lattice = &search->scene.lattice;
     const hs_grid    *grid = &search->grid;

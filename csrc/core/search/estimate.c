@@ -10,14 +10,14 @@
 
 /* What a search takes, about: order, cells and keys; a column and the copy that sorting makes; one
  * neighbourhood. */
-#define BYTES_PER_POINT 24.0
+#define BYTES_PER_POINT      24.0
 #define BYTES_PER_COORDINATE 8.0
-#define BYTES_OF_WALK 4e5
-#define SAMPLES 64         /* points that are counted: an error of some per cent */
-#define SAMPLE_WORK 4.0e6  /* candidates and rows that sampling may cost, some milliseconds */
-#define MOST_PAIRS 0x1p62  /* more than int64 should be asked to count */
-#define ROUNDING 1e-9      /* relative; far more than the coordinates along the axes are rounded */
-#define SURE_ERRORS 3.0    /* standard errors below the mean at which a refusal is sure enough */
+#define BYTES_OF_WALK        4e5
+#define SAMPLES              64     /* points that are counted: an error of some per cent */
+#define SAMPLE_WORK          4.0e6  /* candidates and rows that sampling may cost: milliseconds */
+#define MOST_PAIRS           0x1p62 /* more than int64 should be asked to count */
+#define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
+#define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
 
 static double
 sum_of_squares(const hs_bins *bins, int64_t n_cells)
@@ -40,8 +40,8 @@ bound_pairs(const hs_search *search)
 {
     double squares = sum_of_squares(&search->bins, search->grid.n_cells), offsets = 0.0;
     if (search->has_queries) {
-        const int64_t n_cells =
-            search->is_sparse ? search->query_sparse.n_cells : search->grid.n_cells;
+        const int64_t n_cells = search->is_sparse ? search->query_sparse.n_cells
+                                                  : search->grid.n_cells;
         squares = sqrt(squares * sum_of_squares(&search->query_bins, n_cells));
     }
     for (int64_t s = 0; s < search->stencil.n_rows; s++) {
@@ -192,8 +192,7 @@ hs_estimate_by_density(hs_search *search, hs_failure *failure)
     }
     const bool   has_density = search->scene.lattice.n_periodic == search->scene.ndim;
     const double dense = search->grid.expected_pairs * search->pairs_per_half;
-    return refuse(search, has_density ? dense : least, bytes_per_pair,
-                  failure);
+    return refuse(search, has_density ? dense : least, bytes_per_pair, failure);
 }
 
 /* What a few points have found: the sum of their counts, of the squares, and how many. */
@@ -237,8 +236,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const int64_t n = hs_search_asking(search)->n;
     hs_walker     walker;
     sample        taken;
-    if (n == 0 ||
-        hs_account_allows(&search->call->account, bound_pairs(search) * bytes_per_pair)) {
+    if (n == 0 || hs_account_allows(&search->call->account, bound_pairs(search) * bytes_per_pair)) {
         return HS_OK;
     }
     hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);

@@ -32,12 +32,11 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
     block->norm = complete ? block->y[0] + ndim * room : NULL;
     block->id = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
     block->unsure = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(hs_unsure));
-    block->runs =
-        hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)most_runs + 1, sizeof(hs_run));
+    block->runs = hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)most_runs + 1, sizeof(hs_run));
     complete = complete && block->id != NULL && block->unsure != NULL && block->runs != NULL;
     if (use != HS_BLOCK_COUNTS) {
-        block->hits = hs_alloc(account, HS_FOR_CANDIDATES,
-                               (int64_t)block->most_hits + HS_PADDING, sizeof(int32_t));
+        block->hits = hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)block->most_hits + HS_PADDING,
+                               sizeof(int32_t));
         complete = complete && block->hits != NULL;
     }
     if (use == HS_BLOCK_LISTS_SQUARES) {
@@ -91,7 +90,7 @@ hs_group_load(const hs_bins *bins, hs_group *group)
     for (int k = 0; k < bins->ndim; k++) {
         const double *x = bins->x[k] + group->first;
         for (int32_t t = 0; t < group->last - group->first; t++) {
-            const float q = (float)(x[t] - group->centre[k]);
+            const float    q = (float)(x[t] - group->centre[k]);
             const uint32_t bits = hs_bits_of_float(q) & UINT32_C(0x7fffffff);
             group->q[k][t] = q;
             group->largest = bits > group->largest ? bits : group->largest;
@@ -175,6 +174,6 @@ hs_group_extent(const hs_group *group)
     /* The top five bits of the mantissa, rounded up: at most 1/32 more. */
     const uint32_t low = (UINT32_C(1) << 18) - 1;
     const uint32_t bits = group->largest < UINT32_C(0x7f800000) ? (group->largest + low) & ~low
-                                                                 : group->largest;
+                                                                : group->largest;
     return 2.0 * (double)hs_float_of_bits(bits);
 }

@@ -22,15 +22,15 @@
  * y[0]. */
 typedef struct hs_block {
     float     *y[HS_MAX_DIM];
-    float     *norm;   /* sum of y_k^2 */
-    int32_t   *id;     /* point numbers of the candidates */
-    int32_t   *place;  /* 0, 1, 2, ...; NULL unless asked for */
-    int32_t   *origin; /* where candidates were before neighbourhood_sort.h put them in order; NULL
+    float     *norm;    /* sum of y_k^2 */
+    int32_t   *id;      /* point numbers of the candidates */
+    int32_t   *place;   /* 0, 1, 2, ...; NULL unless asked for */
+    int32_t   *origin;  /* where candidates were before neighbourhood_sort.h put them in order; NULL
                         * when it did not */
-    int32_t   *hits;   /* most_hits + HS_PADDING; NULL when only counting */
+    int32_t   *hits;    /* most_hits + HS_PADDING; NULL when only counting */
     float     *squares; /* of the hits, the same; NULL unless asked for */
-    hs_unsure *unsure; /* capacity */
-    hs_run    *runs;   /* most_runs + 1; runs[n_runs].at is the number of candidates */
+    hs_unsure *unsure;  /* capacity */
+    hs_run    *runs;    /* most_runs + 1; runs[n_runs].at is the number of candidates */
     int32_t    capacity, most_hits, most_runs;
     int32_t    n_runs;
     int32_t    n; /* candidates, of all runs */

@@ -10,10 +10,10 @@
 #include <string.h>
 
 #define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the nearest cache */
-#define LEAD_BITS 8   /* of the only digit that few candidates are sorted by; one more for others */
-#define FEW 24        /* candidates that are quicker sorted by insertion */
-#define MANY 160      /* from here on two digits are quicker than one and insertion */
-#define CROWD 12      /* entries with the same leading digit, beyond which insertion does not pay */
+#define LEAD_BITS  8  /* of the only digit that few candidates are sorted by; one more for others */
+#define FEW        24 /* candidates that are quicker sorted by insertion */
+#define MANY       160 /* from here on two digits are quicker than one and insertion */
+#define CROWD      12 /* entries with the same leading digit, beyond which insertion does not pay */
 
 hs_status
 hs_order_init(hs_account *account, hs_block *block, hs_order *order)
@@ -25,8 +25,8 @@ hs_order_init(hs_account *account, hs_block *block, hs_order *order)
     order->shifts = hs_alloc(account, HS_FOR_CANDIDATES,
                              ((int64_t)block->most_runs + 1) * HS_MAX_DIM, sizeof(int64_t));
     block->origin = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
-    const bool complete = order->entries != NULL && order->spare != NULL &&
-                          order->column != NULL && order->shifts != NULL && block->origin != NULL;
+    const bool complete = order->entries != NULL && order->spare != NULL && order->column != NULL &&
+                          order->shifts != NULL && block->origin != NULL;
     if (complete) { /* padding of labels may be read */
         memset(block->origin, 0, (size_t)n * sizeof(int32_t));
     }
@@ -249,9 +249,9 @@ static hs_status
 arrange(int ndim, const hs_options *options, hs_block_use use, hs_block *block,
         const hs_order *order)
 {
-    const int32_t n = block->n;
-    int32_t *HS_RESTRICT     origin = block->origin;
-    float *HS_RESTRICT       column = order->column;
+    const int32_t        n = block->n;
+    int32_t *HS_RESTRICT origin = block->origin;
+    float *HS_RESTRICT   column = order->column;
     for (int32_t c = 0; c < n; c++) {
         origin[c] = (int32_t)(order->entries[c] & UINT32_MAX);
         if (use == HS_BLOCK_LISTS_IDS) {

@@ -17,7 +17,7 @@ typedef struct hs_order {
     uint64_t *entries; /* key << 32 | place */
     uint64_t *spare;
     float    *column;
-    int64_t  *shifts;  /* of images, by runs: one for each run and row as given */
+    int64_t  *shifts; /* of images, by runs: one for each run and row as given */
 } hs_order;
 
 /* Room for this block, and its `origin`. On failure hs_order_free. */

@@ -176,7 +176,7 @@ load_metric(hs_trace *trace, const hs_run *run, int32_t n)
 static hs_status
 load(hs_trace *trace, bool metric)
 {
-    int32_t unpolled = 0;
+    int32_t    unpolled = 0;
     const bool given = trace->needs_given && !trace->has_given;
     metric = metric && !trace->has_metric;
     trace->has_images = trace->has_images && !metric;

@@ -11,7 +11,7 @@
 #include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
-#define POLL_WORK (INT64_C(1) << 21)
+#define POLL_WORK   (INT64_C(1) << 21)
 #define WORK_OF_RUN 32 /* candidates that could be tested while a run of them is found */
 
 /* Of a group that meets nobody, in candidates. */
@@ -47,10 +47,10 @@ set_thresholds(hs_scanner *scanner)
     scanner->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
     if (scene->extreme) {
         const double low = scene->cutoff_low;
-        scanner->direct.in =
-            low > 0.0 ? hs_thresholds_of(scene->ndim, low, extent, error).in : -1.0f;
-        scanner->expanded.in =
-            low > 0.0 ? hs_expanded_of(scene->ndim, low, extent, error).in : -INFINITY;
+        scanner->direct.in = low > 0.0 ? hs_thresholds_of(scene->ndim, low, extent, error).in
+                                       : -1.0f;
+        scanner->expanded.in = low > 0.0 ? hs_expanded_of(scene->ndim, low, extent, error).in
+                                         : -INFINITY;
     }
 }
 
@@ -89,9 +89,9 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
         scan->y[k] = block->y[k];
         scan->q[k] = scanner->group.q[k];
     }
-    scan->label = block->place == NULL ? block->id
+    scan->label = block->place == NULL  ? block->id
                   : scanner->is_ordered ? block->origin
-                                       : block->place;
+                                        : block->place;
     scan->n = block->n;
     scan->n_points = scanner->group.last - scanner->group.first;
     scan->triangular = scanner->block_is_first;
@@ -133,7 +133,7 @@ note_subnormals(hs_scanner *scanner)
     if (!scanner->flushes && hs_fpenv_met_subnormal()) {
         hs_fpenv_flush(false); /* forgets it */
         scanner->flushes = scanner->options.precision != HS_SINGLE &&
-                          ++scanner->n_subnormal > FEW_SUBNORMAL;
+                           ++scanner->n_subnormal > FEW_SUBNORMAL;
     }
 }
 
@@ -168,8 +168,8 @@ fill_block(hs_scanner *scanner)
     if (!scanner->is_ordered) {
         return HS_OK;
     }
-    status = hs_order_block(&scanner->search->scene.lattice, &scanner->options, scanner->use,
-                            block, &scanner->order);
+    status = hs_order_block(&scanner->search->scene.lattice, &scanner->options, scanner->use, block,
+                            &scanner->order);
     if (status == HS_ERR_SHIFT_RANGE) {
         scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
     }
@@ -239,8 +239,8 @@ is_lone(const hs_scanner *scanner)
 hs_status
 hs_scan_block(hs_scanner *scanner)
 {
-    int32_t   end[HS_GROUP_POINTS];
-    hs_scan   scan;
+    int32_t end[HS_GROUP_POINTS];
+    hs_scan scan;
     if (scanner->blocks < scanner->blocks_to_skip) {
         empty_block(scanner);
         return HS_OK;
@@ -337,11 +337,11 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     scanner->is_ordered = is_ordered;
     scanner->extent = -1.0;
     scanner->candidate_limit = INT64_MAX;
-    hs_status status = hs_block_init(account, search->scene.ndim, use, capacity, most_runs,
-                                     &scanner->block);
+    hs_status status =
+        hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);
     if (status == HS_OK) {
-        status = hs_trace_init(search, &scanner->block, use == HS_BLOCK_LISTS_PLACES,
-                               &scanner->trace);
+        status =
+            hs_trace_init(search, &scanner->block, use == HS_BLOCK_LISTS_PLACES, &scanner->trace);
         scanner->trace.polls = &scanner->options;
     }
     if (status == HS_OK && is_ordered) {

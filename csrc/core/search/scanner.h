@@ -37,20 +37,20 @@ struct hs_scanner {
     hs_order         order;
     hs_group         group;
     hs_trace         trace;
-    hs_visit_fn      visit;   /* NULL when counting */
+    hs_visit_fn      visit; /* NULL when counting */
     void            *visit_context;
-    hs_scan_fn       scan;     /* these for groups of this extent: */
+    hs_scan_fn       scan; /* these for groups of this extent: */
     hs_thresholds    direct;
     hs_expanded      expanded;
     double           extent;
     int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
-    bool             flushes;  /* too many: gathering and scanning, nothing else, go on without */
+    bool             flushes; /* too many: gathering and scanning, nothing else, go on without */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;
-    bool             leaves;         /* set by a visitor: HS_STOPPED once the block is done */
-    int32_t          blocks;         /* of the present group, scanned or skipped so far */
-    int32_t          blocks_to_skip; /* of the next group; they were scanned before */
+    bool             leaves;          /* set by a visitor: HS_STOPPED once the block is done */
+    int32_t          blocks;          /* of the present group, scanned or skipped so far */
+    int32_t          blocks_to_skip;  /* of the next group; they were scanned before */
     int64_t          candidate_limit; /* the walk ends with HS_STOPPED when it has tested more */
     int64_t          failed_point;    /* whose shift passed its range, for HS_ERR_SHIFT_RANGE */
     hs_stages        stages;

@@ -22,8 +22,8 @@ hs_search_set_asking(const hs_sets *sets, hs_search *search)
 void
 hs_search_settle(hs_search *search)
 {
-    search->filter_error = search->scene.x_error + search->grid.shift_error +
-                           search->scene.formula_error;
+    search->filter_error =
+        search->scene.x_error + search->grid.shift_error + search->scene.formula_error;
 }
 
 void

@@ -12,24 +12,24 @@
 
 typedef struct hs_search {
     /* Large, and filled before they are read: not cleared at first. */
-    hs_scene         scene;   /* without its arrays: bins has them */
-    hs_grid          grid;
+    hs_scene scene; /* without its arrays: bins has them */
+    hs_grid  grid;
     /* From here on all begins as zero. */
-    hs_call         *call;    /* borrowed: memory, threads, what is wanted and what was done */
-    hs_stencil       stencil;
-    hs_bins          bins;
-    hs_sparse        sparse;  /* when is_sparse: the rows and cells that bins follows */
-    bool             is_full; /* every asking point meets all its neighbours, not the half list */
-    bool             keeps_none;  /* as in hs_sets */
-    bool             is_borrowed; /* the cells and all of the scene belong to another search */
-    bool             has_queries;  /* then these ask, in the cells of the same grid: */
-    hs_bins          query_bins;
-    hs_sparse        query_sparse;
-    bool             is_sparse;
-    int32_t          first_point;  /* number of the first point */
-    int64_t          n_in_all;     /* points, of which these may be a part: for fractions done */
-    double           pairs_per_half; /* pairs to be found for each pair of the half list */
-    double           filter_error; /* bound on each component before rounding to float32 */
+    hs_call   *call; /* borrowed: memory, threads, what is wanted and what was done */
+    hs_stencil stencil;
+    hs_bins    bins;
+    hs_sparse  sparse;      /* when is_sparse: the rows and cells that bins follows */
+    bool       is_full;     /* every asking point meets all its neighbours, not the half list */
+    bool       keeps_none;  /* as in hs_sets */
+    bool       is_borrowed; /* the cells and all of the scene belong to another search */
+    bool       has_queries; /* then these ask, in the cells of the same grid: */
+    hs_bins    query_bins;
+    hs_sparse  query_sparse;
+    bool       is_sparse;
+    int32_t    first_point;    /* number of the first point */
+    int64_t    n_in_all;       /* points, of which these may be a part: for fractions done */
+    double     pairs_per_half; /* pairs to be found for each pair of the half list */
+    double     filter_error;   /* bound on each component before rounding to float32 */
 } hs_search;
 
 /* Nothing in it yet; the call must outlive it. */

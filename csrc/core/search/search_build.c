@@ -22,7 +22,7 @@ choose_grid(hs_search *search, hs_failure *failure)
         status = hs_grid_init(&search->scene, &search->grid, failure);
     }
     if (status == HS_OK && may_be_sparse) {
-        const double width = hs_sparse_choose(&search->scene, &search->grid);
+        const double  width = hs_sparse_choose(&search->scene, &search->grid);
         const hs_grid dense = search->grid;
         search->is_sparse = width > 0.0;
         if (search->is_sparse) {

@@ -32,9 +32,8 @@ gather_link(hs_walker *walker, hs_link *link, int64_t low, int64_t high, int32_t
             shift[k] = link->shift[k] + (double)turn * lattice->rows[row][k];
         }
         hs_link_window(search, link, low - turn * n_x, high - turn * n_x, &first, &end);
-        const hs_status status =
-            hs_scanner_append(&walker->scanner, turn == 0 && first < from ? from : first, end,
-                              shift, image);
+        const hs_status status = hs_scanner_append(
+            &walker->scanner, turn == 0 && first < from ? from : first, end, shift, image);
         if (status != HS_OK) {
             return status;
         }
@@ -51,9 +50,9 @@ visit_group(hs_walker *walker, const hs_row_group *group)
     for (int64_t l = 0; l < cursor->n_links; l++) {
         hs_link *link = &cursor->links[l];
         /* The own row comes first; in it each point meets only those that follow. */
-        const hs_status status =
-            gather_link(walker, link, group->x_first + link->first, group->x_last + link->last,
-                        l == 0 && !walker->search->is_full ? group->first : 0);
+        const hs_status status = gather_link(walker, link, group->x_first + link->first,
+                                             group->x_last + link->last,
+                                             l == 0 && !walker->search->is_full ? group->first : 0);
         if (status != HS_OK) {
             return status;
         }
@@ -184,7 +183,7 @@ hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
     const double   candidates = most_candidates(search);
     const bool     turns = search->scene.lattice.row_of_axis[0] >= 0;
     /* Of each row of the stencil, in each image along the first axis. */
-    const double   runs = (double)search->stencil.n_rows *
+    const double runs = (double)search->stencil.n_rows *
                         (turns ? 2.0 * (double)(grid->reach[0] / grid->shape[0]) + 3.0 : 1.0);
     most->candidates = candidates < HS_BLOCK_CANDIDATES ? (int64_t)candidates : 0;
     most->runs = (int64_t)hs_smaller(runs, candidates);
@@ -256,8 +255,8 @@ hs_status
 hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                hs_walker *walker)
 {
-    const int32_t capacity = hs_walker_capacity(search);
-    const int32_t most_runs = capacity < HS_BLOCK_RUNS ? capacity : HS_BLOCK_RUNS;
+    const int32_t   capacity = hs_walker_capacity(search);
+    const int32_t   most_runs = capacity < HS_BLOCK_RUNS ? capacity : HS_BLOCK_RUNS;
     const hs_status status = init_walker(search, use, capacity, most_runs, false, walker);
     return settle_walker(search, status, visit, context, walker);
 }

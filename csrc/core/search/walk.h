@@ -26,9 +26,9 @@ typedef struct hs_cursor {
     int32_t      last_first; /* first point of the last group that was taken, or -1 */
     bool         has_next;
     hs_row_group next;
-    hs_link     *links;   /* owned; of the row being walked */
+    hs_link     *links; /* owned; of the row being walked */
     int64_t      n_links;
-    int64_t     *hints;   /* owned; for hs_row_links, NULL unless the grid is sparse */
+    int64_t     *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
 } hs_cursor;
 
 /* One at a time belongs to a thread. */
@@ -60,9 +60,8 @@ hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit,
  * candidate's number and then by S. most: the largest neighbourhood, as a walk with HS_BLOCK_SIZES
  * over all groups has found it.
  */
-hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use,
-                                 const hs_neighbourhood *most, hs_visit_fn visit, void *context,
-                                 hs_walker *walker);
+hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourhood *most,
+                                 hs_visit_fn visit, void *context, hs_walker *walker);
 
 /* Visit the groups whose first point is in [first, end), in cell order. */
 hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end);

@@ -41,9 +41,8 @@ walk(hs_team *team, const hs_options *options, pass *doing)
     for (doing->round = 0; doing->round < doing->n_rounds; doing->round++) {
         const int64_t left = doing->n - doing->round * HS_POLL_POINTS;
         const int64_t now = left < HS_POLL_POINTS ? left : HS_POLL_POINTS;
-        const int64_t n_tasks = doing->n_strips > 0
-                                    ? doing->n_strips
-                                    : (now + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
+        const int64_t n_tasks = doing->n_strips > 0 ? doing->n_strips
+                                                    : (now + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
         hs_team_run(team, n_tasks, doing->n_strips > 0 ? do_strip : do_slab, doing);
         for (int64_t task = 0; task < n_tasks; task++) {
             if (doing->status[task] != HS_OK) {

@@ -11,7 +11,7 @@
 #include "team.h"
 
 /* Slabs of a round. Results of a slab can be kept in an array of that many. */
-#define HS_SLABS 32
+#define HS_SLABS       32
 #define HS_SLAB_POINTS (HS_POLL_POINTS / HS_SLABS)
 
 /* Work on points [first, last). `slab` numbers the ranges of one round in ascending order; no two

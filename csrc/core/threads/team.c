@@ -17,16 +17,16 @@ typedef struct job {
 } job;
 
 struct hs_team {
-    hs_mutex         mutex;     /* guards all but `next` */
-    hs_condition     opened;    /* a job is there, or the team ends */
-    hs_condition     left;      /* nobody works on the job any more */
+    hs_mutex         mutex;  /* guards all but `next` */
+    hs_condition     opened; /* a job is there, or the team ends */
+    hs_condition     left;   /* nobody works on the job any more */
     job              job;
     int64_t          job_number;
     bool             is_open;
     bool             ends;
     int              n_working; /* threads on the job, the caller not among them */
     int              n_others;
-    volatile int64_t next;      /* task to be handed out; atomic */
+    volatile int64_t next; /* task to be handed out; atomic */
     hs_thread        others[];
 };
 

@@ -16,10 +16,10 @@
 #include <math.h>
 #include <string.h>
 
-#define UNIT 0x1p-53
-#define GROW (1.0 + 0x1p-40) /* more than the roundings of any bound here */
-#define TILE 64              /* points whose displacements are held at a time */
-#define SAMPLE 1024          /* points that the drift is guessed from */
+#define UNIT   0x1p-53
+#define GROW   (1.0 + 0x1p-40) /* more than the roundings of any bound here */
+#define TILE   64              /* points whose displacements are held at a time */
+#define SAMPLE 1024            /* points that the drift is guessed from */
 /* A drift is taken away where the sample gets this much shorter: small ones are not worth it. */
 #define WORTHWHILE 0.8
 /* A displacement of this share of the box's smallest height may be a jump. */
@@ -31,12 +31,12 @@ typedef struct tracking {
     hs_strain        strain;
     hs_lattice       lattice; /* of the box now */
     int              m;
-    double           jump;    /* longer displacements are looked at; infinity: none */
+    double           jump; /* longer displacements are looked at; infinity: none */
     bool             has_base;
     double           base[HS_MAX_DIM];
     double           drift[HS_MAX_DIM];
     hs_store        *jumps;
-    int64_t         *jump_of; /* in it, m a point; NULL: there is none yet */
+    int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
     double           square;    /* largest |u|^2 ... */
     double           component; /* ... and |u_k| */
     double           magnitude; /* of the terms of wrapping */
@@ -127,7 +127,7 @@ take_jumps(tracking *track, tile *t)
 {
     const int d = track->lattice.ndim, m = track->m;
     for (int p = 0; p < t->n; p++) {
-        int64_t given[HS_MAX_DIM];
+        int64_t  given[HS_MAX_DIM];
         uint64_t any = 0;
         double   longest = 0.0;
         for (int k = 0; k < d; k++) {
@@ -258,9 +258,8 @@ guess_drift(tracking *track)
     const int d = track->motion->now->points.ndim;
     take_sample(track, drift, &all);
     for (int k = 0; all.count > 0.0 && k < d; k++) {
-        drift[k] = track->motion->now->points.n <= SAMPLE
-                       ? 0.5 * all.lower[k] + 0.5 * all.upper[k]
-                       : all.sum[k] / all.count;
+        drift[k] = track->motion->now->points.n <= SAMPLE ? 0.5 * all.lower[k] + 0.5 * all.upper[k]
+                                                          : all.sum[k] / all.count;
     }
     take_sample(track, drift, &rest);
     if (rest.square < WORTHWHILE * WORTHWHILE * all.square) {

@@ -18,16 +18,16 @@
  */
 typedef struct hs_listing {
     int64_t   n_pairs, n_plain;
-    int32_t  *i, *j;   /* the caller's numbers of them are i < j, or equal */
-    int32_t  *code;    /* of pairs from n_plain on: the number of their image */
+    int32_t  *i, *j; /* the caller's numbers of them are i < j, or equal */
+    int32_t  *code;  /* of pairs from n_plain on: the number of their image */
     hs_images images;
-    int32_t  *order;   /* the caller's number of each place */
-    int64_t  *counts;  /* m for each place, when it was built; NULL: all zero */
+    int32_t  *order;  /* the caller's number of each place */
+    int64_t  *counts; /* m for each place, when it was built; NULL: all zero */
     double    radius;
     /* Where these are. Pairs are written when nothing can fail any more; the others are made beside
      * those in use, and `turn` says which are. */
-    hs_store  for_i, for_j, for_code, for_order[2], for_counts[2];
-    int       turn;
+    hs_store for_i, for_j, for_code, for_order[2], for_counts[2];
+    int      turn;
 } hs_listing;
 
 struct hs_verlet {
@@ -35,11 +35,11 @@ struct hs_verlet {
     hs_listing listing;
     double     cutoff;
     double     margin;
-    double     tried;        /* the margin of the last step before the list was built for it */
-    hs_frame   frames[3];    /* two are in use, one is for the next step */
-    int        built, now;   /* numbers of frames: the step it was built for, the last step */
-    hs_store   jumps[2];     /* since it was built: those of the last step and of the next */
-    int        jumps_now;    /* which of them; -1: nothing has jumped */
+    double     tried;      /* the margin of the last step before the list was built for it */
+    hs_frame   frames[3];  /* two are in use, one is for the next step */
+    int        built, now; /* numbers of frames: the step it was built for, the last step */
+    hs_store   jumps[2];   /* since it was built: those of the last step and of the next */
+    int        jumps_now;  /* which of them; -1: nothing has jumped */
 };
 
 /* Pairs within `radius` of a frame. On failure *listing is as it was. */

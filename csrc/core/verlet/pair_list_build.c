@@ -291,8 +291,7 @@ build(const hs_frame *frame, building *built, hs_failure *failure)
         status = settle_pairs(built);
     }
     if (status == HS_ERR_MEMORY) {
-        failure->expected_pairs =
-            fmax(failure->expected_pairs, (double)built->listing->n_pairs);
+        failure->expected_pairs = fmax(failure->expected_pairs, (double)built->listing->n_pairs);
         failure->limit_bytes = call->account.limit;
     }
     if (opened) {
@@ -307,10 +306,9 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
                  hs_listing *listing, hs_failure *failure)
 {
     int              row[HS_MAX_DIM];
-    const hs_options searching =
-        options_of_build(options, radius, hs_frame_periodic(frame, row));
-    hs_listing next = *listing; /* with its stores */
-    building  *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
+    const hs_options searching = options_of_build(options, radius, hs_frame_periodic(frame, row));
+    hs_listing       next = *listing; /* with its stores */
+    building        *built = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *built);
     if (built == NULL) {
         return HS_ERR_MEMORY;
     }

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define PIECES_A_THREAD 4 /* so that none waits long for the others */
-#define FIRST_SHIFTED 256
+#define FIRST_SHIFTED   256
 
 typedef struct crew crew;
 
@@ -22,10 +22,10 @@ typedef struct worker {
     hs_committer committer;
     hs_failure   failure;
     /* Of the block that was looked at last: */
-    int64_t      block; /* candidates tested before it, which tells blocks apart; -1: none */
-    bool         has_images;
-    bool        *is_shifted; /* owned; whether a run is in another image ... */
-    int32_t     *shift;      /* owned; ... and which, over the rows as given: m numbers */
+    int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
+    bool     has_images;
+    bool    *is_shifted; /* owned; whether a run is in another image ... */
+    int32_t *shift;      /* owned; ... and which, over the rows as given: m numbers */
 } worker;
 
 struct crew {
@@ -73,8 +73,8 @@ make_room(hs_piece *piece, int m)
         return true;
     }
     const int64_t capacity = piece->capacity > 0 ? 2 * piece->capacity : FIRST_SHIFTED;
-    int64_t *at = hs_alloc(NULL, HS_FOR_SHIFTS, capacity, sizeof *at);
-    int32_t *shift = hs_alloc(NULL, HS_FOR_SHIFTS, capacity * m, sizeof *shift);
+    int64_t      *at = hs_alloc(NULL, HS_FOR_SHIFTS, capacity, sizeof *at);
+    int32_t      *shift = hs_alloc(NULL, HS_FOR_SHIFTS, capacity * m, sizeof *shift);
     if (at == NULL || shift == NULL) {
         hs_free(NULL, at);
         hs_free(NULL, shift);
@@ -156,7 +156,7 @@ note_row(worker *me, int32_t si, int32_t first, int32_t end, const hs_hits *hits
             continue;
         }
         const int32_t *shift = me->shift + (int64_t)r * m;
-        const bool turned = me->ids[h] < si || (me->ids[h] == si && is_negative(shift, m));
+        const bool     turned = me->ids[h] < si || (me->ids[h] == si && is_negative(shift, m));
         if (!note_shift(me->piece, m, me->piece->pairs.n_pairs + h, turned, shift)) {
             return false;
         }
@@ -197,7 +197,7 @@ take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits
     }
     by_id.label = me->ids;
     scanner->search->call->kernel->emit_int32(&by_id, hs_output_next(pairs, HS_WANT_I),
-                                       hs_output_next(pairs, HS_WANT_J));
+                                              hs_output_next(pairs, HS_WANT_J));
     status = note_shifts(me, first, hits);
     pairs->n_pairs += n;
     return status;
@@ -232,16 +232,14 @@ open_worker(crew *all, worker *me)
     hs_search *search = all->search;
     me->of = all;
     me->failure = HS_NO_FAILURE;
-    hs_status status =
-        hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
+    hs_status status = hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
     if (status == HS_OK) {
         hs_account     *account = &search->call->account;
         const hs_block *block = &me->walker.scanner.block;
         const int64_t   n_runs = block->most_runs + 1;
-        me->ids = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING,
-                           sizeof *me->ids);
-        me->is_shifted =
-            hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
+        me->ids =
+            hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING, sizeof *me->ids);
+        me->is_shifted = hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
         me->shift = hs_alloc(account, HS_FOR_CANDIDATES, n_runs * search->bins.n_periodic,
                              sizeof *me->shift);
         me->block = -1;
@@ -301,8 +299,7 @@ hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
 {
     crew all = {.search = search, .pieces = pieces};
     pieces->n = search->call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(search->call->team);
-    pieces->of =
-        hs_alloc(&search->call->account, HS_FOR_CANDIDATES, pieces->n, sizeof *pieces->of);
+    pieces->of = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, pieces->n, sizeof *pieces->of);
     if (pieces->of == NULL) {
         return HS_ERR_MEMORY;
     }

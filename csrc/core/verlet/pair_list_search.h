@@ -15,8 +15,8 @@ typedef struct hs_piece {
     hs_output pairs;     /* int32 i and j, places in bins->order; counted by no account */
     int64_t   n_shifted; /* pairs with a shift that is not zero: */
     int64_t   capacity;
-    int64_t  *at;        /* owned; which they are, ascending */
-    int32_t  *shift;     /* owned; m for each, over the box vectors that repeat, as given */
+    int64_t  *at;    /* owned; which they are, ascending */
+    int32_t  *shift; /* owned; m for each, over the box vectors that repeat, as given */
 } hs_piece;
 
 typedef struct hs_pieces {

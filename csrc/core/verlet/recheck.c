@@ -10,7 +10,7 @@
 /* Slabs of a round for each thread: enough that none waits long for the others, and their pairs
  * still lie in the second-level cache when they are written. */
 #define SLABS_A_THREAD 8
-#define MOST_SLABS 64
+#define MOST_SLABS     64
 /* Work between two questions to the caller, in pairs: a few milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)
 /* A decision by integers takes as long as so many pairs, and d or D of a pair as so many. */
@@ -21,8 +21,8 @@
 static void
 sift_slab(const hs_refilter *refilter, hs_sifted *slab)
 {
-    const hs_listing *listing = &refilter->list->listing;
-    const bool        shifted = slab->first >= listing->n_plain;
+    const hs_listing   *listing = &refilter->list->listing;
+    const bool          shifted = slab->first >= listing->n_plain;
     const hs_sift_pairs pairs = {
         .y = refilter->y,
         .stride = hs_sift_stride(refilter->d),
@@ -128,8 +128,7 @@ run_rounds(hs_refilter *refilter, hs_sifted *slabs, int most, hs_failure *failur
         }
         if (status == HS_OK && work > POLL_WORK) {
             work = 0;
-            status = hs_poll(&refilter->call->options,
-                             (double)first / (double)listing->n_pairs);
+            status = hs_poll(&refilter->call->options, (double)first / (double)listing->n_pairs);
         }
         if (status != HS_OK) {
             return status;
@@ -337,7 +336,6 @@ hs_refilter_settle(const hs_refilter *refilter, int32_t n_unsure, hs_sifted *sla
             from = at + 1;
         }
     }
-    memmove(slab->hits + to, slab->hits + from,
-            (size_t)(slab->n_hits - from) * sizeof *slab->hits);
+    memmove(slab->hits + to, slab->hits + from, (size_t)(slab->n_hits - from) * sizeof *slab->hits);
     slab->n_hits -= from - to;
 }

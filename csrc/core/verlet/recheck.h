@@ -27,9 +27,9 @@ typedef struct hs_refilter {
     int              vector_of_row[HS_MAX_DIM];
     hs_metric        given;  /* decides, on points and box vectors as given */
     int64_t         *counts; /* owned; m a point, as those of the list, jumps included; or NULL */
-    double           most_counts; /* the largest of them, of either sign */
-    float           *y;      /* owned; sift.h */
-    float           *offset; /* owned; one row for each image */
+    double           most_counts;    /* the largest of them, of either sign */
+    float           *y;              /* owned; sift.h */
+    float           *offset;         /* owned; one row for each image */
     hs_thresholds    plain, shifted; /* for pairs without and with an image */
     bool             measures;       /* d or D are wanted. Then: */
     hs_scene         scene;
@@ -41,10 +41,10 @@ typedef struct hs_refilter {
 
 /* The hits of one slab. */
 typedef struct hs_sifted {
-    int64_t   first;  /* pair of the list */
-    int32_t   n;      /* pairs, all with or all without an image */
+    int64_t   first; /* pair of the list */
+    int32_t   n;     /* pairs, all with or all without an image */
     int32_t   n_hits;
-    int64_t   at;     /* their place in the output */
+    int64_t   at; /* their place in the output */
     hs_status status;
     int64_t   failed_point;
     hs_stages stages;
@@ -74,8 +74,7 @@ HS_ALWAYS_INLINE void *
 hs_refilter_column(const hs_refilter *refilter, unsigned bit, int64_t at)
 {
     char *column = hs_output_column(refilter->output, bit);
-    return column == NULL ? NULL
-                          : column + (size_t)at * hs_output_width(refilter->output, bit);
+    return column == NULL ? NULL : column + (size_t)at * hs_output_width(refilter->output, bit);
 }
 
 /* S of pair e over the box vectors that repeat. */

@@ -66,8 +66,8 @@ set_refilter(const hs_verlet *list, hs_call *call, hs_refilter *refilter)
     for (int r = 0; r < refilter->m; r++) {
         memcpy(rows[r], now->box.rows[refilter->vector_of_row[r]], sizeof rows[r]);
     }
-    hs_metric_init(&refilter->given, refilter->d, refilter->m,
-                   (const double(*)[HS_MAX_DIM])rows, list->cutoff, call->options.inclusive);
+    hs_metric_init(&refilter->given, refilter->d, refilter->m, (const double(*)[HS_MAX_DIM])rows,
+                   list->cutoff, call->options.inclusive);
 }
 
 hs_status

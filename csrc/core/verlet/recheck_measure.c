@@ -103,9 +103,9 @@ set_lags(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_DIM
         }
         for (int r = 0; r < m; r++) {
             refilter->lag[a * m + r] =
-                over_given ? -count[r]
-                           : (int64_t)((uint64_t)hs_turns_get(&scene->turns, r, i) -
-                                       (uint64_t)reduced[r]);
+                over_given
+                    ? -count[r]
+                    : (int64_t)((uint64_t)hs_turns_get(&scene->turns, r, i) - (uint64_t)reduced[r]);
             any |= refilter->lag[a * m + r];
         }
         refilter->lagging[a] = any != 0;
@@ -136,8 +136,8 @@ set_coordinates(hs_refilter *refilter)
     const hs_scene *scene = &refilter->scene;
     double *const  *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
     const int       d = refilter->d;
-    const int32_t *order = refilter->list->listing.order;
-    const int64_t  n = refilter->now->points.n;
+    const int32_t  *order = refilter->list->listing.order;
+    const int64_t   n = refilter->now->points.n;
     for (int64_t a = 0; a < n; a++) {
         for (int k = 0; k < d; k++) {
             if (a + AHEAD < n) {
@@ -156,9 +156,8 @@ hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure)
     hs_options options = call->options;
     int64_t    over[HS_MAX_DIM][HS_MAX_DIM] = {{0}};
     options.want |= HS_WANT_SHIFT; /* the turns by which points were wrapped are needed */
-    const hs_status status =
-        hs_scene_init(&call->account, call->team, &refilter->now->points,
-                      hs_frame_box(refilter->now), &options, scene, failure);
+    const hs_status status = hs_scene_init(&call->account, call->team, &refilter->now->points,
+                                           hs_frame_box(refilter->now), &options, scene, failure);
     if (status != HS_OK) {
         return status;
     }
@@ -183,10 +182,9 @@ fill_shifts(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *
     const hs_listing *listing = &refilter->list->listing;
     const int         m = refilter->m;
     const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
-    const int32_t    *code = slab->first < listing->n_plain
-                                 ? NULL
-                                 : listing->code + (slab->first - listing->n_plain);
-    int64_t           any = 0;
+    const int32_t    *code =
+        slab->first < listing->n_plain ? NULL : listing->code + (slab->first - listing->n_plain);
+    int64_t any = 0;
     for (int32_t b = 0; b < batch->n; b++) {
         const int32_t  e = hits[b];
         const int64_t *lag_i = refilter->lag + (int64_t)i[e] * m;
@@ -260,8 +258,8 @@ measure(const hs_refilter *refilter, double *const *vector, measured *batch)
             q[k] = batch->q[k][b];
         }
         if (HS_UNLIKELY(!done[b])) {
-            batch->distance[b] = hs_metric_measure(
-                metric, p, q, batch->is_shifted ? batch->shift[b] : NULL, along);
+            batch->distance[b] =
+                hs_metric_measure(metric, p, q, batch->is_shifted ? batch->shift[b] : NULL, along);
             for (int k = 0; vector != NULL && k < refilter->d; k++) {
                 vector[k][b] = along[k];
             }

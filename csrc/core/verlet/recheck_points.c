@@ -21,7 +21,7 @@ add_counts(hs_refilter *refilter)
     const hs_listing *listing = &list->listing;
     const int64_t     n = refilter->now->points.n;
     const int         m = refilter->m;
-    const int64_t *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now].data : NULL;
+    const int64_t    *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now].data : NULL;
     if (listing->counts == NULL && jumps == NULL) {
         return HS_OK;
     }
@@ -89,8 +89,8 @@ HS_ALWAYS_INLINE double
 put_floats(const hs_refilter *refilter, hs_scale scale, const double *centre, const hs_real real,
            const int d, const int m)
 {
-    const int stride = hs_sift_stride(d);
-    double    largest[HS_MAX_DIM] = {0.0}, poison[HS_MAX_DIM] = {0.0}, most = 0.0;
+    const int      stride = hs_sift_stride(d);
+    double         largest[HS_MAX_DIM] = {0.0}, poison[HS_MAX_DIM] = {0.0}, most = 0.0;
     const int32_t *order = refilter->list->listing.order;
     const int64_t  n = refilter->now->points.n;
     for (int64_t a = 0; a < n; a++) {
@@ -102,8 +102,7 @@ put_floats(const hs_refilter *refilter, hs_scale scale, const double *centre, co
         }
         place_of(refilter, real, a, d, m, z);
         for (int k = 0; k < stride; k++) {
-            const float entry =
-                k < d ? (float)hs_scale_apply(scale, z[k] - centre[k]) : 0.0f;
+            const float entry = k < d ? (float)hs_scale_apply(scale, z[k] - centre[k]) : 0.0f;
             y[k] = entry;
             largest[k] = hs_larger(fabs((double)entry), largest[k]);
             poison[k] += (double)(entry - entry);
@@ -145,9 +144,8 @@ put_offsets(const hs_refilter *refilter, hs_scale scale, double *largest, double
         for (int k = 0; k < stride; k++) {
             double sum = 0.0, terms = 0.0;
             for (int r = 0; k < refilter->d && r < refilter->m; r++) {
-                const double term =
-                    images->of[image * refilter->m + r] *
-                    hs_scale_apply(scale, refilter->given.rows[r][k]);
+                const double term = images->of[image * refilter->m + r] *
+                                    hs_scale_apply(scale, refilter->given.rows[r][k]);
                 sum += term;
                 terms += fabs(term);
             }
@@ -192,25 +190,25 @@ set_thresholds(hs_refilter *refilter, hs_scale scale, double largest, double err
     double       offset, size;
     refilter->plain = hs_thresholds_of(refilter->d, cutoff, 2.0 * largest, error + tiny);
     put_offsets(refilter, scale, &offset, &size);
-    const double more = u * (2.0 * largest + offset) * (1.0 + 0x1p-20) +
-                        (2 * refilter->m + 2) * UNIT * size;
-    refilter->shifted = hs_thresholds_of(refilter->d, cutoff, 2.0 * largest + offset,
-                                         error + tiny + more);
+    const double more =
+        u * (2.0 * largest + offset) * (1.0 + 0x1p-20) + (2 * refilter->m + 2) * UNIT * size;
+    refilter->shifted =
+        hs_thresholds_of(refilter->d, cutoff, 2.0 * largest + offset, error + tiny + more);
 }
 
 hs_status
 hs_refilter_prepare(hs_refilter *refilter)
 {
-    hs_account   *account = &refilter->call->account;
-    const int     stride = hs_sift_stride(refilter->d);
-    const double  cutoff = refilter->given.cutoff;
-    const int     exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;
-    const bool    ordinary = exponent >= -ORDINARY_EXPONENT && exponent <= ORDINARY_EXPONENT;
+    hs_account    *account = &refilter->call->account;
+    const int      stride = hs_sift_stride(refilter->d);
+    const double   cutoff = refilter->given.cutoff;
+    const int      exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;
+    const bool     ordinary = exponent >= -ORDINARY_EXPONENT && exponent <= ORDINARY_EXPONENT;
     const hs_scale scale = hs_scale_of(ordinary ? 0 : exponent);
-    double        centre[HS_MAX_DIM];
+    double         centre[HS_MAX_DIM];
     refilter->y = hs_alloc(account, HS_FOR_POINTS, refilter->now->points.n * stride, sizeof(float));
-    refilter->offset = hs_alloc(account, HS_FOR_STENCIL,
-                                refilter->list->listing.images.n * stride, sizeof(float));
+    refilter->offset =
+        hs_alloc(account, HS_FOR_STENCIL, refilter->list->listing.images.n * stride, sizeof(float));
     if (refilter->y == NULL || refilter->offset == NULL || add_counts(refilter) != HS_OK) {
         return HS_ERR_MEMORY;
     }

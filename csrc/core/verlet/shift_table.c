@@ -58,8 +58,7 @@ grow(hs_images *images)
     memset(larger.slots, -1, 2 * (size_t)larger.capacity * sizeof(int32_t));
     for (int64_t number = 0; number < larger.n; number++) {
         const int32_t *shift = images->of + number * images->width;
-        memcpy(larger.of + number * larger.width, shift,
-               (size_t)images->width * sizeof(int32_t));
+        memcpy(larger.of + number * larger.width, shift, (size_t)images->width * sizeof(int32_t));
         larger.slots[find_slot(&larger, shift)] = (int32_t)number;
     }
     hs_images_free(images);

@@ -6,8 +6,8 @@
 #include "../base/base.h"
 
 typedef struct hs_images {
-    int      width;    /* numbers of a shift */
-    int32_t *of;       /* owned; n rows of `width` */
+    int      width; /* numbers of a shift */
+    int32_t *of;    /* owned; n rows of `width` */
     int64_t  n;
     int64_t  capacity; /* rows */
     int32_t *slots;    /* owned; -1, or the number of a shift; twice the capacity, a power of two */

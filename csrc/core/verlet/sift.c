@@ -6,15 +6,15 @@
 #if defined(__SSE2__) || defined(_M_X64)
 #include <emmintrin.h>
 #define HAS_SSE2 1
-#define AHEAD 2048 /* bytes */
+#define AHEAD    2048 /* bytes */
 #else
 #define HAS_SSE2 0
 #endif
 
 /* One pair to the lists. */
 HS_ALWAYS_INLINE void
-put(float square, hs_thresholds limit, int32_t e, uint16_t *hits, int32_t *n_hits,
-    uint16_t *unsure, int32_t *n_unsure)
+put(float square, hs_thresholds limit, int32_t e, uint16_t *hits, int32_t *n_hits, uint16_t *unsure,
+    int32_t *n_unsure)
 {
     hits[*n_hits] = (uint16_t)e;
     unsure[*n_unsure] = (uint16_t)*n_hits;
@@ -45,9 +45,8 @@ difference_of(const hs_sift_pairs *pairs, int32_t e, const bool shifted)
     const __m128 p = _mm_loadu_ps(pairs->y + (int64_t)pairs->i[e] * 4);
     const __m128 q = _mm_loadu_ps(pairs->y + (int64_t)pairs->j[e] * 4);
     const __m128 apart = _mm_sub_ps(q, p);
-    return shifted
-               ? _mm_add_ps(apart, _mm_loadu_ps(pairs->offset + (int64_t)pairs->code[e] * 4))
-               : apart;
+    return shifted ? _mm_add_ps(apart, _mm_loadu_ps(pairs->offset + (int64_t)pairs->code[e] * 4))
+                   : apart;
 }
 
 /* |D|^2 of pairs e to e + 3. */
@@ -114,8 +113,7 @@ sift_all(const hs_sift_pairs *pairs, const int stride, const bool shifted, uint1
     }
 #endif
     for (; e < pairs->n; e++) {
-        put(square_of(pairs, e, stride, shifted), pairs->limit, e, hits, &n_hits, unsure,
-            n_unsure);
+        put(square_of(pairs, e, stride, shifted), pairs->limit, e, hits, &n_hits, unsure, n_unsure);
     }
     return n_hits;
 }

@@ -17,7 +17,7 @@ hs_sift_stride(int ndim)
 
 /* Pairs, and points as floats; all borrowed. */
 typedef struct hs_sift_pairs {
-    const float   *y;      /* points: rows of `stride` */
+    const float   *y; /* points: rows of `stride` */
     int            stride;
     const int32_t *i, *j;
     const int32_t *code;   /* numbers of rows of `offset`, or NULL: none is added */
