@@ -5,6 +5,7 @@
 #define _POSIX_C_SOURCE 200809L
 #endif
 #include "../../../csrc/core/collect/in_turn.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/threads/team.h"
 #include "../../../csrc/core/base/os_thread.h"
