@@ -2,7 +2,8 @@
 /* record_measures.c: see record_measures.h. */
 #include "record_measures.h"
 
-#include <math.h>
+#include "measures.h"
+
 #include <string.h>
 
 /* Hits of the batch that is being written. */
@@ -46,24 +47,11 @@ static void
 measure(hs_recorder *recorder, const hs_trace *trace)
 {
     const hs_search *search = trace->search;
-    const hs_metric *metric = &search->scene.metric;
+    const hs_batch   batch = hs_trace_batch(trace);
+    int64_t *const  *shift = search->bins.keeps_originals ? trace->given : trace->image;
     double *const   *vector = recorder->columns & HS_WANT_VECTOR ? recorder->vector : NULL;
-    uint8_t          done[HS_BATCH + HS_BATCH_PADDING] = {0};
-    if (!trace->is_wide) {
-        const hs_batch batch = hs_trace_batch(trace);
-        search->call->kernel->measure(metric, &batch, recorder->distance, vector, done);
-    }
-    for (int32_t e = 0; e < trace->n; e++) {
-        if (HS_UNLIKELY(!done[e])) {
-            double         p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
-            int64_t        of_pair[HS_MAX_DIM];
-            const int64_t *shift = hs_trace_pair(trace, e, p, q, of_pair);
-            recorder->distance[e] = hs_metric_measure(metric, p, q, shift, along);
-            for (int k = 0; vector != NULL && k < trace->search->scene.ndim; k++) {
-                vector[k][e] = along[k];
-            }
-        }
-    }
+    hs_measure_pairs(search->call->kernel, &search->scene.metric, &batch,
+                     trace->is_shifted ? shift : NULL, trace->is_wide, recorder->distance, vector);
 }
 
 static void
@@ -71,9 +59,7 @@ put_distances(hs_recorder *recorder, const hs_search *search, int32_t first, int
 {
     const hs_options *options = &search->call->options;
     double           *to = hs_output_next(recorder->output, HS_WANT_DISTANCE);
-    if (!search->scene.extreme && search->scene.unscale.exponent != 0) {
-        hs_restore_distances(recorder->distance, n, search->scene.unscale);
-    }
+    hs_restore_distances(recorder->distance, n, hs_measures_unscale(&search->scene));
     if (options->precision == HS_EXACT) {
         hs_keep_all_within(recorder->distance, n, options->cutoff, options->inclusive);
     }
@@ -84,11 +70,10 @@ static void
 put_vectors(const hs_recorder *recorder, const hs_search *search, const double *sign, int32_t first,
             int32_t n)
 {
-    const hs_scale same = {.exponent = 0, .first = 1.0, .second = 1.0};
-    const int      d = recorder->output->ndim;
-    double        *to = hs_output_next(recorder->output, HS_WANT_VECTOR);
+    const int d = recorder->output->ndim;
+    double   *to = hs_output_next(recorder->output, HS_WANT_VECTOR);
     hs_restore_vectors(to + (int64_t)first * d, recorder->vector, sign, n, d,
-                       search->scene.extreme ? same : search->scene.unscale);
+                       hs_measures_unscale(&search->scene));
 }
 
 /* Shifts that only sort the images of one pair may leave out what all of these share: the turns by
@@ -237,47 +222,4 @@ hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const
         }
     }
     return trace->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
-}
-
-/* See restore.h. Loops without branches, which compilers turn into vectors. */
-
-void
-hs_restore_distances(double *distance, int32_t n, hs_scale unscale)
-{
-    for (int32_t e = 0; e < n; e++) {
-        distance[e] = hs_scale_apply(unscale, distance[e]);
-    }
-}
-
-void
-hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive)
-{
-    const double largest = inclusive ? cutoff : nextafter(cutoff, 0.0);
-    for (int32_t e = 0; e < n; e++) {
-        distance[e] = distance[e] < cutoff ? distance[e] : largest;
-    }
-}
-
-HS_ALWAYS_INLINE void
-restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign, int32_t n,
-                const int ndim, hs_scale unscale)
-{
-    for (int32_t e = 0; e < n; e++) {
-        for (int k = 0; k < ndim; k++) {
-            /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
-            to[(int64_t)e * ndim + k] = hs_scale_apply(unscale, vector[k][e]) * sign[e] + 0.0;
-        }
-    }
-}
-
-void
-hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign, int32_t n,
-                   int ndim, hs_scale unscale)
-{
-    switch (ndim) {
-    case 1: restore_vectors(to, vector, sign, n, 1, unscale); break;
-    case 2: restore_vectors(to, vector, sign, n, 2, unscale); break;
-    case 3: restore_vectors(to, vector, sign, n, 3, unscale); break;
-    default: restore_vectors(to, vector, sign, n, ndim, unscale);
-    }
 }

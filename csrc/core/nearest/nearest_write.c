@@ -2,14 +2,11 @@
 /* nearest_write.c: see nearest_write.h. */
 #include "nearest_write.h"
 
-#include "../collect/record_measures.h"
-
 #include <math.h>
 #include <string.h>
 
-#define WIDEST_SHIFT  (INT64_C(1) << 53) /* what the batch kernels take */
-#define LINE          64                 /* bytes that are fetched at once, */
-#define MOST_EXPECTED 512                /* and of a row */
+#define LINE          64  /* bytes that are fetched at once, */
+#define MOST_EXPECTED 512 /* and of a row */
 #define MOST_SQUARE   0x1p1000
 
 void
@@ -71,72 +68,39 @@ hs_near_write_nothing(const hs_near *near, int64_t row, int64_t from)
     }
 }
 
-/* Measures of the batch, in the unit of the metric. */
-static void
-measure(hs_near_writer *writer, double *const *vector)
-{
-    const hs_search *search = writer->near->search;
-    const hs_metric *metric = &writer->near->order;
-    uint8_t          done[HS_BATCH + HS_BATCH_PADDING] = {0};
-    hs_batch         batch = {.n = writer->n};
-    for (int k = 0; k < metric->ndim; k++) {
-        batch.p[k] = writer->p[k];
-        batch.q[k] = writer->q[k];
-    }
-    for (int r = 0; writer->is_shifted && r < metric->n_rows; r++) {
-        batch.shift[r] = writer->times[r];
-    }
-    if (!writer->is_wide) {
-        search->call->kernel->measure(metric, &batch, writer->distance, vector, done);
-    }
-    for (int32_t e = 0; e < writer->n; e++) {
-        double p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
-        for (int k = 0; !done[e] && k < metric->ndim; k++) {
-            p[k] = writer->p[k][e];
-            q[k] = writer->q[k][e];
-        }
-        if (!done[e]) {
-            writer->distance[e] = hs_metric_measure(
-                metric, p, q, writer->is_shifted ? writer->shift[e] : NULL, along);
-        }
-        for (int k = 0; !done[e] && vector != NULL && k < metric->ndim; k++) {
-            vector[k][e] = along[k];
-        }
-    }
-}
-
 /* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted to the
  * one before it, which is then no further from the true one than that. */
 static void
 put_distances(hs_near_writer *writer, double *to)
 {
     const hs_search *search = writer->near->search;
-    if (!search->scene.extreme && search->scene.unscale.exponent != 0) {
-        hs_restore_distances(writer->distance, writer->n, search->scene.unscale);
-    }
+    hs_measured     *pairs = &writer->pairs;
+    hs_restore_distances(pairs->distance, pairs->n, hs_measures_unscale(&search->scene));
     if (search->call->options.cutoff < INFINITY) {
-        hs_keep_all_within(writer->distance, writer->n, search->call->options.cutoff, true);
+        hs_keep_all_within(pairs->distance, pairs->n, search->call->options.cutoff, true);
     }
-    for (int32_t e = 0; e < writer->n; e++) {
+    for (int32_t e = 0; e < pairs->n; e++) {
         const int64_t at = writer->at[e];
-        to[at] = writer->is_first[e] ? writer->distance[e]
-                                     : hs_larger(writer->distance[e], to[at - 1]);
+        to[at] = writer->is_first[e] ? pairs->distance[e]
+                                     : hs_larger(pairs->distance[e], to[at - 1]);
     }
 }
 
 static void
-put_vectors(const hs_near_writer *writer, double *const *vector, double *to)
+put_vectors(hs_near_writer *writer, double *to)
 {
     const hs_search *search = writer->near->search;
-    const hs_scale   same = {.exponent = 0, .first = 1.0, .second = 1.0};
+    hs_measured     *pairs = &writer->pairs;
     const int        d = search->scene.ndim;
-    double           sign[HS_BATCH], packed[HS_BATCH * HS_MAX_DIM];
-    for (int32_t e = 0; e < writer->n; e++) {
+    double          *vector[HS_MAX_DIM], sign[HS_BATCH], packed[HS_BATCH * HS_MAX_DIM];
+    for (int k = 0; k < d; k++) {
+        vector[k] = pairs->vector[k];
+    }
+    for (int32_t e = 0; e < pairs->n; e++) {
         sign[e] = 1.0;
     }
-    hs_restore_vectors(packed, vector, sign, writer->n, d,
-                       search->scene.extreme ? same : search->scene.unscale);
-    for (int32_t e = 0; e < writer->n; e++) {
+    hs_restore_vectors(packed, vector, sign, pairs->n, d, hs_measures_unscale(&search->scene));
+    for (int32_t e = 0; e < pairs->n; e++) {
         memcpy(to + writer->at[e] * d, packed + (int64_t)e * d, (size_t)d * sizeof *to);
     }
 }
@@ -144,25 +108,23 @@ put_vectors(const hs_near_writer *writer, double *const *vector, double *to)
 void
 hs_near_flush(hs_near_writer *writer)
 {
-    double *vector[HS_MAX_DIM];
-    for (int k = 0; k < HS_MAX_DIM; k++) {
-        vector[k] = writer->vector[k];
-    }
-    if (writer->n > 0 && (writer->d != NULL || writer->D != NULL)) {
-        measure(writer, writer->D != NULL ? vector : NULL);
+    hs_measured *pairs = &writer->pairs;
+    if (pairs->n > 0 && (writer->d != NULL || writer->D != NULL)) {
+        hs_measured_find(writer->near->search->call->kernel, &writer->near->order,
+                         writer->D != NULL, pairs);
     }
     if (writer->d != NULL) {
         put_distances(writer, writer->d);
     }
     if (writer->D != NULL) {
-        put_vectors(writer, vector, writer->D);
+        put_vectors(writer, writer->D);
     }
-    if (writer->is_shifted) {
-        memset(writer->times, 0, sizeof writer->times);
-        memset(writer->shift, 0, sizeof writer->shift);
+    if (pairs->is_shifted) {
+        memset(pairs->times, 0, sizeof pairs->times);
+        memset(pairs->shift, 0, sizeof pairs->shift);
     }
-    writer->n = 0;
-    writer->is_shifted = writer->is_wide = false;
+    pairs->n = 0;
+    pairs->is_shifted = pairs->is_wide = false;
 }
 
 /* S over all box vectors; false when it does not fit int32. */
@@ -189,19 +151,15 @@ put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_ke
     const hs_near *near = writer->near;
     const hs_bins *asking = hs_search_asking(near->search);
     for (int32_t e = 0; e < n; e++) {
-        int64_t *shift = writer->shift[writer->n + e];
-        double   q[HS_MAX_DIM];
-        int64_t  given[HS_MAX_DIM];
+        double  q[HS_MAX_DIM];
+        int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
         if (!hs_near_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
             (writer->S != NULL && !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
             writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
         }
         for (int r = 0; r < asking->n_periodic; r++) {
-            writer->times[r][writer->n + e] = (double)shift[r];
-            writer->is_shifted = writer->is_shifted || shift[r] != 0;
-            writer->is_wide = writer->is_wide || shift[r] > WIDEST_SHIFT ||
-                              shift[r] < -WIDEST_SHIFT;
+            hs_measured_shift(&writer->pairs, writer->pairs.n + e, r, shift[r]);
         }
     }
     return HS_OK;
@@ -218,9 +176,7 @@ put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_k
     for (int32_t e = 0; e < n; e++) {
         const hs_near_image *image = hs_near_image_of(block, keys[e].place);
         for (int r = 0; !image->is_home && r < writer->near->order.n_rows; r++) {
-            writer->times[r][writer->n + e] = image->shift[r];
-            writer->shift[writer->n + e][r] = image->shift[r];
-            writer->is_shifted = true;
+            hs_measured_shift(&writer->pairs, writer->pairs.n + e, r, image->shift[r]);
         }
     }
 }
@@ -232,7 +188,7 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
 {
     const hs_near *near = writer->near;
     const hs_bins *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    const int32_t  begin = writer->n;
+    const int32_t  begin = writer->pairs.n;
     const int      index_bytes = near->rows->index_bytes;
     int32_t        number[HS_BATCH];
     for (int32_t e = 0; e < n; e++) {
@@ -244,8 +200,8 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
         const double  own = asking->keeps_originals ? asking->originals[k][ranker->si]
                                                     : asking->x[k][ranker->si];
         for (int32_t e = 0; e < n; e++) {
-            writer->p[k][begin + e] = own;
-            writer->q[k][begin + e] = from[number[e]];
+            writer->pairs.p[k][begin + e] = own;
+            writer->pairs.q[k][begin + e] = from[number[e]];
         }
     }
     for (int32_t e = 0; e < n; e++) {
@@ -258,7 +214,7 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
     } else if (bins->n_periodic > 0) {
         put_images(writer, ranker, keys, n);
     }
-    writer->n += n;
+    writer->pairs.n += n;
     return status;
 }
 
@@ -303,7 +259,7 @@ hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
     const int64_t  row = hs_search_asking(near->search)->order[ranker->si];
     count = count_within(ranker, count);
     for (int64_t e = 0; e < count;) {
-        const int64_t   room = HS_BATCH - writer->n;
+        const int64_t   room = HS_BATCH - writer->pairs.n;
         const int32_t   n = (int32_t)(count - e < room ? count - e : room);
         const hs_status status =
             put_entries(writer, ranker, ranker->keys + e, n, row * near->k + e, e == 0);
@@ -311,7 +267,7 @@ hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
             return status;
         }
         e += n;
-        if (writer->n == HS_BATCH) {
+        if (writer->pairs.n == HS_BATCH) {
             hs_near_flush(writer);
         }
     }

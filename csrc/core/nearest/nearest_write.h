@@ -6,6 +6,7 @@
 #ifndef HS_NEAREST_WRITE_H
 #define HS_NEAREST_WRITE_H
 
+#include "../collect/measures.h"
 #include "nearest_rank.h"
 
 /* Owned by a thread. A batch of entries that are still to be measured. */
@@ -14,16 +15,9 @@ typedef struct hs_near_writer {
     void          *j;    /* columns of the output; NULL where they are not wanted */
     double        *d, *D;
     int32_t       *S;
-    int32_t        n;
     int64_t        at[HS_BATCH];       /* entry of the output */
     bool           is_first[HS_BATCH]; /* of its row */
-    bool           is_shifted, is_wide;
-    double         p[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
-    double         q[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
-    double         times[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING]; /* the metric's shifts; ... */
-    int64_t        shift[HS_BATCH][HS_MAX_DIM]; /* ... zeros from the first entry that is free on */
-    double         distance[HS_BATCH + HS_BATCH_PADDING];
-    double         vector[HS_MAX_DIM][HS_BATCH + HS_BATCH_PADDING];
+    hs_measured    pairs;              /* shifts are zero from the first entry that is free on */
     int32_t        failed; /* the asking point, in the caller's numbers, of HS_ERR_SHIFT_RANGE */
 } hs_near_writer;
 

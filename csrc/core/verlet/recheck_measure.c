@@ -6,27 +6,13 @@
  */
 #include "recheck.h"
 
-#include "../collect/record_measures.h"
+#include "../collect/measures.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Integers up to here are float64 numbers, and what the batch kernels take. */
-#define WIDEST_SHIFT (INT64_C(1) << 53)
-
 /* Points ahead whose numbers are fetched: they lie anywhere in memory. */
 #define AHEAD 16
-
-enum { IN_BATCH = HS_BATCH + HS_BATCH_PADDING };
-
-/* Some hits, as the batch kernels take them, and what they return. */
-typedef struct measured {
-    int32_t n;
-    bool    is_shifted, is_wide;
-    double  p[HS_MAX_DIM][IN_BATCH], q[HS_MAX_DIM][IN_BATCH], times[HS_MAX_DIM][IN_BATCH];
-    int64_t shift[HS_BATCH][HS_MAX_DIM];
-    double  distance[IN_BATCH], vector[HS_MAX_DIM][IN_BATCH];
-} measured;
 
 /* A double that is an integer, modulo 2^64. */
 static int64_t
@@ -177,14 +163,13 @@ hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure)
 /* The shifts of the batch, for the scene's metric. */
 static void
 fill_shifts(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *hits,
-            measured *batch)
+            hs_measured *batch)
 {
     const hs_listing *listing = &refilter->list->listing;
     const int         m = refilter->m;
     const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
     const int32_t    *code =
         slab->first < listing->n_plain ? NULL : listing->code + (slab->first - listing->n_plain);
-    int64_t any = 0;
     for (int32_t b = 0; b < batch->n; b++) {
         const int32_t  e = hits[b];
         const int64_t *lag_i = refilter->lag + (int64_t)i[e] * m;
@@ -193,18 +178,14 @@ fill_shifts(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *
             const int64_t image = code != NULL ? refilter->image[(int64_t)code[e] * m + r] : 0;
             const int64_t shift =
                 (int64_t)((uint64_t)image + (uint64_t)lag_j[r] - (uint64_t)lag_i[r]);
-            batch->shift[b][r] = shift;
-            batch->times[r][b] = (double)shift;
-            any |= shift;
-            batch->is_wide = batch->is_wide || shift > WIDEST_SHIFT || shift < -WIDEST_SHIFT;
+            hs_measured_shift(batch, b, r, shift);
         }
     }
-    batch->is_shifted = any != 0;
 }
 
 HS_ALWAYS_INLINE void
 fill_points(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *hits, const int d,
-            measured *batch)
+            hs_measured *batch)
 {
     const int32_t *i = refilter->list->listing.i + slab->first;
     const int32_t *j = refilter->list->listing.j + slab->first;
@@ -224,7 +205,7 @@ fill_points(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *
 }
 
 static void
-fill(const hs_refilter *refilter, const hs_sifted *slab, int32_t first, measured *batch)
+fill(const hs_refilter *refilter, const hs_sifted *slab, int32_t first, hs_measured *batch)
 {
     const uint16_t *hits = slab->hits + first;
     switch (refilter->d) {
@@ -234,51 +215,17 @@ fill(const hs_refilter *refilter, const hs_sifted *slab, int32_t first, measured
     }
 }
 
-/* d and D of the batch, in the unit of the metric. */
-static void
-measure(const hs_refilter *refilter, double *const *vector, measured *batch)
-{
-    const hs_metric *metric = &refilter->scene.metric;
-    uint8_t          done[IN_BATCH] = {0};
-    hs_batch         given = {.n = batch->n};
-    for (int k = 0; k < refilter->d; k++) {
-        given.p[k] = batch->p[k];
-        given.q[k] = batch->q[k];
-    }
-    for (int r = 0; batch->is_shifted && r < refilter->m; r++) {
-        given.shift[r] = batch->times[r];
-    }
-    if (!batch->is_wide) {
-        refilter->call->kernel->measure(metric, &given, batch->distance, vector, done);
-    }
-    for (int32_t b = 0; b < batch->n; b++) {
-        double p[HS_MAX_DIM], q[HS_MAX_DIM], along[HS_MAX_DIM];
-        for (int k = 0; !done[b] && k < refilter->d; k++) {
-            p[k] = batch->p[k][b];
-            q[k] = batch->q[k][b];
-        }
-        if (HS_UNLIKELY(!done[b])) {
-            batch->distance[b] =
-                hs_metric_measure(metric, p, q, batch->is_shifted ? batch->shift[b] : NULL, along);
-            for (int k = 0; vector != NULL && k < refilter->d; k++) {
-                vector[k][b] = along[k];
-            }
-        }
-    }
-}
-
 void
 hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab)
 {
     const hs_scene   *scene = &refilter->scene;
     const hs_options *options = &refilter->call->options;
-    const hs_scale    same = {.exponent = 0, .first = 1.0, .second = 1.0};
-    const hs_scale    unscale = scene->extreme ? same : scene->unscale;
+    const hs_scale    unscale = hs_measures_unscale(scene);
     const int         d = refilter->d;
     double           *distance = hs_refilter_column(refilter, HS_WANT_DISTANCE, slab->at);
     double           *vectors = hs_refilter_column(refilter, HS_WANT_VECTOR, slab->at);
     double           *vector[HS_MAX_DIM], sign[HS_BATCH];
-    measured          batch;
+    hs_measured       batch;
     memset(&batch, 0, sizeof batch); /* kernels read a little beyond the last pair */
     for (int k = 0; k < d; k++) {
         vector[k] = batch.vector[k];
@@ -290,11 +237,9 @@ hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab)
         const int32_t left = slab->n_hits - first;
         batch.n = left < HS_BATCH ? left : HS_BATCH;
         fill(refilter, slab, first, &batch);
-        measure(refilter, vectors != NULL ? vector : NULL, &batch);
+        hs_measured_find(refilter->call->kernel, &scene->metric, vectors != NULL, &batch);
         if (distance != NULL) {
-            if (unscale.exponent != 0) {
-                hs_restore_distances(batch.distance, batch.n, unscale);
-            }
+            hs_restore_distances(batch.distance, batch.n, unscale);
             hs_keep_all_within(batch.distance, batch.n, options->cutoff, options->inclusive);
             memcpy(distance + first, batch.distance, (size_t)batch.n * sizeof *distance);
         }
