@@ -273,9 +273,10 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
         hs_grid_cut_by_faces(scene, parts, most_cells(scene), grid);
     }
-    if (single_cost < INFINITY && (status != HS_OK || single_cost <= cost_per_point(scene, grid))) {
+    /* Axes with several cells reach a few of them, the others as far as in the single one. */
+    HS_ASSERT(status == HS_OK || single_cost == INFINITY);
+    if (status == HS_OK && single_cost <= cost_per_point(scene, grid)) {
         *grid = single;
-        status = HS_OK;
     }
     return status == HS_OK ? HS_OK : hs_skew_or_memory(&scene->lattice);
 }

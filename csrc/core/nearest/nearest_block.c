@@ -178,7 +178,9 @@ choose_squares(const hs_near *near, const hs_near_group *group, hs_near_block *b
     hs_threshold_bounds(near->tree.ndim, block->reach, extent, block->error, HS_FILTER_UNIT,
                         HS_FILTER_TINY, &in, &out);
     const double square = block->reach * block->reach;
-    block->has_squares = in > 0.0 && out < LARGEST_SQUARE;
+    /* The radius is 1024 errors at least, and the extent some hundred radii at most. */
+    HS_ASSERT(in > 0.0 && out < LARGEST_SQUARE);
+    block->has_squares = true;
     block->square_error = hs_larger(square - in, out - square) * (1.0 + ROOM);
 }
 

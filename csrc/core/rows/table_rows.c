@@ -190,7 +190,8 @@ put_row(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits, i
         int32_t n, int32_t place, table_row *of)
 {
     const bool has_self = !scanner->search->has_queries;
-    of->n = n - (has_self && n > 0);
+    HS_ASSERT(!has_self || n > 0);
+    of->n = n - has_self;
     of->itself = has_self ? of->point : NO_POINT;
     of->numbers = hits->label + hit;
     if (scanner->use == HS_BLOCK_LISTS_PLACES) {
