@@ -221,9 +221,60 @@ shifts_may_be_too_large(void)
     }
 }
 
+/* Those that ask lie at one face of the box and all points at the other: no candidate is where it
+ * lies in the box. */
+static void
+all_candidates_may_lie_in_one_image(void)
+{
+    enum { POINTS = 60, QUERIES = 12 };
+    double         x[2 * POINTS], q[2 * QUERIES];
+    harness_random random = {95};
+    hs_box         box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    for (int trial = 0; trial < 4; trial++) {
+        for (int p = 0; p < POINTS; p++) {
+            x[2 * p] = 0.4375 + 0.05 * random_unit(&random);
+            x[2 * p + 1] = 0.1 * random_unit(&random);
+        }
+        for (int p = 0; p < QUERIES; p++) {
+            q[2 * p] = (trial % 2 ? 0.51 : -0.49) + 0.03 * random_unit(&random);
+            q[2 * p + 1] = 0.1 * random_unit(&random);
+        }
+        const brute_scene scene = {.ndim = 2, .n = POINTS, .x = x, .box = &box, .cutoff = 1.0};
+        const hs_points   queries = {q, QUERIES, 2, HS_FLOAT64, 16, 8};
+        check_columns(&scene, &queries, 3, trial < 2 ? INFINITY : 0.125);
+    }
+}
+
+/* More groups on one spot than a thread takes at a time. */
+static void
+eight_thousand_points_may_be_one(void)
+{
+    enum { POINTS = 8000 };
+    static double   x[3 * POINTS];
+    const hs_points points = {x, POINTS, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    int64_t         wrong = 0;
+    for (int e = 0; e < 3 * POINTS; e++)
+        x[e] = 0.25 * (e % 3);
+    options.cutoff = INFINITY;
+    options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    CHECK(hs_nearest_find(&points, NULL, NULL, 2, &options, &rows, NULL) == HS_OK);
+    const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
+    const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
+    for (int i = 0; i < POINTS; i++) {
+        wrong += j[2 * i] != (i == 0) || j[2 * i + 1] != (i < 2 ? 2 : 1);
+        wrong += d[2 * i] != 0.0 || d[2 * i + 1] != 0.0;
+    }
+    CHECK(wrong == 0);
+    hs_pairs_free(rows);
+}
+
 void
 test_nearest_write(void)
 {
+    RUN(all_candidates_may_lie_in_one_image);
+    RUN(eight_thousand_points_may_be_one);
     RUN(each_column_alone_is_the_same);
     RUN(columns_of_extreme_scenes);
     RUN(columns_of_scenes_that_lose_digits);

@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_nearest_kept.c: one of those that come at once builds the tree that is kept, the others do
+ * with one of their own; rows end at the largest distance; radii at both ends of the numbers. */
+#include "../../../csrc/core/nearest/nearest_kept.h"
+#include "../../../csrc/core/nearest/nearest_write.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../support/near_unit.h"
+
+#include <math.h>
+
+void test_nearest_kept(void);
+
+static near_unit unit;
+
+/* The four numbers 0, 0.5, 1 and 1.2, or so many others. */
+static const double line[4] = {0.0, 0.5, 1.0, 1.2};
+
+static hs_points
+points_on_line(const double *x, int64_t n)
+{
+    return (hs_points){x, n, 1, HS_FLOAT64, 8, 8};
+}
+
+/* Prepares a search that may use what is kept; whether it does. */
+static bool
+borrows(hs_near_kept *kept, double limit)
+{
+    const hs_points points = points_on_line(line, 4);
+    const hs_sets   sets = {
+        .points = &points, .is_full = true, .is_plain = true, .is_wide = true, .trees = kept};
+    hs_options options = hs_options_default();
+    hs_failure failure;
+    options.cutoff = limit;
+    options.want = HS_WANT_J;
+    hs_call_begin(&options, &unit.call);
+    hs_search_begin(&unit.call, &unit.search);
+    unit.near = (hs_near){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
+    CHECK(hs_near_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
+    CHECK(unit.near.tree.n_nodes == 1 && unit.near.limit > 0.0);
+    const bool borrowed = unit.search.is_borrowed;
+    hs_near_release(&unit.near);
+    hs_search_close(&unit.search);
+    hs_call_dismiss(&unit.call);
+    hs_account_close(&unit.call.account);
+    return borrowed;
+}
+
+static void
+whoever_comes_while_it_is_built_does_without(void)
+{
+    const int64_t blocks = hs_test_live_blocks();
+    hs_near_kept *kept = hs_near_kept_new();
+    hs_near      *room = NULL, *other = NULL;
+    CHECK(hs_near_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_near_kept_get(kept, &other) == NULL && other == NULL);
+    CHECK(!borrows(kept, INFINITY));
+    hs_near_kept_end(kept, false); /* it could not be built: the next one tries */
+    CHECK(hs_near_kept_get(kept, &room) == NULL && room != NULL);
+    hs_near_kept_end(kept, false);
+    CHECK(borrows(kept, INFINITY));
+    CHECK(borrows(kept, 1.0));
+    CHECK(!borrows(kept, 0x1p-900)); /* has a scale of its own */
+    const hs_near *built = hs_near_kept_get(kept, &room);
+    CHECK(built != NULL && room == NULL && built->tree.n_nodes == 1);
+    CHECK(hs_near_kept_get(kept, &other) == built && other == NULL);
+    hs_near_kept_free(kept);
+    hs_near_kept_free(NULL);
+    CHECK(hs_test_live_blocks() == blocks);
+}
+
+/* Points that a radius beyond the largest distance has let in. */
+static void
+rows_end_at_the_largest_distance(void)
+{
+    const hs_points       points = points_on_line(line, 4);
+    static hs_near_block  block;
+    static hs_near_writer writer;
+    static const double   limits[] = {0.25, 0.5, 0.75, 1.0, 1.125, 1.25};
+    static const int      within[] = {0, 1, 1, 2, 2, 3};
+    hs_options            options = hs_options_default();
+    for (int l = 0; l < 6; l++) {
+        near_unit_open(&points, NULL, NULL, 3, HS_WANT_J | HS_WANT_DISTANCE, limits[l], &unit);
+        hs_near_ranker ranker = {
+            .near = &unit.near, .block = &block, .pace = {.options = &options}};
+        hs_near_group group = near_unit_group(&unit, 1.5);
+        int32_t       hits[4] = {0, 1, 2, 3}, si = 0;
+        int64_t       count;
+        CHECK(hs_output_reserve(&unit.rows, 12, 0.0) == HS_OK);
+        unit.rows.n_pairs = 12;
+        CHECK(hs_near_block_init(&unit.near, &block) == HS_OK);
+        CHECK(hs_near_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
+              HS_OK);
+        while (unit.search.bins.order[si] != 0)
+            si++;
+        CHECK(hs_near_rank(&ranker, &group, si, hits, 4, &count) == HS_OK && count == 3);
+        hs_near_writer_init(&unit.near, &writer);
+        CHECK(hs_near_write(&writer, &ranker, count) == HS_OK);
+        hs_near_flush(&writer);
+        const int64_t *j = hs_output_column(&unit.rows, HS_WANT_J);
+        const double  *d = hs_output_column(&unit.rows, HS_WANT_DISTANCE);
+        for (int e = 0; e < 3; e++) {
+            CHECK(j[e] == (e < within[l] ? e + 1 : -1));
+            CHECK(d[e] == (e < within[l] ? line[e + 1] : INFINITY));
+        }
+        hs_near_ranker_free(&ranker);
+        hs_near_block_free(&unit.near, &block);
+        near_unit_close(&unit);
+    }
+}
+
+/* Squares of what is far beyond the first guess would overflow, those of what is far below it would
+ * vanish: the unit changes, up and down to the last that there is. */
+static void
+check_radii(const double *x)
+{
+    const hs_points points = points_on_line(x, 2);
+    const hs_options options = hs_options_default();
+    static const int exponents[] = {-1000, -300, 0, 300, 600, 601, 602, 900};
+    for (int e = 0; e < 8; e++) {
+        hs_near_bounder bounder;
+        near_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
+        const double apart = fabs(unit.search.bins.x[0][0] - unit.search.bins.x[0][1]);
+        CHECK(apart > 0.0 && apart < INFINITY);
+        CHECK(hs_near_bounder_init(&unit.near, &bounder) == HS_OK);
+        hs_near_group group;
+        hs_near_group_set(&unit.near, 0, 1, &group);
+        group.radius = ldexp(1.0, exponents[e]);
+        CHECK(hs_near_bound(&unit.near, &options, &bounder, &group) == HS_OK);
+        CHECK(group.radius >= apart && group.radius <= 1.001 * apart);
+        hs_near_bounder_free(&unit.near, &bounder);
+        near_unit_close(&unit);
+    }
+}
+
+static void
+radii_are_found_far_from_a_guess(void)
+{
+    check_radii((const double[2]){-0x1.fp900, 0x1.fp900});
+    check_radii((const double[2]){0.0, 0x1.fp-900});
+    check_radii((const double[2]){-0x1p-500, 0x1.fp-470});
+    check_radii((const double[2]){0x1p500, 0x1.fp470});
+}
+
+void
+test_nearest_kept(void)
+{
+    RUN(whoever_comes_while_it_is_built_does_without);
+    RUN(rows_end_at_the_largest_distance);
+    RUN(radii_are_found_far_from_a_guess);
+}

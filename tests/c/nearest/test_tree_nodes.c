@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_tree_nodes.c: nodes of a tree part their points, within exact bounds, and it is not much
+ * deeper than need be. */
+#include "../support/near_unit.h"
+
+#include <math.h>
+
+void test_tree_nodes(void);
+
+enum { N = 3000 };
+
+static near_unit unit;
+static double    x[3 * N];
+
+/* Whether [low, high] is the exact range of the node's points along axis k. */
+static bool
+is_range(const hs_tree_node *node, int k, double low, double high)
+{
+    const double *of = unit.search.bins.x[k];
+    double        least = INFINITY, most = -INFINITY;
+    for (int32_t si = node->first; si < node->end; si++) {
+        least = fmin(of[si], least);
+        most = fmax(of[si], most);
+    }
+    return low == least && high == most;
+}
+
+/* Bounds and ranges of all nodes; returns how many points are in leaves. */
+static int32_t
+check_nodes(int32_t leaf_points, int *deepest)
+{
+    const hs_tree *tree = &unit.near.tree;
+    const hs_bins *bins = &unit.search.bins;
+    const int      d = tree->ndim;
+    int           *depth = calloc((size_t)tree->n_nodes, sizeof *depth);
+    int32_t        in_leaves = 0;
+    bool           right = true, bounded = true, ascends = true;
+    *deepest = 0;
+    for (int32_t number = 0; number < tree->n_nodes; number++) {
+        const hs_tree_node *node = &tree->nodes[number], *left = &tree->nodes[node->left];
+        *deepest = depth[number] > *deepest ? depth[number] : *deepest;
+        right = right && node->first < node->end;
+        if (node->left == 0) {
+            in_leaves += node->end - node->first;
+            right = right && (node->end - node->first <= leaf_points || node->is_spot);
+            for (int32_t si = node->first + 1; si < node->end; si++) {
+                ascends = ascends && bins->order[si - 1] < bins->order[si];
+                for (int k = 0; node->is_spot && k < d; k++)
+                    right = right && bins->x[k][si] == bins->x[k][si - 1];
+            }
+            continue;
+        }
+        right = right && node->left > number && !node->is_spot;
+        right = right && left[0].first == node->first && left[0].end == left[1].first &&
+                left[1].end == node->end;
+        depth[node->left] = depth[node->left + 1] = depth[number] + 1;
+        const double *bounds = hs_tree_bounds(tree, node->left, d);
+        for (int k = 0; k < d; k++) {
+            for (int side = 0; side < 2; side++)
+                bounded = bounded && is_range(&left[side], k, bounds[4 * k + side],
+                                              bounds[4 * k + 2 + side]);
+        }
+    }
+    for (int k = 0; k < d; k++)
+        bounded = bounded && is_range(&tree->nodes[0], k, tree->lower[k], tree->upper[k]);
+    CHECK(right && bounded && ascends);
+    free(depth);
+    return in_leaves;
+}
+
+static void
+nodes_part_their_points(void)
+{
+    harness_random random = {808};
+    for (int trial = 0; trial < 24; trial++) {
+        const int     d = 1 + trial % 3, n = trial < 6 ? 1 + trial * 7 : N / (1 + trial % 4);
+        const int64_t k = trial % 2 ? 3 : 40; /* leaves of 8 and of 16 */
+        const double  cells = trial / 6 == 2 ? 8.0 : trial / 6 == 3 ? 40.0 : 0x1p40;
+        int           deepest;
+        for (int e = 0; e < d * n; e++)
+            x[e] = floor(random_unit(&random) * cells) / cells;
+        const hs_points points = {x, n, d, HS_FLOAT64, d * 8, 8};
+        near_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
+        CHECK(check_nodes(k < 32 ? 8 : 16, &deepest) == n);
+        CHECK(unit.near.tree.depth == deepest);
+        CHECK(deepest <= 4 + (int)(1.6 * log2(n)));
+        near_unit_close(&unit);
+    }
+}
+
+static void
+leaves_of_one_spot_say_so(void)
+{
+    int deepest;
+    for (int i = 0; i < 100; i++) {
+        x[2 * i] = 0.25 * (i % 2);
+        x[2 * i + 1] = i == 77 ? 0.5 : 0.0;
+    }
+    const hs_points points = {x, 100, 2, HS_FLOAT64, 16, 8};
+    near_unit_open(&points, NULL, NULL, 3, HS_WANT_J, INFINITY, &unit);
+    const hs_tree *tree = &unit.near.tree;
+    CHECK(tree->n_nodes == 5 && check_nodes(8, &deepest) == 100 && deepest == 2);
+    int spots = 0;
+    for (int32_t number = 0; number < tree->n_nodes; number++) {
+        const hs_tree_node *node = &tree->nodes[number];
+        const int32_t       n = node->end - node->first;
+        CHECK(hs_near_of_leaf(&unit.near, node) == (node->is_spot ? 4 : n)); /* k + 1 */
+        spots += node->is_spot;
+    }
+    CHECK(spots == 2); /* the third leaf is one point */
+    near_unit_close(&unit);
+}
+
+void
+test_tree_nodes(void)
+{
+    RUN(nodes_part_their_points);
+    RUN(leaves_of_one_spot_say_so);
+}

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* near_unit.h: a search for the nearest that is ready, so that a test can take its steps one by
+ * one. */
+#ifndef HS_NEAR_UNIT_H
+#define HS_NEAR_UNIT_H
+
+#include "../../../csrc/core/nearest/nearest_block.h"
+#include "../../../csrc/core/nearest/nearest_prepare.h"
+#include "harness.h"
+
+typedef struct near_unit {
+    hs_call   call;
+    hs_search search;
+    hs_near   near;
+    hs_output rows;
+} near_unit;
+
+/* want: quantities of the rows. limit: the largest distance. */
+static inline void
+near_unit_open(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
+               unsigned want, double limit, near_unit *unit)
+{
+    const hs_sets sets = {.points = points,
+                          .queries = queries,
+                          .is_full = true,
+                          .is_plain = true,
+                          .is_wide = true};
+    hs_options    options = hs_options_default();
+    hs_failure    failure;
+    options.cutoff = limit;
+    options.want = want;
+    options.threads = 1;
+    hs_call_begin(&options, &unit->call);
+    hs_search_begin(&unit->call, &unit->search);
+    unit->near = (hs_near){.search = &unit->search,
+                           .k = k,
+                           .of_spot = (int32_t)k + 1,
+                           .omits_self = queries == NULL,
+                           .rows = &unit->rows};
+    hs_output_init(&unit->call.account, points->ndim, want, 8, &unit->rows);
+    CHECK(hs_near_prepare(&unit->near, &sets, box, limit, &failure) == HS_OK);
+    unit->near.shared = hs_shared_new(&unit->call.account);
+    CHECK(unit->near.shared != NULL);
+}
+
+static inline void
+near_unit_close(near_unit *unit)
+{
+    hs_shared_free(unit->near.shared);
+    hs_near_release(&unit->near);
+    hs_output_free(&unit->rows);
+    hs_search_close(&unit->search);
+    hs_call_dismiss(&unit->call);
+    hs_account_close(&unit->call.account);
+}
+
+/* All who ask as one group, with this radius. */
+static inline hs_near_group
+near_unit_group(const near_unit *unit, double radius)
+{
+    hs_near_group group;
+    hs_near_group_set(&unit->near, 0, (int32_t)hs_search_asking(&unit->search)->n, &group);
+    group.radius = radius;
+    return group;
+}
+
+#endif
