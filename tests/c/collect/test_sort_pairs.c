@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_sort_pairs.c: pairs are sorted by i, j and S, a few and a crowd of each i, and those that
+ * are there twice stay. */
+#include "../../../csrc/core/collect/sort_pairs.h"
+#include "../support/search_unit.h"
+
+void test_sort_pairs(void);
+
+enum { POINTS = 20, MOST = 3000 };
+
+static search_unit unit;
+
+/* Random pairs, many of them several times, with a distance that tells where each was. */
+static void
+fill_pairs(harness_random *random, int64_t n, int most_j, bool has_shift, hs_output *found)
+{
+    const unsigned columns = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    hs_output_init(&unit.call.account, 2, has_shift ? columns | HS_WANT_SHIFT : columns, 4,
+                   found);
+    CHECK(hs_output_reserve(found, n, 0.0) == HS_OK);
+    int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
+    int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
+    double  *d = hs_output_column(found, HS_WANT_DISTANCE);
+    for (int64_t p = 0; p < n; p++) {
+        i[p] = (int32_t)(random_bits(random) % POINTS);
+        j[p] = (int32_t)(random_bits(random) % (uint64_t)most_j);
+        d[p] = (double)p;
+        for (int k = 0; has_shift && k < 2; k++)
+            shift[2 * p + k] = (int32_t)(random_bits(random) % 3) - 1;
+    }
+    found->n_pairs = n;
+}
+
+/* Whether entry p comes before the next one, or is the same. */
+static bool
+is_in_order(const hs_output *sorted, const int32_t *shift, int64_t p)
+{
+    const int64_t *i = hs_output_column(sorted, HS_WANT_I);
+    const int64_t *j = hs_output_column(sorted, HS_WANT_J);
+    const int64_t  keys[4] = {i[p], j[p], shift != NULL ? shift[2 * p] : 0,
+                              shift != NULL ? shift[2 * p + 1] : 0};
+    const int64_t  next[4] = {i[p + 1], j[p + 1], shift != NULL ? shift[2 * p + 2] : 0,
+                              shift != NULL ? shift[2 * p + 3] : 0};
+    int            k = 0;
+    while (k < 4 && keys[k] == next[k])
+        k++;
+    return k == 4 || keys[k] < next[k];
+}
+
+static void
+all_pairs_are_there_in_order(void)
+{
+    static bool    seen[MOST];
+    harness_random random = {365};
+    search_unit_points(6, POINTS, 2, 1.0, &unit);
+    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+    for (int trial = 0; trial < 24; trial++) {
+        const int64_t n = trial < 4 ? trial : 1 + (int64_t)(random_bits(&random) % MOST);
+        const bool    has_shift = trial % 2;
+        hs_output     found, sorted;
+        bool          right = true;
+        fill_pairs(&random, n, trial % 3 == 0 ? 2 : 1000, has_shift, &found);
+        hs_output_init(&unit.call.account, 2, found.columns, 8, &sorted);
+        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, &sorted) == HS_OK && sorted.n_pairs == n);
+        const int64_t *i = hs_output_column(&sorted, HS_WANT_I);
+        const int64_t *j = hs_output_column(&sorted, HS_WANT_J);
+        const int32_t *shift = hs_output_column(&sorted, HS_WANT_SHIFT);
+        const int32_t *of_i = hs_output_column(&found, HS_WANT_I);
+        const int32_t *of_j = hs_output_column(&found, HS_WANT_J);
+        const int32_t *of_shift = hs_output_column(&found, HS_WANT_SHIFT);
+        const double  *d = hs_output_column(&sorted, HS_WANT_DISTANCE);
+        memset(seen, 0, sizeof seen);
+        for (int64_t p = 0; p < n; p++) {
+            const int64_t from = (int64_t)d[p];
+            right = right && from >= 0 && from < n && !seen[from];
+            seen[from] = true;
+            right = right && i[p] == of_i[from] && j[p] == of_j[from];
+            right = right && (!has_shift || memcmp(shift + 2 * p, of_shift + 2 * from, 8) == 0);
+            right = right && (p + 1 == n || is_in_order(&sorted, shift, p));
+        }
+        CHECK(right);
+        hs_output_free(&found);
+        hs_output_free(&sorted);
+    }
+    search_unit_close(&unit);
+}
+
+void
+test_sort_pairs(void)
+{
+    RUN(all_pairs_are_there_in_order);
+}

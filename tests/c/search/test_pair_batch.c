@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_pair_batch.c: shifts are kept as short as they are known to be, and those that pass the
+ * integers are told, whoever looks them up. */
+#include "../../../csrc/core/collect/crew.h"
+#include "../../../csrc/core/verlet/pair_list_search.h"
+#include "../support/search_unit.h"
+
+#include <math.h>
+
+void test_pair_batch(void);
+
+static search_unit unit;
+
+static bool
+is_narrow(void)
+{
+    hs_walker walker;
+    hs_trace  trace;
+    CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
+    CHECK(hs_trace_init(&unit.search, &walker.scanner.block, true, &trace) == HS_OK);
+    const bool narrow = trace.is_narrow;
+    hs_trace_free(&unit.call.account, &trace);
+    hs_walker_close(&unit.search, &walker);
+    return narrow;
+}
+
+/* Sums of an image and two turns are int32 where none of them passes 2^28. */
+static void
+shifts_are_int32_where_they_are_known_to_be_few(void)
+{
+    hs_box box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    search_unit_points(17, 20, 2, 1.0, &unit);
+    search_unit_open(&box, 0.5, false, HS_WANT_SHIFT, &unit);
+    hs_search    *search = &unit.search;
+    const hs_grid grid = search->grid;
+    CHECK(is_narrow());
+    search->grid.reach[0] = (INT64_C(1) << 28) * grid.shape[0];
+    CHECK(!is_narrow());
+    search->grid.reach[0] -= 1;
+    CHECK(is_narrow());
+    search->grid = grid;
+    search->grid.reach[1] = (INT64_C(1) << 28) * grid.shape[1]; /* no image is there */
+    CHECK(is_narrow());
+    search->grid = grid;
+    search->scene.cloud.largest = 0x1p27; /* 2 of it, and some */
+    CHECK(!is_narrow());
+    search->scene.cloud.largest = 0x1p27 - 3.0;
+    CHECK(is_narrow());
+    search->scene.lattice.U[0][0] = 2;
+    CHECK(!is_narrow());
+    search->scene.lattice.U[0][0] = -1;
+    CHECK(!is_narrow());
+    search_unit_close(&unit);
+    box.rows[1][0] = 0.25; /* open: of no meaning */
+    search_unit_open(&box, 0.5, false, HS_WANT_SHIFT, &unit);
+    CHECK(is_narrow());
+    search_unit_close(&unit);
+    box.rows[0][1] = 0.25; /* then the points as given are kept */
+    search_unit_open(&box, 0.5, false, HS_WANT_SHIFT, &unit);
+    CHECK(!is_narrow());
+    search_unit_close(&unit);
+}
+
+/* A basis in which every image passes 2^62: neither the keys that pairs are sorted by nor the
+ * shifts of a list hold it. */
+static void
+shifts_beyond_the_integers_are_told(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.5, 1.0}}};
+    for (int beyond = 0; beyond < 2; beyond++) {
+        hs_output  pairs;
+        hs_pieces  pieces;
+        hs_failure failure = HS_NO_FAILURE;
+        search_unit_points(18, 40, 2, 1.0, &unit);
+        search_unit_open(&box, 0.3, false, HS_WANT_I | HS_WANT_J, &unit);
+        hs_search *search = &unit.search;
+        for (int r = 0; r < 2 && beyond; r++)
+            search->scene.lattice.U[r][r] = INT64_MAX;
+        hs_output_init(&search->call->account, 2, HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT, 4, &pairs);
+        CHECK(hs_parallel_record(search, &pairs, &failure) ==
+              (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(beyond ? failure.row >= 0 && failure.row < 40 : pairs.n_pairs > 100);
+        hs_output_free(&pairs);
+        for (int32_t si = 0; si < 40; si++)
+            search->bins.order[si] = si;
+        failure.row = -1;
+        CHECK(hs_pieces_find(search, &pieces, &failure) == (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(beyond ? failure.row >= 0 && failure.row < 40
+                     : pieces.n == 1 && pieces.of[0].n_shifted > 10);
+        if (!beyond)
+            hs_pieces_free(&search->call->account, &pieces);
+        search_unit_close(&unit);
+    }
+}
+
+/* A hundred thousand images of one point, in the block that its ordered neighbours come from: any
+ * poll may end it. */
+static bool
+refuse_at(void *context, double fraction)
+{
+    (void)fraction;
+    return --*(int64_t *)context != 0;
+}
+
+static void
+many_runs_can_be_stopped(void)
+{
+    const hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    const double    x[3] = {0.5, 0.5, 0.5};
+    const hs_points points = {x, 1, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    hs_status       status = HS_ERR_INTERRUPTED;
+    int64_t         nth = 0;
+    options.cutoff = 30.0;
+    options.want = HS_WANT_J;
+    options.threads = 1;
+    options.poll = refuse_at;
+    while (status == HS_ERR_INTERRUPTED && nth < 40) {
+        int64_t left = ++nth;
+        options.poll_context = &left;
+        status = hs_neighbors_find(&points, NULL, &box, &options, &rows, NULL);
+        CHECK((status == HS_OK) == (rows != NULL));
+    }
+    CHECK(status == HS_OK && nth > 3 && hs_pairs_length(rows) == 113080);
+    hs_pairs_free(rows);
+}
+
+void
+test_pair_batch(void)
+{
+    RUN(shifts_are_int32_where_they_are_known_to_be_few);
+    RUN(shifts_beyond_the_integers_are_told);
+    RUN(many_runs_can_be_stopped);
+}
