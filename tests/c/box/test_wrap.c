@@ -184,9 +184,34 @@ points_beyond_the_limit_are_told(void)
     }
 }
 
+/* A lattice whose period is not that of its row: every pass finds turns anew, and what is left
+ * after the last one is the point less as many rows. */
+static void
+what_does_not_settle_is_as_many_rows_away(void)
+{
+    hs_lattice lattice;
+    memset(&lattice, 0, sizeof lattice);
+    lattice.ndim = lattice.n_periodic = 1;
+    lattice.scaled[0][0] = lattice.rows[0][0] = lattice.normal[0][0] = 1.0;
+    lattice.U[0][0] = 1;
+    for (int trial = 0; trial < 2; trial++) {
+        const double r = 0.75 + trial;
+        double       inside = NAN, magnitude = 0.0;
+        int64_t      turns = -1;
+        lattice.period[0] = 0.375;
+        CHECK(hs_wrap_point(&lattice, &r, &inside, &turns, &magnitude));
+        CHECK(turns != 0 && inside == r - (double)turns && fabs(inside) > 0.5);
+        CHECK(magnitude >= fabs(r) + fabs((double)turns));
+        lattice.period[0] = 1.0;
+        CHECK(hs_wrap_point(&lattice, &r, &inside, &turns, &magnitude));
+        CHECK(inside == r - (double)turns && fabs(inside) <= 0.5);
+    }
+}
+
 void
 test_wrap(void)
 {
+    RUN(what_does_not_settle_is_as_many_rows_away);
     RUN(axis_is_exact_up_to_the_limit);
     RUN(axis_is_exact_beyond_the_limit);
     RUN(axis_handles_faces_and_extremes);

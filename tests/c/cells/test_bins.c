@@ -77,6 +77,7 @@ every_point_is_once_in_its_own_cell(void)
         if (!sort_scene(&account, &options, &scene, &grid, &bins))
             continue;
         CHECK(bins.n == shared.scene.n);
+        CHECK(account.total.bytes[HS_FOR_CELLS] >= 4 * (grid.n_cells + 1));
         check_order(&scene, &grid, &bins);
         many_cells += grid.n_cells > 1;
         sorted++;

@@ -90,6 +90,10 @@ check_edges(harness_random *random, const hs_edges *edges, double extent)
         hs_edge_range(&table, edges, squares[s], &low, &high);
         if (table.cells != NULL) {
             CHECK(low == sure && high == perhaps);
+            /* Of one band alone each square is known to be below it, in it or above. */
+            const int32_t cell = (int32_t)(hs_bits_of_float(squares[s]) >> table.shift) -
+                                 table.first;
+            CHECK(low < high || table.cells[cell < 0 ? 0 : cell].n_bands > 1);
         } else {
             CHECK(low == 0 && high == edges->n);
         }

@@ -136,6 +136,27 @@ limbs_do_not_overflow(void)
     hs_weights_free(NULL, &of);
 }
 
+/* 96 bits, of which 53 are kept: half of the last one, with and without the very last bit. */
+static void
+the_last_bit_breaks_ties(void)
+{
+    const double   weight = ldexp(1.0, 53) - 1.0;
+    const uint32_t digits[][3] = {{0, 0x400, 0x80000000}, {1, 0x400, 0x80000000}, {0x800, 0, 1},
+                                  {0x801, 0, 1}};
+    const double   kept[] = {0x1p63, 0x1p63 + 0x1p11, 0x1p32, 0x1p32 + 0x1p-20};
+    hs_weights     of = weights_of(&weight, 1);
+    hs_sums        sums;
+    CHECK(hs_sums_init(NULL, 1, &of, &of, &sums) == HS_OK && sums.n_limbs >= 4);
+    for (int c = 0; c < 4; c++) {
+        memset(sums.limbs, 0, (size_t)sums.n_limbs * sizeof *sums.limbs);
+        for (int e = 0; e < 3; e++)
+            sums.limbs[e] = digits[c][e];
+        CHECK(hs_sums_round(&sums, 0) == ldexp(kept[c], sums.exponent + 32));
+    }
+    hs_sums_free(NULL, &sums);
+    hs_weights_free(NULL, &of);
+}
+
 static void
 weights_must_be_finite(void)
 {
@@ -177,6 +198,7 @@ test_weights(void)
 {
     RUN(sums_are_rounded_once);
     RUN(limbs_do_not_overflow);
+    RUN(the_last_bit_breaks_ties);
     RUN(weights_must_be_finite);
     RUN(sums_need_memory);
 }

@@ -14,16 +14,18 @@ enum { FAR = HS_POLL_POINTS + 1000 };
 
 /* Many cutoffs lie between any two points, but for images of the same. */
 static void
-any_allocation_may_fail(void)
+check_each_allocation(double scale)
 {
-    const double    x[] = {0.25, 0.0, 4096.25, 0.0, 0.0, 1e300, -1e9, 1e300};
+    double          x[] = {0.25, 0.0, 4096.25, 0.0, 0.0, 1e200, -1e9, 1e200};
     const hs_points points = {x, 4, 2, HS_FLOAT64, 16, 8};
-    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0, 0.0}}};
+    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{scale, 0.0}}};
     hs_options      options = hs_options_default();
     hs_status       status = HS_ERR_MEMORY;
     bool            ended = false;
     int             nth = 0, n_failed = 0;
-    options.cutoff = 1e-60;
+    for (int e = 0; e < 8; e++)
+        x[e] *= scale;
+    options.cutoff = 1e-60 * scale;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
     options.sorted = true;
     while (!ended && nth < 200) {
@@ -44,6 +46,14 @@ any_allocation_may_fail(void)
         CHECK(hs_test_live_blocks() == before);
     }
     CHECK(ended && status == HS_OK && n_failed > 8);
+}
+
+/* Where the cutoff is scaled up, and where it is scaled down, so that digits may be lost. */
+static void
+any_allocation_may_fail(void)
+{
+    check_each_allocation(1.0);
+    check_each_allocation(0x1p300);
 }
 
 typedef struct refusal {

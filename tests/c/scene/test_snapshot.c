@@ -37,23 +37,24 @@ any_layout_is_copied(void)
         int64_t   first;
         int       ndim;
     } layouts[] = {{D, 1, 0, D}, {2 * D, 1, 0, D}, {1, N, 0, D}, {-D, 1, (N - 1) * D, D},
-                   {0, 1, 5, D}, {2 * D, 2, 0, D}, {1, 7, 0, 1}, {2, 7, 0, 1}};
+                   {0, 1, 5, D}, {2 * D, 2, 0, D}, {1, 7, 0, 1}, {2, 7, 0, 1},
+                   {D, -1, D - 1, D}};
     hs_frame frame = {0};
-    for (int l = 0; l < 16; l++) {
-        const bool    narrow = l >= 8;
-        const int     d = layouts[l % 8].ndim;
-        const int64_t size = narrow ? sizeof(float) : sizeof(double), first = layouts[l % 8].first;
+    for (int l = 0; l < 18; l++) {
+        const bool    narrow = l >= 9;
+        const int     d = layouts[l % 9].ndim;
+        const int64_t size = narrow ? sizeof(float) : sizeof(double), first = layouts[l % 9].first;
         double        largest = 0.0;
         hs_failure    failure;
         hs_points     points = {.n = N, .ndim = d, .real = narrow ? HS_FLOAT32 : HS_FLOAT64};
         points.data = narrow ? (const void *)(f + first) : (const void *)(x + first);
-        points.row_stride = layouts[l % 8].row * size;
-        points.column_stride = layouts[l % 8].column * size;
+        points.row_stride = layouts[l % 9].row * size;
+        points.column_stride = layouts[l % 9].column * size;
         CHECK(take(&points, &frame, &failure) == HS_OK);
         CHECK(frame.points.row_stride == d * size && frame.points.column_stride == size);
         for (int64_t i = 0; i < N; i++) {
             for (int k = 0; k < d; k++) {
-                const int64_t from = first + i * layouts[l % 8].row + k * layouts[l % 8].column;
+                const int64_t from = first + i * layouts[l % 9].row + k * layouts[l % 9].column;
                 const double  expected = narrow ? f[from] : x[from];
                 CHECK(hs_frame_entry(frame.rows, points.real, i * d + k) == expected);
                 largest = fmax(largest, fabs(expected));

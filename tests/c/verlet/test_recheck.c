@@ -141,7 +141,7 @@ jump_by(int64_t periods, double tilt, double height, const char *kernel, hs_stat
     CHECK((pairs == NULL) == (shift_status != HS_OK));
     if (pairs != NULL) {
         const int32_t *shift = hs_pairs_array(pairs, HS_WANT_SHIFT);
-        CHECK(shift[1] == -periods && shift[0] == (int64_t)tilt * periods);
+        CHECK(shift[1] == -periods && shift[0] == (int64_t)(tilt * (double)periods));
     } else {
         CHECK(failure.row == 0);
     }
@@ -162,6 +162,10 @@ shifts_may_be_as_large_as_jumps_are(void)
         jump_by(-(INT64_C(1) << 33), 0.0, 1.0, names[k], HS_ERR_SHIFT_RANGE);
         jump_by(INT64_C(1) << 34, 0x1p20, 128.0, names[k], HS_ERR_SHIFT_RANGE);
         jump_by(-(INT64_C(1) << 34), 0x1p20, 128.0, names[k], HS_ERR_SHIFT_RANGE);
+        /* A box that is skewed in a shorter basis, too: what is measured are points as given. */
+        jump_by(4, 4.5, 1.0, names[k], HS_OK);
+        jump_by(INT64_C(1) << 34, 0x1p20 + 0.5, 128.0, names[k], HS_ERR_SHIFT_RANGE);
+        jump_by(-(INT64_C(1) << 34), 0x1p20 + 0.5, 128.0, names[k], HS_ERR_SHIFT_RANGE);
     }
 }
 
