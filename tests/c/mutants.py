@@ -227,8 +227,10 @@ class CTests(Judge):
         self.program = work / "core_tests"
         self.link(self.objects, self.program)
         for number in range(jobs):
-            copy_tree(work / f"job{number}")
-            self.free.put(work / f"job{number}")
+            tree = work / f"job{number}"
+            shutil.rmtree(tree, ignore_errors=True)
+            shutil.copytree(work / "base", tree)
+            self.free.put(tree)
 
     def link(self, objects, program):
         demand([*COMPILER, *FURTHER, *objects, "-o", program, *LIBRARIES])

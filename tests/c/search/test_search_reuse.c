@@ -4,6 +4,9 @@
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
+#include "../support/search_unit.h"
+
+#include "../../../csrc/core/search/search_reuse.h"
 
 void test_search_reuse(void);
 
@@ -67,9 +70,45 @@ bad_options_are_refused_in_cells_too(void)
     hs_cells_free(cells);
 }
 
+/* Cells in a lattice whose normals miss the periods by nearly half: ranges have no end, and the
+ * search is refused as one without cells is. */
+static void
+cells_that_cannot_be_narrowed_are_refused(void)
+{
+    static search_unit built;
+    const hs_box       box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_sets      sets = {.points = &built.points, .built = &built.search};
+    hs_call            call;
+    hs_search          search;
+    hs_failure         failure = HS_NO_FAILURE;
+    hs_options         options = hs_options_default();
+    search_unit_points(12, 4, 2, 1.0, &built);
+    search_unit_open(&box, 21.0, false, HS_WANT_I, &built);
+    options.cutoff = 20.0;
+    options.threads = 1;
+    for (int bad = 0; bad < 2; bad++) {
+        if (bad) {
+            const double normals[2][2] = {{0.55, 0.0}, {0.0, 1.0}};
+            built.search.scene.lattice.aligned = false;
+            for (int k = 0; k < 2; k++)
+                memcpy(built.search.scene.lattice.normal[k], normals[k], sizeof normals[k]);
+        }
+        hs_call_begin(&options, &call);
+        CHECK(hs_search_reuse(&sets, &call, &search, &failure) ==
+              (bad ? HS_ERR_MEMORY : HS_OK));
+        if (!bad)
+            hs_search_close(&search);
+        hs_call_dismiss(&call);
+        CHECK(call.account.held == 0);
+        hs_account_close(&call.account);
+    }
+    search_unit_close(&built);
+}
+
 void
 test_search_reuse(void)
 {
+    RUN(cells_that_cannot_be_narrowed_are_refused);
     RUN(cells_for_another_precision_or_cutoff_serve);
     RUN(bad_options_are_refused_in_cells_too);
 }
