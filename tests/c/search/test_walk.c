@@ -129,7 +129,7 @@ single_points_find_the_same(void)
     search_unit_close(&unit);
 }
 
-/* Nothing is below zero, so that nobody is visited. */
+/* No distance is below zero, so that no group is visited. */
 static void
 no_distance_is_below_zero(void)
 {
@@ -214,7 +214,7 @@ ordered_walks_visit_each_group_once(void)
     search_unit_close(&unit);
 }
 
-/* Blocks of 2^28 candidates are refused before any memory is asked for. */
+/* Blocks of 2^28 candidates are refused before any memory is taken. */
 static void
 neighbourhoods_without_end_are_refused(void)
 {

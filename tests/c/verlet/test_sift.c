@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_sift.c: the pairs of a slab that may be within, and which of them nobody can tell yet, in
+/* test_sift.c: the pairs of a slab that may be within, and which of them float32 cannot tell, in
  * every number of pairs, stride and shape. */
 #include "../../../csrc/core/verlet/sift.h"
 #include "../support/harness.h"
