@@ -6,6 +6,7 @@
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
+#include "../support/search_unit.h"
 
 void test_estimate(void);
 
@@ -127,9 +128,33 @@ shortages_leave_out_what_cannot_be_searched(void)
     CHECK(shortage.pairs == before + 3.0);
 }
 
+/* Where all points are counted the number of pairs is known: a byte decides. */
+static void
+small_scenes_are_known_exactly(void)
+{
+    static search_unit unit;
+    enum { FEW = 60, BYTES = 8 + 8 + 24 + 12 };
+    hs_failure failure = HS_NO_FAILURE;
+    search_unit_points(21, FEW, 3, 1.0, &unit);
+    search_unit_open(NULL, 2.0, true, HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT,
+                     &unit);
+    hs_account *account = &unit.call.account;
+    account->limit = (double)account->held + FEW * FEW * BYTES;
+    CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_OK);
+    CHECK(failure.expected_pairs == 0.0);
+    account->limit -= 1.0;
+    CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs == FEW * FEW && failure.expected_bytes == FEW * FEW * BYTES);
+    CHECK(failure.limit_bytes == account->limit);
+    unit.search.keeps_none = true; /* pairs that are handed on take nothing */
+    CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_OK);
+    search_unit_close(&unit);
+}
+
 void
 test_estimate(void)
 {
+    RUN(small_scenes_are_known_exactly);
     RUN(expectations_are_near_the_truth);
     RUN(samples_end_early_in_a_crowd);
     RUN(endless_pairs_are_not_counted);
