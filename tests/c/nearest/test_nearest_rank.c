@@ -190,7 +190,7 @@ only_the_point_itself_is_left_out(void)
     int64_t      count;
     open_scene(x, 1, 2, &box, 4, 0.75);
     CHECK(block.n_images >= 5 && block.n == block.n_images);
-    block.flat_error = 0.25;
+    block.flat_error = 0.3; /* the next images are at 0.27 */
     CHECK(hs_near_rank(&ranker, &group, 0, hits, block.n, &count) == HS_OK && count == 4);
     for (int e = 0; e < 4; e++) { /* -1 and 1, -2 and 2 */
         const hs_near_image *image = hs_near_image_of(&block, ranker.keys[e].place);

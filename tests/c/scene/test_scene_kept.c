@@ -221,9 +221,36 @@ endless_images_are_refused_for_their_number(void)
     CHECK(!hs_scene_box_vanishes(&scene));
 }
 
+/* Where box vectors as given are long, precision="double" adds numbers as large as those: it looks
+ * as much further as their roundings may be, whatever the points are. */
+static void
+the_formula_of_double_errs_with_the_box_vectors(void)
+{
+    const double x[4] = {0.25, 0.5, 0.75, 0.5};
+    for (int skew = 0; skew <= 4000; skew += 2000) {
+        const hs_box    box = {.ndim = 2,
+                               .periodic = {true, true},
+                               .rows = {{1.0, 0.0}, {skew + 0.25, 1.0}}};
+        const hs_points points = points_in(x, 2, 2);
+        hs_options      options = hs_options_default();
+        hs_scene        scene;
+        hs_failure      failure;
+        options.cutoff = 1.0;
+        options.precision = HS_DOUBLE;
+        hs_account_init(&account, &options);
+        CHECK(hs_scene_init(&account, NULL, &points, &box, &options, &scene, &failure) == HS_OK);
+        /* One of the second, less so many of the first: two products and their sum. */
+        CHECK(scene.formula_error >= 3.0 * 0x1p-53 * skew + 0x1p-52);
+        CHECK(scene.formula_error <= 0x1p-40 * (1.0 + skew));
+        CHECK(scene.radius == scene.cutoff + scene.formula_error);
+        hs_scene_free(&account, &scene);
+    }
+}
+
 void
 test_scene_kept(void)
 {
+    RUN(the_formula_of_double_errs_with_the_box_vectors);
     RUN(what_is_refused_is_named);
     RUN(endless_images_are_refused_for_their_number);
     RUN(queries_too_far_to_count_get_another_scene);

@@ -93,8 +93,32 @@ shifts_beyond_the_integers_are_told(void)
     }
 }
 
-/* A hundred thousand images of one point, in the block that its ordered neighbours come from: any
- * poll may end it. */
+/* Two points as given that are neighbours with no shift, while the nearest image of what is wrapped
+ * is another: only the key that sorts it is beyond the integers. */
+static void
+keys_beyond_the_integers_are_told(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.25, 1.0}}};
+    for (int beyond = 0; beyond < 2; beyond++) {
+        hs_output  pairs;
+        hs_failure failure = HS_NO_FAILURE;
+        unit.x[0] = 0.45;
+        unit.x[2] = 0.55;
+        unit.x[1] = unit.x[3] = 0.0;
+        unit.points = (hs_points){unit.x, 2, 2, HS_FLOAT64, 16, 8};
+        search_unit_open(&box, 0.2, false, HS_WANT_I | HS_WANT_J, &unit);
+        hs_search *search = &unit.search;
+        for (int r = 0; r < 2 && beyond; r++)
+            search->scene.lattice.U[r][r] = INT64_MAX;
+        hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT, 4, &pairs);
+        CHECK(hs_parallel_record(search, &pairs, &failure) ==
+              (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(beyond ? failure.row == 0 || failure.row == 1 : pairs.n_pairs == 1);
+        hs_output_free(&pairs);
+        search_unit_close(&unit);
+    }
+}
+
 static bool
 refuse_at(void *context, double fraction)
 {
@@ -102,6 +126,8 @@ refuse_at(void *context, double fraction)
     return --*(int64_t *)context != 0;
 }
 
+/* A hundred thousand images of one point, in the block that its ordered neighbours come from: any
+ * poll may end it. */
 static void
 many_runs_can_be_stopped(void)
 {
@@ -132,5 +158,6 @@ test_pair_batch(void)
 {
     RUN(shifts_are_int32_where_they_are_known_to_be_few);
     RUN(shifts_beyond_the_integers_are_told);
+    RUN(keys_beyond_the_integers_are_told);
     RUN(many_runs_can_be_stopped);
 }
