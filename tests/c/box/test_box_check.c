@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_box_check.c: independence is decided for the numbers given, not for rounded determinants. */
 #include "../../../csrc/core/box/box_check.h"
+#include "../../../csrc/core/box/lattice.h"
 #include "../support/basis_checks.h"
 #include "../support/harness.h"
+
+#include <math.h>
 
 void test_box_check(void);
 
@@ -251,9 +254,27 @@ dimension_counts(void)
     }
 }
 
+/* A box of two dimensions has two rows of two numbers: what lies beyond is of no meaning. */
+static void
+numbers_beyond_the_dimension_are_not_read(void)
+{
+    hs_failure failure;
+    for (int l = 0; l < 3; l++) {
+        for (int k = 0; k < 3; k++) {
+            hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.5, 1.0}}};
+            box.rows[l][k] = NAN;
+            const bool is_read = l < 2 && k < 2;
+            CHECK(hs_box_check(&box, &failure) == (is_read ? HS_ERR_BOX_FINITE : HS_OK));
+            CHECK(!is_read || (failure.row == l && failure.column == k && isnan(failure.value)));
+        }
+    }
+    CHECK(hs_box_check(NULL, &failure) == HS_OK);
+}
+
 void
 test_box_check(void)
 {
+    RUN(numbers_beyond_the_dimension_are_not_read);
     RUN(no_rows_are_independent);
     RUN(a_zero_row_is_dependent);
     RUN(aligned_boxes_of_any_length_are_independent);

@@ -147,6 +147,9 @@ the_last_bit_breaks_ties(void)
     hs_weights     of = weights_of(&weight, 1);
     hs_sums        sums;
     CHECK(hs_sums_init(NULL, 1, &of, &of, &sums) == HS_OK && sums.n_limbs >= 4);
+    /* Room for the largest product 2^62 times, and its sign. */
+    CHECK(32 * sums.n_limbs >= 2 * of.bits + 2 * of.most_place + 63);
+    CHECK(32 * sums.n_limbs < 2 * of.bits + 2 * of.most_place + 63 + 64);
     for (int c = 0; c < 4; c++) {
         memset(sums.limbs, 0, (size_t)sums.n_limbs * sizeof *sums.limbs);
         for (int e = 0; e < 3; e++)

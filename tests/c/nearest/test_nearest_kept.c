@@ -141,9 +141,34 @@ radii_are_found_far_from_a_guess(void)
     check_radii((const double[2]){0x1p500, 0x1.fp470});
 }
 
+/* So far away along an open axis that more images than can be looked at are about as near. */
+static void
+images_without_end_are_refused(void)
+{
+    const double     x[2] = {0.25, 0.0};
+    const hs_box     box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points  points = {x, 1, 2, HS_FLOAT64, 16, 8};
+    const hs_options options = hs_options_default();
+    for (int e = 0; e < 2; e++) {
+        hs_near_bounder bounder;
+        near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+        CHECK(hs_near_bounder_init(&unit.near, &bounder) == HS_OK);
+        hs_near_group group;
+        hs_near_group_set(&unit.near, 0, 1, &group);
+        group.radius = 0.5;
+        group.away = e ? 0x1p60 : 0.0;
+        CHECK(hs_near_bound(&unit.near, &options, &bounder, &group) ==
+              (e ? HS_ERR_MEMORY : HS_OK));
+        CHECK(e || (group.radius >= 1.0 && group.radius < 1.001));
+        hs_near_bounder_free(&unit.near, &bounder);
+        near_unit_close(&unit);
+    }
+}
+
 void
 test_nearest_kept(void)
 {
+    RUN(images_without_end_are_refused);
     RUN(whoever_comes_while_it_is_built_does_without);
     RUN(rows_end_at_the_largest_distance);
     RUN(radii_are_found_far_from_a_guess);

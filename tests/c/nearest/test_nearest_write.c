@@ -251,6 +251,7 @@ eight_thousand_points_may_be_one(void)
 {
     enum { POINTS = 8000 };
     static double   x[3 * POINTS];
+    hs_counters     counters;
     const hs_points points = {x, POINTS, 3, HS_FLOAT64, 24, 8};
     hs_options      options = hs_options_default();
     hs_pairs       *rows = NULL;
@@ -259,7 +260,10 @@ eight_thousand_points_may_be_one(void)
         x[e] = 0.25 * (e % 3);
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
+    options.counters = &counters;
     CHECK(hs_nearest_find(&points, NULL, NULL, 2, &options, &rows, NULL) == HS_OK);
+    CHECK(counters.groups == (POINTS + 47) / 48); /* each candidate is met by all of a group */
+    CHECK(counters.candidates == 3 * POINTS && counters.pairs == 2 * POINTS);
     const int64_t *j = hs_pairs_array(rows, HS_WANT_J);
     const double  *d = hs_pairs_array(rows, HS_WANT_DISTANCE);
     for (int i = 0; i < POINTS; i++) {
