@@ -261,7 +261,7 @@ eight_thousand_points_may_be_one(void)
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
     options.counters = &counters;
-    CHECK(hs_nearest_find(&points, NULL, NULL, 2, &options, &rows, NULL) == HS_OK);
+    CHECK(hs_nearest_find(AMONG(&points, NULL), 2, &options, &rows, NULL) == HS_OK);
     CHECK(counters.groups == (POINTS + 47) / 48); /* each candidate is met by all of a group */
     CHECK(counters.candidates == 3 * POINTS && counters.pairs == 2 * POINTS);
     const int64_t *j = hs_pairs_array(rows, HS_WANT_J);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_scene_kept.c: which queries a scene that was kept takes, step by step; and points that are
  * wrapped before they are scaled. */
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/scene/close_gaps.h"
 #include "../../../csrc/core/scene/scene.h"
@@ -66,10 +67,10 @@ queries_too_far_to_count_get_another_scene(void)
     CHECK(kept.turns.known);
     CHECK(ask(near, 1, HS_WANT_J, &failure) == HS_OK && !failure.in_queries);
     CHECK(ask(near, 1, HS_WANT_SHIFT, &failure) == HS_OK);
-    CHECK(ask(far, 2, HS_WANT_J, &failure) == HS_STATUS_END);
+    CHECK(ask(far, 2, HS_WANT_J, &failure) == HS_UNSERVED);
     CHECK(ask(far, 2, HS_WANT_SHIFT, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(failure.in_queries && failure.row == 1);
-    CHECK(ask(farther, 1, HS_WANT_SHIFT, &failure) == HS_STATUS_END); /* not even tried */
+    CHECK(ask(farther, 1, HS_WANT_SHIFT, &failure) == HS_UNSERVED); /* not even tried */
     CHECK(account.held == held);
     hs_scene_free(&account, &kept);
     CHECK(account.held == 0);
@@ -85,15 +86,15 @@ scenes_that_hold_nothing_take_nothing(void)
     keep(x, 2, &box);
     CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_OK);
     kept.extreme = true;
-    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_STATUS_END);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
     kept.extreme = false;
     kept.in_one_cell = true;
-    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_STATUS_END);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
     kept.in_one_cell = false;
     kept.x_error = kept.t_error[0] = 0.0; /* of an aligned box: these hold for all */
     CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_OK);
     kept.x_largest[0] = 0.25; /* queries lie beyond */
-    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_STATUS_END);
+    CHECK(ask(x, 2, HS_WANT_J, &failure) == HS_UNSERVED);
     hs_scene_free(&account, &kept);
 }
 

@@ -4,8 +4,8 @@
 #include "../../../csrc/core/search/estimate.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
-#include "../support/random_scenes.h"
 #include "../support/among.h"
+#include "../support/random_scenes.h"
 #include "../support/search_unit.h"
 
 void test_estimate(void);

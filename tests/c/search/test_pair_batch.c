@@ -3,6 +3,7 @@
  * integers are told, whoever looks them up. */
 #include "../../../csrc/core/collect/crew.h"
 #include "../../../csrc/core/verlet/pair_list_search.h"
+#include "../support/among.h"
 #include "../support/search_unit.h"
 
 #include <math.h>
@@ -146,7 +147,7 @@ many_runs_can_be_stopped(void)
     while (status == HS_ERR_INTERRUPTED && nth < 40) {
         int64_t left = ++nth;
         options.poll_context = &left;
-        status = hs_neighbors_find(&points, NULL, &box, &options, &rows, NULL);
+        status = hs_neighbors_find(AMONG(&points, &box), &options, &rows, NULL);
         CHECK((status == HS_OK) == (rows != NULL));
     }
     CHECK(status == HS_OK && nth > 3 && hs_pairs_length(rows) == 113080);

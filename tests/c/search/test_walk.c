@@ -250,12 +250,12 @@ walks_end_where_enough_is_tested(void)
     hs_walker_close(&unit.search, &walker);
     open_walker(&walker, &all);
     walker.scanner.candidate_limit = n_candidates - 1;
-    CHECK(hs_walk(&walker, 0, 400) == HS_STATUS_END);
+    CHECK(hs_walk(&walker, 0, 400) == HS_STOPPED);
     CHECK(walker.scanner.n_candidates == n_candidates);
     hs_walker_close(&unit.search, &walker);
     open_walker(&walker, &all);
     walker.scanner.candidate_limit = n_candidates / 2;
-    CHECK(hs_walk(&walker, 0, 400) == HS_STATUS_END);
+    CHECK(hs_walk(&walker, 0, 400) == HS_STOPPED);
     CHECK(walker.scanner.n_candidates > n_candidates / 2);
     CHECK(walker.scanner.n_candidates < n_candidates);
     hs_walker_close(&unit.search, &walker);

@@ -4,6 +4,7 @@
 #ifndef HS_NEAR_UNIT_H
 #define HS_NEAR_UNIT_H
 
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/nearest/nearest_block.h"
 #include "../../../csrc/core/nearest/nearest_prepare.h"
 #include "harness.h"

@@ -4,6 +4,7 @@
 #ifndef HS_SEARCH_UNIT_H
 #define HS_SEARCH_UNIT_H
 
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/search/search_open.h"
 #include "../../../csrc/core/search/walk.h"
