@@ -217,9 +217,30 @@ lonely_points_get_narrow_cells(void)
     close_scene();
 }
 
+/* Where nothing but points on one spot is near, cells are narrow, and can be counted. */
+static void
+cells_without_a_range_can_be_counted(void)
+{
+    for (int exponent = -100; exponent <= 800; exponent += 100) {
+        const double extent = ldexp(1.0, exponent);
+        hs_scene     open;
+        hs_grid      dense, sparse;
+        memset(&open, 0, sizeof open);
+        memset(&dense, 0, sizeof dense);
+        open.ndim = dense.ndim = open.lattice.ndim = 1;
+        open.lattice.row_of_axis[0] = -1;
+        open.upper[0] = extent;
+        hs_sparse_grid(&open, &dense, 1.0, &sparse);
+        CHECK(extent * sparse.cells_per_length[0] <= 0x1p1000);
+        CHECK(sparse.cell_size[0] > 0.0 && sparse.cell_size[0] <= fmax(extent, 1.0) * 0x1p-900);
+        CHECK(sparse.shape[0] > 1000 && sparse.reach[0] < sparse.shape[0]);
+    }
+}
+
 void
 test_grid_ranges(void)
 {
+    RUN(cells_without_a_range_can_be_counted);
     RUN(endless_ranges_are_refused);
     RUN(rows_that_no_shift_counts_mean_a_skewed_box);
     RUN(faces_need_a_cutoff);

@@ -232,6 +232,31 @@ neighbourhoods_without_end_are_refused(void)
     search_unit_close(&unit);
 }
 
+/* What a walker of whole neighbourhoods takes at least, before it is opened. */
+static void
+room_for_a_neighbourhood_is_known(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    for (int trial = 0; trial < 2; trial++) {
+        const hs_neighbourhood most = {.candidates = trial ? 300000 : 200000, .runs = 1};
+        hs_walker              walker;
+        double                 bytes = 0.0;
+        search_unit_points(4, 30, 2, 1.0, &unit);
+        search_unit_open(&box, 0.5, true, HS_WANT_SHIFT | HS_WANT_DISTANCE, &unit);
+        hs_account *account = &unit.call.account;
+        account->limit = 0.0;
+        CHECK(!hs_walker_fits(&unit.search, &most, &bytes));
+        account->limit = INFINITY;
+        const double held = (double)account->held;
+        CHECK(hs_walker_init_ordered(&unit.search, HS_BLOCK_LISTS_PLACES, &most, count_hits, NULL,
+                                     &walker) == HS_OK);
+        const double taken = (double)account->held - held;
+        CHECK(taken >= bytes && taken < 1.6 * bytes);
+        hs_walker_close(&unit.search, &walker);
+        search_unit_close(&unit);
+    }
+}
+
 /* A walk that has tested more than it may ends with the block in which it did. */
 static void
 walks_end_where_enough_is_tested(void)
@@ -266,6 +291,7 @@ void
 test_walk(void)
 {
     RUN(neighbourhoods_without_end_are_refused);
+    RUN(room_for_a_neighbourhood_is_known);
     RUN(walks_end_where_enough_is_tested);
     RUN(ranges_come_in_any_order);
     RUN(single_points_find_the_same);
