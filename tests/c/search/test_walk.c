@@ -181,7 +181,8 @@ neighbourhoods_are_bounded(void)
         hs_walker_close(search, &walker);
         /* Some ninety bytes for each candidate, more where there are more axes. */
         CHECK(hs_walker_fits(search, &most, &bytes) && bytes == 0.0);
-        search->call->account.limit = (double)search->call->account.held + 40.0 * (double)most.candidates;
+        search->call->account.limit =
+            (double)search->call->account.held + 40.0 * (double)most.candidates;
         CHECK(!hs_walker_fits(search, &most, &bytes));
         CHECK(bytes > 40.0 * (double)most.candidates && bytes < 200.0 * (double)most.candidates);
         search->call->account.limit = (double)search->call->account.held + bytes;
