@@ -85,6 +85,33 @@ endless_ranges_are_refused(void)
     close_scene();
 }
 
+/* A product of two terms, its sum and the period are rounded for each of three images: a pair may
+ * be as much further apart. */
+static void
+ranges_have_room_for_roundings(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    double       density;
+    hs_failure   failure;
+    fill_square(1.0);
+    open_scene(4, &box, 1.0);
+    scene.lattice.aligned = false;
+    for (int k = 0; k < 2; k++) {
+        scene.lattice.normal[k][k] = 1.0;
+        scene.lattice.normal[k][1 - k] = 0.0;
+    }
+    scene.radius = 0x1p-30;
+    CHECK(hs_grid_begin(&scene, &density, &grid, &failure) == HS_OK);
+    for (int k = 0; k < 2; k++) {
+        const double room = grid.range[k] - scene.radius;
+        CHECK(room >= 3.0 * 4.9 * 0x1p-53 && room <= 3.0 * 10.0 * 0x1p-53);
+    }
+    scene.t_error[0] = 0x1p-40;
+    CHECK(hs_grid_begin(&scene, &density, &grid, &failure) == HS_OK);
+    CHECK(grid.range[0] - scene.radius >= 0x1p-39 && grid.range[1] - scene.radius < 0x1p-45);
+    close_scene();
+}
+
 static void
 rows_that_no_shift_counts_mean_a_skewed_box(void)
 {
@@ -242,6 +269,7 @@ test_grid_ranges(void)
 {
     RUN(cells_without_a_range_can_be_counted);
     RUN(endless_ranges_are_refused);
+    RUN(ranges_have_room_for_roundings);
     RUN(rows_that_no_shift_counts_mean_a_skewed_box);
     RUN(faces_need_a_cutoff);
     RUN(rows_are_as_long_as_the_circle_is_wide);
