@@ -36,8 +36,8 @@ typedef struct hs_lattice {
     bool    reduced;                        /* B is not the given rows (up to sign) */
     int     vector_of_row[HS_MAX_DIM];      /* box vector that periodic row r is */
     int     row_of_axis[HS_MAX_DIM];        /* row of B along grid axis k, or -1: open */
-    double  given[HS_MAX_DIM][HS_MAX_DIM];  /* periodic rows as given, not scaled */
-    double  scaled[HS_MAX_DIM][HS_MAX_DIM]; /* the same, scaled */
+    double  given[HS_MAX_DIM][HS_MAX_DIM];  /* periodic box vectors as given, not scaled */
+    double  scaled[HS_MAX_DIM][HS_MAX_DIM]; /* `given`, scaled */
     int64_t U[HS_MAX_DIM][HS_MAX_DIM];      /* B = U * scaled */
     double  rows[HS_MAX_DIM][HS_MAX_DIM];   /* B, scaled, rounded to float64 ... */
     double  row_error[HS_MAX_DIM];          /* ... each entry within this; 0 when aligned */
@@ -69,14 +69,14 @@ hs_status hs_box_check(const hs_box *box, hs_failure *failure);
  * dimensions. */
 void hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice);
 
-/* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows, axis k
- * is box vector k. Only rows, normals, periods and the volume are set. */
+/* The lattice in the box vectors as given, for measuring and wrapping: B is `scaled`, axis k is box
+ * vector k. Only rows, normals, periods and the volume are set. */
 void hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice);
 
 /* Volume of the periodic rows, each length times 2^exponent; 1 without rows. */
 double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 
-/* S over the periodic rows as given, from a shift over B; false when it passes 2^62. */
+/* S over the periodic box vectors as given, from a shift over B; false when it passes 2^62. */
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
 
 #endif
