@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * close_gaps.h: coordinates that are far from zero, drawn together. Where two different float64
- * numbers are more than a cutoff apart, all that matters is which are equal, so others can take
- * their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300; with this one does.
- * The scene that results has the same pairs, to the bits of d and D, and S but for the turns.
+ * close_gaps.h: closes the gaps between coordinates that are far from zero. Where two different
+ * float64 numbers are more than a cutoff apart, all that matters is which are equal, so smaller
+ * numbers can take their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300;
+ * once gaps are closed, one does. No pair changes, nor a bit of d and D, and S by the turns alone.
  */
 #ifndef HS_CLOSE_GAPS_H
 #define HS_CLOSE_GAPS_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* points.c: see points.h. */
+/* points.c: slabs of points are copied to columns, and the range of each column is kept. */
 #include "points.h"
 
 #include "../threads/passes.h"

@@ -21,7 +21,7 @@ typedef struct hs_scene {
     int64_t    n;
     hs_scale   scale;
     hs_scale   unscale; /* the way back */
-    hs_scale   pending; /* scale, but for what condensing the points has done of it */
+    hs_scale   pending; /* scale, less what closing gaps has already scaled */
     hs_lattice lattice;
     double     sought;          /* the caller's cutoff, not scaled; less if no two points are so far
                                * apart */
@@ -42,23 +42,26 @@ typedef struct hs_scene {
     double     x_error;               /* each component of X is within this of r - w B */
     double     t_error[HS_MAX_DIM];   /* and each computed t_k of the true one, clamping included */
     double     formula_error;         /* precision="double": its |D| against the true one */
-    bool       is_asked;              /* by queries: the bounds above hold for these too */
-    bool       is_kept;               /* and for others that come later */
+    bool       is_asked;              /* there are queries: the bounds above hold for these too */
+    bool       is_kept;               /* and for queries that come later */
     bool       in_one_cell;           /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
-    bool       is_untested;           /* as hs_sets says: bounds for the cells alone will do */
-    bool       is_plain;              /* the same */
-    bool       is_wide;               /* the same */
-    double     least_cutoff;          /* the same */
-    double     within;                /* the same */
+    bool       is_untested;           /* only cells are wanted: bounds for these alone will do */
+    bool       is_plain;              /* the cutoff is taken as it is; gaps are closed only if
+                                       * need be */
+    bool       is_wide;               /* X is not made float32 */
+    double     least_cutoff;          /* smallest positive length that pairs are compared with;
+                                       * 0: the cutoff */
+    double     within;                /* where is_wide: farther pairs do not matter; 0: all pairs
+                                       * do */
 } hs_scene;
 
-/* Who looks for neighbours among whom; borrowed. */
+/* The points to search among, and the points whose neighbours are sought; borrowed. */
 typedef struct hs_sets {
     const hs_points *points;
     const hs_points *queries;  /* NULL: the points themselves; else of the same dimension */
     bool             is_kept;  /* queries come later: bounds with room for them */
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
-                                * and points are drawn together (close_gaps.h) only if need be */
+                                * and gaps (close_gaps.h) are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_near_kept    *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
@@ -80,29 +83,29 @@ hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *poi
                         hs_failure *failure);
 
 /*
- * The same for two sets of points in one box: each becomes a scene of its own, with one scale, one
- * lattice and bounds that hold for both. asking: that of the queries, NULL when there are none;
- * only its arrays and what they are like are its own.
+ * Two sets of points in one box: each becomes a scene of its own, with one scale, one lattice and
+ * bounds that hold for both. asking: the queries' scene, NULL without queries; only its arrays and
+ * what describes them are its own.
  */
 hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
                              const hs_box *box, const hs_options *options, hs_scene *scene,
                              hs_scene *asking, hs_failure *failure);
 
-/* Steps of that; scene_scale.c. The cutoff that scale and condensing go by. */
+/* Steps of hs_scene_init_sets, in scene_scale.c. The cutoff that scale and gaps go by. */
 double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
 
-/* Whether points and queries are drawn together where they are far. Others that come later may be
- * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
- * holds everything, cells of queries and of lists that last are those of the points as given. */
+/* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
+ * gap, and the k nearest may be at any distance. Where one scale holds everything, cells of queries
+ * and of lists that last are those of the points as given. */
 bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
                            const struct hs_box_size *size, int unit);
 
-/* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled: condensing has
- * brought the points and this box to units. */
+/* The scale of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled:
+ * closing gaps has brought the points and this box to units. */
 void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
                         const hs_scene *asking);
 
-/* More steps; scene_queries.c. Both clouds get the range of both. */
+/* Steps in scene_queries.c. Both clouds get the range of both. */
 void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
 
 /* What has been settled for the points is settled for the queries. */
@@ -144,7 +147,7 @@ hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept
                         const hs_points *queries, const hs_options *options, hs_scene *asking,
                         hs_failure *failure);
 
-/* Points wrapped as those of a scene that was kept, however far away they are: for their cells
+/* Points wrapped into the box of a scene that was kept, however far away they are: for their cells
  * alone. On failure it holds nothing. */
 hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
                                 const hs_options *options, hs_scene *scene, hs_failure *failure);
@@ -171,13 +174,13 @@ void hs_scene_settle_ranges(hs_scene *scene);
 /* formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
 void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
 
-/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
- * that it might call near are too many to try, and its answer is noise; and the point or query to
- * blame for that. asking: NULL without queries. */
+/* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
+ * the box: then it might call too many images near, and its answer is noise. hs_scene_name_farthest
+ * says which point or query is to blame; asking: NULL without queries. */
 bool hs_scene_is_drowned(const hs_scene *scene);
 void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
 
-/* What decides: X and B where they hold every digit, else the points and rows as given. */
+/* What decides: X and B where they hold every digit, else points and box vectors as given. */
 void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
 
 /* t_k of point i, as hs_lattice_coordinate. */
@@ -195,7 +198,7 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-/* Steps of scene_scale.c once the box is scaled. Whether a period of it has come to nothing. */
+/* Steps of scene_scale.c once the box is scaled. Whether one of its periods has become zero. */
 struct hs_condensed;
 bool hs_scene_box_vanishes(const hs_scene *scene);
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * scene_queries.c: two sets of points in one scene, at once or one after the other: what is known
- * of one must hold for both. See scene.h.
- */
+/* scene_queries.c: points and queries in one scene, at once or one after the other: bounds must
+ * hold for both. */
 #include "scene.h"
 
 #include <math.h>

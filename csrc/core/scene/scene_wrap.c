@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scene_wrap.c: the pass over all points that wraps them into the box. See scene.h, wrap.h. */
+/* scene_wrap.c: the pass over all points that wraps them into the box, axis by axis where
+ * it can. */
 #include "scene.h"
 
 #include "../box/box_skew.h"

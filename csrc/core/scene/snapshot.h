@@ -7,7 +7,7 @@
 #include "../memory/growable.h"
 
 typedef struct hs_frame {
-    hs_points points; /* rows without gaps, of the caller's type */
+    hs_points points; /* one point behind another, of the caller's type */
     hs_store  store;
     void     *rows;    /* in it; what points.data is */
     double    largest; /* largest |x| of all coordinates, 0 without points */
