@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * grid.c: see grid.h.
+ * grid.c: how far apart the coordinates of a pair can be, then as many cells as make a search
+ * cheapest.
  *
  * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
  * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
@@ -16,7 +17,7 @@
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK
 #define MOST_CELLS_PER_AXIS HS_GRID_CELLS_PER_AXIS
-/* In all: cell ids are uint32. */
+/* Cells of a grid: their ids are uint32. */
 #define MOST_CELLS 4294967295.0
 /* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
  * more; walks put cells together where these are fewer. */
@@ -25,7 +26,7 @@
  * nothing to put together along them. */
 #define FEW_CELLS      4.0
 #define POINTS_PER_ROW 8.0
-/* Of sorting a point into its cell, in candidates. */
+/* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
 
 /* Largest number of images per row of B that a pair can be apart; `drift` as below. */
@@ -69,7 +70,7 @@ measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
     }
 }
 
-/* The same for as many images as a pair can be apart, which in turn depend on it. */
+/* That drift for as many images as a pair can be apart, a number that depends on the drift. */
 static void
 bound_drift(const hs_scene *scene, double *images, double *drift)
 {
@@ -319,7 +320,7 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
     return HS_OK;
 }
 
-/* There would be more pairs than any memory holds. */
+/* Fills the failure where there would be more pairs than any memory holds. */
 static void
 tell_endless(hs_failure *failure)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * sparse_grid.c: see sparse_grid.h.
+ * sparse_grid.c: cells whose number has no limit, and whether they are worth it.
  *
  * Why the reach holds at any distance. A place is (t - lower) c with c cells per length: two
  * roundings, so it is within 2^-52 of itself (and 2^-106), and it is a monotone function of t. The

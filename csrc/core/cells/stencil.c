@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * stencil.c: see stencil.h.
+ * stencil.c: counts through the offsets of rows and drops those that are out of reach.
  *
  * How far a neighbour can be along the first axis depends on the row: in a frame in which the
  * directions of the grid axes are lower triangular, the offsets along the later axes bound some
@@ -282,7 +282,7 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
     }
     if (scene->lattice.aligned && bound > FIRST_CAPACITY &&
         !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {
-        return HS_ERR_MEMORY; /* rather than after as much has been written */
+        return HS_ERR_MEMORY; /* refused now, not after as much has been written */
     }
     const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
     stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));
