@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* decide.c: see decide.h. */
+/* decide.c: a batch of pairs at a time by the batch kernel; pairs that it leaves, one by one. */
 #include "decide.h"
 
 #include "../exact/metric_float.h"
@@ -30,7 +30,7 @@ remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
     }
 }
 
-/* The same when hits are only counted. */
+/* Takes the first n of scan->unsure from the counts, where hits are not listed. */
 static void
 remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
 {
@@ -58,9 +58,9 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
 }
 
 /*
- * Where squares would leave float64's range: the same on differences that are scaled so that the
- * cutoff is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is
- * near r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
+ * Where squares would leave float64's range: judges differences that are scaled so that the cutoff
+ * is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is near
+ * r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
  */
 static void
 judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, hs_stages *stages)

@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * neighbourhood_sort.c: a radix sort from the least digit, stable, of numbers that share few bits:
- * those of some hundred candidates. See neighbourhood_sort.h.
- */
+/* neighbourhood_sort.c: a radix sort from the least digit, stable, of numbers that share few bits:
+ * those of some hundred candidates. */
 #include "neighbourhood_sort.h"
 
 #include "../base/poll.h"
 
 #include <string.h>
 
-#define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the nearest cache */
+#define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the first-level cache */
 #define LEAD_BITS  8  /* of the only digit that few candidates are sorted by; one more for others */
 #define FEW        24 /* candidates that are quicker sorted by insertion */
 #define MANY       160 /* from here on two digits are quicker than one and insertion */
@@ -180,7 +178,7 @@ sort_by_number(const hs_block *block, hs_order *order)
     return has_twice(order, n);
 }
 
-/* The same, stable, of entries that are in another order. */
+/* By the candidates' numbers, stable, of entries that are in another order already. */
 static void
 sort_again_by_number(const hs_block *block, hs_order *order)
 {
@@ -194,7 +192,7 @@ sort_again_by_number(const hs_block *block, hs_order *order)
     sort_entries(order, block->n, any);
 }
 
-/* S of each run's image, over the rows as given. */
+/* S of each run's image, over the box vectors as given. */
 static bool
 find_shifts(const hs_lattice *lattice, const hs_block *block, int64_t *shifts)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scan.c: see scan.h. */
+/* scan.c: the extent of group and block decides the form of the scan and its thresholds. */
 #include "scan.h"
 
 #include "decide.h"
@@ -14,7 +14,7 @@
 #define POLL_WORK   (INT64_C(1) << 21)
 #define WORK_OF_RUN 32 /* candidates that could be tested while a run of them is found */
 
-/* Of a group that meets nobody, in candidates. */
+/* Work of a group without candidates, in candidates. */
 #define LONE_GROUP 64
 
 /* Blocks with subnormal numbers before the filter flushes: some lie behind the last candidate. */
@@ -27,7 +27,7 @@
  */
 #define BURST 128
 
-/* By one float32 comparison: nothing is decided again. */
+/* Thresholds of one float32 comparison: no hit is unsure. */
 static void
 set_single(hs_scanner *scanner)
 {
@@ -131,7 +131,7 @@ static void
 note_subnormals(hs_scanner *scanner)
 {
     if (!scanner->flushes && hs_fpenv_met_subnormal()) {
-        hs_fpenv_flush(false); /* forgets it */
+        hs_fpenv_flush(false); /* forgets the flag */
         scanner->flushes = scanner->options.precision != HS_SINGLE &&
                            ++scanner->n_subnormal > FEW_SUBNORMAL;
     }
@@ -229,7 +229,7 @@ finish_block(hs_scanner *scanner, int64_t n_points)
     return end_block(scanner);
 }
 
-/* Nobody has been appended but the one point of the group itself, if that. */
+/* Nothing has been appended or, in a half list, only the one point of the group itself. */
 static bool
 is_lone(const hs_scanner *scanner)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search_build.c: see search_build.h. */
+/* search_build.c: the scene first, then the grid, its stencil, and the points sorted into its
+ * cells. */
 #include "search_build.h"
 
 #include "../base/outcome.h"
@@ -7,7 +8,8 @@
 #include "estimate.h"
 
 /* The dense grid, with cells as wide as the caller wants them or as is best. Where points crowd in
- * few of its cells one that stores occupied cells only, unless the caller has what he wants. */
+ * few of its cells, one that stores occupied cells only, unless the dense one has the caller's
+ * width. */
 static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {

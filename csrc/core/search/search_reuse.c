@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search_reuse.c: see search_reuse.h. */
+/* search_reuse.c: a copy of the other search that borrows its arrays, with a reach and queries of
+ * its own. */
 #include "search_reuse.h"
 
 #include "../base/outcome.h"

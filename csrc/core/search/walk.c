@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* walk.c: see walk.h. */
+/* walk.c: finds the links of each row once; then each group has a window of cells in each link. */
 #include "walk.h"
 
 #include "scan.h"
@@ -238,7 +238,7 @@ init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_
     return status == HS_OK ? init_links(search, &walker->cursor) : status;
 }
 
-/* Tells whom the hits are for, or closes what could not be opened. */
+/* Sets the visitor, or closes what could not be opened. */
 static hs_status
 settle_walker(hs_search *search, hs_status status, hs_visit_fn visit, void *context,
               hs_walker *walker)
