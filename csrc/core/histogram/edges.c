@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* edges.c: see edges.h. */
+/* edges.c: bands are the filter's thresholds at each edge; the table is made as fine as keeps most
+ * bands apart. */
 #include "edges.h"
 
 #include "../exact/filter.h"
@@ -74,7 +75,7 @@ set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
     }
 }
 
-/* Of a square that is not negative, and no larger than the end of the last band. */
+/* The cell of a square that is not negative, and no larger than the end of the last band. */
 static int32_t
 cell_of(const hs_edge_table *table, float square)
 {

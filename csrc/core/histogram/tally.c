@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tally.c: see tally.h. */
+/* tally.c: slots of all hits by table; hits that stay unsure wait for the edge that halves their
+ * range, and a batch decides them. */
 #include "tally.h"
 
 #include "../search/decide.h"
@@ -198,8 +199,8 @@ count_typed(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, i
     }
 }
 
-/* Hits of point si whose slots are even; those beyond the last edge have a sum that nobody reads.
- * has_places: otherwise all places of weights are 0. */
+/* Hits of point si whose slots are even; those beyond the last edge add to a sum that is never
+ * read. has_places: otherwise all places of weights are 0. */
 HS_ALWAYS_INLINE void
 sum_hits(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end,
          const bool has_places)
