@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_block.c: see nearest_block.h. */
+/* nearest_block.c: runs and images first; then a unit for which the radius is between 1 and 2; then
+ * the kernel copies. */
 #include "nearest_block.h"
 
 #include "../exact/bounds.h"
@@ -87,8 +88,8 @@ hs_near_block_free(const hs_near *near, hs_near_block *block)
     hs_shared_release(near->shared, (void **)&block->stack);
 }
 
-/* Images in reach. A radius that is nothing beside the errors of shifted coordinates is raised to
- * some of these: a unit as small as that would be of no use. */
+/* Images in reach. A radius that is small beside the errors of shifted coordinates is raised to
+ * some multiple of these: a smaller unit would be of no use. */
 static hs_status
 start_images(const hs_near *near, hs_near_group *group, hs_near_images *images)
 {
@@ -250,7 +251,7 @@ hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_bloc
         scan.y[k] = block->y[k];
         scan.q[k] = block->q[k];
     }
-    /* Nothing is decided here: no hit is unsure. */
+    /* nearest_rank.c decides: no hit is unsure here. */
     scan.direct = hs_thresholds_of(d, block->reach, extent, block->error);
     if (block->has_squares) {
         scan.squares = block->squares;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_keys.c: see nearest_keys.h. */
+/* nearest_keys.c: few keys are placed by counting the smaller ones, many are merged; the nearest of
+ * many come by partitioning. */
 #include "nearest_keys.h"
 
 HS_ALWAYS_INLINE bool

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_leaves.c: see nearest_leaves.h. */
+/* nearest_leaves.c: one walk for the box of all groups, in float32 units around its centre; then
+ * the kernel lists each group's leaves. */
 #include "nearest_leaves.h"
 
 #include <math.h>
@@ -141,7 +142,7 @@ find_in_image(const hs_near *near, const hs_near_group *all, double limit, hs_ne
     }
 }
 
-/* The same for all images. */
+/* The leaves of all images within reach: false when there are too many. */
 static bool
 find_leaves(const hs_near *near, const hs_near_group *all, hs_near_images *images,
             hs_near_leaves *leaves)

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * nearest_leaves.h: the leaves that any of some neighbouring groups may need, found by one walk
- * down the tree, so that each group has but a list of boxes to go through.
- */
+/* nearest_leaves.h: the leaves that any of some neighbouring groups may need, found by one walk
+ * down the tree, so that each group has only a list of boxes to go through. */
 #ifndef HS_NEAREST_LEAVES_H
 #define HS_NEAREST_LEAVES_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_prepare.c: see nearest_prepare.h. */
+/* nearest_prepare.c: chooses a cutoff that scales the scene without loss, then builds the trees or
+ * borrows the kept one. */
 #include "nearest_prepare.h"
 
 #include "nearest_kept.h"
@@ -109,7 +110,7 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
     return status;
 }
 
-/* A tree for whoever comes: for any k, largest distance and quantities. */
+/* A tree that any later call can use: for any k, largest distance and quantities. */
 static hs_status
 build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near *room,
            hs_failure *failure)
@@ -185,7 +186,7 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
     }
     const hs_scene *scene = &kept->search->scene;
     const int       unit = hs_exponent_of(hs_scale_apply(scene->scale, limit));
-    /* What is far is drawn together, which a tree that is kept is not. */
+    /* Far points need closed gaps, which a tree that is kept does not have. */
     if (scene->in_one_cell || hs_is_far(scene->cloud.largest, unit, HS_FAR_BOUNDED_EXPONENT)) {
         return HS_UNSERVED;
     }

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_rank.c: see nearest_rank.h. */
+/* nearest_rank.c: squares in float64 are sorted; neighbours in that order that are too close are
+ * compared exactly. */
 #include "nearest_rank.h"
 
-/* A part of the largest square. The last bits of a key hold the number of its hit: so much two
- * keys lose together, doubled. */
+/* A part of the largest square. The last bits of a key hold the number of its hit: this is twice
+ * what two keys lose by that. */
 #define KEY_ERROR 0x1p-15
 /* Where there are more than so many times the keys that are wanted, the farthest are set aside
  * before the others are sorted. */
@@ -79,7 +80,7 @@ hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_
     return true;
 }
 
-/* Where the point that asks is, for the metric. */
+/* Where the asking point is, for the metric. */
 static void
 take_origin(const hs_near *near, int32_t si, double *p)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_runs.c: which leaves a group may be near to, as runs of points. See nearest_block.h. */
+/* nearest_runs.c: which leaves a group may be near to, as runs of points. */
 #include "nearest_block.h"
 
 #include "../base/outcome.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * nearest_search.c: see nearest_search.h.
+ * nearest_search.c: threads take ranges of groups.
  *
- * Those that ask are taken in groups, subtrees of a few points. What lies within a radius guessed
+ * Asking points are taken in groups, subtrees of a few points. What lies within a radius guessed
  * from the local density is gathered once for the group, and each of its points ranks its hits.
  * Points that found too few, and groups for which the guess is of no use, are searched one by one,
  * with a radius that surely suffices: so the cost follows n and k, however unevenly points lie.
@@ -20,7 +20,7 @@
 /* Points of a group. Measured: from 32 to 64 the time falls by some 10 %,
  * where vectors are wide. */
 #define GROUP_POINTS 48
-#define AHEAD        8 /* points between asking for a row's memory and writing to it */
+#define AHEAD        8 /* points from prefetching a row to writing it */
 /* A thread takes subtrees at a time whose groups share a walk down the tree: at most a so many-th
  * part of all points, so that there is enough for all threads, within these bounds. Measured: with
  * more points the walk is a smaller part of the work. */
@@ -34,7 +34,7 @@
 /* ... and so many times more for each axis beyond the third. */
 #define MOST_PER_AXIS 3.0
 
-/* Groups, as nodes of the tree of those that ask; spots are cut into several. */
+/* Groups, as nodes of the tree of asking points; spots are cut into several. */
 typedef struct near_part {
     int32_t first, last;
 } near_part;
@@ -120,7 +120,8 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
     return status;
 }
 
-/* One point, from a radius that surely suffices; where rounding says otherwise, from more. */
+/* One point, within a radius that surely suffices; a larger one where rounding makes it
+ * fall short. */
 static hs_status
 search_point(near_worker *worker, int32_t si, double guess)
 {
@@ -277,7 +278,7 @@ list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
     crew->ranges[crew->n_ranges] = crew->n_parts;
 }
 
-/* Everybody searches. */
+/* Runs all workers. */
 static hs_status
 run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
 {

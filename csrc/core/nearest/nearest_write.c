@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_write.c: see nearest_write.h. */
+/* nearest_write.c: a batch of entries at a time, measured by the batch kernel; each goes to its
+ * place in the output. */
 #include "nearest_write.h"
 
 #include "../collect/record_measures.h"
@@ -8,8 +9,8 @@
 #include <string.h>
 
 #define WIDEST_SHIFT  (INT64_C(1) << 53) /* what the batch kernels take */
-#define LINE          64                 /* bytes that are fetched at once, */
-#define MOST_EXPECTED 512                /* and of a row */
+#define LINE          64                 /* bytes of a cache line, */
+#define MOST_EXPECTED 512                /* and of a row to prefetch */
 #define MOST_SQUARE   0x1p1000
 
 void
@@ -105,8 +106,8 @@ measure(hs_near_writer *writer, double *const *vector)
     }
 }
 
-/* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted to the
- * one before it, which is then no further from the true one than that. */
+/* Rows ascend in exact order. A distance, known to a unit in the last place, may be raised to the
+ * one before it, which is then no further from the true one than a unit. */
 static void
 put_distances(hs_near_writer *writer, double *to)
 {
@@ -207,7 +208,8 @@ put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_ke
     return HS_OK;
 }
 
-/* The metric's shifts where they are those of the images: few are not zero, as all were before. */
+/* The metric's shifts where they are those of the images: all are zero before, and few are not
+ * after. */
 static void
 put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n)
 {

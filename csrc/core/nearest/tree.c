@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tree.c: see tree.h. */
+/* tree.c: splits nodes at a sampled middle, the smaller half first; bounds are filled from the
+ * leaves up. */
 #include "tree.h"
 
 #include "../base/poll.h"
@@ -66,7 +67,7 @@ sort_numbers(double *numbers, int n)
     }
 }
 
-/* By some of the points, evenly picked from the node; false when they are all in one place. */
+/* Where to split, by a sample picked evenly from the node; false when it is all in one place. */
 static bool
 cut_by_sample(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
 {
@@ -106,7 +107,7 @@ cut_by_sample(const tree_builder *builder, const hs_tree_node *node, tree_cut *c
     return true;
 }
 
-/* By all points; false when they are all in one place. */
+/* Where to split, by all points; false when they are all in one place. */
 static bool
 cut_by_range(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
 {
@@ -144,7 +145,8 @@ is_spot(const tree_builder *builder, const hs_tree_node *node)
     return true;
 }
 
-/* Keeps the order on both sides; returns where the right one begins. */
+/* Partitions the points of a node, keeping the order on both sides; returns where the right one
+ * begins. */
 static int32_t
 part_points(tree_builder *builder, const hs_tree_node *node, const tree_cut *cut)
 {
