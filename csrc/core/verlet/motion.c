@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * motion.c: see motion.h. The displacement of point i is u_i = r_i - r0_i F - k_i h - c: what is
- * left when the deformation of the box, whole box vectors and what all points share are taken away.
- * Any F, k and c are right; good ones make it small. c is `base`, taken away before box vectors are
- * looked for, and `drift`, taken away behind that.
+ * motion.c: the displacement of point i is u_i = r_i - r0_i F - k_i h - c: what is left when the
+ * deformation of the box, whole box vectors and what all points share are taken away. Any F, k and
+ * c are right; good ones make it small. c is `base`, taken away before box vectors are looked for,
+ * and `drift`, taken away behind that.
  */
 #include "motion.h"
 
@@ -236,7 +236,7 @@ take_sample(tracking *track, const double *drift, sample *found)
         find_displacements(track, &t);
         if (may_have_jumped(track, &t)) {
             int64_t given[HS_MAX_DIM];
-            (void)take_jump(track, &t, 0, given); /* the same again when it counts */
+            (void)take_jump(track, &t, 0, given); /* a failure shows again in the full pass */
         }
         for (int k = 0; k < d; k++) {
             const double u = t.u[k][0];

@@ -101,7 +101,7 @@ renumber(hs_search *search, hs_listing *listing)
         bins->order[si] = (int32_t)si;
     }
     if (!bins->keeps_originals) {
-        bins->turns.known = false; /* nobody needs them any more */
+        bins->turns.known = false; /* they are not needed any more */
     }
     return HS_OK;
 }
@@ -229,14 +229,15 @@ count_pairs(building *built, placing *place)
         n_shifted += piece->n_shifted;
     }
     listing->n_plain = listing->n_pairs - n_shifted;
-    /* The pieces, which nobody has counted, and the listing. */
+    /* The pieces, which are on no account, and the listing. */
     if (!hs_account_allows(account, 16.0 * (double)listing->n_pairs + 32.0 * (double)n_shifted)) {
         return false;
     }
     return true;
 }
 
-/* Room for the pairs: the last thing that can fail, for it may be that of the list in use, ... */
+/* Room for the pairs, which may be that of the list in use: so this is the last step that can fail,
+ * ... */
 static bool
 make_room(hs_listing *listing)
 {

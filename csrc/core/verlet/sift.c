@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* sift.c: see sift.h. Four pairs at a time with SSE2, which every x86-64 CPU has, else one by one:
- * which pairs are unsure may differ, what comes out in the end does not. */
+/* sift.c: four pairs at a time with SSE2, which every x86-64 CPU has, else one by one. Which pairs
+ * are unsure may differ; the pairs in the end do not. */
 #include "sift.h"
 
 #if defined(__SSE2__) || defined(_M_X64)
