@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * kernel_scalar.c: the kernels in plain C; the specification of the others. See kernel.h.
+ * kernel_scalar.c: the kernels in plain C; the specification of the others.
  *
  * Scans take two short loops for each chunk of candidates: the first tests, without branches or
  * stores at changing addresses, so that compilers vectorise it for whatever the baseline CPU has;
@@ -73,7 +73,7 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
     return unsure != 0;
 }
 
-/* The same sums again, for a chunk that has unsure ones. */
+/* Notes the unsure ones of a chunk, by computing its sums again. */
 HS_ALWAYS_INLINE void
 note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32_t n,
             const int ndim, const bool expanded, const int32_t *near, int32_t at)
