@@ -130,7 +130,7 @@ mean_company(const hs_scene *scene, const hs_grid *grid, bool sparse)
     const int64_t samples = (int64_t)fmin(wanted, (double)scene->n), stride = scene->n / samples;
     double        shared = 0.0;
     for (int64_t s = 0; s < samples; s++) {
-        /* One point of each stretch, not always at the same place in it: inputs have patterns. */
+        /* One point of each range, not always at the same place in it: inputs have patterns. */
         const int64_t i = s * stride + (int64_t)(mix((uint64_t)s) % (uint64_t)stride);
         names[s] = 0;
         for (int k = 0; k < scene->ndim; k++) {

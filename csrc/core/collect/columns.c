@@ -255,7 +255,7 @@ enum { part_bytes = PART_BYTES };
 #endif
 
 typedef struct toucher {
-    volatile char *bytes; /* volatile: what is written is never read, and written all the same */
+    volatile char *bytes; /* volatile: what is written is never read, but must be written */
     size_t         first, end;
 } toucher;
 

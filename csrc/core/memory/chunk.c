@@ -164,7 +164,7 @@ hs_chunk_expect(void *data, size_t bytes)
     }
     if (huge > chunk->huge) {
         /* From the mapping on, so that Linux keeps two mappings and not three; what lies in front
-         * of the first whole huge page stays small all the same. */
+         * of the first whole huge page stays small anyway. */
         hs_pages_advise(chunk->huge > 0 ? start + chunk->huge : chunk->raw, start + huge, true);
     } else if (huge < chunk->huge) {
         hs_pages_advise(huge > 0 ? start + huge : chunk->raw, start + chunk->huge, false);

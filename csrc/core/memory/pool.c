@@ -189,8 +189,8 @@ suits(const hs_chunk *chunk, size_t expected)
 }
 
 /* Bytes that a request would waste, or twice those that it would lack. Lists are expected to be a
- * little longer than they are: the chunk that the same list had before is the one for it, and not
- * the next larger one, which another column had. */
+ * little longer than they are, so the best chunk is the one that this list had before, and not the
+ * next larger one, which another column had. */
 static uint64_t
 misfit(const hs_chunk *chunk, size_t expected)
 {
