@@ -71,7 +71,7 @@ typedef struct term {
                                         * than 2^26 turns are exact */
 } term;
 
-/* At most this many rows at a time; more need a second loop. */
+/* At most this many terms at a time; more need a second loop. */
 #define TERMS 3
 
 static int

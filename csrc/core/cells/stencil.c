@@ -16,7 +16,7 @@
 #include <string.h>
 
 #define DUALITY_DEFECT 1e-9   /* normals and directions further from dual than this are not used */
-#define FIRST_CAPACITY 1024   /* rows; doubled as needed: most of a wide block is out of reach */
+#define FIRST_CAPACITY 1024   /* rows; doubled as needed: of many, most are out of reach */
 #define MOST_UNPRUNED  0x1p22 /* rows, in a box too flat to tell which of them are out of reach */
 #define POLL_ROWS      (1 << 16)
 #define FRAME_SLACK    1e-6 /* relative; covers the defect in 8 dimensions many times */

@@ -17,7 +17,7 @@ typedef struct hs_edges {
     bool    inclusive, last_inclusive; /* as hs_histogram has them */
     double *at;                        /* owned; as the scene's metric takes them; n */
     double *lower;                     /* at most, ... */
-    double *upper; /* ... and at least the scaled edge; in the block of `lower`, or `at` itself */
+    double *upper; /* ... and at least the scaled edge; in the memory of `lower`, or `at` itself */
     int     ndim;
     double  filter_error; /* of the search: bound on each component before rounding to float32 */
 } hs_edges;
@@ -34,7 +34,7 @@ typedef struct hs_edge_cell {
 typedef struct hs_edge_table {
     double        extent; /* 0 when there is no table yet */
     float        *in;     /* owned, n: the band of each edge; ascending */
-    float        *out;    /* in the block of `in` */
+    float        *out;    /* in the memory of `in` */
     hs_edge_cell *cells;  /* owned; NULL where squares may overflow: then nothing is sure */
     int           shift;  /* bits of a square that do not choose the cell */
     int32_t       first;  /* leading bits of the squares of cell 0 */

@@ -97,7 +97,7 @@ reach_along(const hs_near_group *group)
     return group->radius * (sqrt((1.0 - ratio) * (1.0 + ratio) + LAYER_ROOM) + UPRIGHT);
 }
 
-/* Shifts along the row of axis k, for at most most[r] of each row; false when too many. */
+/* Shifts along the row of B of axis k, at most most[r] of them; false when too many. */
 static bool
 set_range(const hs_near *near, const hs_near_group *group, int k, const double *most,
           hs_near_images *images)

@@ -38,8 +38,8 @@ bool hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits,
 hs_status hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si,
                        const int32_t *hits, int64_t n, int64_t *count);
 
-/* What the metric measures to, and its shift; also S over the periodic rows as given when `given`
- * is not NULL. False when a shift passes its range. */
+/* What the metric measures to, and its shift; also S over the periodic box vectors as given when
+ * `given` is not NULL. False when a shift passes its range. */
 bool hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_t place,
                   double *q, int64_t *shift, int64_t *given);
 

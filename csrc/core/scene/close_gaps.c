@@ -312,7 +312,7 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     return status;
 }
 
-/* All four arrays are one block, which begins with the keys. */
+/* All four arrays are one memory block, which begins with the keys. */
 static bool
 allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
 {

@@ -18,7 +18,7 @@ typedef struct hs_condensed {
     const hs_box *box;       /* in place of the caller's: borrowed, or `rows` */
     const hs_box *given_box; /* the caller's */
     hs_box        rows;
-    bool          is_scaled; /* points and rows are in units of 2^unit now */
+    bool          is_scaled; /* points and box vectors are in units of 2^unit now */
     bool          has_turns; /* something was wrapped into the box, and S is wanted: */
     /* Owned, of points and of queries; n each for a column where some were, else NULL. */
     int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];

@@ -94,7 +94,7 @@ hs_scene_make_room(hs_scene *scene, double *magnitude)
     scene->cloud.largest = hs_larger(FURTHER * scene->cloud.largest, away);
     *magnitude = hs_larger(FURTHER * *magnitude, away);
     for (int k = 0; k < scene->ndim; k++) {
-        double across = 0.0; /* what is wrapped lies within half of each row */
+        double across = 0.0; /* what is wrapped lies within half of each row of B */
         for (int r = 0; r < lattice->n_periodic; r++) {
             across += 0.5 * fabs(lattice->rows[r][k]);
         }

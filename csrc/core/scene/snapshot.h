@@ -38,7 +38,7 @@ hs_frame_box(const hs_frame *frame)
     return frame->has_box ? &frame->box : NULL;
 }
 
-/* Entry e of the rows, row by row. */
+/* Coordinate e, counted point after point. */
 HS_ALWAYS_INLINE double
 hs_frame_entry(const void *rows, hs_real real, int64_t e)
 {

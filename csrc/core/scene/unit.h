@@ -46,11 +46,11 @@ bool hs_is_far(double size, int unit, int powers);
 
 /* Sizes of the periodic box entries. */
 typedef struct hs_box_size {
-    double   largest;    /* 0 without rows */
-    double   smallest;   /* not counting zeros; infinity without rows */
-    double   short_row;  /* the least of the rows' largest entries; infinity without rows */
-    unsigned moved;      /* bit k: some row has an entry in column k */
-    bool     is_coupled; /* a row has several entries, or a column has */
+    double   largest;    /* 0 without box vectors */
+    double   smallest;   /* not counting zeros; infinity without box vectors */
+    double   short_row;  /* the least of the vectors' largest entries; infinity without */
+    unsigned moved;      /* bit k: some vector has an entry in column k */
+    bool     is_coupled; /* a vector has several entries, or a column has */
 } hs_box_size;
 
 /* box: NULL for none. */
@@ -58,10 +58,10 @@ hs_box_size hs_box_size_of(const hs_box *box);
 
 /* What moves a column of coordinates besides the points' own values. */
 #define HS_OPEN    (-1) /* nothing */
-#define HS_COUPLED (-2) /* rows that have entries in other columns as well */
+#define HS_COUPLED (-2) /* box vectors that have entries in other columns as well */
 
-/* HS_OPEN, HS_COUPLED, or the row that alone has an entry in this column, and no other entry.
- * periodic: the rows that count; NULL: all. */
+/* HS_OPEN, HS_COUPLED, or the number of the row (a box vector) that alone has an entry in this
+ * column, and no other entry. periodic: the rows that count; NULL: all. */
 int hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
                    int column);
 

@@ -151,7 +151,7 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
     }
 }
 
-/* Whether a key occurs twice in a row. */
+/* Whether two neighbouring entries have equal keys. */
 static bool
 has_twice(const hs_order *order, int32_t n)
 {

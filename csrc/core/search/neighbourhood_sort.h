@@ -2,7 +2,7 @@
 /*
  * neighbourhood_sort.h: gathered candidates in the order of the caller's numbers, so that hits come
  * out sorted: a neighbourhood is sorted once for all points of its group, which is some twenty
- * times less work than sorting the rows that it gives.
+ * times less work than sorting each point's hits.
  */
 #ifndef HS_NEIGHBOURHOOD_SORT_H
 #define HS_NEIGHBOURHOOD_SORT_H

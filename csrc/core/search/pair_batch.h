@@ -63,7 +63,7 @@ hs_trace_reset(hs_trace *trace)
 }
 
 /* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
- * many. They are looked up together, because the rows of one point are short. */
+ * many. They are looked up together, because one point has few hits. */
 int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n);
 
 /*

@@ -26,7 +26,7 @@ typedef struct worker {
     int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool     has_images;
     bool    *is_shifted; /* owned; whether a run is in another image ... */
-    int32_t *shift;      /* owned; ... and which, over the rows as given: m numbers */
+    int32_t *shift;      /* owned; ... and which, over the given box vectors: m numbers */
 } worker;
 
 struct crew {
@@ -36,7 +36,7 @@ struct crew {
     hs_commits *commits;
 };
 
-/* The shift of a run over the rows as given. */
+/* The shift of a run over the box vectors as given. */
 static bool
 shift_of_run(const hs_search *search, const hs_run *run, int32_t *shift)
 {

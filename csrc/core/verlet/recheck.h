@@ -29,7 +29,7 @@ typedef struct hs_refilter {
     int64_t         *counts; /* owned; m a point, as those of the list, jumps included; or NULL */
     double           most_counts;    /* the largest of them, of either sign */
     float           *y;              /* owned; sift.h */
-    float           *offset;         /* owned; one row for each image */
+    float           *offset;         /* owned; stride for each image */
     hs_thresholds    plain, shifted; /* for pairs without and with an image */
     bool             measures;       /* d or D are wanted. Then: */
     hs_scene         scene;

@@ -7,9 +7,9 @@
 
 typedef struct hs_images {
     int      width; /* numbers of a shift */
-    int32_t *of;    /* owned; n rows of `width` */
+    int32_t *of;    /* owned; n shifts of `width` numbers */
     int64_t  n;
-    int64_t  capacity; /* rows */
+    int64_t  capacity; /* shifts */
     int32_t *slots;    /* owned; -1, or the number of a shift; twice the capacity, a power of two */
     int32_t  last;     /* number of the last shift: most often the next has it, too */
 } hs_images;
