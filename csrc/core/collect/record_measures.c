@@ -241,7 +241,7 @@ hs_put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const
     return trace->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
 }
 
-/* Measures in the caller's unit: loops without branches, which compilers vectorise. */
+/* See restore.h. Loops without branches, which compilers turn into vectors. */
 
 void
 hs_restore_distances(double *distance, int32_t n, hs_scale unscale)

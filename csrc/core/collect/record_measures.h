@@ -20,8 +20,7 @@ void hs_restore_distances(double *distance, int32_t n, hs_scale unscale);
 /* hs_keep_within for n distances. */
 void hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive);
 
-/* n vectors of ndim numbers, one behind another, in the caller's unit, times sign[e], which is 1 or
- * -1. */
+/* n rows of ndim numbers: the vectors in the caller's unit, times sign[e], which is 1 or -1. */
 void hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign,
                         int32_t n, int ndim, hs_scale unscale);
 

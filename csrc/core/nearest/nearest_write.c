@@ -9,8 +9,8 @@
 #include <string.h>
 
 #define WIDEST_SHIFT  (INT64_C(1) << 53) /* what the batch kernels take */
-#define LINE          64                 /* bytes of a cache line, */
-#define MOST_EXPECTED 512                /* and of a row to prefetch */
+#define LINE          64                 /* bytes that are fetched at once, */
+#define MOST_EXPECTED 512                /* and of a row */
 #define MOST_SQUARE   0x1p1000
 
 void
@@ -106,8 +106,8 @@ measure(hs_near_writer *writer, double *const *vector)
     }
 }
 
-/* Rows ascend in exact order. A distance, known to a unit in the last place, may be raised to the
- * one before it, which is then no further from the true one than a unit. */
+/* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted to the
+ * one before it, which is then no further from the true one than that. */
 static void
 put_distances(hs_near_writer *writer, double *to)
 {
