@@ -140,7 +140,7 @@ start_volume(hs_lattice *lattice)
     lattice->volume_exponent = 0;
 }
 
-/* By length * 2^exponent. */
+/* Multiplies the volume by length * 2^exponent. */
 static void
 multiply_volume(hs_lattice *lattice, double length, int exponent)
 {

@@ -321,7 +321,7 @@ descend(basis *b)
     }
 }
 
-/* By the product of the lengths, which bounds how flat the basis is. */
+/* Compares the products of the lengths, which bound how flat a basis is. */
 static bool
 is_shorter(const basis *a, const basis *b)
 {

@@ -69,7 +69,7 @@ typedef struct hs_folded {
     int64_t failed;    /* lowest point that could not be wrapped, or -1 */
 } hs_folded;
 
-/* Nothing yet. */
+/* The result of wrapping no point. */
 hs_folded hs_folded_none(void);
 
 /* Joins `more` to *folded. */

@@ -95,7 +95,7 @@ count_strip(void *context, int strip, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* From numbers of points to places: cell by cell, and in each cell strip by strip. */
+/* Turns numbers of points into places: cell by cell, and in each cell strip by strip. */
 static void
 accumulate(const sorting *sort)
 {

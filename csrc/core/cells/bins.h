@@ -34,8 +34,8 @@ hs_status hs_bins_build(hs_account *account, hs_team *team, const hs_options *op
  * caller's order as yet, and without `start`; the scene's spare column stays usable. */
 void hs_bins_take(hs_scene *scene, hs_bins *bins);
 
-/* Then, with bins->order filled: all columns into that order. Overwrites the spare column. HS_OK or
- * HS_ERR_INTERRUPTED. */
+/* Then, with bins->order filled: moves all columns into that order. Overwrites the spare column.
+ * HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                           const hs_scene *scene, hs_bins *bins);
 

@@ -29,7 +29,8 @@
 /* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
 
-/* Largest number of images per row of B that a pair can be apart; `drift` as below. */
+/* Sets the largest number of images per row of B that a pair can be apart; drift: of
+ * measure_drift. */
 static void
 bound_images(const hs_scene *scene, const double *drift, double *images)
 {
@@ -70,7 +71,8 @@ measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
     }
 }
 
-/* That drift for as many images as a pair can be apart, a number that depends on the drift. */
+/* Bounds the drift over as many images as a pair can be apart, a number that depends on the
+ * drift. */
 static void
 bound_drift(const hs_scene *scene, double *images, double *drift)
 {
@@ -197,7 +199,7 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
     grid->by_faces[k] = false;
     grid->lower[k] = scene->lower[k];
     grid->cell_size[k] = extent / count;
-    /* One cell needs no place in it, and a subnormal extent no infinite scale. */
+    /* One cell needs no scale; that of a subnormal extent would be infinite. */
     grid->cells_per_length[k] = count > 1.0 || !open ? count / extent : 0.0;
     const double cells =
         grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) + 0x1p-50 * count;
@@ -246,7 +248,7 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
-/* One cell, or a grid of cells where that is cheaper. */
+/* Chooses one cell, or a grid of cells where that is cheaper. */
 static hs_status
 choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid)
 {
@@ -299,8 +301,8 @@ is_blurred(const hs_scene *scene, const double *drift)
     return false;
 }
 
-/* How far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more images
- * than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
+/* Sets how far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more
+ * images than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
 static hs_status
 set_ranges(const hs_scene *scene, hs_grid *grid)
 {
@@ -330,7 +332,7 @@ tell_endless(hs_failure *failure)
 hs_status
 hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure)
 {
-    /* Of the periodic part, times the open extents. */
+    /* Volume of the periodic axes, times the open extents. */
     double volume = hs_lattice_volume(&scene->lattice, 0);
     *grid = (hs_grid){.ndim = scene->ndim};
     hs_status status = set_ranges(scene, grid);

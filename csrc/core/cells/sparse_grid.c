@@ -24,7 +24,8 @@
 
 /* More than the 1e-5 cells by which stencil.c widens windows, so that these end at the reach. */
 #define LEAST_MARGIN 0x1p-16
-/* Of a place: 2^-51 for the roundings of two, times 4/3 for e <= 1/4 in 1 / (1 - e), rounded up. */
+/* Relative error of a place: 2^-51 for two roundings, times 4/3 for e <= 1/4 in 1 / (1 - e),
+ * rounded up. */
 #define PLACE_ERROR 0x1p-50
 /* No place passes 2^1000, also where the range is 0. */
 #define SMALLEST_PITCH 0x1p-1000

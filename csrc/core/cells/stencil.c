@@ -27,7 +27,7 @@ typedef struct frame {
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
 
-/* What rows are looked for in. */
+/* What add_rows needs beside the stencil. */
 typedef struct scope {
     const hs_scene *scene;
     const hs_grid  *grid;
@@ -115,7 +115,7 @@ typedef struct spans {
     double low[HS_MAX_DIM], high[HS_MAX_DIM];
 } spans;
 
-/* Those that points of the cells at `offset` can have, rounding included. */
+/* Sets the differences that points of the cells at `offset` can have, rounding included. */
 static void
 set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, double radius,
           spans *t)
@@ -127,7 +127,7 @@ set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, dou
     }
 }
 
-/* Range of component c of D; of the first one, what the later axes add to it. */
+/* Finds the range of component c of D; of the first one, what the later axes add to it. */
 static void
 range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least, double *most)
 {
@@ -243,7 +243,7 @@ grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
     return true;
 }
 
-/* The rows from this one on to the last in the order of the axes, as far as they are in reach. */
+/* Adds the rows from this one to the last in the order of the axes, as far as they are in reach. */
 static hs_status
 add_rows(hs_account *account, const hs_options *options, const scope *of, hs_stencil_row *row,
          hs_stencil *stencil, int64_t capacity)

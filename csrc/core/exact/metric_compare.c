@@ -33,7 +33,7 @@ sign_of(double x)
     return (x > 0.0) - (x < 0.0);
 }
 
-/* Both differences by their double-word squares; false when these cannot tell. */
+/* Compares both differences by their double-word squares; false when these cannot tell. */
 static bool
 compare_double_words(const hs_difference *one, const hs_difference *other, int ndim, int *sign)
 {

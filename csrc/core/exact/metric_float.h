@@ -184,8 +184,8 @@ hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference,
     return HS_UNDECIDED;
 }
 
-/* Of the cutoff: components below this are a hair, and what their squares sum to, of its square:
- * eight of them are below 2^-125. */
+/* A hair: a component below this fraction of the cutoff. Eight squares of hairs sum to less than
+ * 2^-125 of its square. */
 #define HS_HAIR         0x1p-64
 #define HS_HAIR_SQUARES 0x1p-120
 

@@ -95,7 +95,7 @@ anything_is_far(const hs_cloud *cloud, const hs_box *box, int unit, int powers)
     return found;
 }
 
-/* The column of both sets, before any number in it is wrapped. */
+/* Copies the column of both sets before any number in it is wrapped. */
 static hs_status
 keep_given(const condensing *doing, int k)
 {
@@ -111,7 +111,7 @@ keep_given(const condensing *doing, int k)
     return HS_OK;
 }
 
-/* Room for the turns of a column, none so far. */
+/* Makes room for the turns of a column, all zero. */
 static hs_status
 begin_turns(const condensing *doing, int set, int k)
 {
@@ -179,7 +179,7 @@ typedef struct places {
     double moved; /* and, unless it is beyond 2^54 u, by what */
 } places;
 
-/* Where the next magnitude goes, and those that are equal to it. */
+/* Where the next magnitude goes, and all that are equal to it. */
 static double
 next_place(places *at, double x, bool is_coarse)
 {
@@ -196,7 +196,7 @@ next_place(places *at, double x, bool is_coarse)
     return at->place;
 }
 
-/* As a coordinate of the scene that results. */
+/* A place as a coordinate of the scene. */
 static double
 placed(const condensing *doing, double place)
 {
@@ -261,7 +261,7 @@ condense_numbers(condensing *doing, int k, double from, double *half)
     return status;
 }
 
-/* The range of a column, of both sets in each. */
+/* Sets the range of a column: each cloud gets that of both. */
 static void
 measure_column(const condensing *doing, int k)
 {
@@ -326,7 +326,7 @@ allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys
     return keys->keys != NULL;
 }
 
-/* Columns in which there is something to do, one after the other. */
+/* Closes the gaps of all columns that have any, one after the other. */
 static hs_status
 condense_columns(condensing *doing, hs_failure *failure)
 {

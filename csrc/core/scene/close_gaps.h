@@ -22,8 +22,8 @@ typedef struct hs_condensed {
     bool          has_turns; /* something was wrapped into the box, and S is wanted: */
     /* Owned, of points and of queries; n each for a column where some were, else NULL. */
     int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
-    /* And where scaling may lose digits these columns of both sets, if either has turns, as they
-     * were given: S with all its turns is that of those numbers and of the box as given. */
+    /* Owned; where scaling may lose digits: the columns that have turns, of both sets, as they were
+     * given. S with all its turns belongs to these numbers and to the box as given. */
     double *given[HS_CONDENSED_SETS][HS_MAX_DIM];
 } hs_condensed;
 

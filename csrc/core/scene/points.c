@@ -117,7 +117,7 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* The ranges of all slabs in one. Returns whether every entry is finite. */
+/* Joins the ranges of all slabs. Returns whether every entry is finite. */
 static bool
 join_ranges(const loading *load, int n_slabs)
 {

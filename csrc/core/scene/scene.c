@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Columns for the originals and the turns, as far as these are kept, in this order. */
+/* Allocates columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
 {
@@ -242,7 +242,7 @@ add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
     }
 }
 
-/* In columns that are decided on as they were given, the box vectors as given. */
+/* Sets the box vectors as given in columns that are decided on as they were given. */
 static void
 restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
 {
@@ -255,7 +255,7 @@ restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
     }
 }
 
-/* Lattice and radius, then the points. */
+/* Sets lattice and radius, then wraps the points. */
 static hs_status
 fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
             const hs_condensed *condensed, hs_scene *scene, hs_scene *asking, hs_failure *failure)

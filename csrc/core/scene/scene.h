@@ -126,14 +126,15 @@ void hs_scene_put_in_one_cell(hs_scene *scene);
  * its scale would round unless only cells are wanted. */
 bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
 
-/* And whether its bounds hold for what wrapping has made of it. */
+/* Whether the bounds of a scene that was kept hold for queries that have been wrapped. */
 bool hs_scene_covers(const hs_scene *kept, const hs_scene *asking);
 
-/* Of queries whose cells are wanted: row, column and value of the first coordinate that a kept
- * scene does not take; where each alone would do, of the largest. Nothing where no query would. */
+/* Names, of queries whose cells are wanted, row, column and value of the first coordinate that a
+ * kept scene does not take; if each alone would do, the largest. Names none where no query would
+ * do. */
 void hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure);
 
-/* Bounds on what was wrapped, with room for queries that come later. Before and after they are
+/* Widen the bounds on what was wrapped, for queries that come later: before and after they are
  * settled. */
 void hs_scene_make_room(hs_scene *scene, double *magnitude);
 void hs_scene_widen_errors(hs_scene *scene);
@@ -152,7 +153,7 @@ hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept
 hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
                                 const hs_options *options, hs_scene *scene, hs_failure *failure);
 
-/* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
+/* Sets cutoff, radius and metric for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of the square of the cutoff: far above what rounding can do to the sum of 8 squares. */
+/* A fraction of the square of the cutoff, far above the rounding of a sum of 8 squares. */
 #define SCALED_MARGIN 0x1p-47
 
 /* Takes the first n of scan->unsure from the hits of points [first, next). */
@@ -43,7 +43,7 @@ remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
     }
 }
 
-/* One pair of the batch, by all stages or by the last alone. */
+/* Decides one pair of the batch, by all stages or by the last alone. */
 static bool
 decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others_failed)
 {
@@ -137,7 +137,8 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         }
         hs_decide_traced(scanner, &scanner->search->scene.metric, within);
         for (int32_t e = 0; e < end - u; e++) {
-            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather at the front */
+            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond the cutoff gather at
+                                                           * the front */
             n_beyond += !within[e];
         }
     }

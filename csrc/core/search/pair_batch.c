@@ -131,7 +131,7 @@ turns_of(const hs_bins *bins, int r, int64_t si)
     return bins->turns.known ? hs_turns_get(&bins->turns, r, si) : 0;
 }
 
-/* The shifts of the candidates of one run, less their turns. */
+/* Looks up the shifts of the candidates of one run, less their turns. */
 static void
 load_given(hs_trace *trace, const hs_run *run, int32_t n)
 {
@@ -154,7 +154,7 @@ load_given(hs_trace *trace, const hs_run *run, int32_t n)
     }
 }
 
-/* What the metric needs of the candidates of one run. */
+/* Looks up what the metric needs of the candidates of one run. */
 static void
 load_metric(hs_trace *trace, const hs_run *run, int32_t n)
 {

@@ -47,7 +47,7 @@ hs_status hs_trace_init(hs_search *search, const hs_block *block, bool needs_giv
                         hs_trace *trace);
 void      hs_trace_free(hs_account *account, hs_trace *trace);
 
-/* Before the first pair of a batch. */
+/* Empties the batch. */
 HS_ALWAYS_INLINE void
 hs_trace_clear(hs_trace *trace)
 {
@@ -55,7 +55,7 @@ hs_trace_clear(hs_trace *trace)
     trace->is_shifted = trace->is_wide = false;
 }
 
-/* When the block has new candidates. */
+/* Call when the block has new candidates: they will be looked up again. */
 HS_ALWAYS_INLINE void
 hs_trace_reset(hs_trace *trace)
 {
@@ -73,7 +73,7 @@ int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t
  */
 hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
 
-/* As the batch kernels take it. */
+/* The batch as the batch kernels take it. */
 hs_batch hs_trace_batch(const hs_trace *trace);
 
 /* Pair e as the functions of metric.h take it; returns shift, filled, or NULL for none. */

@@ -37,7 +37,7 @@ set_single(hs_scanner *scanner)
     scanner->direct.in = INFINITY;
 }
 
-/* Thresholds for the present extent. A scaled cutoff may be known between bounds only. */
+/* Sets thresholds for the present extent. A scaled cutoff may be known between bounds only. */
 static void
 set_thresholds(hs_scanner *scanner)
 {
@@ -54,7 +54,7 @@ set_thresholds(hs_scanner *scanner)
     }
 }
 
-/* Thresholds and form of the scan, by the size of the present group and block. */
+/* Chooses thresholds and form of the scan by the size of the present group and block. */
 static void
 set_form(hs_scanner *scanner)
 {
@@ -149,7 +149,7 @@ visit_hits(hs_scanner *scanner, const hs_scan *scan, int32_t first, int32_t next
     return scanner->visit(scanner->visit_context, scanner, si, &hits);
 }
 
-/* The block as it was appended, ready to be scanned. */
+/* Makes the block ready to be scanned: gathers it, and sorts it where that is wanted. */
 static hs_status
 fill_block(hs_scanner *scanner)
 {
@@ -195,7 +195,7 @@ empty_block(hs_scanner *scanner)
     scanner->blocks++;
 }
 
-/* Of the block alone. */
+/* Adds the size of the block to that of the neighbourhood; scans nothing. */
 static hs_status
 note_size(hs_scanner *scanner)
 {
@@ -206,7 +206,7 @@ note_size(hs_scanner *scanner)
     return poll_sometimes(scanner);
 }
 
-/* Whether to go on. */
+/* Ends the walk if a limit or the visitor says so; else polls now and then. */
 static hs_status
 end_block(hs_scanner *scanner)
 {
@@ -216,7 +216,7 @@ end_block(hs_scanner *scanner)
     return poll_sometimes(scanner);
 }
 
-/* What was tested. */
+/* Counts what was tested, and empties the block. */
 static hs_status
 finish_block(hs_scanner *scanner, int64_t n_points)
 {

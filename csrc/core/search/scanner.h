@@ -27,7 +27,7 @@ typedef struct hs_neighbourhood {
     int64_t candidates, runs;
 } hs_neighbourhood;
 
-/* One at a time belongs to a thread. */
+/* Belongs to one thread. */
 struct hs_scanner {
     const hs_search *search;  /* borrowed, read only */
     hs_options       options; /* the search's, with a poll only for the caller's own thread */

@@ -32,7 +32,7 @@ typedef struct hs_search {
     double     filter_error;   /* bound on each component before rounding to float32 */
 } hs_search;
 
-/* Nothing in it yet; the call must outlive it. */
+/* An empty search; the call must outlive it. */
 void hs_search_begin(hs_call *call, hs_search *search);
 
 /* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
@@ -48,7 +48,7 @@ hs_search_asking(const hs_search *search)
 /* Sets, from the sets, which points ask and whether lists are full. */
 void hs_search_set_asking(const hs_sets *sets, hs_search *search);
 
-/* What follows from scene and grid. */
+/* Sets what follows from scene and grid. */
 void hs_search_settle(hs_search *search);
 
 /* Frees what it has; harmless twice. The call goes on. */

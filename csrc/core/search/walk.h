@@ -31,7 +31,7 @@ typedef struct hs_cursor {
     int64_t     *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
 } hs_cursor;
 
-/* One at a time belongs to a thread. */
+/* Belongs to one thread. */
 typedef struct hs_walker {
     const hs_search *search; /* borrowed, read only */
     hs_cursor        cursor;
