@@ -174,7 +174,7 @@ typedef int32_t (*hs_boxes_fn)(const hs_boxes *boxes);
  * but for the last ones, which are the square's number. squares: HS_PADDING more may be read. */
 typedef void (*hs_order_fn)(const float *squares, int32_t n, int32_t *keys);
 
-/* Beyond all squares. */
+/* A key beyond those of all squares. */
 #define HS_ORDER_LAST INT32_C(0x7f000000)
 
 /* The hits of some points; all arrays borrowed. */

@@ -90,8 +90,8 @@ keep_inside(const hs_lattice *lattice, double *wrapped)
     }
 }
 
-/* From the middle period to [0, 1): one more vector for each negative fraction. Rounded once, from
- * the point as given, so that points that are inside stay as they are. */
+/* Moves a point from the middle period to [0, 1): one more vector for each negative fraction.
+ * Rounded once, from the point as given, so that points that are inside stay as they are. */
 static bool
 wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *turns)
 {

@@ -21,7 +21,7 @@ hs_options_default(void)
                         .memory_limit = INFINITY};
 }
 
-/* By the caller's thread, straight into an output that grows. */
+/* Records pairs by the caller's thread, straight into an output that grows. */
 static hs_status
 record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 {
@@ -41,7 +41,7 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
     return status;
 }
 
-/* All pairs, unsorted. */
+/* Records all pairs, unsorted. */
 static hs_status
 record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
@@ -53,8 +53,8 @@ record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
                                       : record_alone(search, output, failure);
 }
 
-/* All pairs, sorted: found in an output of their own, with the columns that sorting needs
- * besides. */
+/* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting
+ * needs besides. */
 static hs_status
 sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {

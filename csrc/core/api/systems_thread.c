@@ -85,7 +85,7 @@ count_system(hs_systems_worker *worker, int64_t s)
     return status;
 }
 
-/* All pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
+/* Records all pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
 static hs_status
 record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, void *context)
 {
@@ -108,7 +108,7 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
     return status;
 }
 
-/* The pairs of the present system in ascending order. */
+/* Writes the pairs of the present system in ascending order. */
 static hs_status
 sort_system(hs_systems_worker *worker)
 {

@@ -171,7 +171,7 @@ wait_for_change(hs_commits *commits, const hs_committer *committer, double fract
     return status;
 }
 
-/* With the mutex held: settles where the n pairs that are due go. */
+/* With the mutex held: settles where in the output the n pairs that are due go. */
 static hs_status
 claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
 {
@@ -206,7 +206,7 @@ heed_limits(hs_committer *committer, const hs_commit_part *part)
     }
 }
 
-/* With the mutex held, which it gives up while it copies: the part that is due. */
+/* Writes the part that is due. The mutex is held, but not while it copies. */
 static hs_status
 write_part(hs_committer *committer, const hs_commit_part *part)
 {

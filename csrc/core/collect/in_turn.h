@@ -30,7 +30,7 @@ typedef struct hs_commit_part {
     bool    is_last;  /* of its range */
 } hs_commit_part;
 
-/* One thread's share in it. */
+/* What one thread needs to take ranges and commit their pairs. */
 typedef struct hs_committer {
     hs_commits    *commits; /* borrowed */
     hs_options    *options; /* borrowed; its poll tells whether to go on */

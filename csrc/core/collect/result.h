@@ -12,7 +12,7 @@ struct hs_pairs {
     hs_output offsets; /* int64, where the rows of hs_neighbors_find begin; else nothing */
 };
 
-/* One that holds nothing yet; its call is to be begun next. NULL when memory is short. */
+/* An empty result, whose call must be begun next. NULL when memory is short. */
 hs_pairs *hs_pairs_new(void);
 
 /* An empty output of the columns that the call wants, or the caller's arrays. */

@@ -62,7 +62,7 @@ void      hs_edge_table_free(hs_edge_table *table);
  * for the last edge there. Returns whether any is odd. */
 bool hs_edge_slots(const hs_edge_table *table, const float *squares, int32_t n, int32_t *slots);
 
-/* For a square whose slot is odd: *low edges are surely reached, no more than *high perhaps. */
+/* For a square whose slot is odd: at least *low edges are reached, and at most *high. */
 void hs_edge_range(const hs_edge_table *table, const hs_edges *edges, float square, int32_t *low,
                    int32_t *high);
 

@@ -52,7 +52,7 @@ void hs_sums_carry(hs_sums *sums);
 
 #define HS_SUMS_MOST_ADDED (INT64_C(1) << 30)
 
-/* Before n products are added. */
+/* Call before n products are added: passes on carries in time. */
 HS_ALWAYS_INLINE void
 hs_sums_expect(hs_sums *sums, int64_t n)
 {

@@ -24,8 +24,9 @@
 void *hs_pages_alloc(size_t bytes, void **mapping, size_t *length);
 void  hs_pages_free(void *mapping, size_t length);
 
-/* That room, but as a reservation: address space that costs nothing until it is written, in small
- * pages unless advised. Between the mapping and the block lie exactly HS_PAGES_STEP bytes. */
+/* Room as from hs_pages_alloc, but as a reservation: address space that costs nothing until it is
+ * written, in small pages unless advised. Between the mapping and the block lie exactly
+ * HS_PAGES_STEP bytes. */
 void *hs_pages_reserve(size_t bytes, void **mapping, size_t *length);
 
 /* Huge pages for what is written from now on in [from, to), or small ones. A wish. */

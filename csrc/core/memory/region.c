@@ -30,7 +30,7 @@ count_block(int change)
 #endif
 }
 
-/* To the pool or to the system. */
+/* Gives a chunk to the pool, or else to the system. */
 static void
 give_back(void *data)
 {

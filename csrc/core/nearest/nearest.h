@@ -73,7 +73,7 @@ hs_near_of_leaf(const hs_near *near, const hs_tree_node *node)
 /* Measures `drift`, of the rows of B. */
 void hs_near_measure_drift(hs_near *near);
 
-/* Where points lie along open axes, once they are in tree order. */
+/* Measures the range of points along open axes, once they are in tree order. */
 void hs_near_measure_layer(hs_near *near);
 
 /* HS_ERR_MEMORY when there are more images than memory could hold points. */

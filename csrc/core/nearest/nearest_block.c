@@ -22,14 +22,14 @@
 #define MOST_BY_SQUARES (HS_ORDER_MOST / 2)
 #define LARGEST_SQUARE  0x1p60 /* far from where float32 ends */
 
-/* After a step that every candidate took part in. */
+/* Polls after a pass over all candidates, if they are many. */
 static hs_status
 poll_if_large(const hs_options *options, const hs_near_block *block)
 {
     return block->n > HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
 }
 
-/* Room for n candidates, and what kernels read and write beyond. */
+/* Makes room for n candidates, and for what kernels read and write beyond. */
 static bool
 reserve(const hs_near *near, hs_near_block *block, int64_t n)
 {

@@ -11,7 +11,7 @@
 
 typedef struct hs_near_kept hs_near_kept;
 
-/* Nothing is built as yet. NULL when memory is short. */
+/* One without a tree as yet. NULL when memory is short. */
 hs_near_kept *hs_near_kept_new(void);
 void          hs_near_kept_free(hs_near_kept *kept); /* NULL-safe */
 

@@ -28,7 +28,7 @@ typedef struct hs_near_pace {
     hs_status         status;
 } hs_near_pace;
 
-/* After so many more steps; false: stop. */
+/* Counts so many more steps, and polls now and then; false: stop. */
 HS_ALWAYS_INLINE bool
 hs_near_goes_on(hs_near_pace *pace, int64_t steps)
 {

@@ -38,7 +38,7 @@ scene_cutoff(const hs_box *box, double limit)
     return limit_is_small(limit) ? limit : short_row < SMALL_BOX ? 0.0 : 1.0;
 }
 
-/* The largest distance, in the scene's unit and for the metric. */
+/* Sets the largest distance, in the scene's unit and for the metric. */
 static void
 set_limit(hs_near *near, double limit)
 {
@@ -50,8 +50,8 @@ set_limit(hs_near *near, double limit)
                    of_metric < INFINITY ? of_metric : 1.0, true);
 }
 
-/* The tree of the points, and what is measured of them: all that searches with other k and other
- * queries can share. */
+/* Builds the tree of the points and measures them: all that searches with other k and other queries
+ * can share. */
 static hs_status
 build_tree(hs_near *near, int32_t leaf_points)
 {
@@ -69,7 +69,7 @@ build_tree(hs_near *near, int32_t leaf_points)
     return status;
 }
 
-/* The tree of the queries; their scene is freed. */
+/* Builds the tree of the queries, and frees their scene. */
 static hs_status
 build_asking_tree(hs_near *near, hs_scene *asking)
 {
@@ -110,7 +110,7 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
     return status;
 }
 
-/* A tree that any later call can use: for any k, largest distance and quantities. */
+/* Builds a tree that any later call can use: for any k, largest distance and quantities. */
 static hs_status
 build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near *room,
            hs_failure *failure)
@@ -144,7 +144,7 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
     return status;
 }
 
-/* What is shared, as the new search's own; what it must not free is marked as borrowed. */
+/* Takes what is shared as the new search's own, and marks as borrowed what it must not free. */
 static void
 borrow(const hs_near *kept, hs_near *near)
 {

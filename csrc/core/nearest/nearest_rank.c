@@ -80,7 +80,7 @@ hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_
     return true;
 }
 
-/* Where the asking point is, for the metric. */
+/* Copies the coordinates of the asking point that the metric measures from. */
 static void
 take_origin(const hs_near *near, int32_t si, double *p)
 {
@@ -114,7 +114,8 @@ is_nearer(void *ranker, const hs_near_key *b, const hs_near_key *a)
     return compare(ranker, b, a) < 0;
 }
 
-/* By (j, S). Images of one j differ by their shifts over B, which the turns of i and j leave. */
+/* Whether b comes before a by (j, S). The turns of i and j are common to all images of one j, so
+ * shifts over B tell these apart. */
 static bool
 is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
 {
@@ -142,7 +143,8 @@ is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
     return false;
 }
 
-/* In exact order, the first `wanted` of n keys that float64 cannot tell; the others behind them. */
+/* Puts in exact order the first `wanted` of n keys that float64 cannot tell; the others come behind
+ * them. */
 static void
 settle_keys(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, int64_t wanted)
 {
@@ -168,7 +170,8 @@ settle_keys(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, int64_t wanted
     }
 }
 
-/* Sorted keys whose squares are too close to tell, as far as they reach into the first `wanted`. */
+/* Finds sorted keys whose squares are too close to tell, among the first `wanted`, and settles
+ * them. */
 static void
 settle_order(hs_near_ranker *ranker, int64_t n, int64_t wanted)
 {
@@ -266,7 +269,7 @@ hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits, const
     const bool           omits_self = ranker->near->omits_self;
     const int64_t        wanted = ranker->near->k + omits_self;
     const double         reach = block->reach * block->reach;
-    /* Of two squares, and of two keys. */
+    /* The error of two squares, and of two keys. */
     const double least = 2.0 * block->square_error + KEY_ERROR * reach;
     int32_t      keys[HS_ORDER_MOST + 1];
     *count = -1;

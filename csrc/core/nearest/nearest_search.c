@@ -94,7 +94,7 @@ finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_
     return status;
 }
 
-/* The points of a filled block; bit t of *left: point t of the group is not done. */
+/* Does the points of a filled block; bit t of *left: point t of the group is not done. */
 static hs_status
 finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
 {
@@ -120,8 +120,8 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
     return status;
 }
 
-/* One point, within a radius that surely suffices; a larger one where rounding makes it
- * fall short. */
+/* Does one point within a radius that surely suffices; a larger one where rounding makes it fall
+ * short. */
 static hs_status
 search_point(near_worker *worker, int32_t si, double guess)
 {
@@ -235,7 +235,7 @@ close_worker(const near_crew *crew, near_worker *worker)
     hs_near_block_free(crew->near, &worker->block);
 }
 
-/* Points of a node, as one group or several, in the present range or from it on in new ones. */
+/* Adds the points of a node, as one group or several, to the present range and new ones. */
 static void
 add_parts(near_crew *crew, const hs_tree_node *node)
 {
@@ -248,8 +248,8 @@ add_parts(near_crew *crew, const hs_tree_node *node)
     }
 }
 
-/* Largest subtrees of at most GROUP_POINTS, in ranges that are larger ones; leaves that are larger
- * in parts. */
+/* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
+ * which are larger subtrees. A larger leaf becomes several groups. */
 static void
 list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
 {

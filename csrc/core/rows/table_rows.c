@@ -78,8 +78,8 @@ put_measures(const hs_filler *fill, int64_t at, int64_t hit, int32_t n)
     }
 }
 
-/* Where the group's first point itself is among the candidates, in the places they were gathered
- * to; the others follow it. */
+/* The place of the group's first point itself among the candidates as gathered; the others follow
+ * it. */
 static int32_t
 own_place(const hs_scanner *scanner)
 {
@@ -268,7 +268,7 @@ hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
     hs_output_init(NULL, to->ndim, to->columns & HS_MEASURES, to->index_bytes, &fill->part);
     fill->numbers =
         hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1, sizeof *fill->numbers);
-    /* It keeps no numbers of hits: there are none to be turned round. */
+    /* It keeps no numbers of hits: no pair must be turned round. */
     const hs_status status = hs_recorder_init(account, &fill->part, 0, &fill->recorder);
     return fill->numbers == NULL ? HS_ERR_MEMORY : status;
 }

@@ -51,7 +51,7 @@ options_of_build(const hs_options *options, double radius, int m)
     return searching;
 }
 
-/* By how many given box vectors each point was wrapped; none are stored where none was. */
+/* Stores by how many given box vectors each point was wrapped; nothing where none was. */
 static hs_status
 take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
 {
@@ -86,7 +86,7 @@ take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
     return HS_OK;
 }
 
-/* From here on the search speaks of points by their places in cell order, and of images alone. */
+/* Renumbers the points by their places in cell order; shifts are images alone from here on. */
 static hs_status
 renumber(hs_search *search, hs_listing *listing)
 {
@@ -106,7 +106,7 @@ renumber(hs_search *search, hs_listing *listing)
     return HS_OK;
 }
 
-/* All pairs within the radius; the search stays open. */
+/* Finds all pairs within the radius; the search stays open. */
 static hs_status
 find(building *built, hs_failure *failure)
 {
@@ -134,7 +134,7 @@ typedef struct placing {
     int64_t        *plain, *shifted; /* owned, one for each piece */
 } placing;
 
-/* A pair the way the caller's numbers have it: i < j. Half of them must be turned, without any
+/* Writes a pair with i < j in the caller's numbers. Half of them must be turned, without any
  * pattern: a branch would be mispredicted. */
 HS_ALWAYS_INLINE void
 put_pair(const int32_t *order, int32_t a, int32_t b, hs_listing *listing, int64_t to)
@@ -236,8 +236,8 @@ count_pairs(building *built, placing *place)
     return true;
 }
 
-/* Room for the pairs, which may be that of the list in use: so this is the last step that can fail,
- * ... */
+/* Makes room for the pairs, which may be that of the list in use: so this is the last step that can
+ * fail, ... */
 static bool
 make_room(hs_listing *listing)
 {
@@ -258,7 +258,7 @@ make_room(hs_listing *listing)
     return true;
 }
 
-/* From what was found to the listing. */
+/* Writes what was found to the listing. */
 static hs_status
 settle_pairs(building *built)
 {

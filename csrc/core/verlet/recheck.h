@@ -51,7 +51,7 @@ typedef struct hs_sifted {
     uint16_t  hits[HS_SIFT + 4], unsure[HS_SIFT + 4];
 } hs_sifted;
 
-/* All that is within the cutoff, to the output. */
+/* Writes all pairs within the cutoff to the output. */
 hs_status hs_refilter_run(hs_refilter *refilter, hs_failure *failure);
 
 /* The points as floats, their counts and thresholds. In recheck_points.c. */

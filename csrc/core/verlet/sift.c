@@ -11,7 +11,7 @@
 #define HAS_SSE2 0
 #endif
 
-/* One pair to the lists. */
+/* Adds one pair to the lists. */
 HS_ALWAYS_INLINE void
 put(float square, hs_thresholds limit, int32_t e, uint16_t *hits, int32_t *n_hits, uint16_t *unsure,
     int32_t *n_unsure)
