@@ -137,8 +137,7 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         }
         hs_decide_traced(scanner, &scanner->search->scene.metric, within);
         for (int32_t e = 0; e < end - u; e++) {
-            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond the cutoff gather at
-                                                           * the front */
+            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather in front */
             n_beyond += !within[e];
         }
     }
