@@ -87,7 +87,7 @@ detect_features(void)
     return found;
 }
 
-/* Asked once in a process: in a virtual machine every cpuid is a trip to the host, tens of
+/* Found once in a process: in a virtual machine every cpuid calls the host, which takes tens of
  * microseconds. Threads that come here together find and write equal values. */
 static int
 features(void)

@@ -208,7 +208,7 @@ typedef struct hs_kernel {
     hs_measure_fn measure;
 } hs_kernel;
 
-/* The fields for which every kernel's file has functions of its own, of these names. */
+/* The fields that each kernel's file fills with its own functions of these names. */
 #define HS_KERNEL_LOOPS                                                         \
     .gather = gather, .list = list, .count = count, .list_direct = list_direct, \
     .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32, \

@@ -65,7 +65,7 @@ typedef struct hs_folded {
     double  x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
     double  lower[HS_MAX_DIM];     /* range of t_k of X; not set in aligned lattices */
     double  upper[HS_MAX_DIM];
-    double  magnitude; /* as hs_wrap_point says */
+    double  magnitude; /* the largest sum of absolute terms of any point */
     int64_t failed;    /* lowest point that could not be wrapped, or -1 */
 } hs_folded;
 

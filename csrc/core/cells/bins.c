@@ -32,8 +32,8 @@ typedef struct sorting {
                                           * its next point there */
 } sorting;
 
-/* id += the part of the cell id that axis k gives, as hs_grid_index finds it. Cell ids and strides
- * are below 2^32, indices below 2^31. */
+/* id += the part of the cell id that axis k gives, by the steps of hs_grid_index. Cell ids and
+ * strides are below 2^32, indices below 2^31. */
 static void
 add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
           uint32_t *HS_RESTRICT id)

@@ -60,7 +60,7 @@ hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *
 void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
 
 /* The cells of `grid`, not cut by faces, for a scene whose cutoff was `cutoff_before` and is
- * smaller now. HS_ERR_MEMORY, HS_ERR_BOX_SKEWED as hs_grid_init. */
+ * smaller now. HS_ERR_MEMORY, HS_ERR_BOX_SKEWED for the reasons of hs_grid_init. */
 hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before,
                          hs_grid *grid);
 

@@ -14,7 +14,7 @@
 /* The edges of a histogram; shared by all threads. */
 typedef struct hs_edges {
     int64_t n;
-    bool    inclusive, last_inclusive; /* as hs_histogram has them */
+    bool    inclusive, last_inclusive; /* edges, the last edge, belong to the bin below */
     double *at;                        /* owned; as the scene's metric takes them; n */
     double *lower;                     /* at most, ... */
     double *upper; /* ... and at least the scaled edge; in the memory of `lower`, or `at` itself */

@@ -29,7 +29,8 @@ void  hs_pages_free(void *mapping, size_t length);
  * HS_PAGES_STEP bytes. */
 void *hs_pages_reserve(size_t bytes, void **mapping, size_t *length);
 
-/* Huge pages for what is written from now on in [from, to), or small ones. A wish. */
+/* Requests huge pages, or small ones, for what is written from now on in [from, to); the system
+ * need not comply. */
 void hs_pages_advise(void *from, void *to, bool huge);
 
 /* The reservation with room for `bytes` bytes, more than before, contents kept, all of it advised

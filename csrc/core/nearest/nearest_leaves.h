@@ -20,7 +20,7 @@ typedef struct hs_near_leaves {
     double         centre[HS_MAX_DIM];
     double         unit;   /* a power of two: lengths times this */
     double         extent; /* largest number of any range */
-    double         error;  /* of the images, as hs_near_images has it */
+    double         error;  /* on each component of a shifted coordinate */
     double         radius; /* for groups up to this one; 0: for none */
 } hs_near_leaves;
 

@@ -157,22 +157,22 @@ hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
- * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled;
+ * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. In
  * scene_wrap.c. */
 void hs_scene_fold_far(hs_scene *scene);
 
-/* Wraps the points into the box; scene_wrap.c. Sets x_largest, the range of t_k of the points in
- * lower and upper, and *magnitude as hs_wrap_point says. */
+/* Wraps the points into the box, in scene_wrap.c. Sets x_largest, the range of t_k of the points in
+ * lower and upper, and *magnitude, the largest sum of absolute terms. */
 hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
                         double *magnitude, hs_failure *failure);
 
-/* Steps of scene_bounds.c. x_error and t_error, from x_largest and what wrapping says. */
+/* Steps in scene_bounds.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
 void hs_scene_bound_errors(hs_scene *scene, double magnitude);
 
-/* Range of the grid coordinates: the points' own where open, one period where periodic. */
+/* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
 void hs_scene_settle_ranges(hs_scene *scene);
 
-/* formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
+/* Sets formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
 void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
 
 /* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
@@ -181,10 +181,10 @@ void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double larg
 bool hs_scene_is_drowned(const hs_scene *scene);
 void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
 
-/* What decides: X and B where they hold every digit, else points and box vectors as given. */
+/* Sets what decides: X and B where they hold every digit, else points and box vectors as given. */
 void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
 
-/* t_k of point i, as hs_lattice_coordinate. */
+/* t_k of point i, with the bits of hs_lattice_coordinate. */
 HS_ALWAYS_INLINE double
 hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
 {

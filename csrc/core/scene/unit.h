@@ -83,7 +83,7 @@ bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, 
 bool hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
 /* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
- * digits. unit: as hs_unit_exponent. */
+ * digits. unit: from hs_unit_exponent. */
 int hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
                        int largest, bool *extreme);
 

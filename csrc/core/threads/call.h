@@ -16,7 +16,7 @@
 typedef struct hs_call {
     hs_account       account;
     hs_options       options;      /* the caller's; their poll counts how often it is called */
-    const hs_kernel *kernel;       /* NULL: this machine has none of that name */
+    const hs_kernel *kernel;       /* NULL: this CPU has none of that name */
     hs_team         *team;         /* owned; NULL: the caller's thread alone */
     hs_counters      done;         /* by walkers that have finished */
     hs_poll_fn       callers_poll; /* behind options.poll */

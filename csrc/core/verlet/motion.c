@@ -298,7 +298,7 @@ bound_rounding(const tracking *track)
     for (int k = 0; track->has_base && k < d; k++) { /* two differences */
         bound += 2.0 * UNIT * (sizes + fabs(track->base[k]));
     }
-    if (track->jump_of != NULL) { /* a difference, wrapped as wrap.h says */
+    if (track->jump_of != NULL) { /* a difference, wrapped: hs_wrap_point bounds its error */
         const double terms = 2 * track->m + 2;
         bound += 2.0 * UNIT * (sizes + track->magnitude) +
                  terms * terms * 0x1p-104 * track->magnitude + 0x1p-1050;
