@@ -63,7 +63,7 @@ typedef enum hs_status {
     HS_ERR_FAR,           /* queries, or points from each other, lie too far away for cells */
     HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
-    HS_ERR_TYPES,         /* a type is none of those that there are: failure.row */
+    HS_ERR_TYPES,         /* a type is negative or too large: failure.row */
     HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
     HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or a pointer is
                              NULL; failure.system: where first descends */
@@ -176,11 +176,11 @@ typedef struct hs_pair_arrays {
 /* Called at most once per call, when the result may be large: bytes that may still be used. */
 typedef double (*hs_limit_fn)(void *context);
 
-/* Points from which on the work takes a millisecond, while a thread costs some ten microseconds to
+/* With this many points the work takes a millisecond, while a thread costs some ten microseconds to
  * start and to end. */
 #define HS_POINTS_FOR_THREADS 20000
 
-/* Of one call; more than these would only wait for each other. */
+/* Most threads of one call; more would only wait for each other. */
 #define HS_MOST_THREADS 1024
 
 typedef struct hs_options {
@@ -196,7 +196,7 @@ typedef struct hs_options {
     int                   threads; /* so many, 0 as 1, at most HS_MOST_THREADS; -n: n from
                                   HS_POINTS_FOR_THREADS on, else 1 */
     double       memory_limit;     /* bytes that result and search may take; infinity: no limit */
-    hs_limit_fn  find_limit;       /* NULL, or asked for a further limit beyond 64 MB */
+    hs_limit_fn  find_limit;       /* NULL, or called for a further limit beyond 64 MB */
     void        *find_context;
     hs_poll_fn   poll; /* NULL: never */
     void        *poll_context;
@@ -210,7 +210,7 @@ hs_options hs_options_default(void);
 typedef struct hs_cells hs_cells;
 
 /*
- * Among what a search looks: points in a box, or cells, which have both. All borrowed: points must
+ * What a search looks among: points in a box, or cells, which have both. All borrowed: points must
  * not move during the call (a concurrent write may change the answer, it cannot corrupt memory:
  * each number is read once).
  */
@@ -237,7 +237,7 @@ typedef struct hs_pairs hs_pairs;
 hs_status hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **pairs,
                         hs_failure *failure);
 
-/* The same search, counting only; options->want and ->sorted are ignored. With queries: every
+/* The number of pairs of hs_pairs_find; options->want and ->sorted are ignored. With queries: every
  * neighbour of each, the sum of what hs_neighbors_count counts. */
 hs_status hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
                          hs_failure *failure);
@@ -275,7 +275,7 @@ typedef struct hs_histogram {
     hs_marks      of_points;
     hs_marks      of_queries;
     int64_t      *counts; /* n_types * n_types * n_edges, or NULL */
-    double       *sums;   /* the same, or NULL */
+    double       *sums;   /* n_types * n_types * n_edges, or NULL */
 } hs_histogram;
 
 /*
@@ -296,15 +296,15 @@ hs_status hs_pairs_histogram(const hs_among *among, const hs_options *options,
 /*
  * Find the k nearest points of each query, k >= 1, row after row and k entries in each: pairs (i in
  * queries, j in points, S) with the vector D = points[j] - queries[i] + S * box, ascending by the
- * exact distance and, where that is the same, by (j, S). In a periodic box each image of a point
+ * exact distance and, where distances are equal, by (j, S). In a periodic box each image of a point
  * counts for itself. Without queries: of each point among the points, itself left out where S = 0.
  *
  * options->cutoff is the largest distance that counts, itself included, and may be infinite. What a
- * row lacks is j = -1, distance infinity, vector NaN, S = 0. Of options->want, j, distance, vector
- * and shift are heard; inclusive, sorted, precision and out are ignored. hs_pairs_length is k times
- * the number of queries. Memory and failures as for hs_neighbors_find; HS_ERR_MEMORY also when a
- * query is so far from points that repeat that more of their images than memory holds are about as
- * near.
+ * row lacks is j = -1, distance infinity, vector NaN, S = 0. Of options->want only j, distance,
+ * vector and shift count; inclusive, sorted, precision and out are ignored. hs_pairs_length is k
+ * times the number of queries. Memory and failures as for hs_neighbors_find; HS_ERR_MEMORY also
+ * when a query is so far from points that repeat that more of their images than memory holds are
+ * about as near.
  */
 hs_status hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options,
                           hs_pairs **rows, hs_failure *failure);
@@ -315,7 +315,7 @@ hs_status hs_nearest_find(const hs_among *among, int64_t k, const hs_options *op
 int64_t        hs_pairs_rows(const hs_pairs *pairs);
 const int64_t *hs_pairs_offsets(const hs_pairs *pairs);
 
-/* The same, but ownership goes to the caller: hs_array_free. */
+/* The offsets, whose ownership goes to the caller: hs_array_free. */
 int64_t *hs_pairs_take_offsets(hs_pairs *pairs);
 
 /* Number of pairs: each array has one entry or row for each. */
@@ -326,8 +326,8 @@ int64_t hs_pairs_length(const hs_pairs *pairs);
  * one bit. */
 const void *hs_pairs_array(const hs_pairs *pairs, unsigned which);
 
-/* The same, but ownership goes to the caller: hs_array_free. Never NULL for a quantity that was
- * wanted, unless it was taken before or the caller's arrays were used. */
+/* The array of one HS_WANT_ bit, whose ownership goes to the caller: hs_array_free. Never NULL for
+ * a quantity that was wanted, unless it was taken before or the caller's arrays were used. */
 void *hs_pairs_take(hs_pairs *pairs, unsigned which);
 
 /* NULL-safe. */
@@ -342,17 +342,19 @@ typedef struct hs_stream hs_stream;
 
 /*
  * All is borrowed for this call only: points may change afterwards, but cells must outlive the
- * stream. No queries. max_pairs >= 1: of a block.
- * options->sorted, ->out and ->counters are ignored, ->poll is asked by this call; the limits,
- * whose context must stay, hold for what the stream has. *stream is NULL on failure.
+ * stream. No queries. max_pairs >= 1: of a block. options->sorted, ->out and ->counters are
+ * ignored, ->poll is called by this call only; the limits, whose context must stay, hold for what
+ * the stream has. *stream is NULL on failure.
  */
 hs_status hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pairs,
                          hs_stream **stream, hs_failure *failure);
 
-/* The next max_pairs pairs, or those that are left, for hs_pairs_free; *block is NULL after the
- * last ones. poll may be NULL; from call to call its fraction never falls, and it is 1 once all
- * pairs have been found. No thread is left behind. On failure *block is NULL, and the stream
- * as it was before: it may be asked again. */
+/*
+ * The next max_pairs pairs, or those that are left, to be freed with hs_pairs_free; *block is NULL
+ * after the last ones. poll may be NULL; from call to call its fraction never falls, and it is 1
+ * once all pairs have been found. No thread is left behind. On failure *block is NULL, and the
+ * stream is as it was before: it may be called again.
+ */
 hs_status hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                          hs_failure *failure);
 
@@ -366,7 +368,8 @@ void hs_stream_free(hs_stream *stream);
  */
 typedef int (*hs_pair_fn)(int64_t i, int64_t j, const int32_t *S, const double *D, double d2,
                           void *user);
-/* The same for n pairs: all but `both`. *n_taken, n at first: how many it has looked at. */
+/* Called for n pairs at once, with all arrays but `both`. *n_taken, n at first: how many it has
+ * looked at. */
 typedef int (*hs_pairs_fn)(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user);
 typedef struct hs_visit {
     hs_pair_fn  pair;
@@ -385,8 +388,8 @@ hs_status hs_pairs_visit(const hs_among *among, const hs_options *options, const
                          int64_t *n_visited, hs_failure *failure);
 
 /*
- * Points that are sorted into cells once and asked many times. Immutable: any number of calls may
- * use them at once. Opaque, owned by the caller.
+ * Points that are sorted into cells once and searched many times. Immutable: any number of calls
+ * may use them at once. Opaque, owned by the caller.
  *
  * points, box, options are borrowed for this call only: the points are copied. options->cutoff is
  * the largest cutoff that the cells are made for; larger ones, and queries much further away than
@@ -471,7 +474,7 @@ typedef struct hs_systems {
 hs_status hs_systems_find(const hs_points *points, const hs_systems *systems,
                           const hs_options *options, hs_pairs **pairs, hs_failure *failure);
 
-/* The same search, counting only; counts: n, unspecified on failure. */
+/* The number of pairs of each system; counts: n, unspecified on failure. */
 hs_status hs_systems_count(const hs_points *points, const hs_systems *systems,
                            const hs_options *options, int64_t *counts, hs_failure *failure);
 

@@ -3,9 +3,9 @@
  * batch.h: the contract of the batch kernels: the float stages of the decision
  * (core/exact/metric.h) and the measuring of D, for many pairs at once.
  *
- * Both give, pair by pair, what the functions of core/exact/metric.h give for one: the same
- * verdicts by the same stages, the same bits. What they cannot do they leave to those functions.
- * Like these they must be called with round to nearest and without flushing.
+ * Both give, pair by pair, what the functions of core/exact/metric.h give for one pair: equal
+ * verdicts by the same stages, equal bits. They leave to those functions what they cannot do. They
+ * must be called with round to nearest and without flushing, too.
  */
 #ifndef HS_BATCH_H
 #define HS_BATCH_H

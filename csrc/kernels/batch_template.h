@@ -7,9 +7,9 @@
  *   MEASURE   name of the hs_measure_fn
  *
  * Each is one loop over groups of LANES pairs, made for 1, 2, 3 and any number of axes, with and
- * without shifts, by inlining with constants. What a line computes is explained where the same is
- * done for one pair: core/exact/metric_float.h, core/exact/metric_measure.c. Undefines both
- * parameters at its end.
+ * without shifts, by inlining with constants. Line by line they follow core/exact/metric_float.h
+ * and core/exact/metric_measure.c, which explain the steps for one pair. Undefines both parameters
+ * at its end.
  */
 #if !defined(JUDGE) || !defined(MEASURE)
 #error "define JUDGE and MEASURE before including batch_template.h"
@@ -17,7 +17,7 @@
 
 #include "wide_doubleword.h"
 
-#define SAFE_LARGE ldexp(1.0, HS_SAFE_EXPONENT) /* constants, to compilers */
+#define SAFE_LARGE ldexp(1.0, HS_SAFE_EXPONENT) /* compilers see constants */
 #define SAFE_SMALL ldexp(1.0, -HS_SAFE_EXPONENT)
 
 #define EVERY_LANE ((1u << LANES) - 1)
@@ -76,7 +76,7 @@ find_differences(differences *d, const hs_metric *metric, const hs_batch *batch,
 {
     const reals zero = broadcast(0.0), one = broadcast(1.0);
     reals       total = zero, weighted = zero;
-    int         k = 0; /* ndim is not 0: compilers wonder */
+    int         k = 0; /* ndim is at least 1: compilers warn without this */
     d->lost = zero;
     do {
         const reals q = load(batch->q[k] + e), p = load(batch->p[k] + e);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * copy_template.h: the vector loops that bring candidates in and pairs out, once for each
- * instruction set. Include it as scan_template.h. Defines gather (hs_gather_fn), emit_int32 and
- * emit_int64 (hs_emit_fn).
+ * instruction set. Include it after a vocabulary (simd_<isa>.h), inside that instruction set's
+ * target region. Defines gather (hs_gather_fn), emit_int32 and emit_int64 (hs_emit_fn).
  */
 
 /* Largest magnitude of n floats. */

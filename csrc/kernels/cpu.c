@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* cpu.c: see cpu.h. A feature counts when cpuid reports it and xgetbv shows that the operating
- * system saves its registers. */
+/* cpu.c: a feature counts when cpuid reports it and xgetbv shows that the operating system saves
+ * its registers. */
 #include "cpu.h"
 
 #include "target.h"
@@ -87,10 +87,8 @@ detect_features(void)
     return found;
 }
 
-/*
- * Asked once in a process: in a virtual machine every cpuid is a trip to the host, tens of
- * microseconds. Threads that come here together find the same and write the same.
- */
+/* Found once in a process: in a virtual machine every cpuid calls the host, which takes tens of
+ * microseconds. Threads that come here together find and write equal values. */
 static int
 features(void)
 {

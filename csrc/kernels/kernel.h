@@ -5,8 +5,8 @@
  *   gather   copies a run of points to float32, relative to a centre
  *   list     compares the points of a group with gathered candidates in float32 and lists those
  *            that are not surely beyond the cutoff
- *   count    the same, but only counts them
- *   squares  the same as list, but gives the float32 square of each in place of the unsure ones
+ *   count    counts them, and lists none
+ *   squares  lists them too, with the float32 square of each, and notes none as unsure
  *   emit     writes listed hits as pairs, i < j, int32 or int64
  *   relate   gathers candidates of a search for the nearest
  *   order    puts the squares of a few hits in order
@@ -67,7 +67,7 @@ typedef struct hs_unsure {
 typedef struct hs_scan {
     int            ndim;
     const float   *y[HS_MAX_DIM]; /* candidates, n + HS_PADDING each, those past n of any value */
-    const float   *norm;          /* sum of y_k^2, the same */
+    const float   *norm;          /* sum of y_k^2, n + HS_PADDING */
     const int32_t *label;         /* what a hit is listed as; n + HS_PADDING */
     int32_t        n;             /* candidates */
     const float   *q[HS_MAX_DIM]; /* points, n_points each */
@@ -109,10 +109,10 @@ typedef struct hs_run {
 typedef struct hs_gather {
     int            ndim;
     const double  *x[HS_MAX_DIM]; /* points in cell order; HS_PADDING more may be read */
-    const int32_t *order;         /* their numbers; the same */
+    const int32_t *order;         /* their numbers; HS_PADDING more may be read */
     float         *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
-    float         *norm;          /* the same */
-    int32_t       *id;            /* the same */
+    float         *norm;          /* room for all candidates and HS_PADDING more */
+    int32_t       *id;            /* room for all candidates and HS_PADDING more */
     uint32_t       largest;       /* bits of the largest |y| so far; infinity and NaN are largest */
 } hs_gather;
 
@@ -143,8 +143,8 @@ typedef struct hs_relate {
     double               unit; /* a power of two: lengths times this */
     double               extent;
     float               *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
-    float               *norm;          /* the same */
-    int32_t             *number;        /* the same */
+    float               *norm;          /* room for all candidates and HS_PADDING more */
+    int32_t             *number;        /* room for all candidates and HS_PADDING more */
 } hs_relate;
 
 /* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
@@ -156,7 +156,7 @@ typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_near_run *runs, i
 typedef struct hs_boxes {
     int            ndim;
     const float   *low[HS_MAX_DIM];  /* n + HS_PADDING each */
-    const float   *high[HS_MAX_DIM]; /* the same */
+    const float   *high[HS_MAX_DIM]; /* n + HS_PADDING each */
     float          from[HS_MAX_DIM], to[HS_MAX_DIM];
     float          out;   /* largest square of the distance */
     const int32_t *label; /* n + HS_PADDING */
@@ -174,7 +174,7 @@ typedef int32_t (*hs_boxes_fn)(const hs_boxes *boxes);
  * but for the last ones, which are the square's number. squares: HS_PADDING more may be read. */
 typedef void (*hs_order_fn)(const float *squares, int32_t n, int32_t *keys);
 
-/* Beyond all squares. */
+/* A key beyond those of all squares. */
 #define HS_ORDER_LAST INT32_C(0x7f000000)
 
 /* The hits of some points; all arrays borrowed. */
@@ -208,7 +208,7 @@ typedef struct hs_kernel {
     hs_measure_fn measure;
 } hs_kernel;
 
-/* The fields for which every kernel's file has functions of its own, of these names. */
+/* The fields that each kernel's file fills with its own functions of these names. */
 #define HS_KERNEL_LOOPS                                                         \
     .gather = gather, .list = list, .count = count, .list_direct = list_direct, \
     .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32, \

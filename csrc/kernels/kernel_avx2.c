@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* kernel_avx2.c: the kernels for x86-64 CPUs with AVX2. See kernel.h. */
+/* kernel_avx2.c: the kernels for x86-64 CPUs with AVX2, from the templates. */
 #include "kernel.h"
 
 #include "cpu.h"
@@ -24,7 +24,7 @@ HS_TARGET_END
 static bool
 supported(void)
 {
-    return hs_cpu_has_avx2() && sound(); /* in this order: its instructions must be there */
+    return hs_cpu_has_avx2() && sound(); /* in this order: sound() needs the instructions */
 }
 
 const hs_kernel hs_kernel_avx2 = {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* kernel_neon.c: the kernels for AArch64 CPUs, all of which have NEON. See kernel.h. */
+/* kernel_neon.c: the kernels for AArch64 CPUs, all of which have NEON, from the templates. */
 #include "kernel.h"
 
 #include "target.h"

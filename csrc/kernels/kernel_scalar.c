@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * kernel_scalar.c: the kernels in plain C; the specification of the others. See kernel.h.
+ * kernel_scalar.c: the kernels in plain C; the specification of the others.
  *
- * Scans take two short loops for each chunk of candidates: the first tests, without branches or
+ * Scans take two short loops for each tile of candidates: the first tests, without branches or
  * stores at changing addresses, so that compilers vectorise it for whatever the baseline CPU has;
  * the second packs the labels. Measured: half the time of one loop that does both.
  */
@@ -11,7 +11,7 @@
 #include <string.h>
 
 /* Candidates tested before they are packed; their flags stay in the first-level cache. */
-#define CHUNK 128
+#define TILE 128
 
 /* What depends on the point that is compared. */
 typedef struct scalar_scan {
@@ -73,7 +73,7 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
     return unsure != 0;
 }
 
-/* The same sums again, for a chunk that has unsure ones. */
+/* Notes the unsure ones of a tile, by computing its sums again. */
 HS_ALWAYS_INLINE void
 note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32_t n,
             const int ndim, const bool expanded, const int32_t *near, int32_t at)
@@ -90,7 +90,7 @@ note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32
 HS_ALWAYS_INLINE int32_t
 scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, const bool lists)
 {
-    int32_t near[CHUNK];
+    int32_t near[TILE];
     int32_t t = first, n_listed = 0;
     int64_t count = 0;
     scan->n_unsure = 0;
@@ -100,8 +100,8 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
             break;
         }
         const scalar_scan v = set_point(scan, t, ndim, expanded);
-        for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += CHUNK) {
-            const int32_t left = scan->n - begin, n = left < CHUNK ? left : CHUNK;
+        for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += TILE) {
+            const int32_t left = scan->n - begin, n = left < TILE ? left : TILE;
             if (test_chunk(scan, &v, begin, n, ndim, expanded, near)) {
                 note_unsure(scan, &v, t, begin, n, ndim, expanded, near, n_listed);
             }
@@ -140,16 +140,16 @@ square_chunk(const hs_scan *scan, const float *point, int32_t begin, int32_t n, 
 HS_ALWAYS_INLINE int32_t
 square_points(hs_scan *scan, int32_t first, const int ndim)
 {
-    float   s[CHUNK];
-    int32_t near[CHUNK];
+    float   s[TILE];
+    int32_t near[TILE];
     int32_t t = first, at = 0;
     for (; t < scan->n_points && at + scan->n <= scan->most_hits; t++) {
         float point[HS_MAX_DIM] = {0.0f};
         for (int k = 0; k < ndim; k++) {
             point[k] = scan->q[k][t];
         }
-        for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += CHUNK) {
-            const int32_t left = scan->n - begin, n = left < CHUNK ? left : CHUNK;
+        for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += TILE) {
+            const int32_t left = scan->n - begin, n = left < TILE ? left : TILE;
             square_chunk(scan, point, begin, n, ndim, s, near);
             for (int32_t c = 0; c < n; c++) {
                 scan->squares[at] = s[c];

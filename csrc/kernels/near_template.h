@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * near_template.h: the vector loops of a search for the nearest, once for each instruction set.
- * Include it as scan_template.h. Defines relate (hs_relate_fn), order
- * (hs_order_fn) and near_boxes (hs_boxes_fn).
+ * Include it after a vocabulary (simd_<isa>.h), inside that instruction set's target region.
+ * Defines relate (hs_relate_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
  */
 
 HS_ALWAYS_INLINE void

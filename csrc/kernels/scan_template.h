@@ -5,8 +5,8 @@
  * and, by scan_forms.h, list, count, list_direct, count_direct and squares (hs_scan_fn).
  */
 
-/* Notes the lanes of m, all of them hits that are listed from entry `at` on. Rare, or in crystals
- * common: a bit at a time. */
+/* Notes the lanes of m as unsure hits, listed from entry `at` on. They are rare, so one bit at a
+ * time; in crystals they are common. */
 static HS_NO_INLINE void
 note_unsure(hs_scan *scan, int32_t t, int32_t c, unsigned near, unsigned m, int32_t at)
 {
@@ -104,8 +104,8 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
     return t;
 }
 
-/* Unlike the direct form above, fused where that is quicker: nobody but the caller sees s, and the
- * bounds of filter.h hold either way. */
+/* Unlike the direct form above, fused where that is quicker: only the caller sees s, and the bounds
+ * of filter.h hold either way. */
 HS_ALWAYS_INLINE int32_t
 square_points(hs_scan *scan, int32_t first, const int ndim)
 {

@@ -72,7 +72,7 @@ append(int32_t *dst, const int32_t *label, mask m)
     return (int32_t)_mm_popcnt_u32(m);
 }
 
-/* The same for numbers. */
+/* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)
 {
@@ -94,7 +94,7 @@ store_integers(int32_t *p, integers a)
 {
     _mm256_storeu_si256((__m256i *)p, a);
 }
-/* As int64. */
+/* Widens to int64. */
 HS_ALWAYS_INLINE void
 store_wide(int64_t *p, integers a)
 {

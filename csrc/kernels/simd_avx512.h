@@ -51,7 +51,7 @@ append(int32_t *dst, const int32_t *label, mask m)
     return (int32_t)_mm_popcnt_u32(m);
 }
 
-/* The same for numbers. */
+/* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)
 {
@@ -64,7 +64,7 @@ HS_ALWAYS_INLINE void store(float *p, floats a) { _mm512_storeu_ps(p, a); }
 HS_ALWAYS_INLINE integers broadcast_integer(int32_t a) { return _mm512_set1_epi32(a); }
 HS_ALWAYS_INLINE integers load_integers(const int32_t *p) { return _mm512_loadu_si512(p); }
 HS_ALWAYS_INLINE void store_integers(int32_t *p, integers a) { _mm512_storeu_si512(p, a); }
-/* As int64. */
+/* Widens to int64. */
 HS_ALWAYS_INLINE void
 store_wide(int64_t *p, integers a)
 {

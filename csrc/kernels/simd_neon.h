@@ -47,8 +47,8 @@ and_not_less(mask m, floats a, floats b)
 /* The first n of them, 1 <= n < LANES. */
 HS_ALWAYS_INLINE mask first_lanes(int32_t n) { return (1u << n) - 1; }
 
-/* From a word of 16 digits, one for each mask: the instruction that counts bits works in vector
- * registers only, and going there and back takes longer. */
+/* The count of bits, from a word of 16 digits, one for each mask: the instruction that counts works
+ * in vector registers only, and going there and back takes longer. */
 HS_ALWAYS_INLINE unsigned
 popcount(mask m)
 {
@@ -76,7 +76,7 @@ append(int32_t *dst, const int32_t *label, mask m)
     return (int32_t)popcount(m);
 }
 
-/* The same for numbers. */
+/* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)
 {
@@ -88,7 +88,7 @@ HS_ALWAYS_INLINE void store(float *p, floats a) { vst1q_f32(p, a); }
 HS_ALWAYS_INLINE integers broadcast_integer(int32_t a) { return vdupq_n_s32(a); }
 HS_ALWAYS_INLINE integers load_integers(const int32_t *p) { return vld1q_s32(p); }
 HS_ALWAYS_INLINE void store_integers(int32_t *p, integers a) { vst1q_s32(p, a); }
-/* As int64. */
+/* Widens to int64. */
 HS_ALWAYS_INLINE void
 store_wide(int64_t *p, integers a)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * wide_doubleword.h: core/exact/doubleword.h in lanes: the same operations in the same order, so
- * that every lane has the same bits. Include it after a vocabulary (wide_<isa>.h), inside that
- * instruction set's target region.
+ * wide_doubleword.h: core/exact/doubleword.h in lanes: its operations in its order, so that every
+ * lane has its bits. Include it after a vocabulary (wide_<isa>.h), inside that instruction set's
+ * target region.
  */
 #ifndef HS_WIDE_DOUBLEWORD_H
 #define HS_WIDE_DOUBLEWORD_H

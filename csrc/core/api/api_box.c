@@ -56,8 +56,8 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
     return status;
 }
 
-/* The only entry of row r, in a column where no other row has one; -1 when there is no such. Then
- * that coordinate alone says what is inside along row r. */
+/* The column of the only entry of box vector r, if no other vector has one there, or -1. That
+ * coordinate alone then says what is inside along r. */
 static int
 own_column(const hs_lattice *lattice, int r)
 {
@@ -90,8 +90,8 @@ keep_inside(const hs_lattice *lattice, double *wrapped)
     }
 }
 
-/* From the middle period to [0, 1): one more vector for each negative fraction. Rounded once, from
- * the point as given, so that points that are inside stay as they are. */
+/* Moves a point from the middle period to [0, 1): one more vector for each negative fraction.
+ * Rounded once, from the point as given, so that points that are inside stay as they are. */
 static bool
 wrap_row(const hs_lattice *lattice, const double *x, double *wrapped, int64_t *turns)
 {
@@ -136,7 +136,7 @@ wrap_rows(const hs_lattice *lattice, hs_scale scale, const hs_cloud *cloud, doub
             failure->row = i;
             return HS_ERR_SHIFT_RANGE;
         }
-        (void)hs_lattice_shift(lattice, turns, given); /* these fit: wrap_row found it */
+        (void)hs_lattice_shift(lattice, turns, given); /* these fit: wrap_row has checked it */
         for (int k = 0; wrapped != NULL && k < d; k++) {
             const bool stays = inside[k] == x[k]; /* scaling may have lost its last digits */
             wrapped[i * d + k] = stays ? cloud->x[k][i] : hs_scale_apply(back, inside[k]);
@@ -173,7 +173,8 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
     if (status == HS_OK) {
         const hs_scale scale = scale_of_box(box);
         hs_lattice_init_given(box, scale, &lattice);
-        /* First without writing: a point that cannot be wrapped leaves the outputs alone. */
+        /* First without writing, so that a point that cannot be wrapped leaves the outputs as they
+         * were. */
         status = wrap_rows(&lattice, scale, &cloud, NULL, NULL, failure);
         if (status == HS_OK) {
             status = wrap_rows(&lattice, scale, &cloud, wrapped, shift, failure);

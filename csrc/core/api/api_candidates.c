@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * api_candidates.c: what cells say without a distance test: where points are, which points the
- * cells around a query hold. See halfshell.h.
- */
+/* api_candidates.c: what cells say without a distance test: where points are, which points the
+ * cells around a query hold. */
 #include "arguments.h"
 #include "api_cells.h"
 #include "../base/outcome.h"
@@ -264,7 +262,7 @@ find_ranges(hs_pairs *rows, range_list *list, hs_failure *failure)
     return status;
 }
 
-/* With an open search: room to work in, and the ranges. */
+/* With an open search: allocates links and ranges, and fills the ranges. */
 static hs_status
 list_ranges(hs_search *search, hs_pairs *rows, hs_failure *failure)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_cells.c: points that are sorted into cells once and asked many times. See halfshell.h. */
+/* api_cells.c: the public functions of cells: points that are copied, sorted once and searched many
+ * times. */
 #include "arguments.h"
 #include "api_cells.h"
 #include "../base/poll.h"
@@ -25,7 +26,7 @@ copy_points(const hs_points *points, double *copy)
     }
 }
 
-/* The points in memory of our own: nobody changes them while they are asked. */
+/* The points in memory of the cells: the caller cannot change them between searches. */
 static hs_status
 keep_points(const hs_points *points, hs_cells *cells)
 {
@@ -44,7 +45,7 @@ keep_points(const hs_points *points, hs_cells *cells)
     return HS_OK;
 }
 
-/* The options that cells are built with: whatever may be asked for later is kept. */
+/* The options that cells are built with: they keep all that a later search may want. */
 static hs_options
 options_of_cells(const hs_options *options)
 {
@@ -69,7 +70,7 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
         status = keep_points(points, cells);
     }
     if (status == HS_OK) {
-        /* Pairs are for later calls to keep, or only to count. */
+        /* keeps_none: no pairs are kept by this call */
         const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
         hs_call_gather(call, points->n);
         status =

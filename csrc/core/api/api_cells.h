@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_cells.h: what kept cells are, for those who ask them. */
+/* api_cells.h: what kept cells are, for the functions of api/ that search them. */
 #ifndef HS_API_CELLS_H
 #define HS_API_CELLS_H
 
@@ -14,7 +14,7 @@ struct hs_cells {
     hs_box        box;
     bool          has_box;
     double       *copy;  /* owned; points as given, for cutoffs and queries that need other cells */
-    hs_near_kept *trees; /* owned; for nearest points, which cells are of no use for */
+    hs_near_kept *trees; /* owned; a search for the nearest needs a tree, not cells */
 };
 
 #endif

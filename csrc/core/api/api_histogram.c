@@ -41,8 +41,7 @@ smallest_edge(const hs_histogram *histogram)
     return 0.0;
 }
 
-/* Which pairs of types are told apart: all, or for the half list all that are not each other the
- * other way round. */
+/* Which pairs of types are told apart: all, but in the half list (a, b) and (b, a) are one. */
 static hs_status
 plan_groups(bool has_queries, hs_tally_plan *plan)
 {
@@ -153,7 +152,7 @@ write_result(const hs_tally_plan *plan, hs_tally *tallies, int n, bool is_symmet
     return n_pairs;
 }
 
-/* Everybody counts for himself; then the counts are added up. */
+/* Each thread counts by itself; then the counts are added up. */
 static hs_status
 count_pairs(hs_search *search, const hs_tally_plan *plan, const hs_histogram *histogram,
             int64_t *n_pairs, hs_failure *failure)
@@ -232,7 +231,8 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
     return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 
-/* Edges are compared before there is a search. */
+/* Enters the floating-point environment itself, because edges are compared before the
+ * search does. */
 hs_status
 hs_pairs_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                    hs_failure *failure)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_nearest.c: the public searches for the k nearest points: trees, then groups
- * (nearest_search.h). */
+/* api_nearest.c: the public search for the k nearest points: prepares trees, then searches group by
+ * group. */
 #include "request.h"
 #include "../base/fpenv.h"
 #include "../nearest/nearest_prepare.h"
@@ -9,7 +9,7 @@
 #include "../collect/result.h"
 #include "../base/poll.h"
 
-/* Room for k entries for each point that asks. */
+/* Room for k entries for each asking point. */
 static hs_status
 make_room(hs_near *near, int64_t n_asking, hs_failure *failure)
 {

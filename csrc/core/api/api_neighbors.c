@@ -8,7 +8,7 @@
 #include "../rows/table.h"
 #include "../collect/columns.h"
 
-/* Rows have an order of their own. */
+/* The caller's options, unsorted: table rows have an order of their own. */
 static hs_options
 options_of_rows(const hs_options *options)
 {
@@ -72,7 +72,7 @@ find_rows(hs_search *search, hs_pairs *rows, hs_failure *failure)
         status = hs_table_prepare(&table, failure);
     }
     if (status == HS_OK && !hs_walker_fits(search, &table.most, &failure->search_bytes)) {
-        status = HS_ERR_MEMORY; /* before anything is counted */
+        status = HS_ERR_MEMORY; /* refused before anything is counted */
     }
     if (status == HS_OK) {
         status = find_entries(rows, &table, failure);

@@ -21,7 +21,7 @@ hs_options_default(void)
                         .memory_limit = INFINITY};
 }
 
-/* By the caller's thread, straight into an output that grows. */
+/* Records pairs by the caller's thread, straight into an output that grows. */
 static hs_status
 record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 {
@@ -41,7 +41,7 @@ record_alone(hs_search *search, hs_output *output, hs_failure *failure)
     return status;
 }
 
-/* All pairs, unsorted. */
+/* Records all pairs, unsorted. */
 static hs_status
 record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
@@ -53,7 +53,8 @@ record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
                                       : record_alone(search, output, failure);
 }
 
-/* As the output, but first into one of its own, with what else tells pairs apart. */
+/* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting
+ * needs besides. */
 static hs_status
 sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
@@ -101,7 +102,7 @@ hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **resul
     return hs_request_fill(&request, fill_pairs, result, failure);
 }
 
-/* A hs_use_fn: of pairs, or of those that are ordered where every point is asked for all. */
+/* A hs_use_fn: counts pairs, each once; with queries, all neighbours of each. */
 static hs_status
 count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_plan.c: what a search of a scene would do, read off the same structures that would do it. */
+/* api_plan.c: what a search of a scene would do, read from the structures that would do it. */
 #include "../../halfshell.h"
 
 #include "request.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_stream.c: pairs in blocks. A stream holds a search that is ready to be walked, a bookmark of
- * how far that has come, and the pairs that were found and not yet handed out. See halfshell.h. */
+ * how far that has come, and the pairs that were found and not yet handed out. */
 #include "request.h"
 
 #include "../base/fpenv.h"
@@ -81,7 +81,7 @@ move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
     return status;
 }
 
-/* Looks for as many pairs as a block has. What an unfinished attempt has found is forgotten. */
+/* Looks for as many pairs as a block has. What an unfinished attempt has found is dropped. */
 static hs_status
 fill(hs_stream *stream, hs_failure *failure)
 {
@@ -109,7 +109,7 @@ fill(hs_stream *stream, hs_failure *failure)
                    (double)stream->next.point / (double)hs_search_asking(search)->n);
 }
 
-/* The first n pairs that wait, as all that is held, which is not copied: the rest is. */
+/* Hands out the first n pairs that wait: the held columns become theirs, the rest is copied. */
 static hs_status
 give_away(hs_stream *stream, int64_t n, hs_output *given)
 {
@@ -126,7 +126,7 @@ give_away(hs_stream *stream, int64_t n, hs_output *given)
     return status;
 }
 
-/* The first n pairs that wait, copied. */
+/* Hands out a copy of the first n pairs that wait. */
 static hs_status
 copy_out(hs_stream *stream, int64_t n, hs_output *copy)
 {
@@ -161,8 +161,8 @@ take_block(hs_stream *stream, hs_pairs **result)
     return HS_OK;
 }
 
-/* A hs_poll_fn: what is looked for a second time, because it did not fit a block or the caller
- * stopped, does not tell less than the first time. */
+/* A hs_poll_fn: the fraction does not fall where pairs are sought a second time, because they did
+ * not fit a block or the caller stopped. */
 static bool
 tell(void *context, double fraction)
 {
@@ -203,7 +203,7 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     return status;
 }
 
-/* What there is to do with a search; the caller's own only during the call. */
+/* The options of the stream's search: what the caller lends for one call is left out. */
 static hs_options
 options_of_stream(const hs_options *options)
 {

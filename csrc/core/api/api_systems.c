@@ -13,7 +13,7 @@
  * it seldom waits for others, and taking a range costs little beside them. */
 #define RANGE_POINTS 512
 
-/* `total` has the account of the output and sums up what was done. */
+/* Runs all workers. `total` has the account of the output and sums up what was done. */
 static hs_status
 run_crew(hs_systems_crew *crew, hs_call *total, hs_failure *failure)
 {
@@ -97,7 +97,8 @@ tell_shortage(const hs_systems_crew *crew, const hs_call *total, hs_failure *fai
     hs_shortage_tell(&shortage, &total->options, crew->points->ndim, total->account.limit, failure);
 }
 
-/* Both functions once all is checked. `total`: where the account and the counts are kept. */
+/* Both public functions once all is checked. `total`: where the account and the counters
+ * are kept. */
 static hs_status
 search_systems(hs_systems_crew *crew, hs_call *total, hs_failure *failure)
 {

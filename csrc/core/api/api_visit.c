@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* api_visit.c: pairs handed to a function as they are found, stored nowhere. See halfshell.h. */
+/* api_visit.c: pairs handed to a function as they are found, stored nowhere. */
 #include "request.h"
 
 #include "../base/outcome.h"
@@ -59,7 +59,7 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
     const int            stops = visit->pairs != NULL
                                      ? visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user)
                                      : call_each(visit, &pairs, part->ndim, &n_taken);
-    (void)hs_fpenv_enter(); /* whatever the function has done to it */
+    (void)hs_fpenv_enter(); /* the caller's function may have changed it */
     doing->n_visited += n_taken;
     scanner->work_since_poll += CALL_WORK * part->n_pairs;
     return stops != 0 ? HS_ENOUGH : HS_OK;
@@ -80,7 +80,7 @@ close_visitor(hs_search *search, visitor *doing)
     hs_output_free(&doing->part);
 }
 
-/* Everybody visits what they find. */
+/* Each thread visits the pairs that it finds. */
 static hs_status
 visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
 {
@@ -108,7 +108,7 @@ visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failu
     return status == HS_ENOUGH ? HS_OK : status;
 }
 
-/* What one search calls, and how many pairs it has handed over. */
+/* What a search calls, and how many pairs it has handed over. */
 typedef struct visiting {
     const hs_visit *visit;
     int64_t        *n_visited;
@@ -119,7 +119,7 @@ static hs_status
 visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
     const visiting *doing = context;
-    if (!doing->visit->thread_safe) { /* threads only make the search ready */
+    if (!doing->visit->thread_safe) { /* other threads only make the search ready */
         hs_call_dismiss(search->call);
     }
     const hs_status status = visit_all(search, doing->visit, n_pairs, failure);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* arguments.c: nothing is read before it is known to be there. See arguments.h. */
+/* arguments.c: counts and pointers first, then what they lead to: nothing is read before it is
+ * known to be there. */
 #include "arguments.h"
 
 #include <limits.h>
@@ -8,8 +9,8 @@
 #include "../base/poll.h"
 #include "../base/want.h"
 
-/* Bytes that no array reaches across: a little less than addresses do, for the sum that is compared
- * with it is rounded. */
+/* Most bytes from one end of an array to the other: a little less than addresses allow, because the
+ * sum that is compared with it is rounded. */
 #define MOST_EXTENT (0.99 * (double)PTRDIFF_MAX)
 
 static hs_status

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * arguments.h: checks of what a program of C may get wrong about the arguments of halfshell.h, so
- * that no memory is read or written out of bounds. Python checks its own before. Coordinates, boxes
- * and cutoffs are checked when the scene is made (scene.h). Any pointer may be NULL, except the
- * options and the failure that are given to a function hs_check_*.
+ * that no memory is read or written out of bounds. The binding checks Python's arguments before.
+ * Coordinates, boxes and cutoffs are checked when the scene is made (scene.h). Any pointer may be
+ * NULL, except the options and the failure that are given to a function hs_check_*.
  */
 #ifndef HS_ARGUMENTS_H
 #define HS_ARGUMENTS_H
@@ -21,7 +21,7 @@ hs_status hs_end_early(hs_status status, const hs_options *options, hs_failure *
  * unless NULL, is NULL afterwards. */
 bool hs_can_return(hs_pairs **result, const hs_options *options);
 
-/* The same for objects of other types, once their pointer, unless NULL, has been cleared. */
+/* hs_can_return for objects of other types, once their pointer, unless NULL, has been cleared. */
 bool hs_can_begin(const void *result, const hs_options *options);
 
 /* Whether an array is there that has one entry for each of these points, if there are any. */
@@ -36,12 +36,12 @@ hs_status hs_check_systems(const hs_systems *systems, int64_t n_points, hs_failu
 /* HS_OK or HS_ERR_ARGUMENT. The box may be NULL; ndim is that of the points. */
 hs_status hs_check_box(const hs_box *box, int ndim);
 
-/* Those of the options that every function heeds: threads and the limit of memory. */
+/* Checks the options that every function uses: threads and the memory limit. */
 hs_status hs_check_resources(const hs_options *options);
 
 hs_status hs_check_options(const hs_options *options);
 
-/* All of these but systems; the failure says whether it is of the queries, if there are any. */
+/* Checks all of the above but systems; failure->in_queries tells queries from points. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
                              const hs_options *options, hs_failure *failure);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* request.c: the way that all searches go. See request.h. */
+/* request.c: checks, opens, uses and closes, in this order for every search. */
 #include "request.h"
 
 #include "api_cells.h"
@@ -7,7 +7,8 @@
 #include "../search/estimate.h"
 #include "../search/search_open.h"
 
-/* What the caller is told when memory is short. Where no pairs are kept their number is not why. */
+/* Fills the failure when memory is short. Where no pairs are kept, their number is not the
+ * reason. */
 static void
 tell_shortage(const hs_request *request, const hs_search *search, hs_failure *failure)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* systems_thread.c: see systems_thread.h. */
+/* systems_thread.c: takes a range of systems, searches one after the other, commits their pairs in
+ * turn. */
 #include "systems_thread.h"
 
 #include "../search/estimate.h"
@@ -9,7 +10,7 @@
 
 #include <string.h>
 
-/* Candidates between two questions to the caller, and as how many the rest of a system counts. */
+/* Candidates between two polls, and as how many the rest of a system counts. */
 #define POLL_WORK   (INT64_C(1) << 21)
 #define SYSTEM_WORK 1024
 
@@ -21,7 +22,7 @@ hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points, hs_bo
     const int         d = crew->points->ndim;
     *points = *crew->points;
     points->n = systems->first[s + 1] - first;
-    if (points->n > 0) { /* otherwise there is no such row */
+    if (points->n > 0) { /* without points there is no first row */
         points->data = (const char *)points->data + first * points->row_stride;
     }
     if (systems->box == NULL || systems->rows == NULL) {
@@ -35,7 +36,8 @@ hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points, hs_bo
     return own_box;
 }
 
-/* Makes the scene of system s ready, its points numbered among all. */
+/* Makes the scene of system s ready; its points keep their numbers among the points of all
+ * systems. */
 static hs_status
 build_system(hs_systems_worker *worker, int64_t s)
 {
@@ -83,7 +85,7 @@ count_system(hs_systems_worker *worker, int64_t s)
     return status;
 }
 
-/* All pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
+/* Records all pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
 static hs_status
 record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, void *context)
 {
@@ -106,7 +108,7 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
     return status;
 }
 
-/* The pairs of the present system in ascending order. */
+/* Writes the pairs of the present system in ascending order. */
 static hs_status
 sort_system(hs_systems_worker *worker)
 {
@@ -187,7 +189,7 @@ search_range(void *context, int64_t range)
     if (!crew->is_direct) {
         return hs_commit(&worker->committer, done, true);
     }
-    if (first == 0 && done > 0.0) { /* most batches are much the same from end to end */
+    if (first == 0 && done > 0.0) { /* most batches have systems of similar size */
         hs_output_expect(crew->output, (double)crew->output->n_pairs / done);
     }
     return HS_OK;
@@ -210,7 +212,7 @@ hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options, hs_syst
     memset(worker, 0, sizeof *worker);
     worker->crew = crew;
     hs_call_begin(options, &worker->call);
-    worker->call.options = *options; /* their poll counts already, for the call as a whole */
+    worker->call.options = *options; /* their poll counts already, for the whole call */
     worker->failure = HS_NO_FAILURE;
     if (crew->systems->box != NULL) {
         worker->box = *crew->systems->box;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* base.h: compiler macros, and arithmetic that C libraries make a call, for every file of the
- * core. */
+/* base.h: compiler macros, and small arithmetic that must not become a library call. Every file of
+ * the core includes it. */
 #ifndef HS_BASE_H
 #define HS_BASE_H
 
@@ -10,10 +10,10 @@
 #include <string.h>
 
 /*
- * Results must not depend on the compiler's mood: no sum in another order, no fused multiply-add
- * unless it is written. Whatever the flags, the code is right, is refused here, or is refused when
- * it runs (hs_rounds_products). gcc fuses in its GNU modes unless told otherwise; it knows no
- * FP_CONTRACT, and says by __GCC_IEC_559 that it was told to fuse in a strict one.
+ * Results must not depend on the compiler: sums keep their order, and no multiply-add is fused
+ * unless it is written so. Whatever the flags, the code is right, is refused here, or is refused
+ * when it runs (hs_rounds_products). gcc fuses in its GNU modes unless a flag forbids it; it
+ * ignores FP_CONTRACT, and __GCC_IEC_559 tells whether a flag allows fusing in a strict mode.
  */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
     (defined(__GCC_IEC_559) && __GCC_IEC_559 == 0) || defined(_M_FP_FAST)
@@ -59,8 +59,7 @@ __extension__ typedef __int128          hs_int128;
 __extension__ typedef unsigned __int128 hs_uint128;
 #endif
 
-/* The sanitizers of addresses and of memory watch malloc: under them, memory comes from nowhere
- * else. */
+/* AddressSanitizer and MemorySanitizer watch malloc: under them, all memory comes from malloc. */
 #if defined(__SANITIZE_ADDRESS__)
 #define HS_WATCHED_MALLOC 1
 #elif defined(__has_feature)
@@ -72,8 +71,7 @@ __extension__ typedef unsigned __int128 hs_uint128;
 #define HS_WATCHED_MALLOC 0
 #endif
 
-/* As fmax and fmin, which most C libraries make a call, where `b` is no NaN: an `a` that is one is
- * passed over. */
+/* fmax and fmin without a library call. `b` must not be NaN; where `a` is, the result is `b`. */
 HS_ALWAYS_INLINE double
 hs_larger(double a, double b)
 {

@@ -12,7 +12,7 @@
 #define WIN32_LEAN_AND_MEAN
 #include <process.h>
 #include <windows.h>
-/* windows.h defines these words of ours, as nothing. */
+/* windows.h defines these names as empty macros. */
 #undef near
 #undef far
 
@@ -53,7 +53,7 @@ hs_thread_join(hs_thread thread)
 #define hs_thread_self() GetCurrentThreadId()
 #define hs_thread_is(id) (GetCurrentThreadId() == (id))
 
-/* There are no signals to block. */
+/* Windows has no signals to block. */
 typedef int hs_signals;
 #define hs_signals_block(saved)   ((void)(*(saved) = 0))
 #define hs_signals_restore(saved) ((void)(saved))
@@ -109,7 +109,7 @@ hs_condition_wait_briefly(hs_condition *condition, hs_mutex *mutex)
     (void)pthread_cond_timedwait(condition, mutex, &until);
 }
 
-/* Threads inherit what their maker blocks: every signal goes to a thread of the caller's. */
+/* New threads inherit the blocked signals: each signal then goes to a thread of the caller. */
 typedef sigset_t hs_signals;
 
 HS_ALWAYS_INLINE void

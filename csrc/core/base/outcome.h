@@ -11,7 +11,7 @@
 /* What was kept (cells, a tree, a list) does not serve: it is to be made anew. */
 #define HS_UNSERVED ((hs_status)(HS_STATUS_END + 1))
 
-/* More than this way is made for: another one is to be taken. */
+/* There is more than this method is made for: the caller takes another one. */
 #define HS_TOO_MUCH ((hs_status)(HS_STATUS_END + 2))
 
 /* The work ended here because something else did: a visitor left, or another thread has failed. */

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* poll.h: what a search and its caller say to each other: whether to go on, and what was wrong. */
+/* poll.h: asking the caller whether to go on, and the failure that the caller gets. */
 #ifndef HS_POLL_H
 #define HS_POLL_H
 
 #include "../../halfshell.h"
 #include "base.h"
 
-/* Points that loading, wrapping and sorting handle between two questions: some milliseconds. */
+/* Points that loading, wrapping and sorting handle between two polls: some milliseconds. */
 #define HS_POLL_POINTS (INT64_C(1) << 17)
 
-/* Candidates of one neighbourhood that a pass handles between two questions: some milliseconds. */
+/* Candidates of one neighbourhood that a pass handles between two polls: some milliseconds. */
 #define HS_POLL_CANDIDATES (1 << 18)
 
-/* Nothing in it applies yet. */
+/* A failure without details. */
 #define HS_NO_FAILURE ((hs_failure){.row = -1, .column = -1, .system = -1})
 
 /* HS_OK, or HS_ERR_INTERRUPTED when the caller wants to stop. */

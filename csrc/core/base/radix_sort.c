@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * radix_sort.c: see radix_sort.h. A radix sort from the top: each range looks for the highest bit
- * in which its keys differ and distributes by the eight bits from there, so that clusters far apart
- * cost one pass and not one for every digit of the distance.
+ * radix_sort.c: sorts from the highest digit down. Each range looks for the highest bit in which
+ * its keys differ and distributes by the eight bits from there, so that clusters far apart cost one
+ * pass and not one for every digit of the distance.
  */
 #include "radix_sort.h"
 
@@ -70,7 +70,7 @@ distribute(hs_keys *sort, int64_t first, int64_t n, int shift, int32_t *end)
     }
     for (int b = 0; b < BUCKETS; b++) {
         const int32_t count = end[b];
-        end[b] = sum; /* where the bucket begins: runs ahead to its end */
+        end[b] = sum; /* where the bucket begins; counts up to its end */
         sum += count;
     }
     for (int64_t e = 0; e < n; e++) {

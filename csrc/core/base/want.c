@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* want.c: a row for each quantity; see want.h. */
+/* want.c: a table with one entry for each quantity. */
 #include "want.h"
 
 /* Bytes of one pair: a fixed number of entries, or one for each axis. */

@@ -16,7 +16,7 @@
 /* Bytes of one pair in the column of this HS_WANT_ bit. index_bytes: 4 or 8, of i and j. */
 size_t hs_want_width(unsigned bit, int ndim, int index_bytes);
 
-/* The same, of all columns of a union of bits. */
+/* Bytes of one pair in the columns of all bits of `want`. */
 int64_t hs_want_bytes(unsigned want, int ndim, int index_bytes);
 
 /* The number of a bit, from 0 on; HS_QUANTITIES for what is not one bit of them. */

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* box_skew.c: see box_skew.h. */
+/* box_skew.c: tests of the reduced basis: how flat it is, and how large its coefficients are. */
 #include "box_skew.h"
 
 #include <math.h>
 
 /* Least height of a reduced basis in its row, with much room: 8 rows may have 2^-4. */
 #define LEAST_HEIGHT 0x1p-20
-/* No S of int32 holds as many. */
+/* More than an int32 component of S holds. */
 #define MOST_OF_A_ROW 0x1p32
 
 bool

@@ -5,8 +5,8 @@
 
 #include "lattice.h"
 
-/* Whether reduction has failed: rows of B nearly depend on each other, or take more of the rows as
- * given than a shift may have. */
+/* Whether reduction has failed: rows of B nearly depend on each other, or have coefficients over
+ * the given box vectors that no shift may have. */
 bool hs_skew_is_left(const hs_lattice *lattice);
 
 /* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * lattice.c: see lattice.h.
+ * lattice.c: a short basis of the box vectors, and a unit normal for each grid axis.
  *
  * Normals and heights need not be accurate, only consistent: whatever unit vector `normal[k]`
  * is, |normal[k] . D| <= |D| holds, and grid.c measures how far a lattice vector moves a grid
@@ -140,7 +140,7 @@ start_volume(hs_lattice *lattice)
     lattice->volume_exponent = 0;
 }
 
-/* By length * 2^exponent. */
+/* Multiplies the volume by length * 2^exponent. */
 static void
 multiply_volume(hs_lattice *lattice, double length, int exponent)
 {
@@ -156,7 +156,7 @@ hs_lattice_volume(const hs_lattice *lattice, int exponent)
     return power == 0 ? lattice->volume_mantissa : ldexp(lattice->volume_mantissa, power);
 }
 
-/* The unit vector that meets row r of B only. */
+/* The unit vector that is orthogonal to all rows of B but row r. */
 static void
 set_periodic_normal(hs_lattice *lattice, int r, double *normal)
 {
@@ -174,8 +174,8 @@ set_periodic_normal(hs_lattice *lattice, int r, double *normal)
     orthonormalise(ndim, n_basis, basis, normal);
 }
 
-/* Orthonormal vectors that no row of B meets, one for each open grid axis: of all coordinate
- * axes the one that is least covered so far. */
+/* Orthonormal vectors that are orthogonal to all rows of B, one for each open grid axis. Each
+ * starts from the coordinate axis that the vectors so far cover least. */
 static void
 set_open_normals(hs_lattice *lattice)
 {
@@ -258,7 +258,7 @@ set_aligned_axes(hs_lattice *lattice, const int *column)
     }
 }
 
-/* The given rows, scaled; B starts as these. The axes are open yet. */
+/* The given box vectors, scaled; B starts as these. All axes are open as yet. */
 static void
 take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
 {
@@ -282,8 +282,8 @@ take_rows(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice)
     }
 }
 
-/* Replaces B by a short basis. Returns whether it is axis-aligned then, as a box sheared by
- * whole widths is. */
+/* Replaces B by a short basis. Returns whether it is then axis-aligned, as it is for a box sheared
+ * by whole widths. */
 static bool
 reduce_rows(hs_lattice *lattice, int *column)
 {
@@ -315,8 +315,8 @@ hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice
 }
 
 /*
- * The vector that meets given row l with product 1 and the other rows not at all: a combination of
- * the same vectors of the short basis, which are known well however skewed the box is. Scaled by
+ * The vector whose product with given box vector l is 1, and 0 with the others: a combination of
+ * the dual vectors of the short basis, which are accurate however skewed the box is. Scaled by
  * 2^*exponent to have an ordinary size. False where a height of the short basis has vanished.
  */
 static bool

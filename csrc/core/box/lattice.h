@@ -33,17 +33,18 @@ typedef struct hs_lattice {
     int     ndim;
     int     n_periodic;
     bool    aligned;                        /* B is diagonal: t_k is coordinate k itself */
-    bool    reduced;                        /* B is not the given rows (up to sign) */
+    bool    reduced;                        /* B is not the given box vectors (up to sign) */
     int     vector_of_row[HS_MAX_DIM];      /* box vector that periodic row r is */
     int     row_of_axis[HS_MAX_DIM];        /* row of B along grid axis k, or -1: open */
-    double  given[HS_MAX_DIM][HS_MAX_DIM];  /* periodic rows as given, not scaled */
-    double  scaled[HS_MAX_DIM][HS_MAX_DIM]; /* the same, scaled */
+    double  given[HS_MAX_DIM][HS_MAX_DIM];  /* periodic box vectors as given, not scaled */
+    double  scaled[HS_MAX_DIM][HS_MAX_DIM]; /* `given`, scaled */
     int64_t U[HS_MAX_DIM][HS_MAX_DIM];      /* B = U * scaled */
     double  rows[HS_MAX_DIM][HS_MAX_DIM];   /* B, scaled, rounded to float64 ... */
     double  row_error[HS_MAX_DIM];          /* ... each entry within this; 0 when aligned */
     double  normal[HS_MAX_DIM][HS_MAX_DIM]; /* unit vectors */
     double  period[HS_MAX_DIM];             /* normal[k] . B along k: the height; 0 when open */
-    double  volume_mantissa;                /* the volume of the periodic rows, scaled, ... */
+    double  volume_mantissa;                /* the volume of the periodic box vectors, scaled,
+                                             * ... */
     int     volume_exponent; /* ... is mantissa * 2^exponent: products of lengths overflow */
     double  direction[HS_MAX_DIM][HS_MAX_DIM]; /* D = sum_k (normal[k] . D) direction[k] */
 } hs_lattice;
@@ -62,21 +63,22 @@ hs_lattice_coordinate(const hs_lattice *lattice, const double *x, int k)
     return t;
 }
 
-/* Periodic entries finite and periodic rows independent, decided exactly. NULL box: HS_OK. */
+/* Periodic entries finite and periodic box vectors independent, decided exactly. NULL box:
+ * HS_OK. */
 hs_status hs_box_check(const hs_box *box, hs_failure *failure);
 
 /* The lattice in a short basis, for searching. box: checked, or NULL for open space in ndim
  * dimensions. */
 void hs_lattice_init(const hs_box *box, int ndim, hs_scale scale, hs_lattice *lattice);
 
-/* The lattice in the box vectors as given, for measuring and wrapping: B is the scaled rows, axis k
- * is box vector k. Only rows, normals, periods and the volume are set. */
+/* The lattice in the box vectors as given, for measuring and wrapping: B is `scaled`, axis k is box
+ * vector k. Only rows, normals, periods and the volume are set. */
 void hs_lattice_init_given(const hs_box *box, hs_scale scale, hs_lattice *lattice);
 
-/* Volume of the periodic rows, each length times 2^exponent; 1 without rows. */
+/* Volume of the periodic box vectors, each length times 2^exponent; 1 without any. */
 double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 
-/* S over the periodic rows as given, from a shift over B; false when it passes 2^62. */
+/* S over the periodic box vectors as given, from a shift over B; false when it passes 2^62. */
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
 
 #endif

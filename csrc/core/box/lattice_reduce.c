@@ -28,7 +28,7 @@
 /* What a step must gain to count: far above rounding, so that ties are left alone. */
 #define NOTABLY_LESS (1.0 - 0x1p-40)
 
-/* Bounds on work, several times what any box was seen to need that ends by itself. */
+/* Bounds on work: several times what boxes needed where the reduction ended by itself. */
 enum { MAX_STEPS = 2000, MAX_SWEEPS = 16, MAX_REFUSED = 100, MAX_PASSES = 8 };
 
 /* x * 2^exponent, where the largest |x[k]| is in [0.5, 1): squares neither overflow nor vanish. */
@@ -321,7 +321,7 @@ descend(basis *b)
     }
 }
 
-/* By the product of the lengths, which bounds how flat the basis is. */
+/* Compares the products of the lengths, which bound how flat a basis is. */
 static bool
 is_shorter(const basis *a, const basis *b)
 {

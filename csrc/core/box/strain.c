@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * strain.c: see strain.h. Sums of non-negative numbers are rounded up by a factor GROW at the end:
- * no sum here has more than 200 operations, each of a relative error of at most 2^-53.
+ * strain.c: a first guess of F, then bounds on how wrong it is. Sums of non-negative numbers are
+ * rounded up by a factor GROW at the end: no sum here has more than 200 operations, each of a
+ * relative error of at most 2^-53.
  */
 #include "strain.h"
 

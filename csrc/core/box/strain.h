@@ -8,10 +8,8 @@
 
 #include "../../halfshell.h"
 
-/*
- * F, any matrix near the one that takes the old box vectors h0 to the new ones h. That it is not
- * quite that one is paid for by `residual`; nothing depends on how well it was found.
- */
+/* F, any matrix near the one that takes the old box vectors h0 to the new ones h. `residual` pays
+ * for the difference between the two; no bound depends on how well F was found. */
 typedef struct hs_strain {
     double F[HS_MAX_DIM][HS_MAX_DIM]; /* a row vector x goes to x F */
     double column_sum;                /* at least the largest sum over |F| of a column */

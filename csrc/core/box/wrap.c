@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* wrap.c: see wrap.h. */
+/* wrap.c: one point in any box, and columns of points along coordinate axes. Remainders are exact
+ * or computed by compensated sums. */
 #include "wrap.h"
 
 #include <math.h>
@@ -76,7 +77,7 @@ subtract_product(double factor, double entry, double *sum, double *low, double *
     *absolute += fabs(product.hi);
 }
 
-/* X = r - sum_l given_turns[l] * scaled row l. Turns of more than 52 bits are split into two
+/* X = r - sum_l given_turns[l] * scaled box vector l. Turns of more than 52 bits are split into two
  * doubles. */
 static void
 subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_turns,
@@ -146,11 +147,11 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
 }
 
 /*
- * See fold.h. Along coordinate axes.
+ * Columns of points along coordinate axes, hs_fold_axis.
  *
- * Why the bits are those of wrap.c: for |x| <= 1.25 L the rounded quotient x / L rounds to 0
+ * Why the bits are those of hs_wrap_axis: for |x| <= 1.25 L the rounded quotient x / L rounds to 0
  * exactly where |x| <= L/2 (the next double beyond L/2 is more than half a unit in the last place
- * of 0.5 too large), and to +-1 beyond; x - n L is the expression of wrap.c.
+ * of 0.5 too large), and to +-1 beyond; x - n L is the expression there.
  */
 
 #define TILE  256 /* points at a time: they stay in the nearest cache */
@@ -203,8 +204,8 @@ hs_fold_largest(const double *x, int64_t n, double largest)
     return largest;
 }
 
-/* At most one turn each way. Written so that compilers make vectors of it: 1 and 0 for true and
- * false, and n * length instead of a choice. */
+/* At most one turn each way. Written so that compilers vectorise it: 1 and 0 for true and false,
+ * and n * length instead of a branch. */
 static void
 fold_once(double *HS_RESTRICT x, int64_t n, double length)
 {
@@ -276,7 +277,7 @@ hs_fold_turns(const hs_lattice *lattice, double largest)
     return fmax(most, given);
 }
 
-/* The first three terms at once: the rest are for more dimensions than most scenes have. */
+/* The first three terms at once: most scenes have no more dimensions. */
 void
 hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, int64_t n,
                     double *HS_RESTRICT t)

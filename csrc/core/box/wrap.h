@@ -26,17 +26,15 @@ double hs_wrap_axis(double x, double length, int64_t *turns);
 bool hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_t *turns,
                    double *magnitude);
 
-/*
- * X = r - turns * B, rounded, for turns over B; without turns r itself. Returns false when a turn
- * over the given rows passes 2^62. *magnitude as above.
- */
+/* X = r - turns * B, rounded, for turns over B; without turns r itself. Returns false when a turn
+ * over the given box vectors passes 2^62. *magnitude as in hs_wrap_point. */
 bool hs_wrap_by(const hs_lattice *lattice, const double *r, const int64_t *turns, double *inside,
                 double *magnitude);
 
 /*
- * Wrapping many points at once, to the same bits as wrap.h does one by one. Points are
- * columns here. The quick ways are for points that lie within a few periods of the box, which is
- * all of them nearly always.
+ * Wrapping many points at once, to the bits that hs_wrap_axis and hs_wrap_point give one by one.
+ * Points are columns here. The quick ways are for points that lie within a few periods of the box,
+ * which is all of them nearly always.
  */
 
 /* By how many box vectors each point was wrapped. */
@@ -67,11 +65,11 @@ typedef struct hs_folded {
     double  x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
     double  lower[HS_MAX_DIM];     /* range of t_k of X; not set in aligned lattices */
     double  upper[HS_MAX_DIM];
-    double  magnitude; /* as hs_wrap_point says */
+    double  magnitude; /* the largest sum of absolute terms of any point */
     int64_t failed;    /* lowest point that could not be wrapped, or -1 */
 } hs_folded;
 
-/* Nothing yet. */
+/* The result of wrapping no point. */
 hs_folded hs_folded_none(void);
 
 /* Joins `more` to *folded. */
@@ -87,8 +85,8 @@ void hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, in
 
 /*
  * In any lattice: points [first, last) of the columns r go wrapped to the columns x, which may be
- * the same. few_turns: hs_fold_turns() says that no point is more than HS_FOLD_TURNS away; or else
- * it is looked at.
+ * r. few_turns: hs_fold_turns() says that no point is more than HS_FOLD_TURNS away; if false, each
+ * point is tested.
  */
 void hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
                     int64_t last, double *const *x, const hs_turns *turns, hs_folded *folded);
@@ -96,12 +94,12 @@ void hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r,
 /* Largest |x|, or `largest` if that is larger. */
 double hs_fold_largest(const double *x, int64_t n, double largest);
 
-/* t_k of n points, summed in the order of hs_lattice_coordinate: to the same bits. */
+/* t_k of n points, with the bits of hs_lattice_coordinate: summed in its order. */
 void hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, int64_t n,
                          double *t);
 
 /* At least the turns over any row of B that a point with all |x| <= largest needs, and the turns
- * over the rows as given that these make. */
+ * over the given box vectors that these make. */
 double hs_fold_turns(const hs_lattice *lattice, double largest);
 
 #define HS_FOLD_TURNS 0x1p20

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * wrap_skewed.c: see fold.h. In any box.
+ * wrap_skewed.c: columns of points into a box of any shape, hs_fold_points. A tile of points at a
+ * time, without branches.
  *
- * Why the bits are those of wrap.c: the steps are those of hs_wrap_point's first pass. With so few
- * turns the products by the leading part of the turns vanish, and the splitting of the turns is
- * trivial; a vanishing product changes nothing but the sign of a zero, which adding `low`, never
- * -0, takes away again. A tile with a point that may need a second pass goes through hs_wrap_point.
+ * Why the bits are those of hs_wrap_point: the steps are those of its first pass. With so few turns
+ * the products by the leading part of the turns vanish, and the splitting of the turns is trivial;
+ * a vanishing product changes nothing but the sign of a zero, which adding `low`, never -0, takes
+ * away again. A tile with a point that may need a second pass goes through hs_wrap_point.
  */
 #include "../exact/doubleword.h"
 #include "wrap.h"
@@ -22,7 +23,7 @@
 typedef struct tile {
     int    n;
     double inside[HS_MAX_DIM][TILE];
-    double given[HS_MAX_DIM][TILE];  /* turns over the rows as given, as doubles */
+    double given[HS_MAX_DIM][TILE];  /* turns over the given box vectors, as doubles */
     double turned[HS_MAX_DIM][TILE]; /* turns over B */
     double moved[TILE];              /* 0 where no turn is needed */
     double t[TILE], sum[TILE], low[TILE], absolute[TILE];
@@ -62,7 +63,7 @@ count_turns(const hs_lattice *lattice, const double *const *x, tile *work)
     }
 }
 
-/* A row as given with a component along the axis that is worked on, and the turns over it. */
+/* A given box vector with a component along the present axis, and the turns over it. */
 typedef struct term {
     const double *turns;
     double        entry;
@@ -70,7 +71,7 @@ typedef struct term {
                                         * than 2^26 turns are exact */
 } term;
 
-/* At most this many rows at a time; more need a second loop. */
+/* At most this many terms at a time; more need a second loop. */
 #define TERMS 3
 
 static int
@@ -88,7 +89,7 @@ list_terms(const hs_lattice *lattice, int k, const tile *work, term *terms)
     return n_terms;
 }
 
-/* sum + low -= turns * entry for each of n_terms terms, as subtract_product of wrap.c does it.
+/* sum + low -= turns * entry for each of n_terms terms, by the steps of subtract_product (wrap.c).
  * Inlined with constant n_terms. */
 HS_ALWAYS_INLINE void
 subtract_terms(const term *terms, int n_terms, tile *work)
@@ -185,7 +186,7 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_folded *folded)
     return beyond;
 }
 
-/* Wraps every point by wrap.h. Returns the first point that fails, or -1. */
+/* Wraps every point by hs_wrap_point. Returns the first point that fails, or -1. */
 static int
 fold_one_by_one(const hs_lattice *lattice, const double *const *x, const hs_turns *turns,
                 int64_t begin, tile *work, hs_folded *folded)
@@ -237,7 +238,7 @@ turns_are_few(const tile *work, double most)
     return many == 0;
 }
 
-/* Turns over B that make at most HS_FOLD_TURNS over any row as given. */
+/* Turns over B that make at most HS_FOLD_TURNS over any given box vector. */
 static double
 most_turns(const hs_lattice *lattice)
 {

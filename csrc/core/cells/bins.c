@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * bins.c: a stable counting sort, O(n + cells). See bins.h.
+ * bins.c: a stable counting sort, O(n + cells).
  *
- * The point numbers are sorted first, then the columns are gathered in their order (bin_columns.h).
- * While the numbers are sorted the spare column holds the cell of every point.
+ * The point numbers are sorted first, then the columns are gathered in their order
+ * (hs_columns_gather). While the numbers are sorted the spare column holds the cell of every point.
  *
  * With a team the points are cut into strips, each with counts of its own. Cell after cell, the
  * strips' points follow each other in the order of the strips, which is that of the points: the
- * result is the same for any number of strips.
+ * result does not depend on the number of strips.
  */
 #include "bins.h"
 
@@ -16,7 +16,7 @@
 #include "../../kernels/kernel.h"
 #include "../threads/passes.h"
 
-/* Points whose cells are found together: their coordinates stay in the nearest cache. */
+/* Points whose cells are found together: their coordinates stay in the first-level cache. */
 #define TILE 512
 /* Points for which a strip of its own pays. */
 #define STRIP_POINTS 16384
@@ -32,8 +32,8 @@ typedef struct sorting {
                                           * its next point there */
 } sorting;
 
-/* id += the part of the cell id that axis k gives, as hs_grid_index finds it. Cell ids and strides
- * are below 2^32, indices below 2^31. */
+/* id += the part of the cell id that axis k gives, by the steps of hs_grid_index. Cell ids and
+ * strides are below 2^32, indices below 2^31. */
 static void
 add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
           uint32_t *HS_RESTRICT id)
@@ -95,7 +95,7 @@ count_strip(void *context, int strip, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* From numbers of points to places: cell by cell, and in each cell strip by strip. */
+/* Turns numbers of points into places: cell by cell, and in each cell strip by strip. */
 static void
 accumulate(const sorting *sort)
 {
@@ -156,7 +156,7 @@ sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sort
         accumulate(sort);
         status = hs_walk_strips(team, options, n, sort->n_strips, order_strip, sort);
     }
-    /* The last strip's place in a cell has run ahead to where the next cell starts. */
+    /* The last strip's place in a cell has moved up to where the next cell starts. */
     memmove(start + 1, sort->counts[sort->n_strips - 1], (size_t)n_cells * sizeof *start);
     start[0] = 0;
     hs_free(account, others);

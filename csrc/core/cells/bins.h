@@ -14,7 +14,7 @@ typedef struct hs_bins {
     int      ndim;
     int      n_periodic;
     double  *x[HS_MAX_DIM]; /* X of each axis, n each; HS_PADDING more can be read */
-    int32_t *order;         /* a permutation of 0 ... n - 1; the same */
+    int32_t *order;         /* a permutation of 0 ... n - 1; HS_PADDING more can be read */
     int32_t *start;         /* owned; n_cells + 1, nondecreasing, last is n */
     bool     keeps_originals;
     double  *originals[HS_MAX_DIM]; /* the points as given, n each, if they are kept */
@@ -30,12 +30,12 @@ typedef struct hs_bins {
 hs_status hs_bins_build(hs_account *account, hs_team *team, const hs_options *options,
                         hs_scene *scene, const hs_grid *grid, hs_bins *bins);
 
-/* The parts of that, for other orders: the scene's arrays become those of the bins, in the caller's
- * order as yet, and without `start`; the scene's spare column stays usable. */
+/* Steps of hs_bins_build, for other orders: the scene's arrays become those of the bins, in the
+ * caller's order as yet, and without `start`; the scene's spare column stays usable. */
 void hs_bins_take(hs_scene *scene, hs_bins *bins);
 
-/* Then, with bins->order filled: all columns into that order. Overwrites the spare column. HS_OK or
- * HS_ERR_INTERRUPTED. */
+/* Then, with bins->order filled: moves all columns into that order. Overwrites the spare column.
+ * HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                           const hs_scene *scene, hs_bins *bins);
 
@@ -52,8 +52,9 @@ void hs_bins_free(hs_account *account, hs_bins *bins);
 
 /*
  * Columns of x, originals and turns, as bins->order says, in the order in which they lie behind the
- * free column: the wide ones go before the narrow ones. x_is_beside: as in hs_scene. *end: where
- * the last column ends that is still needed. HS_OK or HS_ERR_INTERRUPTED.
+ * free column: the wide ones go before the narrow ones. x_is_beside: the originals lie behind the
+ * free column, X lies apart. *end: where the last column ends that is still needed. HS_OK or
+ * HS_ERR_INTERRUPTED.
  */
 hs_status hs_columns_gather(hs_team *team, const hs_options *options, bool x_is_beside,
                             hs_bins *bins, void *free_column, char **end);

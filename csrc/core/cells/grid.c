@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * grid.c: see grid.h.
+ * grid.c: how far apart the coordinates of a pair can be, then as many cells as make a search
+ * cheapest.
  *
  * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
  * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole
@@ -16,7 +17,7 @@
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK
 #define MOST_CELLS_PER_AXIS HS_GRID_CELLS_PER_AXIS
-/* In all: cell ids are uint32. */
+/* Cells of a grid: their ids are uint32. */
 #define MOST_CELLS 4294967295.0
 /* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
  * more; walks put cells together where these are fewer. */
@@ -25,10 +26,11 @@
  * nothing to put together along them. */
 #define FEW_CELLS      4.0
 #define POINTS_PER_ROW 8.0
-/* Of sorting a point into its cell, in candidates. */
+/* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
 
-/* Largest number of images per row of B that a pair can be apart; `drift` as below. */
+/* Sets the largest number of images per row of B that a pair can be apart; drift: of
+ * measure_drift. */
 static void
 bound_images(const hs_scene *scene, const double *drift, double *images)
 {
@@ -69,7 +71,8 @@ measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
     }
 }
 
-/* The same for as many images as a pair can be apart, which in turn depend on it. */
+/* Bounds the drift over as many images as a pair can be apart, a number that depends on the
+ * drift. */
 static void
 bound_drift(const hs_scene *scene, double *images, double *drift)
 {
@@ -196,7 +199,7 @@ hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
     grid->by_faces[k] = false;
     grid->lower[k] = scene->lower[k];
     grid->cell_size[k] = extent / count;
-    /* One cell needs no place in it, and a subnormal extent no infinite scale. */
+    /* One cell needs no scale; that of a subnormal extent would be infinite. */
     grid->cells_per_length[k] = count > 1.0 || !open ? count / extent : 0.0;
     const double cells =
         grid->range[k] * grid->cells_per_length[k] * (1.0 + SLACK) + 0x1p-50 * count;
@@ -245,7 +248,7 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
-/* One cell, or a grid of cells where that is cheaper. */
+/* Chooses one cell, or a grid of cells where that is cheaper. */
 static hs_status
 choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid)
 {
@@ -299,8 +302,8 @@ is_blurred(const hs_scene *scene, const double *drift)
     return false;
 }
 
-/* How far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more images
- * than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
+/* Sets how far apart the computed coordinates of a pair can be. HS_ERR_MEMORY when they pass more
+ * images than can be counted, HS_ERR_BOX_SKEWED when it is rounding that does. */
 static hs_status
 set_ranges(const hs_scene *scene, hs_grid *grid)
 {
@@ -320,7 +323,7 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
     return HS_OK;
 }
 
-/* There would be more pairs than any memory holds. */
+/* Fills the failure where there would be more pairs than any memory holds. */
 static void
 tell_endless(hs_failure *failure)
 {
@@ -330,7 +333,7 @@ tell_endless(hs_failure *failure)
 hs_status
 hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure)
 {
-    /* Of the periodic part, times the open extents. */
+    /* Volume of the periodic axes, times the open extents. */
     double volume = hs_lattice_volume(&scene->lattice, 0);
     *grid = (hs_grid){.ndim = scene->ndim};
     hs_status status = set_ranges(scene, grid);

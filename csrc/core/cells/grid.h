@@ -19,9 +19,9 @@ typedef struct hs_grid {
     double  cells_per_length[HS_MAX_DIM];
     bool    by_faces[HS_MAX_DIM]; /* cells begin at the numbers hs_grid_face() gives, exactly */
     double  range[HS_MAX_DIM];    /* largest |difference of computed t_k| of a pair */
-    int64_t reach[HS_MAX_DIM];    /* the same in cells, images counted on */
+    int64_t reach[HS_MAX_DIM];    /* `range` in cells, counted on through images */
     double  shift_error;          /* bound on the error of a shifted coordinate minus a centre */
-    double  expected_pairs;       /* if the points were spread evenly over the region they occupy */
+    double  expected_pairs;       /* if the points were spread evenly over the space they occupy */
 } hs_grid;
 
 #define HS_GRID_SPARE_CELLS 64
@@ -34,35 +34,33 @@ hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure
 
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where
- * there would be too many of them, or too many around each. HS_TOO_MUCH where there can be none.
+ * there would be too many of them, or too many around each. HS_TOO_MUCH where no grid will do. In
  * grid_width.c.
  */
 hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, bool *is_wider,
                             hs_failure *failure);
 
-/* Steps of both. Ranges, errors and expected pairs, no cells yet; *density: points in a unit of the
- * volume that they are in. */
+/* Steps of hs_grid_init and hs_grid_init_wide. Ranges, errors and expected pairs, no cells yet;
+ * *density: points in a unit of the volume that they are in. */
 hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
 
 /* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
  * whether it had to. */
 bool hs_grid_cap_counts(const hs_scene *scene, double *counts);
 
-/* So many cells along each axis. HS_ERR_MEMORY as hs_grid_set_axis. */
+/* So many cells along each axis. HS_ERR_MEMORY when a reach passes its integers. */
 hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid);
 
 /* `count` cells of equal width along axis k: sets all but the stride, from the scene's range there
  * and grid->range. HS_ERR_MEMORY when the reach passes its integers. */
 hs_status hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid);
 
-/*
- * Tries one cell more along each axis, each a whole part of the radius wide (one of parts[k]) and
- * no wider. Not for scenes that others ask: the points alone are looked at. grid_faces.c.
- */
+/* Tries one cell more along each axis, each a whole part of the radius wide (one of parts[k]) and
+ * no wider. Not for scenes with queries: only the points are looked at. In grid_faces.c. */
 void hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_grid *grid);
 
-/* The same cells, not cut by faces, for a scene whose cutoff was `cutoff_before` and is smaller
- * now. Fails as above. */
+/* The cells of `grid`, not cut by faces, for a scene whose cutoff was `cutoff_before` and is
+ * smaller now. HS_ERR_MEMORY, HS_ERR_BOX_SKEWED for the reasons of hs_grid_init. */
 hs_status hs_grid_narrow(const hs_scene *scene, bool is_sparse, double cutoff_before,
                          hs_grid *grid);
 

@@ -3,7 +3,7 @@
  * grid_faces.c: boxes are often whole multiples of the cutoff. There is no room for rounding then,
  * so points are told apart by the faces between cells, which are numbers: two points with `part`
  * whole cells between their cells are more than the radius apart, also across a periodic face
- * unless one lies on it. See grid.h.
+ * unless one lies on it.
  */
 #include "grid.h"
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * grid_width.c: cells as wide as somebody wants them. Any cells find all pairs, for their reach
- * follows from their width (grid.c): only layout and speed are the caller's.
- */
+/* grid_width.c: cells of a width that the caller chooses. Any cells find all pairs, for their reach
+ * follows from their width (grid.c): only layout and speed are the caller's. */
 #include "stencil.h"
 
 #include "../base/outcome.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * sparse_grid.c: see sparse_grid.h.
+ * sparse_grid.c: cells whose number has no limit, and whether they are worth it.
  *
  * Why the reach holds at any distance. A place is (t - lower) c with c cells per length: two
  * roundings, so it is within 2^-52 of itself (and 2^-106), and it is a monotone function of t. The
@@ -24,7 +24,8 @@
 
 /* More than the 1e-5 cells by which stencil.c widens windows, so that these end at the reach. */
 #define LEAST_MARGIN 0x1p-16
-/* Of a place: 2^-51 for the roundings of two, times 4/3 for e <= 1/4 in 1 / (1 - e), rounded up. */
+/* Relative error of a place: 2^-51 for two roundings, times 4/3 for e <= 1/4 in 1 / (1 - e),
+ * rounded up. */
 #define PLACE_ERROR 0x1p-50
 /* No place passes 2^1000, also where the range is 0. */
 #define SMALLEST_PITCH 0x1p-1000
@@ -130,7 +131,7 @@ mean_company(const hs_scene *scene, const hs_grid *grid, bool sparse)
     const int64_t samples = (int64_t)fmin(wanted, (double)scene->n), stride = scene->n / samples;
     double        shared = 0.0;
     for (int64_t s = 0; s < samples; s++) {
-        /* One point of each stretch, not always at the same place in it: inputs have patterns. */
+        /* One point of each range, not always at the same place in it: inputs have patterns. */
         const int64_t i = s * stride + (int64_t)(mix((uint64_t)s) % (uint64_t)stride);
         names[s] = 0;
         for (int k = 0; k < scene->ndim; k++) {

@@ -16,8 +16,8 @@
 #define HS_SPARSE_LINEAR 0x1p49
 
 /*
- * The grid of the same scene with rows `width` ranges wide (a power of two from 1 on) and cells of
- * width / HS_SPARSE_SPLIT along the first axis, however many these are; range, shift_error and
+ * The grid of a scene with rows of cells `width` ranges wide (a power of two from 1 on) and cells
+ * of width / HS_SPARSE_SPLIT along the first axis, however many these are; range, shift_error and
  * expected_pairs are those of `dense`. stride is 0, and n_cells is 0 until hs_sparse_build has
  * counted the occupied cells.
  */
@@ -51,8 +51,8 @@ hs_sparse_index(const hs_grid *grid, int k, double t)
 }
 
 /*
- * Whether storing occupied cells only is quicker than the grid `dense`: 0 if not, else the width of
- * rows to ask for. A judgement from the scene alone; costs nothing where the dense grid has the
+ * Whether storing occupied cells only is quicker than the grid `dense`: 0 if not, else the `width`
+ * for hs_sparse_grid. A judgement from the scene alone; costs nothing where the dense grid has the
  * cells it wants, some microseconds where it has not, and more only where points crowd.
  */
 double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* sparse_rows.c: finding rows, windows and groups. See sparse_rows.h; sparse_build.c makes them. */
+/* sparse_rows.c: sorts the points into rows of cells; finds rows, windows and groups by steps that
+ * double, then by halves. */
 #include "sparse_rows.h"
 
 #include "../base/poll.h"
@@ -72,7 +73,7 @@ hs_sparse_find_row(const hs_sparse *sparse, const int64_t *index, int64_t *hint)
     return row;
 }
 
-/* The first of cells [low, high) at x or beyond, or high; found as above. */
+/* The first of cells [low, high) at x or beyond, or high; by steps that double, then by halves. */
 static int32_t
 seek_cell(const int64_t *cell_x, int32_t low, int32_t high, int32_t hint, int64_t x)
 {
@@ -141,9 +142,9 @@ hs_sparse_next_group(const hs_sparse *sparse, int64_t row, int32_t most, hs_spar
 }
 
 /*
- * Sorting the points of a sparse grid. By the index along the last axis first, then
- * each run of equal ones by the axis before it, down to the first axis: a run of equal indices
- * along all others is a row. Indices are computed where they are compared, not stored.
+ * Sorting the points of a sparse grid. By the index along the last axis first, then each range of
+ * equal ones by the axis before it, down to the first axis: points with equal indices along all
+ * others are a row. Indices are computed where they are compared, not stored.
  */
 
 typedef struct build {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * stencil.c: see stencil.h.
+ * stencil.c: counts through the offsets of rows and drops those that are out of reach.
  *
  * How far a neighbour can be along the first axis depends on the row: in a frame in which the
  * directions of the grid axes are lower triangular, the offsets along the later axes bound some
@@ -16,7 +16,7 @@
 #include <string.h>
 
 #define DUALITY_DEFECT 1e-9   /* normals and directions further from dual than this are not used */
-#define FIRST_CAPACITY 1024   /* rows; doubled as needed: most of a wide block is out of reach */
+#define FIRST_CAPACITY 1024   /* rows; doubled as needed: of many, most are out of reach */
 #define MOST_UNPRUNED  0x1p22 /* rows, in a box too flat to tell which of them are out of reach */
 #define POLL_ROWS      (1 << 16)
 #define FRAME_SLACK    1e-6 /* relative; covers the defect in 8 dimensions many times */
@@ -27,7 +27,7 @@ typedef struct frame {
     double lower[HS_MAX_DIM][HS_MAX_DIM]; /* direction k = sum_{c <= k} lower[k][c] q_c */
 } frame;
 
-/* What rows are looked for in. */
+/* What add_rows needs beside the stencil. */
 typedef struct scope {
     const hs_scene *scene;
     const hs_grid  *grid;
@@ -115,7 +115,7 @@ typedef struct spans {
     double low[HS_MAX_DIM], high[HS_MAX_DIM];
 } spans;
 
-/* Those that points of the cells at `offset` can have, rounding included. */
+/* Sets the differences that points of the cells at `offset` can have, rounding included. */
 static void
 set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, double radius,
           spans *t)
@@ -127,7 +127,7 @@ set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, dou
     }
 }
 
-/* Range of component c of D; of the first one, what the later axes add to it. */
+/* Finds the range of component c of D; of the first one, what the later axes add to it. */
 static void
 range_of_component(const frame *axes, const spans *t, int ndim, int c, double *least, double *most)
 {
@@ -243,7 +243,7 @@ grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
     return true;
 }
 
-/* The rows from this one on to the last in the order of the axes, as far as they are in reach. */
+/* Adds the rows from this one to the last in the order of the axes, as far as they are in reach. */
 static hs_status
 add_rows(hs_account *account, const hs_options *options, const scope *of, hs_stencil_row *row,
          hs_stencil *stencil, int64_t capacity)
@@ -282,7 +282,7 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
     }
     if (scene->lattice.aligned && bound > FIRST_CAPACITY &&
         !hs_account_allows(account, hs_stencil_bytes(grid, is_full))) {
-        return HS_ERR_MEMORY; /* rather than after as much has been written */
+        return HS_ERR_MEMORY; /* refused now, not after as much has been written */
     }
     const int64_t capacity = (int64_t)hs_smaller(bound, FIRST_CAPACITY);
     stencil->rows = hs_alloc(account, HS_FOR_STENCIL, capacity, sizeof(hs_stencil_row));

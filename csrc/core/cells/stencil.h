@@ -30,7 +30,8 @@ hs_status hs_stencil_build(hs_account *account, const hs_options *options, const
 /* Number of rows that hs_stencil_build would look at, before it drops those out of reach. */
 double hs_stencil_bound(const hs_grid *grid);
 
-/* Bytes that they take at least, in boxes along the coordinate axes; elsewhere about so many. */
+/* Bytes that the rows take at least, in boxes along the coordinate axes; elsewhere about so
+ * many. */
 double hs_stencil_bytes(const hs_grid *grid, bool is_full);
 
 void hs_stencil_free(hs_account *account, hs_stencil *stencil);

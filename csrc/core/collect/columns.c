@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* columns.c: see columns.h. */
+/* columns.c: columns grow together, by a guess of the number of pairs in the end. */
 #include "columns.h"
 
 #include <math.h>
@@ -15,7 +15,7 @@
 #define MOST_GROWTH  8.0
 /* Pairs that the account is charged for at a time. */
 #define CHARGE_STEP (INT64_C(1) << 20)
-/* Of one column: half the address space. */
+/* Most bytes of one column: half the address space. */
 #define MOST_BYTES (0.5 * (double)SIZE_MAX)
 
 void
@@ -60,7 +60,7 @@ hs_output_next(const hs_output *output, unsigned bit)
     return column == NULL ? NULL : column + (size_t)output->n_pairs * hs_output_width(output, bit);
 }
 
-/* What some columns got is of no use where another was refused, and may be what that one lacks. */
+/* Gives back what some columns got where another was refused: it may be what that one lacks. */
 static void
 undo_resize(hs_output *output)
 {
@@ -85,7 +85,7 @@ resize(hs_output *output, double pairs)
             continue;
         }
         const size_t width = hs_output_width(output, 1u << k);
-        /* As numbers first: size_t may have 32 bits. */
+        /* as double first: size_t may have 32 bits */
         if (!((pairs + HS_PADDING) * (double)width < MOST_BYTES)) {
             undo_resize(output);
             return false;
@@ -154,7 +154,7 @@ hs_status
 hs_output_reserve(hs_output *output, int64_t n, double fraction)
 {
     const int64_t needed = output->n_pairs + n;
-    if (!may_charge(output, needed)) { /* before the system is asked for it */
+    if (!may_charge(output, needed)) { /* before the system allocates it */
         return HS_ERR_MEMORY;
     }
     if (needed > output->capacity || output->capacity == 0) {
@@ -232,9 +232,10 @@ hs_output_free(hs_output *output)
     output->charged = 0;
 }
 
-/* Of the smallest pages there are. Larger ones are written to several times, which costs little. */
+/* Bytes of the smallest pages there are. Larger ones are written to several times, which costs
+ * little. */
 #define PAGE 4096
-/* What one thread touches between two questions: some 10 milliseconds. */
+/* What one thread touches between two polls: some 10 milliseconds. */
 #define PART_BYTES ((size_t)1 << 23)
 /* So many parts: less is cleared in a tenth of a second. */
 #define LEAST_PARTS 8
@@ -254,7 +255,7 @@ enum { part_bytes = PART_BYTES };
 #endif
 
 typedef struct toucher {
-    volatile char *bytes; /* volatile: what is written is never read, and written all the same */
+    volatile char *bytes; /* volatile: what is written is never read, but must be written */
     size_t         first, end;
 } toucher;
 

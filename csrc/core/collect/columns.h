@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * columns.h: the pairs that have been found, one growable column for each quantity that was asked
- * for and none for the others. What is written here is what the caller gets.
- */
+/* columns.h: the pairs that have been found, one growable column for each wanted quantity and none
+ * for the others. What is written here is what the caller gets. */
 #ifndef HS_COLUMNS_H
 #define HS_COLUMNS_H
 
@@ -68,10 +66,9 @@ void *hs_output_take(hs_output *output, unsigned bit);
 void hs_output_free(hs_output *output);
 
 /*
- * Asks the system for memory before it is written to in no particular order. Each
- * page of new memory is cleared by the system at the first write to it, a huge one in a millisecond
- * or more. Where the first thousand writes go to a thousand pages, the caller could not be asked
- * for seconds.
+ * Touches new memory before pairs are written to it in no particular order. Each page of new memory
+ * is cleared by the system at the first write to it, a huge one in a millisecond or more. Where the
+ * first thousand writes go to a thousand pages, the caller would not be polled for seconds.
  */
 
 /* Writes to every page of the columns' first n_pairs pairs, if they are so large that it matters:

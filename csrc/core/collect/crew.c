@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* crew.c: see crew.h. */
+/* crew.c: one worker for each thread, with a walker and a backlog of its own; ranges are committed
+ * in turn. */
 #include "crew.h"
 
 #include <string.h>
@@ -8,8 +9,8 @@
 #include "../base/poll.h"
 #include "../threads/team.h"
 
-/* Points of a range: some groups at least, and so few that their pairs, with all that may be asked
- * for, fit what a thread can hold back: it seldom waits for others. */
+/* Points of a range: some groups at least, and so few that their pairs, with all quantities, fit
+ * what a thread can hold back: it seldom waits for others. */
 #define RANGE_POINTS 256
 
 typedef struct hs_crew hs_crew;
@@ -33,7 +34,7 @@ struct hs_crew {
     const hs_visitors *visitors; /* NULL: hits are recorded, or only counted */
     hs_worker         *workers;
     hs_commits        *commits;
-    hs_neighbourhood   most; /* set at the end, as the next */
+    hs_neighbourhood   most; /* set at the end, as is `n_found` */
     int64_t            n_found;
 };
 
@@ -168,7 +169,7 @@ close_worker(hs_crew *crew, hs_worker *worker)
     }
 }
 
-/* Everybody walks. */
+/* Runs all workers. */
 static hs_status
 walk_together(hs_crew *crew, hs_failure *failure)
 {

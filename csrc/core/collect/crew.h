@@ -2,7 +2,7 @@
 /*
  * crew.h: the walk over all points by several threads. Points are handed out in ranges; what a
  * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
- * that the result is the same for any number of threads.
+ * that the result does not depend on the number of threads.
  */
 #ifndef HS_CREW_H
 #define HS_CREW_H
@@ -25,9 +25,9 @@ typedef struct hs_visitors {
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
 
 /*
- * The same from the bookmark on, until the output has `enough` pairs or all have been found: then
- * the bookmark says where to go on. The output has at most HS_COMMIT_BYTES a thread and one block
- * of candidates more than that. A failure leaves the bookmark, and in the output what it may.
+ * Records pairs from the bookmark on, until the output has `enough` pairs or all have been found:
+ * then the bookmark says where to go on. The output has at most HS_COMMIT_BYTES a thread and one
+ * block of candidates more than that. A failure leaves the bookmark, and in the output what it may.
  */
 hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough,
                                 hs_bookmark *bookmark, hs_failure *failure);
@@ -36,7 +36,7 @@ hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t en
 hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
                             hs_failure *failure);
 
-/* Counts them. */
+/* Counts all pairs. */
 hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure);
 
 /*
@@ -45,7 +45,7 @@ hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failu
  */
 
 typedef struct hs_backlog {
-    hs_output     pairs; /* owned; counted by nobody: it is small and does not stay */
+    hs_output     pairs; /* owned; on no account: it is small and does not stay */
     hs_recorder   recorder;
     hs_committer *committer; /* borrowed; takes the pairs when they are many */
 } hs_backlog;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* in_turn.c: see in_turn.h. */
+/* in_turn.c: a mutex guards the number of the range that is due; pairs are copied without it. */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif
@@ -25,7 +25,7 @@ struct hs_commits {
     hs_status        status;
     hs_failure       failure;
     int64_t          failed_range;
-    int64_t          enough, most; /* pairs; as hs_commits_limit says */
+    int64_t          enough, most; /* in pairs: limits set by hs_commits_limit */
     bool             has_enough;
     int64_t          full_range; /* the last one that is written, n_ranges at first */
 };
@@ -73,7 +73,7 @@ hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure)
     return status;
 }
 
-/* A hs_poll_fn of the threads that may not ask the caller: has nobody failed? */
+/* A hs_poll_fn of the threads that may not call the caller's: true until a thread has failed. */
 static bool
 goes_on(void *context, double fraction)
 {
@@ -122,8 +122,8 @@ hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs, hs_c
     }
 }
 
-/* Takes the next range; false when there is none, when somebody has failed, or when there are
- * pairs enough. */
+/* Takes the next range; false when there is none, when a thread has failed, or when there are
+ * enough pairs. */
 static bool
 take_range(hs_committer *committer)
 {
@@ -138,8 +138,8 @@ take_range(hs_committer *committer)
     return committer->range < commits->n_ranges;
 }
 
-/* This range has failed: everybody stops. A status that only follows from another's failure is
- * not noted. */
+/* This range has failed: all threads stop. A status that only follows from another failure is not
+ * noted. */
 static void
 fail(hs_committer *committer, hs_status status, const hs_failure *failure)
 {
@@ -171,7 +171,7 @@ wait_for_change(hs_commits *commits, const hs_committer *committer, double fract
     return status;
 }
 
-/* With the mutex held: settles where the n pairs that are due go. */
+/* With the mutex held: settles where in the output the n pairs that are due go. */
 static hs_status
 claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
 {
@@ -180,7 +180,7 @@ claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
         while (commits->n_copying > 0) { /* soon over */
             hs_condition_wait(&commits->changed, &commits->mutex);
         }
-        /* One that is filled only so far is no larger in the end for what is still to do. */
+        /* An output with a limit does not grow with the work that is left. */
         const bool      is_limited = commits->enough < INT64_MAX;
         const hs_status status = hs_output_reserve(output, n, is_limited ? 0.0 : fraction);
         if (status != HS_OK) {
@@ -192,7 +192,7 @@ claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
     return HS_OK;
 }
 
-/* With the mutex held: is it enough, is it all that there may be? */
+/* With the mutex held: notes whether the output has `enough` or `most` pairs. */
 static void
 heed_limits(hs_committer *committer, const hs_commit_part *part)
 {
@@ -206,7 +206,7 @@ heed_limits(hs_committer *committer, const hs_commit_part *part)
     }
 }
 
-/* With the mutex held, which it gives up while it copies: the part that is due. */
+/* Writes the part that is due. The mutex is held, but not while it copies. */
 static hs_status
 write_part(hs_committer *committer, const hs_commit_part *part)
 {
@@ -244,7 +244,7 @@ write_parts(hs_committer *committer, bool waits)
     while (done < committer->n_parts && status == HS_OK) {
         const hs_commit_part *part = &committer->parts[done];
         if (commits->status != HS_OK || part->range > commits->full_range) {
-            status = HS_STOPPED; /* somebody else has failed, or has filled the output */
+            status = HS_STOPPED; /* another thread has failed, or has filled the output */
         } else if (commits->due == part->range) {
             status = write_part(committer, part);
             done++;
@@ -275,7 +275,7 @@ hs_commit(hs_committer *committer, double fraction, bool ends)
                        !ends || committer->n_parts == HS_COMMIT_PARTS || bytes >= HS_COMMIT_BYTES);
 }
 
-/* There is no range left for this thread. The caller's goes on polling for the others. */
+/* There is no range left for this thread. The caller's thread goes on polling for the others. */
 static hs_status
 leave(hs_committer *committer)
 {

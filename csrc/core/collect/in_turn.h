@@ -2,7 +2,7 @@
 /*
  * in_turn.h: several threads that fill one output in a fixed order. The work is cut into numbered
  * ranges, which are handed out one at a time; what is found in one is written when all earlier
- * ranges have been, so that the result is the same for any number of threads.
+ * ranges have been, so that the result does not depend on the number of threads.
  *
  * Usage, in each thread of a crew:
  *     hs_commits_join(commits, options, pairs, &committer);
@@ -30,7 +30,7 @@ typedef struct hs_commit_part {
     bool    is_last;  /* of its range */
 } hs_commit_part;
 
-/* One thread's share in it. */
+/* What one thread needs to take ranges and commit their pairs. */
 typedef struct hs_committer {
     hs_commits    *commits; /* borrowed */
     hs_options    *options; /* borrowed; its poll tells whether to go on */
@@ -62,24 +62,24 @@ int64_t hs_commits_written(const hs_commits *commits);
 hs_status hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure);
 
 /* Called by the thread itself. pairs: NULL when it commits nothing. options: those that it works
- * with; for threads that may not poll they are changed to ask whether anybody has failed, for the
- * caller's thread to tell a fraction that never falls. committer must outlive them. */
+ * with; they are changed: threads that may not poll look whether another has failed, and the
+ * caller's thread tells a fraction that never falls. committer must outlive them. */
 void hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
                      hs_committer *committer);
 
 /*
- * Takes ranges as long as there are any and nobody has failed, and waits until all that was
- * committed has been written. Everybody stops when a range fails; `failure` tells why it did. The
+ * Takes ranges as long as there are any and no thread has failed, and waits until all that was
+ * committed has been written. All threads stop when a range fails; `failure` tells why it did. The
  * caller's thread then waits for the others, and polls meanwhile.
  */
 void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
                      const hs_failure *failure);
 
 /*
- * What has been collected of this range is all of it, or with `ends` false all but what comes:
- * writes it if the earlier ranges have been written, and waits for these only when the range goes
- * on or much is held back. What is written leaves the collected pairs, sooner or later.
- * HS_STOPPED: somebody else has failed.
+ * Commits what has been collected: with `ends` the whole range, else a part of it. Writes it if the
+ * earlier ranges have been written, and waits for these only when the range goes on or much is held
+ * back. What is written leaves the collected pairs, sooner or later. HS_STOPPED: another thread has
+ * failed.
  */
 hs_status hs_commit(hs_committer *committer, double fraction, bool ends);
 

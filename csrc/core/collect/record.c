@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* record.c: see record.h. */
+/* record.c: i and j by the kernel; what is measured follows in batches (record_measures.h). */
 #include "record.h"
 
 #include "record_measures.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* record_measures.c: see record_measures.h. */
+/* record_measures.c: a batch of hits at a time, looked up, measured by the batch kernel, brought to
+ * the caller's unit. */
 #include "record_measures.h"
 
 #include "measures.h"
@@ -76,8 +77,9 @@ put_vectors(const hs_recorder *recorder, const hs_search *search, const double *
                        hs_measures_unscale(&search->scene));
 }
 
-/* Shifts that only sort the images of one pair may leave out what all of these share: the turns by
- * which i and j were wrapped, which can be too many for int32. Returns as put_shifts. */
+/* Shifts that only sort the images of one pair may leave out what these images share: the turns by
+ * which i and j were wrapped, which can be too many for int32. Returns the first pair whose shift
+ * does not fit, or their number. */
 static int32_t
 find_keys(const hs_trace *trace, int64_t keys[][HS_BATCH])
 {
@@ -107,7 +109,7 @@ put_narrow(const hs_trace *trace, const double *sign, int32_t *to)
     for (int32_t e = 0; e < trace->n; e++) {
         flip[e] = -(sign[e] < 0.0);
     }
-    if (d == 3 && lattice->n_periodic == 3) { /* most scenes: row by row, not column by column */
+    if (d == 3 && lattice->n_periodic == 3) { /* most scenes: one pair after the other */
         const int32_t *x = trace->shift[0], *y = trace->shift[1], *z = trace->shift[2];
         for (int32_t e = 0; e < trace->n; e++, to += 3) {
             to[lattice->vector_of_row[0]] = (x[e] ^ flip[e]) - flip[e];
@@ -139,7 +141,7 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
     if (m < d) {
         memset(to, 0, (size_t)trace->n * (size_t)d * sizeof *to);
     }
-    if (trace->is_narrow) { /* keys as well: what is left out is zero or the same for all images */
+    if (trace->is_narrow) { /* what is left out is zero, or common to all images */
         put_narrow(trace, sign, to);
         return fitting;
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* recorder.c: see recorder.h. */
+/* recorder.c: takes only the arrays that the columns of the output need. */
 #include "recorder.h"
 
 hs_block_use

@@ -13,10 +13,10 @@ typedef struct hs_recorder {
     int32_t   *ids;                /* point numbers of hits that are places */
     int32_t   *ends[2];            /* i and j for HS_WANT_BOTH */
     double    *distance;           /* of a batch */
-    double    *vector[HS_MAX_DIM]; /* the same */
+    double    *vector[HS_MAX_DIM]; /* of a batch */
 } hs_recorder;
 
-/* What a walker must list for these columns. */
+/* What a walker's block must list for these columns. */
 hs_block_use hs_record_use(unsigned columns);
 
 /* For a walker that lists at most most_hits hits at a time. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* result.c: a finished search, from its making to what the caller asks of it. */
+/* result.c: makes the object of a finished search; the public functions that read it and take from
+ * it. */
 #include "result.h"
 
 #include <string.h>

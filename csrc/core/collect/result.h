@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* result.h: what a finished search is, for those who make one. */
+/* result.h: what a finished search is, for the functions of api/ that make one. */
 #ifndef HS_RESULT_H
 #define HS_RESULT_H
 
@@ -12,13 +12,13 @@ struct hs_pairs {
     hs_output offsets; /* int64, where the rows of hs_neighbors_find begin; else nothing */
 };
 
-/* One that holds nothing yet; its call is to be begun next. NULL when memory is short. */
+/* An empty result, whose call must be begun next. NULL when memory is short. */
 hs_pairs *hs_pairs_new(void);
 
 /* An empty output of the columns that the call wants, or the caller's arrays. */
 void hs_pairs_open(hs_pairs *pairs, int ndim);
 
-/* Leaves the call, which found so many pairs. *result becomes the object, or that is freed. Returns
+/* Leaves the call, which found n_pairs pairs. *result becomes the object, or that is freed. Returns
  * the status. */
 hs_status hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **result);
 

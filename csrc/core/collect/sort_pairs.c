@@ -197,7 +197,7 @@ put_all(const hs_options *options, const hs_output *found, const int64_t *order,
 {
     const int64_t n = found->n_pairs;
     if (sorted->fixed && n > sorted->capacity) {
-        sorted->n_pairs = n; /* found out by the caller */
+        sorted->n_pairs = n; /* tells hs_pairs_conclude that they do not fit */
         return HS_OK;
     }
     hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, n, 1.0);

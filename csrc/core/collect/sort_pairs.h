@@ -6,7 +6,7 @@
 #include "columns.h"
 #include "../search/search.h"
 
-/* What must be found, so that it can be put in order and has all that is wanted. */
+/* The columns that must be found, so that pairs can be put in order and have all that is wanted. */
 unsigned hs_sort_columns(const hs_search *search);
 
 /*

@@ -55,7 +55,7 @@ hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double
         return;
     }
 
-    /* n roundings in a row change a number by at most the factor 1 +- gamma. */
+    /* n successive roundings change a number by at most the factor 1 +- gamma. */
     const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
 
     const double far_root = multiply_up(hs_next_up(1.0 + difference), add_up(cutoff, a));

@@ -16,8 +16,8 @@ typedef struct hs_thresholds {
     float out; /* rounded up; +infinity when nothing is sure */
 } hs_thresholds;
 
-/* The same for the expanded form. A kernel compares with (float)(in - |q|^2) and
- * (float)(out - |q|^2), where |q|^2 is summed in float64. */
+/* The thresholds of the expanded form. A kernel compares with (float)(in - |q|^2) and (float)(out -
+ * |q|^2), where |q|^2 is summed in float64. */
 typedef struct hs_expanded {
     double in;  /* -infinity when nothing is sure */
     double out; /* +infinity when nothing is sure */
@@ -34,19 +34,19 @@ typedef struct hs_expanded {
  */
 hs_thresholds hs_thresholds_of(int ndim, double cutoff, double extent, double error);
 
-/* The same bounds for arithmetic with unit roundoff `unit` and smallest normal number `tiny`,
- * before they are rounded to float32. The product uses 2^-24 and 2^-126; the tests also try every
- * number of a tiny floating-point system. */
+/* The bounds of hs_thresholds_of for arithmetic with unit roundoff `unit` and smallest normal
+ * number `tiny`, before they are rounded to float32. The product uses 2^-24 and 2^-126; the tests
+ * also try every number of a tiny floating-point system. */
 void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
                          double tiny, double *in, double *out);
 
-/* The same for the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
+/* The thresholds of the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
 hs_expanded hs_expanded_of(int ndim, double cutoff, double extent, double error);
 void        hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,
                                double tiny, double *in, double *out);
 
 /* Errors of the expanded form grow with extent^2, those of the direct form with extent * cutoff:
- * worth it where this holds, which is wherever cells have the size that the cutoff asks for. */
+ * worth it where this holds, which is wherever cells are about as wide as the cutoff. */
 HS_ALWAYS_INLINE bool
 hs_expanded_pays(double cutoff, double extent)
 {

@@ -53,7 +53,7 @@ hs_multiply_add(uint64_t a, uint64_t b, uint64_t c, uint64_t *carry)
     const uint64_t mask = UINT32_MAX;
     const uint64_t low = (a & mask) * (b & mask);
     const uint64_t mid = (a >> 32) * (b & mask) + (low >> 32);    /* at most 2^64 - 2^32 */
-    const uint64_t other = (a & mask) * (b >> 32) + (mid & mask); /* likewise */
+    const uint64_t other = (a & mask) * (b >> 32) + (mid & mask); /* at most 2^64 - 2^32 */
     uint64_t       high = (a >> 32) * (b >> 32) + (mid >> 32) + (other >> 32);
     uint64_t       sum = (other << 32) | (low & mask);
     sum += c;

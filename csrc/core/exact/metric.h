@@ -6,7 +6,7 @@
  *
  * The stages, cheapest first (docs/exactness.md derives each bound):
  *   float64       one squared distance with a proven error bound
- *   double-word   the same in pairs of doubles, then without what is too small to be summed
+ *   double-word   that square in pairs of doubles, then without what is too small to be summed
  *   integers      every input is an integer times a power of two: exact, always decides
  *
  * Callers must have set round to nearest without flushing (fpenv.h) when calling in here.
@@ -17,7 +17,8 @@
 #include "../../halfshell.h"
 #include "../base/base.h"
 
-/* The rows that shifts multiply and the cutoff to compare with; plain values, nothing owned. */
+/* The box vectors that shifts multiply, as rows, and the cutoff to compare with; plain values,
+ * nothing owned. */
 typedef struct hs_metric {
     int    ndim;                         /* 1 ... HS_MAX_DIM */
     int    n_rows;                       /* 0 ... ndim; 0: shifts are ignored */
@@ -50,7 +51,7 @@ void hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[]
 bool hs_metric_within(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 
-/* The same for pairs that the float64 and double-word stages have left undecided. */
+/* hs_metric_within for pairs that the float64 and double-word stages have left undecided. */
 bool hs_metric_settle(const hs_metric *metric, const double *p, const double *q,
                       const int64_t *shift, hs_stages *stages);
 

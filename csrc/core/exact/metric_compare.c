@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* metric_compare.c: see metric_compare.h; docs/exactness.md derives the bounds. */
+/* metric_compare.c: double-words first, then integers. docs/exactness.md derives the bounds. */
 #include "metric_compare.h"
 
 #include "metric_float.h"
@@ -10,7 +10,7 @@
 #define LEAST_SQUARE 0x1p-800
 #define MOST_SQUARE  0x1p800
 
-/* D in double-words, watched. False where floats cannot hold it. */
+/* D in double-words, with what was lost. False where floats cannot hold it. */
 static bool
 subtract(const hs_metric *metric, const hs_span *span, hs_difference *difference)
 {
@@ -33,7 +33,7 @@ sign_of(double x)
     return (x > 0.0) - (x < 0.0);
 }
 
-/* Both differences by their double-word squares; false when these cannot tell. */
+/* Compares both differences by their double-word squares; false when these cannot tell. */
 static bool
 compare_double_words(const hs_difference *one, const hs_difference *other, int ndim, int *sign)
 {

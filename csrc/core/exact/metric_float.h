@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * metric_float.h: the float stages of the decision, each a value with a proven bound on its error.
- * For metric.c, metric_measure.c and their tests only.
+ * For metric_decide.c, metric_compare.c, metric_measure.c, the batch kernels and tests only.
  *
  * ndim is passed beside the metric because callers that know it let the compiler unroll loops.
  */
@@ -27,7 +27,7 @@ typedef struct hs_difference {
 HS_ALWAYS_INLINE void
 hs_difference_plain(hs_difference *difference, const double *p, const double *q, int ndim)
 {
-    int k = 0; /* ndim is not 0: compilers wonder */
+    int k = 0; /* ndim is at least 1: compilers warn without this */
     do
         difference->component[k] = hs_two_difference(q[k], p[k]);
     while (++k < ndim);
@@ -184,8 +184,8 @@ hs_double_word_verdict(const hs_metric *metric, const hs_difference *difference,
     return HS_UNDECIDED;
 }
 
-/* Of the cutoff: components below this are a hair, and what their squares sum to, of its square:
- * eight of them are below 2^-125. */
+/* A hair: a component below this fraction of the cutoff. Eight squares of hairs sum to less than
+ * 2^-125 of its square. */
 #define HS_HAIR         0x1p-64
 #define HS_HAIR_SQUARES 0x1p-120
 

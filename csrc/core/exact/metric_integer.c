@@ -206,7 +206,7 @@ compare_squares(const exact_sums *sums, int ndim, int n, uint64_t *total, uint64
     return compare_limbs(total, limit, 2 * n);
 }
 
-/* Everything fits 62 bits: the same with single words instead of limbs. */
+/* The comparison where everything fits 62 bits: single words instead of limbs. */
 static int
 compare_small(const exact_sums *sums, int ndim)
 {
@@ -260,7 +260,7 @@ hs_integer_compare(const hs_metric *metric, const double *p, const double *q, co
     }
 }
 
-/* Both squares in 2 n limbs, in the same unit. */
+/* Compares both squares, in 2 n limbs and one unit. */
 HS_ALWAYS_INLINE int
 compare_two_sums(const exact_sums *one, const exact_sums *other, int ndim, int n, uint64_t *first,
                  uint64_t *second, uint64_t *value)
@@ -291,7 +291,7 @@ compare_two_large(const exact_sums *one, const exact_sums *other, int ndim, int 
     return compare_two_sums(one, other, ndim, n, first, second, value);
 }
 
-/* The same unit and width for both. */
+/* Gives both sums one unit and one width. */
 static void
 join_units(exact_sums *one, exact_sums *other)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* edges.c: see edges.h. */
+/* edges.c: bands are the filter's thresholds at each edge; the table is made as fine as keeps most
+ * bands apart. */
 #include "edges.h"
 
 #include "../exact/filter.h"
@@ -52,7 +53,7 @@ hs_edges_free(hs_account *account, hs_edges *edges)
     edges->at = NULL;
 }
 
-/* The band of every edge. */
+/* Sets the band of every edge. */
 static void
 set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
 {
@@ -74,7 +75,7 @@ set_bands(const hs_edges *edges, double extent, hs_edge_table *table)
     }
 }
 
-/* Of a square that is not negative, and no larger than the end of the last band. */
+/* The cell of a square that is not negative, and no larger than the end of the last band. */
 static int32_t
 cell_of(const hs_edge_table *table, float square)
 {
@@ -83,8 +84,8 @@ cell_of(const hs_edge_table *table, float square)
     return cell < 0 ? 0 : cell;
 }
 
-/* Cells of 2^shift neighbouring floats each, from the first band that ends above zero to the last.
- * Returns how many pairs of bands share a cell although they do not overlap. */
+/* Makes cells of 2^shift neighbouring floats each, from the first band that ends above zero to the
+ * last. Returns how many pairs of bands share a cell although they do not overlap. */
 static int64_t
 set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
 {
@@ -108,7 +109,7 @@ set_cells(const hs_edges *edges, int shift, hs_edge_table *table)
     return shared;
 }
 
-/* As few cells as keep most bands apart. */
+/* Chooses as few cells as keep most bands apart. */
 static void
 choose_cells(const hs_edges *edges, hs_edge_table *table)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tally.c: see tally.h. */
+/* tally.c: slots of all hits by table; hits that stay unsure wait for the edge that halves their
+ * range, and a batch decides them. */
 #include "tally.h"
 
 #include "../search/decide.h"
@@ -129,7 +130,7 @@ load_block(hs_tally *tally, const hs_scanner *scanner)
     }
 }
 
-/* Where the groups of pairs with a point of this type begin. */
+/* The groups of pairs of point si, by the type of the other point. */
 static const int32_t *
 groups_of(const hs_tally *tally, int32_t si)
 {
@@ -152,7 +153,7 @@ weight_of(const hs_tally *tally, int32_t si, int32_t *place)
     return weights->value != NULL ? weights->value[si] : 1;
 }
 
-/* Where the sum of a group is for pairs that reach so many edges. */
+/* The sum of a group for pairs that reach so many edges. */
 static int64_t *
 limbs_of(const hs_tally *tally, int64_t group, int32_t n_reached)
 {
@@ -188,7 +189,7 @@ count_plain(hs_tally *tally, int32_t n)
     }
 }
 
-/* Hits [begin, end) of point si. */
+/* Counts hits [begin, end) of point si. */
 static void
 count_typed(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end)
 {
@@ -198,8 +199,8 @@ count_typed(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, i
     }
 }
 
-/* Hits of point si whose slots are even; those beyond the last edge have a sum that nobody reads.
- * has_places: otherwise all places of weights are 0. */
+/* Sums weights of the hits of point si whose slots are even; those beyond the last edge add to a
+ * sum that is never read. has_places: otherwise all places of weights are 0. */
 HS_ALWAYS_INLINE void
 sum_hits(hs_tally *tally, int32_t si, const int32_t *places, int32_t begin, int32_t end,
          const bool has_places)

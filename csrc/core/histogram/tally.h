@@ -24,7 +24,7 @@ typedef struct hs_tally_plan {
     int32_t         *group;    /* owned; n_types * n_types; when has_types */
 } hs_tally_plan;
 
-#define HS_TALLY_TABLES 4 /* extents that a walk may come back to; each a power of two */
+#define HS_TALLY_TABLES 4 /* extents that a walk may meet again; each a power of two */
 #define HS_TALLY_COPIES 4 /* of small histograms: counting does not wait for the last count */
 
 /* A pair that is decided edge by edge: it reaches at least `low` edges and at most `high`. */
@@ -45,8 +45,8 @@ typedef struct hs_tally {
     hs_sums              sums;   /* owned; n_groups * (edges + 1) */
     int32_t             *slots;  /* owned; of the hits of a visit */
     int32_t             *type;   /* owned; of each candidate of the block; or NULL */
-    int64_t             *value;  /* owned; the same: its weight, as hs_weights; or NULL */
-    int32_t             *place;  /* owned; or NULL */
+    int64_t             *value;  /* owned; of each candidate: its weight; or NULL */
+    int32_t             *place;  /* owned; of each candidate: the place of its weight; or NULL */
     int64_t              block;  /* number of the block that these are of */
     hs_tally_open       *open;   /* owned; HS_TALLY_OPEN */
     int32_t              n_open;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* weights.c: see weights.h. */
+/* weights.c: weights to integers, carries between limbs, and the one rounding at the end. */
 #include "weights.h"
 
 #include <math.h>
@@ -44,8 +44,8 @@ find_range(const double *weights, int64_t n, int *lowest, int *highest, hs_failu
     return HS_OK;
 }
 
-/* As integers of one exponent where 62 bits hold them, else each with a place of its own. Somebody
- * may write to the weights meanwhile: places are kept in range. */
+/* Takes weights as integers of one exponent where 62 bits hold them, else each with a place of its
+ * own. Another thread may write to the weights meanwhile: places are kept in range. */
 static void
 take_weights(const double *weights, const int32_t *order, int64_t n, hs_weights *taken)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * weights.h: exact sums of products of two floats, rounded once at the end, so that neither the
- * order of the terms nor who adds them can change a bit.
+ * order of the terms nor the threads that add them can change a bit.
  *
  * A weight is an integer times a power of two. Each sum is a long integer in steps of 32 bits, kept
  * in limbs of 64: what is carried stays where it arose until 2^30 products have been added.
@@ -32,7 +32,7 @@ typedef struct hs_sums {
     int32_t  n_limbs;
     int      exponent; /* of their lowest bit */
     int64_t *limbs;    /* owned; n_limbs of each, lowest first */
-    int64_t  n_added;  /* products since what was carried has been passed on */
+    int64_t  n_added;  /* products added since carries were last passed on */
 } hs_sums;
 
 /* Zeros, for products of these two. */
@@ -52,7 +52,7 @@ void hs_sums_carry(hs_sums *sums);
 
 #define HS_SUMS_MOST_ADDED (INT64_C(1) << 30)
 
-/* Before n products are added. */
+/* Call before n products are added: passes on carries in time. */
 HS_ALWAYS_INLINE void
 hs_sums_expect(hs_sums *sums, int64_t n)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* account.c: see account.h. A header in front of each block remembers its size. */
+/* account.c: each block has a header in front of it, which remembers its size. */
 #include "account.h"
 
 #include "pages.h"
@@ -13,7 +13,7 @@
 typedef struct block_header {
     void   *raw;    /* what malloc returned, or the mapping */
     size_t  length; /* of the mapping; 0 for malloc and for the arena */
-    int64_t bytes;  /* what the caller asked for */
+    int64_t bytes;  /* usable, as requested */
 } block_header;     /* raw == NULL: in the arena */
 
 _Static_assert(sizeof(block_header) <= HS_PAGES_HEADROOM, "the header lies in the headroom");

@@ -30,21 +30,19 @@
 
 #define HS_ARENA_BYTES (32 << 10) /* what 64 points with a few hundred pairs take */
 
-/*
- * What one call holds. The limit is asked for only when it could matter: finding out what the
- * machine has left costs more than a small search.
- */
+/* What one call holds. The limit is looked up only when it could matter: finding out what the
+ * machine has left costs more than a small search. */
 typedef struct hs_account {
     hs_counters total;      /* bytes[] and bytes_peak are kept here */
     int64_t     held;       /* bytes held now */
     double      limit;      /* bytes allowed */
-    hs_limit_fn find_limit; /* asked once, when held first passes HS_LIMIT_FREE; or NULL */
+    hs_limit_fn find_limit; /* called once, when held first passes HS_LIMIT_FREE; or NULL */
     void       *find_context;
     char       *arena;      /* owned, taken with the first small block; or NULL */
     char       *arena_next; /* where its next block begins */
 } hs_account;
 
-#define HS_LIMIT_FREE (64 << 20) /* bytes that are handed out without asking for the limit */
+#define HS_LIMIT_FREE (64 << 20) /* bytes that are handed out before the limit is looked up */
 
 void hs_account_init(hs_account *account, const hs_options *options);
 
@@ -81,7 +79,7 @@ void hs_free(hs_account *account, void *block);
 /* Make the nth allocation from now fail (1: the next), once; -n: that one and all behind it; 0
  * switches this off. */
 void hs_test_fail_allocation(int64_t nth);
-/* Whether that one has not been asked for yet; not for -1. */
+/* Whether that allocation is still to come; false for -1. */
 bool hs_test_failure_is_due(void);
 /* Blocks and arenas that are allocated and not yet freed, in the whole process. */
 int64_t hs_test_live_blocks(void);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* account_shared.c: see account_shared.h. */
+/* account_shared.c: a mutex around each change of the account. */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* chunk.c: see chunk.h. */
+/* chunk.c: small chunks come from malloc, large ones are pages. A small one that grows large is
+ * copied from the first to the second. */
 #include "chunk.h"
 
 #include "account.h"
@@ -131,8 +132,8 @@ hs_chunk_grow(void *data, size_t bytes, size_t used)
         }
     }
     if (in_pages || bytes >= HS_PAGES_FROM) {
-        /* From malloc to pages; or the kernel cannot move a mapping in one piece, as in a process
-         * forked from the one that made it. */
+        /* From malloc to pages; or Linux cannot move a mapping in one piece, as in a process forked
+         * from the one that made it. */
         void *copy = new_in_pages(bytes);
         if (copy != NULL) {
             memcpy(copy, data, used);
@@ -162,8 +163,8 @@ hs_chunk_expect(void *data, size_t bytes)
         return; /* all of that has its pages already */
     }
     if (huge > chunk->huge) {
-        /* From the mapping on, so that there are two parts in the kernel's list and not three;
-         * what lies in front of the first whole huge page stays small all the same. */
+        /* From the mapping on, so that Linux keeps two mappings and not three; what lies in front
+         * of the first whole huge page stays small anyway. */
         hs_pages_advise(chunk->huge > 0 ? start + chunk->huge : chunk->raw, start + huge, true);
     } else if (huge < chunk->huge) {
         hs_pages_advise(huge > 0 ? start + huge : chunk->raw, start + chunk->huge, false);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * chunk.h: one chunk of memory that can grow, shrink and be told how far it will be filled. Large
- * ones are reservations of pages (pages.h) where there are such, the others come from malloc.
- * What region.h and pool.h are made of; nobody else needs it.
+ * ones are reservations of pages (pages.h) where there are such, the others come from malloc. Only
+ * region.c and pool.c use chunks directly.
  *
  * A chunk is known by its data pointer: 64-byte aligned, with this header right in front of it.
  */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pages.c: see pages.h. Linux only; elsewhere, and under the address sanitizer, which watches
- * malloc, there are no such blocks. */
+/* pages.c: mmap, mremap and madvise of Linux. Elsewhere, and under AddressSanitizer, which watches
+ * malloc, every request is refused. */
 #if defined(__linux__)
 #define _GNU_SOURCE /* madvise, mremap, MAP_ANONYMOUS */
 #endif
@@ -71,9 +71,9 @@ hs_pages_reserve(size_t bytes, void **mapping, size_t *length)
 {
     char *block = map_aligned(bytes, MAP_NORESERVE, mapping, length);
     if (block != NULL) {
-        /* The first touch comes before the first advice, which splits the mapping in two: the
-         * parts then share what the kernel knows about their pages, and hs_pages_grow can make
-         * them one again. */
+        /* The first touch comes before the first advice, which splits the mapping in two:
+         * the parts then share what Linux knows about their pages, and hs_pages_grow can
+         * make them one again. */
         *(volatile char *)(block - 1) = 0;
         hs_pages_advise(*mapping, block + round_up(bytes), false);
     }
@@ -127,7 +127,7 @@ void
 hs_pages_tear(void *from, void *to)
 {
 #if defined(MADV_FREE)
-    /* Freeing lazily is what makes the kernel split a huge page on the spot; the cut frees it. */
+    /* Freeing lazily makes Linux split a huge page at once; the cut frees it. */
     (void)madvise(from, (size_t)((char *)to - (char *)from), MADV_FREE);
 #else
     (void)from;

@@ -18,19 +18,19 @@
 /*
  * Room for `bytes` bytes, zeroed, aligned to a huge page, with at least HS_PAGES_HEADROOM writable
  * bytes in front of it. *mapping and *length are for hs_pages_free. NULL when refused, and always
- * where there is no such service: then use malloc.
+ * where the system cannot do this: then use malloc.
  */
 #define HS_PAGES_HEADROOM 64
 void *hs_pages_alloc(size_t bytes, void **mapping, size_t *length);
 void  hs_pages_free(void *mapping, size_t length);
 
-/*
- * The same room, but as a reservation: address space that costs nothing until it is written, in
- * small pages unless advised. Between the mapping and the block lie exactly HS_PAGES_STEP bytes.
- */
+/* Room as from hs_pages_alloc, but as a reservation: address space that costs nothing until it is
+ * written, in small pages unless advised. Between the mapping and the block lie exactly
+ * HS_PAGES_STEP bytes. */
 void *hs_pages_reserve(size_t bytes, void **mapping, size_t *length);
 
-/* Huge pages for what is written from now on in [from, to), or small ones. A wish. */
+/* Requests huge pages, or small ones, for what is written from now on in [from, to); the system
+ * need not comply. */
 void hs_pages_advise(void *from, void *to, bool huge);
 
 /* The reservation with room for `bytes` bytes, more than before, contents kept, all of it advised
@@ -39,7 +39,7 @@ void hs_pages_advise(void *from, void *to, bool huge);
 void *hs_pages_grow(size_t bytes, void **mapping, size_t *length);
 
 /* [from, to) is the end of a huge page and will be cut off: breaks the page up, so that this part
- * is free at once. Else the kernel keeps it until memory is short. Takes a third of a ms. */
+ * is free at once. Else Linux keeps it until memory is short. Takes a third of a ms. */
 void hs_pages_tear(void *from, void *to);
 
 /* Gives [from, to) back; both are multiples of HS_PAGES_STEP from the mapping. False: the range

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pool.c: see pool.h. Chunks are freed after the lock is left: that is a system call. */
+/* pool.c: an array of chunks, oldest first. Chunks are freed after the lock is released, because
+ * freeing is a system call. */
 #if !defined(_WIN32)
 #define _DEFAULT_SOURCE /* sched_yield */
 #endif
@@ -67,8 +68,8 @@ let_others_run(void)
 
 #endif
 
-/* For what should not be skipped. The lock is held for some hundred instructions: whoever has it
- * is done after a few of these, or never. */
+/* For work that should not be skipped. A thread holds the lock for some hundred instructions: it is
+ * free again after a few tries, or never. */
 static bool
 lock_patiently(void)
 {
@@ -178,7 +179,7 @@ hs_pool_clear(void)
 /*
  * Pages can be added to a chunk and given back from its end, so that any chunk in pages suits any
  * request. A chunk from malloc must have the room, and not twice what is wanted: it cannot be
- * shrunk for sure. For scratch, which comes back whole and at once, that does not matter.
+ * shrunk for sure. For scratch, which is given back whole and at once, that does not matter.
  */
 static bool
 suits(const hs_chunk *chunk, size_t expected)
@@ -188,8 +189,8 @@ suits(const hs_chunk *chunk, size_t expected)
 }
 
 /* Bytes that a request would waste, or twice those that it would lack. Lists are expected to be a
- * little longer than they are: the chunk that the same list had before is the one for it, and not
- * the next larger one, which another column had. */
+ * little longer than they are, so the best chunk is the one that this list had before, and not the
+ * next larger one, which another column had. */
 static uint64_t
 misfit(const hs_chunk *chunk, size_t expected)
 {
@@ -224,7 +225,7 @@ hs_pool_give(void *data)
     void        *removed[HS_POOL_CHUNKS];
     int          n = 0;
     const size_t touched = hs_chunk_of(data)->touched;
-    if (HS_WATCHED_MALLOC || !try_lock()) { /* it must see who writes to what was freed */
+    if (HS_WATCHED_MALLOC || !try_lock()) { /* the sanitizer must see writes to freed memory */
         return false;
     }
     const bool keep = pool.limit > 0 && touched <= pool.limit;

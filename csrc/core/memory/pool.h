@@ -8,10 +8,11 @@
  * hs_pool_clear gives everything back.
  *
  * All functions may be called from many threads at once and after fork. The pool is guarded by a
- * lock that nobody waits for: a lock that another thread holds at the moment of a fork stays taken
- * in the child for ever. Who finds it taken does without the pool: new memory, and old memory
- * straight back to the system. Only the four functions of halfshell.h try again for a while; where
- * the lock never comes free they do nothing and return 0, for such a pool gives and takes no more.
+ * lock that no thread waits for: a lock that another thread holds at the moment of a fork stays
+ * taken in the child for ever. A thread that finds it taken does without the pool: it takes new
+ * memory, and gives old memory straight back to the system. Only the four functions of halfshell.h
+ * try again for a while; where the lock never comes free they do nothing and return 0, for such a
+ * pool gives and takes no more.
  */
 #ifndef HS_POOL_H
 #define HS_POOL_H

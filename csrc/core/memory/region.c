@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* region.c: see region.h. */
+/* region.c: each region is one chunk, taken from the pool if it has one and given back to it. */
 #include "region.h"
 
 #include "chunk.h"
 #include "account.h"
 #include "pool.h"
 
-/* Address space without memory that a chunk takes along to the pool, so that the next request
- * needs no system call. More of it would only be in the way of others. */
+/* Address space without memory that a chunk takes along to the pool, so that the next request needs
+ * no system call. More would only use up address space. */
 #define KEPT_SPARE ((size_t)64 << 20)
 
 static bool
@@ -30,7 +30,7 @@ count_block(int change)
 #endif
 }
 
-/* To the pool or to the system. */
+/* Gives a chunk to the pool, or else to the system. */
 static void
 give_back(void *data)
 {
@@ -51,7 +51,8 @@ take_recycled(size_t expected)
     if (data == NULL || hs_chunk_of(data)->capacity >= expected) {
         return data;
     }
-    void *grown = hs_chunk_grow(data, expected, 0); /* in pages: others come with the room */
+    void *grown = hs_chunk_grow(data, expected, 0); /* in pages: chunks from malloc come with the
+                                                     * room */
     if (grown == NULL) {
         hs_chunk_free(data);
     }

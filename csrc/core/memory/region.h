@@ -4,7 +4,7 @@
  * written from the front, grown if that was too little, and at the end either detached, with what
  * was not needed given back, or released. Memory that is no longer used goes to the pool (pool.h).
  *
- * Where the system has such a service (pages.h) the room beyond what is written costs nothing.
+ * Where the system can reserve pages (pages.h), the room beyond what is written costs nothing.
  *
  * Usage:
  *     hs_region region = {0};
@@ -27,7 +27,7 @@ typedef struct hs_region {
 } hs_region;
 
 /* An empty region gets at least `expected` writable bytes. False when refused: it is still empty,
- * and less may be asked for. Implies hs_region_expect. */
+ * and a smaller request may succeed. Implies hs_region_expect. */
 bool hs_region_reserve(hs_region *region, size_t expected);
 
 /* At least `bytes` writable bytes; the first `used` ones are kept but may move. False when

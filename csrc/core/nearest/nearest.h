@@ -15,7 +15,7 @@ typedef struct hs_near {
     hs_search     *search;      /* borrowed: scene, bins, kernel, options */
     hs_tree        tree;        /* of the points; owned unless the search is borrowed */
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
-    const hs_tree *asking;      /* the tree of those that ask */
+    const hs_tree *asking;      /* the tree of the asking points */
     int64_t        k;           /* points wanted for each */
     int32_t        of_spot;     /* of one spot, in one image, no more points than this can count */
     bool           omits_self;  /* without queries: a point is not its own neighbour */
@@ -31,7 +31,7 @@ typedef struct hs_near {
     hs_shared     *shared; /* owned; for what threads need more of */
 } hs_near;
 
-/* Points that ask, or one of them, and how far they look. Lengths are the scene's. */
+/* Asking points, or one of them, and how far they look. Lengths are the scene's. */
 typedef struct hs_near_group {
     int32_t first, last;       /* in the order of their tree */
     double  lower[HS_MAX_DIM]; /* range of X */
@@ -70,31 +70,31 @@ hs_near_of_leaf(const hs_near *near, const hs_tree_node *node)
     return node->is_spot && n > near->of_spot ? near->of_spot : n;
 }
 
-/* Of rows of the lattice. */
+/* Measures `drift`, of the rows of B. */
 void hs_near_measure_drift(hs_near *near);
 
-/* Where points lie along open axes, once they are in tree order. */
+/* Measures the range of points along open axes, once they are in tree order. */
 void hs_near_measure_layer(hs_near *near);
 
 /* HS_ERR_MEMORY when there are more images than memory could hold points. */
 hs_status hs_near_images_start(const hs_near *near, const hs_near_group *group,
                                hs_near_images *images);
 
-/* The next one, as shift and moved; false when there is none. */
+/* The next image, as shift and moved; false when there is none. */
 bool hs_near_images_next(hs_near_images *images);
 
-/* Range of the group's points, before anything else is asked about it. */
+/* Sets the group to these points and the range of their X; must come first. */
 void hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_group *group);
 
 /* Sets the radius: one within which about as many points are expected as are wanted, and a few
  * more; in any case not more than can be of use. */
 void hs_near_guess(const hs_near *near, hs_near_group *group);
 
-/* What nothing of use is beyond: all points, or the largest distance. In periodic boxes infinity,
- * unless there is a largest distance. */
+/* A distance beyond which nothing is of use: that of all points, or the largest distance. In
+ * periodic boxes infinity, unless there is a largest distance. */
 double hs_near_farthest(const hs_near *near, const hs_near_group *group);
 
-/* The present one, as it is kept. */
+/* The present image, as a group keeps it. */
 void hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_near_image *image);
 
 /* Owned by a thread: the least squares found so far, and what is left to look at. */
@@ -115,7 +115,7 @@ void      hs_near_bounder_free(const hs_near *near, hs_near_bounder *bounder);
 hs_status hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *bounder,
                         hs_near_group *group);
 
-/* Smallest radius, in the scene's unit: squares of nothing below it are looked at closely. */
+/* Smallest radius of a group, in the scene's unit: shorter distances get no finer unit. */
 #define HS_NEAR_LEAST_RADIUS 0x1p-1000
 
 /* Exponent of the radius: 2^-exponent is the unit in which it is between 1 and 2. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_block.c: see nearest_block.h. */
+/* nearest_block.c: runs and images first; then a unit for which the radius is between 1 and 2; then
+ * the kernel copies. */
 #include "nearest_block.h"
 
 #include "../exact/bounds.h"
@@ -21,14 +22,14 @@
 #define MOST_BY_SQUARES (HS_ORDER_MOST / 2)
 #define LARGEST_SQUARE  0x1p60 /* far from where float32 ends */
 
-/* After a step that every candidate took part in. */
+/* Polls after a pass over all candidates, if they are many. */
 static hs_status
 poll_if_large(const hs_options *options, const hs_near_block *block)
 {
     return block->n > HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
 }
 
-/* Room for n candidates, and what kernels read and write beyond. */
+/* Makes room for n candidates, and for what kernels read and write beyond. */
 static bool
 reserve(const hs_near *near, hs_near_block *block, int64_t n)
 {
@@ -87,8 +88,8 @@ hs_near_block_free(const hs_near *near, hs_near_block *block)
     hs_shared_release(near->shared, (void **)&block->stack);
 }
 
-/* Images in reach. A radius that is nothing beside the errors of shifted coordinates is raised to
- * some of these: a unit as small as that would be of no use. */
+/* Images in reach. A radius that is small beside the errors of shifted coordinates is raised to
+ * some multiple of these: a smaller unit would be of no use. */
 static hs_status
 start_images(const hs_near *near, hs_near_group *group, hs_near_images *images)
 {
@@ -252,7 +253,7 @@ hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_bloc
         scan.y[k] = block->y[k];
         scan.q[k] = block->q[k];
     }
-    /* Nothing is decided here: no hit is unsure. */
+    /* nearest_rank.c decides: no hit is unsure here. */
     scan.direct = hs_thresholds_of(d, block->reach, extent, block->error);
     if (block->has_squares) {
         scan.squares = block->squares;

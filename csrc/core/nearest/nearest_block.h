@@ -40,7 +40,7 @@ hs_status hs_near_runs_find(const hs_near *near, const hs_options *options,
                             const hs_near_group *group, double most, hs_near_images *images,
                             hs_near_block *block);
 
-/* The same from leaves that are for this group and others. */
+/* hs_near_runs_find from leaves that were found for this group and others. */
 hs_status hs_near_runs_take(const hs_near *near, const hs_near_group *group, double most,
                             hs_near_leaves *leaves, hs_near_block *block);
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * nearest_bound.c: a radius that surely holds as many points as are wanted: the tree is walked
- * down, nearest nodes first, with a heap of the least squares so far. See nearest.h.
- */
+/* nearest_bound.c: a radius that surely holds as many points as are wanted: the tree is walked
+ * down, nearest nodes first, with a heap of the least squares so far. */
 #include "nearest.h"
 
 #include "../base/poll.h"
@@ -18,7 +16,7 @@
 #define MOST_SQUARE  0x1p600
 #define UNIT_STEP    400
 
-/* A point that asks, in one image and unit. */
+/* An asking point, in one image and unit. */
 typedef struct near_probe {
     const hs_near   *near;
     hs_near_bounder *bounder;
@@ -158,7 +156,7 @@ walk_images(const hs_near *near, const hs_options *options, const hs_near_group 
     return status;
 }
 
-/* The same, in a unit in which the largest of these squares is an ordinary number. */
+/* The k least squares, in a unit in which the largest of them is an ordinary number. */
 static hs_status
 walk_scaled(const hs_near *near, const hs_options *options, const hs_near_group *group,
             near_probe *probe, double *error)
@@ -181,7 +179,7 @@ walk_scaled(const hs_near *near, const hs_options *options, const hs_near_group 
     }
 }
 
-/* The whole of what could be of use. */
+/* Sets the radius to all that could be of use. */
 static void
 take_all(hs_near_group *group, double farthest)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_images.c: images of the points that can be near a group. See nearest.h. */
+/* nearest_images.c: which images of the points can be near a group, by the range of its t_k along
+ * each periodic axis. */
 #include "nearest.h"
 
 #include <math.h>
@@ -14,9 +15,8 @@
 #define UPRIGHT     0x1p-40
 #define LAYER_ROOM  0x1p-36
 #define MOST_SHIFTS 0x1p30 /* they are int32, with room for sums of two */
-/* More images than these take minutes: they are refused, but where so many neighbours are asked
- * for that all of them may be images of one point. A box around a ball in 8 dimensions is 63 times
- * as large. */
+/* More images than these take minutes: they are refused, unless k is so large that all neighbours
+ * may be images of one point. A box around a ball in 8 dimensions is 63 times as large. */
 #define MOST_IMAGES        0x1p24
 #define IMAGES_A_NEIGHBOUR 1024.0
 
@@ -88,7 +88,8 @@ hs_near_measure_layer(hs_near *near)
     }
 }
 
-/* How far the group looks along axes that repeat: what the way to the layer leaves of a radius. */
+/* How far the group looks along axes that repeat: what the distance to the layer leaves of the
+ * radius. */
 static double
 reach_along(const hs_near_group *group)
 {
@@ -96,7 +97,7 @@ reach_along(const hs_near_group *group)
     return group->radius * (sqrt((1.0 - ratio) * (1.0 + ratio) + LAYER_ROOM) + UPRIGHT);
 }
 
-/* Shifts along the row of axis k, for at most most[r] of each row; false when too many. */
+/* Shifts along the row of B of axis k, at most most[r] of them; false when too many. */
 static bool
 set_range(const hs_near *near, const hs_near_group *group, int k, const double *most,
           hs_near_images *images)
@@ -121,7 +122,7 @@ set_range(const hs_near *near, const hs_near_group *group, int k, const double *
     return true;
 }
 
-/* Of X_j + moved, as docs/exactness.md says for gathered candidates. */
+/* Bound on the error of X_j + moved, by the rule of docs/exactness.md for gathered candidates. */
 static double
 bound_error(const hs_scene *scene, const double *most)
 {

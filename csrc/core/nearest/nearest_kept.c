@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_kept.c: see nearest_kept.h. */
+/* nearest_kept.c: a mutex guards two flags, is_building and is_built; the tree is built without
+ * holding it. */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif

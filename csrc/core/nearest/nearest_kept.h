@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * nearest_kept.h: a tree that is kept with cells. The first search for the nearest points there
- * builds it; others borrow it, any number of them at once. Nobody waits: who comes while it is
- * being built makes a tree for that call alone.
+ * builds it; others borrow it, any number of them at once. No call waits: one that comes while it
+ * is being built makes a tree for itself alone.
  */
 #ifndef HS_NEAREST_KEPT_H
 #define HS_NEAREST_KEPT_H
@@ -11,7 +11,7 @@
 
 typedef struct hs_near_kept hs_near_kept;
 
-/* Nothing is built as yet. NULL when memory is short. */
+/* One without a tree as yet. NULL when memory is short. */
 hs_near_kept *hs_near_kept_new(void);
 void          hs_near_kept_free(hs_near_kept *kept); /* NULL-safe */
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_keys.c: see nearest_keys.h. */
+/* nearest_keys.c: few keys are placed by counting the smaller ones, many are merged; the nearest of
+ * many come by partitioning. */
 #include "nearest_keys.h"
 
 HS_ALWAYS_INLINE bool
@@ -12,7 +13,7 @@ is_smaller(void *context, const hs_near_key *b, const hs_near_key *a)
 /*
  * Each key goes to the place that is the number of smaller ones: as integers of 16 bits, the square
  * in some hundreds of steps followed by the key's own number, so that no two are equal. Insertion
- * puts in order what these cannot tell: on average less than one in a row of thirty.
+ * puts in order what these cannot tell: on average less than one among thirty.
  */
 static void
 sort_by_counting(hs_near_key **keys, hs_near_key **spare, int64_t n, double largest)

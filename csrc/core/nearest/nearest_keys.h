@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_keys.h: putting hits in order, by their squares or by whatever else. */
+/* nearest_keys.h: hits put in order, by their squares or by any comparison. */
 #ifndef HS_NEAREST_KEYS_H
 #define HS_NEAREST_KEYS_H
 
@@ -23,12 +23,12 @@ typedef bool (*hs_near_before_fn)(void *context, const hs_near_key *b, const hs_
 /* Whether what may take long goes on: once it does not, keys are in any order, some of them twice,
  * and of no use. */
 typedef struct hs_near_pace {
-    const hs_options *options; /* borrowed; whom to ask */
+    const hs_options *options; /* borrowed; polled */
     int64_t           steps;   /* since the last poll */
     hs_status         status;
 } hs_near_pace;
 
-/* After so many more steps; false: stop. */
+/* Counts so many more steps, and polls now and then; false: stop. */
 HS_ALWAYS_INLINE bool
 hs_near_goes_on(hs_near_pace *pace, int64_t steps)
 {
@@ -40,7 +40,7 @@ hs_near_goes_on(hs_near_pace *pace, int64_t steps)
     return pace->status == HS_OK;
 }
 
-/* By their squares, none of which is above `largest`. *spare: room for n keys; the two may change
+/* Sorts by squares, none of which is above `largest`. *spare: room for n keys; the two may change
  * places. */
 void hs_near_sort(hs_near_pace *pace, hs_near_key **keys, hs_near_key **spare, int64_t n,
                   double largest);
@@ -48,7 +48,7 @@ void hs_near_sort(hs_near_pace *pace, hs_near_key **keys, hs_near_key **spare, i
 /* Brings the `wanted` keys of least squares to the front, in no order. */
 void hs_near_select(hs_near_key *keys, int64_t n, int64_t wanted);
 
-/* Stable. */
+/* Stable, by insertion. */
 HS_ALWAYS_INLINE void
 hs_near_insert(void *context, hs_near_key *keys, int64_t n, hs_near_before_fn before)
 {
@@ -62,8 +62,8 @@ hs_near_insert(void *context, hs_near_key *keys, int64_t n, hs_near_before_fn be
     }
 }
 
-/* The same by merging, with room for n keys in `left`; with few calls of `before` where all is in
- * order already. */
+/* Stable, by merging, with room for n keys in `left`; few calls of `before` where all is in order
+ * already. */
 HS_ALWAYS_INLINE void
 hs_near_merge(hs_near_pace *pace, void *context, hs_near_key *keys, hs_near_key *left, int64_t n,
               hs_near_before_fn before)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_leaves.c: see nearest_leaves.h. */
+/* nearest_leaves.c: one walk for the box of all groups, in float32 units around its centre; then
+ * the kernel lists each group's leaves. */
 #include "nearest_leaves.h"
 
 #include <math.h>
@@ -13,7 +14,8 @@
 #define WIDEST 256.0
 /* Relative room, far more than roundings of floats take. */
 #define ROOM 0x1p-18
-/* Of the extent, on each axis: two roundings to floats and one of their difference, twice. */
+/* Error on each axis as a fraction of the extent: two roundings to floats and one of their
+ * difference, twice. */
 #define AXIS_ERROR 0x1p-21
 
 hs_status
@@ -55,7 +57,7 @@ hs_near_leaves_free(const hs_near *near, hs_near_leaves *leaves)
     hs_shared_release(shared, (void **)&leaves->stack);
 }
 
-/* The range that holds all of those groups which do not look much further than others. */
+/* One group around all that do not look much further than others. */
 static hs_near_group
 unite(const hs_near_group *groups, int32_t n, int ndim)
 {
@@ -86,7 +88,7 @@ unite(const hs_near_group *groups, int32_t n, int ndim)
     return all;
 }
 
-/* As it lies in units from the centre of all groups. */
+/* A coordinate in units, relative to the centre of all groups. */
 HS_ALWAYS_INLINE float
 relative(const hs_near_leaves *leaves, int k, double x)
 {
@@ -108,7 +110,8 @@ add_leaf(const hs_near *near, int32_t number, hs_near_leaves *leaves)
     leaves->runs[leaves->n++] = (hs_near_run){0, hs_near_of_leaf(near, node), node->first, image};
 }
 
-/* Leaves of the last image within reach, squared: false when there are too many. */
+/* Adds the leaves of the last image whose squared distance is within `limit`; false when there are
+ * too many. */
 HS_ALWAYS_INLINE bool
 find_in_image(const hs_near *near, const hs_near_group *all, double limit, hs_near_leaves *leaves,
               const int ndim)
@@ -141,7 +144,7 @@ find_in_image(const hs_near *near, const hs_near_group *all, double limit, hs_ne
     }
 }
 
-/* The same for all images. */
+/* Finds the leaves of all images within reach; false when there are too many. */
 static bool
 find_leaves(const hs_near *near, const hs_near_group *all, hs_near_images *images,
             hs_near_leaves *leaves)

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * nearest_leaves.h: the leaves that any of some neighbouring groups may need, found by one walk
- * down the tree, so that each group has but a list of boxes to go through.
- */
+/* nearest_leaves.h: the leaves that any of some neighbouring groups may need, found by one walk
+ * down the tree, so that each group has only a list of boxes to go through. */
 #ifndef HS_NEAREST_LEAVES_H
 #define HS_NEAREST_LEAVES_H
 
@@ -22,19 +20,20 @@ typedef struct hs_near_leaves {
     double         centre[HS_MAX_DIM];
     double         unit;   /* a power of two: lengths times this */
     double         extent; /* largest number of any range */
-    double         error;  /* of the images, as hs_near_images has it */
+    double         error;  /* on each component of a shifted coordinate */
     double         radius; /* for groups up to this one; 0: for none */
 } hs_near_leaves;
 
 hs_status hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves);
 void      hs_near_leaves_free(const hs_near *near, hs_near_leaves *leaves);
 
-/* For groups with first guesses. Where there is nothing to be won the leaves are for none. */
+/* Finds leaves for groups with first guesses. Sets leaves->radius to 0 where a list would save
+ * nothing. */
 void hs_near_leaves_find(const hs_near *near, const hs_near_group *groups, int32_t n,
                          hs_near_leaves *leaves);
 
-/* Those within `radius`, not above leaves->radius, of one of these groups: their number; which in
- * leaves->hits, ascending. */
+/* Lists the leaves within `radius` of one of these groups in leaves->hits, ascending; returns how
+ * many. radius: at most leaves->radius. */
 int32_t hs_near_leaves_list(const hs_near *near, const hs_near_group *group, double radius,
                             hs_near_leaves *leaves);
 

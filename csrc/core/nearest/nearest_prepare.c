@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_prepare.c: see nearest_prepare.h. */
+/* nearest_prepare.c: chooses a cutoff that scales the scene without loss, then builds the trees or
+ * borrows the kept one. */
 #include "nearest_prepare.h"
 
 #include "nearest_kept.h"
@@ -37,7 +38,7 @@ scene_cutoff(const hs_box *box, double limit)
     return limit_is_small(limit) ? limit : short_row < SMALL_BOX ? 0.0 : 1.0;
 }
 
-/* The largest distance, in the scene's unit and for the metric. */
+/* Sets the largest distance, in the scene's unit and for the metric. */
 static void
 set_limit(hs_near *near, double limit)
 {
@@ -49,8 +50,8 @@ set_limit(hs_near *near, double limit)
                    of_metric < INFINITY ? of_metric : 1.0, true);
 }
 
-/* The tree of the points, and what is measured of them: all that searches with other k and other
- * queries can share. */
+/* Builds the tree of the points and measures them: all that searches with other k and other queries
+ * can share. */
 static hs_status
 build_tree(hs_near *near, int32_t leaf_points)
 {
@@ -68,7 +69,7 @@ build_tree(hs_near *near, int32_t leaf_points)
     return status;
 }
 
-/* The tree of the queries; their scene is freed. */
+/* Builds the tree of the queries, and frees their scene. */
 static hs_status
 build_asking_tree(hs_near *near, hs_scene *asking)
 {
@@ -109,7 +110,7 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
     return status;
 }
 
-/* A tree for whoever comes: for any k, largest distance and quantities. */
+/* Builds a tree that any later call can use: for any k, largest distance and quantities. */
 static hs_status
 build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near *room,
            hs_failure *failure)
@@ -143,7 +144,7 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
     return status;
 }
 
-/* What is shared, as the new search's own; what it must not free is marked as borrowed. */
+/* Takes what is shared as the new search's own, and marks as borrowed what it must not free. */
 static void
 borrow(const hs_near *kept, hs_near *near)
 {
@@ -185,7 +186,7 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
     }
     const hs_scene *scene = &kept->search->scene;
     const int       unit = hs_exponent_of(hs_scale_apply(scene->scale, limit));
-    /* What is far is drawn together, which a tree that is kept is not. */
+    /* Far points need closed gaps, which a tree that is kept does not have. */
     if (scene->in_one_cell || hs_is_far(scene->cloud.largest, unit, HS_FAR_BOUNDED_EXPONENT)) {
         return HS_UNSERVED;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* nearest_radius.c: how far to look: at first by the density of points, and where that was too
- * short or would be too far by walking down the tree. See nearest.h. */
+ * short or would be too far, by walking down the tree. */
 #include "nearest.h"
 
 #include <math.h>
@@ -9,8 +9,8 @@
 #define ROOM 0x1p-40
 /* The density is that of at least so many times the points that are wanted. */
 #define POINTS_PER_WANTED 4.0
-/* Standard deviations of their number that a first radius makes room for. Measured: with 3 the
- * time is the same within the noise. */
+/* Standard deviations of their number that a first radius makes room for. Measured: with 3 the time
+ * differs by less than the noise. */
 #define SPREAD 3.5
 
 int

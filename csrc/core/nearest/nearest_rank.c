@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_rank.c: see nearest_rank.h. */
+/* nearest_rank.c: squares in float64 are sorted; neighbours in that order that are too close are
+ * compared exactly. */
 #include "nearest_rank.h"
 
-/* A part of the largest square. The last bits of a key hold the number of its hit: so much two
- * keys lose together, doubled. */
+/* A part of the largest square. The last bits of a key hold the number of its hit: this is twice
+ * what two keys lose by that. */
 #define KEY_ERROR 0x1p-15
 /* Where there are more than so many times the keys that are wanted, the farthest are set aside
  * before the others are sorted. */
@@ -78,7 +79,7 @@ hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_
     return true;
 }
 
-/* Where the point that asks is, for the metric. */
+/* Copies the coordinates of the asking point that the metric measures from. */
 static void
 take_origin(const hs_near *near, int32_t si, double *p)
 {
@@ -112,7 +113,8 @@ is_nearer(void *ranker, const hs_near_key *b, const hs_near_key *a)
     return compare(ranker, b, a) < 0;
 }
 
-/* By (j, S). Images of one j differ by their shifts over B, which the turns of i and j leave. */
+/* Whether b comes before a by (j, S). The turns of i and j are common to all images of one j, so
+ * shifts over B tell these apart. */
 static bool
 is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
 {
@@ -140,7 +142,8 @@ is_listed_before(void *context, const hs_near_key *b, const hs_near_key *a)
     return false;
 }
 
-/* In exact order, the first `wanted` of n keys that float64 cannot tell; the others behind them. */
+/* Puts in exact order the first `wanted` of n keys that float64 cannot tell; the others come behind
+ * them. */
 static void
 settle_keys(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, int64_t wanted)
 {
@@ -166,7 +169,8 @@ settle_keys(hs_near_ranker *ranker, hs_near_key *keys, int64_t n, int64_t wanted
     }
 }
 
-/* Sorted keys whose squares are too close to tell, as far as they reach into the first `wanted`. */
+/* Finds sorted keys whose squares are too close to tell, among the first `wanted`, and settles
+ * them. */
 static void
 settle_order(hs_near_ranker *ranker, int64_t n, int64_t wanted)
 {
@@ -264,7 +268,7 @@ hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits, const
     const bool           omits_self = ranker->near->omits_self;
     const int64_t        wanted = ranker->near->k + omits_self;
     const double         reach = block->reach * block->reach;
-    /* Of two squares, and of two keys. */
+    /* The error of two squares, and of two keys. */
     const double least = 2.0 * block->square_error + KEY_ERROR * reach;
     int32_t      keys[HS_ORDER_MOST + 1];
     *count = -1;

@@ -17,7 +17,7 @@ typedef struct hs_near_ranker {
     hs_near_key         *keys;  /* those that count come first */
     hs_near_key         *spare;
     int64_t              capacity;
-    int32_t              si; /* the point that asks */
+    int32_t              si; /* the asking point */
     hs_near_pace         pace;
     hs_stages            stages;
     int64_t              n_compared;
@@ -25,8 +25,8 @@ typedef struct hs_near_ranker {
 
 void hs_near_ranker_free(hs_near_ranker *ranker);
 
-/* The same as hs_near_rank, from squares in float32, for a block that has them: false when these
- * cannot tell. */
+/* Ranks as hs_near_rank does, but from squares in float32, for a block that has them: false when
+ * these cannot tell. */
 bool hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits,
                        const float *squares, int64_t n, int64_t *count);
 
@@ -38,8 +38,8 @@ bool hs_near_rank_fast(hs_near_ranker *ranker, int32_t si, const int32_t *hits,
 hs_status hs_near_rank(hs_near_ranker *ranker, const hs_near_group *group, int32_t si,
                        const int32_t *hits, int64_t n, int64_t *count);
 
-/* What the metric measures to, and its shift; also S over the periodic rows as given when `given`
- * is not NULL. False when a shift passes its range. */
+/* What the metric measures to, and its shift; also S over the periodic box vectors as given when
+ * `given` is not NULL. False when a shift passes its range. */
 bool hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_t place,
                   double *q, int64_t *shift, int64_t *given);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_runs.c: which leaves a group may be near to, as runs of points. See nearest_block.h. */
+/* nearest_runs.c: which leaves a group may be near to, as runs of points. */
 #include "nearest_block.h"
 
 #include "../base/outcome.h"
@@ -27,7 +27,7 @@ add_image(const hs_near *near, const hs_near_image *image, hs_near_block *block)
     return true;
 }
 
-/* Points si, ..., si + n - 1 in that image. */
+/* Adds points si, ..., si + n - 1 in that image. */
 static bool
 add_points(const hs_near *near, int32_t si, int32_t n, int32_t image, hs_near_block *block)
 {
@@ -50,15 +50,15 @@ add_points(const hs_near *near, int32_t si, int32_t n, int32_t image, hs_near_bl
     return true;
 }
 
-/* Points of a leaf, in the last image. */
+/* Adds the points of a leaf, in the last image. */
 static bool
 add_leaf(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
 {
     return add_points(near, node->first, hs_near_of_leaf(near, node), block->n_images - 1, block);
 }
 
-/* Leaves of the last image that are in reach: runs in ascending order. low, high: the group, less
- * the image's displacement. */
+/* Adds the leaves of the last image that are in reach, as runs in ascending order. low, high: the
+ * group, less the image's displacement. */
 HS_ALWAYS_INLINE hs_status
 find_runs(const hs_near *near, const double *low, const double *high, double most, double reach,
           hs_near_block *block, const int ndim)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * nearest_search.c: see nearest_search.h.
+ * nearest_search.c: threads take ranges of groups.
  *
- * Those that ask are taken in groups, subtrees of a few points. What lies within a radius guessed
+ * Asking points are taken in groups, subtrees of a few points. What lies within a radius guessed
  * from the local density is gathered once for the group, and each of its points ranks its hits.
  * Points that found too few, and groups for which the guess is of no use, are searched one by one,
  * with a radius that surely suffices: so the cost follows n and k, however unevenly points lie.
@@ -20,7 +20,7 @@
 /* Points of a group. Measured: from 32 to 64 the time falls by some 10 %,
  * where vectors are wide. */
 #define GROUP_POINTS 48
-#define AHEAD        8 /* points between asking for a row's memory and writing to it */
+#define AHEAD        8 /* points from prefetching a row to writing it */
 /* A thread takes subtrees at a time whose groups share a walk down the tree: at most a so many-th
  * part of all points, so that there is enough for all threads, within these bounds. Measured: with
  * more points the walk is a smaller part of the work. */
@@ -34,7 +34,7 @@
 /* ... and so many times more for each axis beyond the third. */
 #define MOST_PER_AXIS 3.0
 
-/* Groups, as nodes of the tree of those that ask; spots are cut into several. */
+/* Groups, as nodes of the tree of asking points; spots are cut into several. */
 typedef struct near_part {
     int32_t first, last;
 } near_part;
@@ -94,7 +94,7 @@ finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_
     return status;
 }
 
-/* The points of a filled block; bit t of *left: point t of the group is not done. */
+/* Does the points of a filled block; bit t of *left: point t of the group is not done. */
 static hs_status
 finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
 {
@@ -120,7 +120,8 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
     return status;
 }
 
-/* One point, from a radius that surely suffices; where rounding says otherwise, from more. */
+/* Does one point within a radius that surely suffices; a larger one where rounding makes it fall
+ * short. */
 static hs_status
 search_point(near_worker *worker, int32_t si, double guess)
 {
@@ -234,7 +235,7 @@ close_worker(const near_crew *crew, near_worker *worker)
     hs_near_block_free(crew->near, &worker->block);
 }
 
-/* Points of a node, as one group or several, in the present range or from it on in new ones. */
+/* Adds the points of a node, as one group or several, to the present range and new ones. */
 static void
 add_parts(near_crew *crew, const hs_tree_node *node)
 {
@@ -247,8 +248,8 @@ add_parts(near_crew *crew, const hs_tree_node *node)
     }
 }
 
-/* Largest subtrees of at most GROUP_POINTS, in ranges that are larger ones; leaves that are larger
- * in parts. */
+/* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
+ * which are larger subtrees. A larger leaf becomes several groups. */
 static void
 list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
 {
@@ -277,7 +278,7 @@ list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
     crew->ranges[crew->n_ranges] = crew->n_parts;
 }
 
-/* Everybody searches. */
+/* Runs all workers. */
 static hs_status
 run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
 {

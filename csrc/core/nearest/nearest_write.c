@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* nearest_write.c: see nearest_write.h. */
+/* nearest_write.c: a batch of entries at a time, measured by the batch kernel; each goes to its
+ * place in the output. */
 #include "nearest_write.h"
 
 #include <math.h>
@@ -165,7 +166,8 @@ put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_ke
     return HS_OK;
 }
 
-/* The metric's shifts where they are those of the images: few are not zero, as all were before. */
+/* The metric's shifts where they are those of the images: all are zero before, and few are not
+ * after. */
 static void
 put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n)
 {

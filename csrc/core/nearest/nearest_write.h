@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * nearest_write.h: rows of the nearest, to their places in the output: k entries for each point
- * that asks, in the caller's order; what a row lacks is j = -1, d = infinity, D = NaN and S = 0.
- */
+/* nearest_write.h: rows of the nearest, to their places in the output: k entries for each asking
+ * point, in the caller's order; what a row lacks is j = -1, d = infinity, D = NaN and S = 0. */
 #ifndef HS_NEAREST_WRITE_H
 #define HS_NEAREST_WRITE_H
 
@@ -24,16 +22,17 @@ typedef struct hs_near_writer {
 void hs_near_writer_init(const hs_near *near, hs_near_writer *writer);
 
 /* The row of the ranker's point: the first `count` of its keys, as far as they are within the
- * largest distance, and then what stands for nothing. HS_ERR_SHIFT_RANGE. */
+ * largest distance, and then entries that stand for no neighbour. HS_ERR_SHIFT_RANGE. */
 hs_status hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count);
 
-/* The row of point si comes soon: rows are far apart, and their memory is fetched meanwhile. */
+/* Prefetches the row of point si, which will be written soon: rows lie far apart in memory. */
 void hs_near_expect(const hs_near_writer *writer, int32_t si);
 
 /* Writes what is left of the batch: needed once, at the end. Entries do not refer to the block. */
 void hs_near_flush(hs_near_writer *writer);
 
-/* Nothing, from the given entry of a row of the caller's point `row` on. */
+/* Entries that stand for no neighbour, from entry `from` of the row of the caller's point
+ * `row` on. */
 void hs_near_write_nothing(const hs_near *near, int64_t row, int64_t from);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tree.c: see tree.h. */
+/* tree.c: splits nodes at a sampled middle, the smaller half first; bounds are filled from the
+ * leaves up. */
 #include "tree.h"
 
 #include "../base/poll.h"
@@ -66,7 +67,8 @@ sort_numbers(double *numbers, int n)
     }
 }
 
-/* By some of the points, evenly picked from the node; false when they are all in one place. */
+/* Finds where to split, by a sample picked evenly from the node; false when it is all in
+ * one place. */
 static bool
 cut_by_sample(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
 {
@@ -106,7 +108,7 @@ cut_by_sample(const tree_builder *builder, const hs_tree_node *node, tree_cut *c
     return true;
 }
 
-/* By all points; false when they are all in one place. */
+/* Finds where to split, by all points; false when they are all in one place. */
 static bool
 cut_by_range(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
 {
@@ -144,7 +146,8 @@ is_spot(const tree_builder *builder, const hs_tree_node *node)
     return true;
 }
 
-/* Keeps the order on both sides; returns where the right one begins. */
+/* Partitions the points of a node, keeping the order on both sides; returns where the right one
+ * begins. */
 static int32_t
 part_points(tree_builder *builder, const hs_tree_node *node, const tree_cut *cut)
 {
@@ -216,8 +219,8 @@ split_all(tree_builder *builder)
     return status;
 }
 
-/* Range of a leaf, from its points, which are in tree order by now; of another node, from its
- * children. */
+/* Sets the range of a leaf from its points, which are in tree order by now; of another node, from
+ * its children. */
 static void
 bound_axis(const hs_bins *bins, const hs_tree *tree, int32_t number, int k, double *range)
 {
@@ -288,7 +291,7 @@ build_nodes(tree_builder *builder)
     if (bins->n == 0) {
         return HS_OK;
     }
-    /* Half full leaves and as many other nodes; more are made room for. */
+    /* Room for half full leaves and as many other nodes; it grows if there are more. */
     tree->capacity = (int32_t)(4 * bins->n / builder->leaf_points < INT32_MAX / 2
                                    ? 4 * bins->n / builder->leaf_points + 4
                                    : INT32_MAX / 2);

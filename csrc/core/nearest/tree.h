@@ -2,7 +2,7 @@
 /*
  * tree.h: cells that follow the points: each node halves its points along the axis where they are
  * spread widest, about evenly, so that cells are small where points crowd and few where they are
- * rare, on any scale and in any box. What is nearest is looked for here (nearest.h).
+ * rare, on any scale and in any box. The search for the nearest walks it.
  */
 #ifndef HS_TREE_H
 #define HS_TREE_H
@@ -14,7 +14,7 @@
 typedef struct hs_tree_node {
     int32_t first, end; /* its points, in tree order */
     int32_t left;       /* its children are nodes left and left + 1; 0: it has none */
-    bool    is_spot;    /* its points are one and the same, to the last digit; a leaf */
+    bool    is_spot;    /* its points have equal coordinates, to the last digit; a leaf */
 } hs_tree_node;
 
 typedef struct hs_tree {
@@ -76,7 +76,7 @@ hs_tree_gaps(const double *bounds, const double *low, const double *high, double
     gaps[1] = sum[1];
 }
 
-/* The same for the first node. */
+/* Squared distance, in a given unit, from [low, high] to the range of the first node. */
 HS_ALWAYS_INLINE double
 hs_tree_gap(const hs_tree *tree, const double *low, const double *high, double unit)
 {

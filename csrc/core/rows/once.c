@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* once.c: see once.h. */
+/* once.c: the walk keeps table rows as it finds them; then two passes in the order of the table
+ * write j, then i. */
 #include "once.h"
 
 #include "table_rows.h"
@@ -10,17 +11,17 @@
 
 #include <string.h>
 
-#define AHEAD         24        /* rows between asking for one and reading it */
-#define MOST_EXPECTED 1024      /* bytes of a row that are asked for; others follow by themselves */
-#define LEAST_ENTRIES (1 << 20) /* fewer, and their rows, stay in a cache (table.c) */
-#define POLL_ENTRIES  (1 << 20) /* written between two questions: some milliseconds */
+#define AHEAD         24        /* rows between prefetching one and reading it */
+#define MOST_EXPECTED 1024      /* bytes of a row to prefetch; the hardware takes the rest */
+#define LEAST_ENTRIES (1 << 20) /* with fewer, all rows stay in a cache (table.c) */
+#define POLL_ENTRIES  (1 << 20) /* written between two polls: some milliseconds */
 
 /* The walk and what it leaves. */
 typedef struct once {
     hs_table *table;
     hs_filler fill;
     hs_output kept;  /* its numbers j lie in the entries' column i */
-    int64_t  *where; /* owned; by asking points: where in `kept` the row begins */
+    int64_t  *where; /* owned; for each asking point: where in `kept` its row begins */
 } once;
 
 bool
@@ -69,7 +70,7 @@ walk_once(once *doing, hs_failure *failure)
     return status;
 }
 
-/* Asks for the row that waits some rows ahead. */
+/* Prefetches the row that is AHEAD rows ahead. */
 static void
 ask_ahead(const once *doing, const int32_t *kept, int64_t row)
 {

@@ -12,9 +12,9 @@
 /* Whether to try: i and j, nothing else, in columns of the search's own, by one thread. */
 bool hs_once_applies(const hs_table *table);
 
-/* After hs_table_prepare: offsets and entries. HS_TOO_MUCH when memory is short: nothing is kept
- * then, and two walks, the first of which only counts, can do with less or tell how much it takes.
- */
+/* After hs_table_prepare: finds offsets and entries. HS_TOO_MUCH when memory is short: nothing is
+ * kept then, and two walks, the first of which only counts, can do with less or tell how much it
+ * takes. */
 hs_status hs_once_find(hs_table *table, hs_failure *failure);
 
 #endif

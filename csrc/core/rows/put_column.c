@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* put_column.c: see put_column.h. */
+/* put_column.c: collects numbers in a small buffer, then writes whole cache lines by streaming
+ * stores. */
 #include "put_column.h"
 
 #include <string.h>
@@ -56,7 +57,7 @@ hs_put_numbers(hs_put_column *out, const int32_t *numbers, int64_t n)
         if (out->index_bytes == 8) {
             int64_t *wide = out->part.wide + out->n / sizeof *out->part.wide;
             for (int64_t k = 0; k < part; k++) {
-                wide[k] = (int64_t)(uint32_t)numbers[k]; /* cheaper than the sign */
+                wide[k] = (int64_t)(uint32_t)numbers[k]; /* cheaper than a sign */
             }
         } else {
             memcpy(out->part.bytes + out->n, numbers, (size_t)part * sizeof *numbers);

@@ -11,7 +11,7 @@
 
 #include "../memory/account.h"
 
-#define HS_PUT_BYTES 4096 /* collected before they are written: well inside the nearest cache */
+#define HS_PUT_BYTES 4096 /* collected before they are written: well inside the first-level cache */
 
 /* Numbers of 4 or 8 bytes on their way to memory. */
 typedef struct hs_put_column {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* table.c: see table.h. */
+/* table.c: lengths of table rows by a counting walk, or by the one walk that keeps them; their sums
+ * are the offsets. */
 #include "table.h"
 
 #include "../base/outcome.h"
@@ -33,12 +34,12 @@ hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure)
     }
     const hs_status status = hs_parallel_visit(search, &visitors, NULL, failure);
     for (int64_t i = 0; !search->has_queries && i < n; i++) {
-        counts[i] -= counts[i] > 0; /* the point itself; none at all below a cutoff of zero */
+        counts[i] -= counts[i] > 0; /* the point itself, unless nothing is within */
     }
     return status;
 }
 
-/* In a small scene, the largest that there could be, which is small. */
+/* In a small scene a bound on the largest neighbourhood does, which is small as well. */
 hs_status
 hs_table_prepare(hs_table *table, hs_failure *failure)
 {

@@ -13,7 +13,7 @@
  * sets failure->row. */
 hs_status hs_table_count(hs_search *search, int64_t *counts, hs_failure *failure);
 
-/* Before the rest: finds the largest neighbourhood. */
+/* Call first: finds the largest neighbourhood. */
 hs_status hs_table_prepare(hs_table *table, hs_failure *failure);
 
 /* Fills offsets. Where few entries are expected, one walk finds them, and keeps them. */
@@ -22,7 +22,7 @@ hs_status hs_table_measure(hs_table *table, hs_failure *failure);
 /* Offsets that hold the number of each row's entries: where it begins. */
 void hs_table_sum(hs_table *table);
 
-/* Then the entries, which have room for offsets[rows]. */
+/* Call last: fills the entries, which have room for offsets[rows]. */
 hs_status hs_table_fill(hs_table *table, hs_failure *failure);
 
 /* Harmless twice. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* table_rows.c: see table_rows.h. */
+/* table_rows.c: hits come in the order of the table; the point itself is left out, and each column
+ * is copied. */
 #include "table_rows.h"
 
 #include "../base/outcome.h"
@@ -7,10 +8,8 @@
 
 #include <string.h>
 
-#define AHEAD \
-    32                     /* points between asking for a row and writing it; twice that for where
-                            * it is */
-#define MOST_EXPECTED 2048 /* bytes of a row that are asked for */
+#define AHEAD         32        /* points from prefetch to writing; twice that for offsets */
+#define MOST_EXPECTED 2048      /* bytes of a table row to prefetch */
 #define NO_POINT      INT32_MAX /* more than any point's number */
 
 /* The row of one point. */
@@ -79,8 +78,8 @@ put_measures(const hs_filler *fill, int64_t at, int64_t hit, int32_t n)
     }
 }
 
-/* Where the group's first point itself is among the candidates, in the places they were gathered
- * to; the others follow it. */
+/* The place of the group's first point itself among the candidates as gathered; the others follow
+ * it. */
 static int32_t
 own_place(const hs_scanner *scanner)
 {
@@ -150,8 +149,8 @@ put_places(const hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits
     }
 }
 
-/* Rows lie anywhere in the result: asks for the memory of one that is soon to be written, and for
- * where another one will be. */
+/* Table rows lie anywhere in the result: prefetches the memory of one that is soon to be written,
+ * and the offset of a later one. */
 HS_ALWAYS_INLINE void
 expect_rows(const hs_filler *fill, const hs_bins *asking, int64_t si)
 {
@@ -270,7 +269,7 @@ hs_filler_open(hs_table *table, hs_output *to, hs_filler *fill)
     hs_output_init(NULL, to->ndim, to->columns & HS_MEASURES, to->index_bytes, &fill->part);
     fill->numbers =
         hs_alloc(account, HS_FOR_CANDIDATES, table->most.candidates + 1, sizeof *fill->numbers);
-    /* It keeps no numbers of hits: there are none to be turned round. */
+    /* It keeps no numbers of hits: no pair must be turned round. */
     const hs_status status = hs_recorder_init(account, &fill->part, 0, &fill->recorder);
     return fill->numbers == NULL ? HS_ERR_MEMORY : status;
 }

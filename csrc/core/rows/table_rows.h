@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * table_rows.h: the rows of a table, written as walkers find them: to their places when offsets are
- * known, or one behind another in cell order, to be moved later.
- */
+/* table_rows.h: table rows (the neighbours of one point each), written as walkers find them: to
+ * their places when offsets are known, or one behind another in cell order, to be moved later. */
 #ifndef HS_TABLE_ROWS_H
 #define HS_TABLE_ROWS_H
 
@@ -39,8 +37,8 @@ void      hs_filler_close(hs_filler *fill);
 /* A hs_visit_fn of ordered walkers: whole rows, to their places by table->offsets. */
 hs_status hs_fill_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
-/* The same: whole rows, one behind another, and their lengths as offsets. HS_TOO_MUCH when they
- * are more than HS_MOST_KEPT. */
+/* A hs_visit_fn of ordered walkers: whole rows, one behind another, and their lengths as offsets.
+ * HS_TOO_MUCH when they are more than HS_MOST_KEPT. */
 hs_status hs_keep_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for

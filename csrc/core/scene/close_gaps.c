@@ -1,24 +1,25 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * close_gaps.c: see close_gaps.h.
+ * close_gaps.c: sorts the far magnitudes of each column and moves them closer to zero.
  *
  * Why pairs stay what they are. Let u be the unit, so that the cutoff is below 2 u. The magnitudes
- * of a column are taken in their order; whatever is more than 8 u beyond the one before it moves
- * towards it, to some 4 u to 12 u from it, and all that follow move with it. Numbers up to 2^54 u
- * move by multiples of 4 u: they are multiples of a unit in their last place, which is at most 2 u,
- * and become smaller, so that nothing is rounded. Larger numbers are multiples of 4 u, so each is
- * 4 u or more from all others: only which are equal matters, and each follows at the next multiple.
- * So every difference of two coordinates stays what it is to the last bit, or was more than 2 u and
- * is so still. None becomes larger, so all are float64 numbers, wherever drawing together begins.
+ * of a column are taken in ascending order. One that is more than 8 u beyond the one before it
+ * moves to some 4 u to 12 u from it, and all that follow move with it. Numbers up to 2^54 u move by
+ * multiples of 4 u: they are multiples of a unit in their last place, which is at most 2 u, and
+ * become smaller, so that nothing is rounded. Larger numbers are multiples of 4 u, so each is 4 u
+ * or more from all others: only which are equal matters, and each follows at the next multiple. So
+ * every difference of two coordinates stays what it is to the last bit, or was more than 2 u and is
+ * so still. None becomes larger, so all are float64 numbers, wherever closing begins.
  *
  * Along a periodic axis of length L, all x lie in [-L/2, L/2] first, and L/2 takes part as one more
  * number. Across the face, the difference of two points is the sum of L/2 - |x| and L/2 - |y|, and
- * each of these stays what it is or more than the cutoff. Queries take part as if they were
+ * each of these stays as it is, or stays more than the cutoff. Queries take part as if they were
  * points: the differences that count are between both.
  *
- * Where scaling loses digits pairs are decided on coordinates and rows that are not scaled. Those
- * that result will do, for the same reason; but S counts the turns that were made here as well, so
- * a column with such turns is decided on as it was given, and so is its row.
+ * Where scaling loses digits, pairs are decided on coordinates and box vectors that are not scaled.
+ * Those with closed gaps will do: differences are what they were. But S also counts the turns that
+ * were made here, so a column with such turns is decided on as it was given, and so is its box
+ * vector.
  */
 #include "close_gaps.h"
 
@@ -29,16 +30,17 @@
 #include <math.h>
 #include <string.h>
 
-/* Along one axis: what condensing leaves where all points are apart. */
+/* Extent of one axis after closing, per point, where all points are apart. */
 #define UNITS_PER_POINT 8.0
 
-/* Among the keys: half a box vector. Points are numbers from 0 on, queries from -2 on downwards. */
+/* Stands for half a box vector among the keys. Points are numbers from 0 on, queries from -2 on
+ * downwards. */
 #define HALF (-1)
 
-/* Beyond it the half of a row is exact: the last place is twice the smallest number. */
+/* From here on half a box entry is exact: its last place is at least twice the smallest number. */
 #define LEAST_HALF 0x1p-1022
 
-/* How one call condenses. */
+/* What one call of hs_condense works with. */
 typedef struct condensing {
     hs_account       *account;
     const hs_options *options;
@@ -46,11 +48,11 @@ typedef struct condensing {
     int               n_sets;
     int64_t           n; /* of both together */
     hs_condensed     *condensed;
-    bool              changes_rows; /* boxes may be condensed as well */
+    bool              changes_rows; /* gaps of box vectors may be closed, too */
     bool              keeps_given;  /* columns that are wrapped, as they were before */
     hs_scale          to_units, from_units;
-    double            far;    /* drawn together from here on, in the caller's unit */
-    double            coarse; /* 2^54 u, the same */
+    double            far;    /* gaps are closed from here on, in the caller's unit */
+    double            coarse; /* 2^54 u, in the caller's unit */
     hs_keys           keys;   /* room for n + 1 */
 } condensing;
 
@@ -68,7 +70,7 @@ coordinate_of(const condensing *doing, int k, int32_t id)
     return id >= 0 ? &doing->of[0]->x[k][id] : &doing->of[1]->x[k][HALF - 1 - (int64_t)id];
 }
 
-/* Rows are left alone where what is decided on the points as given would not be the same: in
+/* Box vectors are left alone where closing would change a decision on the points as given: in
  * coupled boxes, and for precision="double". */
 static bool
 rows_may_change(const condensing *doing, const hs_box *box)
@@ -93,7 +95,7 @@ anything_is_far(const hs_cloud *cloud, const hs_box *box, int unit, int powers)
     return found;
 }
 
-/* The column of both sets, before any number in it is wrapped. */
+/* Copies the column of both sets before any number in it is wrapped. */
 static hs_status
 keep_given(const condensing *doing, int k)
 {
@@ -109,7 +111,7 @@ keep_given(const condensing *doing, int k)
     return HS_OK;
 }
 
-/* Room for the turns of a column, none so far. */
+/* Makes room for the turns of a column, all zero. */
 static hs_status
 begin_turns(const condensing *doing, int set, int k)
 {
@@ -170,14 +172,14 @@ number_of(int64_t bits)
     return x;
 }
 
-/* The magnitudes of a column, in their order and in units. */
+/* The magnitudes of a column, ascending, in units. */
 typedef struct places {
     double last;  /* the last one, */
     double place; /* where it went, */
     double moved; /* and, unless it is beyond 2^54 u, by what */
 } places;
 
-/* Where the next magnitude goes, and those that are equal to it. */
+/* Where the next magnitude goes, and all that are equal to it. */
 static double
 next_place(places *at, double x, bool is_coarse)
 {
@@ -194,7 +196,7 @@ next_place(places *at, double x, bool is_coarse)
     return at->place;
 }
 
-/* As a coordinate of the scene that results. */
+/* A place as a coordinate of the scene. */
 static double
 placed(const condensing *doing, double place)
 {
@@ -232,7 +234,7 @@ collect(condensing *doing, int k, double from, double half, places *at)
     return found;
 }
 
-/* Condenses the numbers of a column from `from` on, and *half, which is 0 along an open axis. */
+/* Closes the gaps of a column from `from` on, and *half, which is 0 along an open axis. */
 static hs_status
 condense_numbers(condensing *doing, int k, double from, double *half)
 {
@@ -259,7 +261,7 @@ condense_numbers(condensing *doing, int k, double from, double *half)
     return status;
 }
 
-/* The range of a column, of both sets in each. */
+/* Sets the range of a column: each cloud gets that of both. */
 static void
 measure_column(const condensing *doing, int k)
 {
@@ -310,7 +312,7 @@ condense_column(condensing *doing, int k, hs_failure *failure)
     return status;
 }
 
-/* All four arrays are one block, which begins with the keys. */
+/* All four arrays are one memory block, which begins with the keys. */
 static bool
 allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys *keys)
 {
@@ -324,7 +326,7 @@ allocate_keys(hs_account *account, const hs_options *options, int64_t n, hs_keys
     return keys->keys != NULL;
 }
 
-/* Columns in which there is something to do, one after the other. */
+/* Closes the gaps of all columns that have any, one after the other. */
 static hs_status
 condense_columns(condensing *doing, hs_failure *failure)
 {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * close_gaps.h: coordinates that are far from zero, drawn together. Where two different float64
- * numbers are more than a cutoff apart, all that matters is which are equal, so others can take
- * their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300; with this one does.
- * The scene that results has the same pairs, to the bits of d and D, and S but for the turns.
+ * close_gaps.h: closes the gaps between coordinates that are far from zero. Where two different
+ * float64 numbers are more than a cutoff apart, all that matters is which are equal, so smaller
+ * numbers can take their place. No scale holds both a cutoff of 1e-300 and an outlier at 1e300;
+ * once gaps are closed, one does. No pair changes, nor a bit of d and D, and S by the turns alone.
  */
 #ifndef HS_CLOSE_GAPS_H
 #define HS_CLOSE_GAPS_H
@@ -18,12 +18,12 @@ typedef struct hs_condensed {
     const hs_box *box;       /* in place of the caller's: borrowed, or `rows` */
     const hs_box *given_box; /* the caller's */
     hs_box        rows;
-    bool          is_scaled; /* points and rows are in units of 2^unit now */
+    bool          is_scaled; /* points and box vectors are in units of 2^unit now */
     bool          has_turns; /* something was wrapped into the box, and S is wanted: */
     /* Owned, of points and of queries; n each for a column where some were, else NULL. */
     int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
-    /* And where scaling may lose digits these columns of both sets, if either has turns, as they
-     * were given: S with all its turns is that of those numbers and of the box as given. */
+    /* Owned; where scaling may lose digits: the columns that have turns, of both sets, as they were
+     * given. S with all its turns belongs to these numbers and to the box as given. */
     double *given[HS_CONDENSED_SETS][HS_MAX_DIM];
 } hs_condensed;
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* points.c: see points.h. */
+/* points.c: slabs of points are copied to columns, and the range of each column is kept. */
 #include "points.h"
 
 #include "../threads/passes.h"
@@ -117,7 +117,7 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
     return HS_OK;
 }
 
-/* The ranges of all slabs in one. Returns whether every entry is finite. */
+/* Joins the ranges of all slabs. Returns whether every entry is finite. */
 static bool
 join_ranges(const loading *load, int n_slabs)
 {

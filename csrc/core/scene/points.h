@@ -12,8 +12,8 @@
 #include "../../kernels/kernel.h"
 
 /*
- * Coordinates as given, float32 widened exactly to float64, in one block together with the room
- * that sorting them takes. In the block, with nothing of use between or behind them:
+ * Coordinates as given, float32 widened exactly to float64, in one memory block together with the
+ * room that sorting them takes. In it, with nothing of use between or behind them:
  *
  *     order | spare | x[0] | x[1] | ...
  */
@@ -29,10 +29,11 @@ typedef struct hs_cloud {
     double   largest; /* largest |x|, 0 without points */
 } hs_cloud;
 
-/* Bytes behind the last column of a block that may be read: kernels work in whole vectors. */
+/* Bytes behind the last column of a memory block that may be read: kernels work in whole
+ * vectors. */
 #define HS_COLUMN_PADDING ((int64_t)(HS_PADDING * sizeof(double)))
 
-/* Entries from one column of a block to the next: all begin on a cache line. */
+/* Entries from one column to the next: all begin on a cache line. */
 HS_ALWAYS_INLINE int64_t
 hs_column_pitch(int64_t n, size_t size)
 {

@@ -11,7 +11,7 @@
 #error "define REAL and NAME before including points_template.h"
 #endif
 
-/* Copies rows [first, last). Inlined with constants for ndim and column_stride. */
+/* Copies points [first, last). Inlined with constants for ndim and column_stride. */
 HS_ALWAYS_INLINE void
 NAME(copy_rows)(const hs_points *points, int ndim, ptrdiff_t column_stride, int64_t first,
                 int64_t last, double *const *x)
@@ -20,7 +20,7 @@ NAME(copy_rows)(const hs_points *points, int ndim, ptrdiff_t column_stride, int6
     for (int k = 0; k < ndim; k++) {
         to[k] = x[k];
     }
-    for (int64_t i = first; i < last; i++) { /* no row behind the last: its address may overflow */
+    for (int64_t i = first; i < last; i++) { /* no address behind the last point: it may overflow */
         const char *row = (const char *)points->data + i * points->row_stride;
         for (int k = 0; k < ndim; k++) {
             REAL given;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scene.c: see scene.h. */
+/* scene.c: reads the points, closes gaps, scales, wraps, and settles bounds, in this order. */
 #include "scene.h"
 
 #include "close_gaps.h"
@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Columns for the originals and the turns, as far as these are kept, in this order. */
+/* Allocates columns for the originals and the turns, as far as these are kept, in this order. */
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
 {
@@ -94,7 +94,7 @@ prepare_points(hs_account *account, hs_team *team, const hs_options *options, hs
     const bool copies = scene->keeps_originals && !scene->x_is_beside;
     if (copies || scene->pending.exponent != 0) {
         scaling          doing = {scene, copies, !scene->extreme};
-        const hs_options silent = {.poll = NULL}; /* a copy of what was asked about already */
+        const hs_options silent = {.poll = NULL}; /* the caller was polled when this was copied */
         (void)hs_walk_slabs(team, &silent, scene->n, scale_slab, &doing);
     }
     for (int k = 0; scene->x_is_beside && k < scene->ndim; k++) {
@@ -113,7 +113,7 @@ wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_sc
     return status == HS_OK ? hs_scene_wrap(scene, team, options, magnitude, failure) : status;
 }
 
-/* asking: NULL, or wrapped as well, and left with the same bounds. */
+/* asking: NULL, or the queries' scene, which is wrapped too and gets the bounds of `scene`. */
 static hs_status
 fill_scene(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
            hs_scene *asking, hs_failure *failure)
@@ -208,7 +208,7 @@ hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points
     return status;
 }
 
-/* Reads both clouds, the other one if there is one. */
+/* Reads the points, and the queries if there are any. */
 static hs_status
 load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_options *options,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
@@ -224,8 +224,8 @@ load_clouds(hs_account *account, hs_team *team, const hs_sets *sets, const hs_op
     return status;
 }
 
-/* The turns that condensing made, added to those that wrapping made after it. With all of them the
- * originals are the columns as given. */
+/* The turns that closing gaps made, added to those that wrapping made after it. With all of them
+ * the originals are the columns as given. */
 static void
 add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
 {
@@ -242,7 +242,7 @@ add_turns(const hs_condensed *condensed, int set, hs_scene *scene)
     }
 }
 
-/* In columns that are decided on as they were given, the rows as given. */
+/* Sets the box vectors as given in columns that are decided on as they were given. */
 static void
 restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
 {
@@ -255,7 +255,7 @@ restore_rows(const hs_condensed *condensed, hs_lattice *lattice)
     }
 }
 
-/* Lattice and radius, then the points. */
+/* Sets lattice and radius, then wraps the points. */
 static hs_status
 fill_scaled(hs_account *account, hs_team *team, const hs_options *options,
             const hs_condensed *condensed, hs_scene *scene, hs_scene *asking, hs_failure *failure)

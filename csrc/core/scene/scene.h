@@ -21,7 +21,7 @@ typedef struct hs_scene {
     int64_t    n;
     hs_scale   scale;
     hs_scale   unscale; /* the way back */
-    hs_scale   pending; /* scale, but for what condensing the points has done of it */
+    hs_scale   pending; /* scale, less what closing gaps has already scaled */
     hs_lattice lattice;
     double     sought;          /* the caller's cutoff, not scaled; less if no two points are so far
                                * apart */
@@ -33,32 +33,35 @@ typedef struct hs_scene {
     hs_cloud   cloud;           /* its columns are X, in the caller's order, once that is known */
     bool       keeps_originals; /* X does not hold every digit */
     double    *originals[HS_MAX_DIM]; /* n each: the points as given */
-    bool       x_is_beside; /* the originals stayed in the cloud's block, X is in the other */
-    hs_turns   turns;       /* known if shifts or originals need them */
-    void      *beside;      /* owned; the columns of originals and turns, one behind another */
+    bool       x_is_beside;           /* the originals stayed in cloud.block, X is in `beside` */
+    hs_turns   turns;                 /* known if shifts or originals need them */
+    void      *beside; /* owned; the columns of originals and turns, one behind another */
     double     lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
     double     upper[HS_MAX_DIM];
     double     x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
     double     x_error;               /* each component of X is within this of r - w B */
     double     t_error[HS_MAX_DIM];   /* and each computed t_k of the true one, clamping included */
     double     formula_error;         /* precision="double": its |D| against the true one */
-    bool       is_asked;              /* by queries: the bounds above hold for these too */
-    bool       is_kept;               /* and for others that come later */
+    bool       is_asked;              /* there are queries: the bounds above hold for these too */
+    bool       is_kept;               /* and for queries that come later */
     bool       in_one_cell;           /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
-    bool       is_untested;           /* as hs_sets says: bounds for the cells alone will do */
-    bool       is_plain;              /* the same */
-    bool       is_wide;               /* the same */
-    double     least_cutoff;          /* the same */
-    double     within;                /* the same */
+    bool       is_untested;           /* only cells are wanted: bounds for these alone will do */
+    bool       is_plain;              /* the cutoff is taken as it is; gaps are closed only if
+                                       * need be */
+    bool       is_wide;               /* X is not made float32 */
+    double     least_cutoff;          /* smallest positive length that pairs are compared with;
+                                       * 0: the cutoff */
+    double     within;                /* where is_wide: farther pairs do not matter; 0: all pairs
+                                       * do */
 } hs_scene;
 
-/* Who looks for neighbours among whom; borrowed. */
+/* The points to search among, and the points whose neighbours are sought; borrowed. */
 typedef struct hs_sets {
     const hs_points *points;
     const hs_points *queries;  /* NULL: the points themselves; else of the same dimension */
     bool             is_kept;  /* queries come later: bounds with room for them */
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
-                                * and points are drawn together (close_gaps.h) only if need be */
+                                * and gaps (close_gaps.h) are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_near_kept    *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
@@ -80,29 +83,29 @@ hs_status hs_scene_init(hs_account *account, hs_team *team, const hs_points *poi
                         hs_failure *failure);
 
 /*
- * The same for two sets of points in one box: each becomes a scene of its own, with one scale, one
- * lattice and bounds that hold for both. asking: that of the queries, NULL when there are none;
- * only its arrays and what they are like are its own.
+ * Two sets of points in one box: each becomes a scene of its own, with one scale, one lattice and
+ * bounds that hold for both. asking: the queries' scene, NULL without queries; only its arrays and
+ * what describes them are its own.
  */
 hs_status hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets,
                              const hs_box *box, const hs_options *options, hs_scene *scene,
                              hs_scene *asking, hs_failure *failure);
 
-/* Steps of that; scene_scale.c. The cutoff that scale and condensing go by. */
+/* Steps of hs_scene_init_sets, in scene_scale.c. The cutoff that scale and gaps go by. */
 double hs_scene_settle_cutoff(const hs_scene *scene, const struct hs_box_size *size, double cutoff);
 
-/* Whether points and queries are drawn together where they are far. Others that come later may be
- * near to what is far from all of these, and the k nearest may be at any distance. Where one scale
- * holds everything, cells of queries and of lists that last are those of the points as given. */
+/* Whether gaps between far points and queries are closed. Queries that come later may lie in such a
+ * gap, and the k nearest may be at any distance. Where one scale holds everything, cells of queries
+ * and of lists that last are those of the points as given. */
 bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
                            const struct hs_box_size *size, int unit);
 
-/* Of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled: condensing has
- * brought the points and this box to units. */
+/* The scale of points, lengths and the cutoff. asking: NULL, or the queries' scene. is_scaled:
+ * closing gaps has brought the points and this box to units. */
 void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
                         const hs_scene *asking);
 
-/* More steps; scene_queries.c. Both clouds get the range of both. */
+/* Steps in scene_queries.c. Both clouds get the range of both. */
 void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);
 
 /* What has been settled for the points is settled for the queries. */
@@ -123,14 +126,15 @@ void hs_scene_put_in_one_cell(hs_scene *scene);
  * its scale would round unless only cells are wanted. */
 bool hs_scene_takes(const hs_scene *kept, const hs_cloud *cloud);
 
-/* And whether its bounds hold for what wrapping has made of it. */
+/* Whether the bounds of a scene that was kept hold for queries that have been wrapped. */
 bool hs_scene_covers(const hs_scene *kept, const hs_scene *asking);
 
-/* Of queries whose cells are wanted: row, column and value of the first coordinate that a kept
- * scene does not take; where each alone would do, of the largest. Nothing where no query would. */
+/* Names, of queries whose cells are wanted, row, column and value of the first coordinate that a
+ * kept scene does not take; if each alone would do, the largest. Names none where no query would
+ * do. */
 void hs_scene_name_refused(const hs_scene *kept, const hs_points *queries, hs_failure *failure);
 
-/* Bounds on what was wrapped, with room for queries that come later. Before and after they are
+/* Widen the bounds on what was wrapped, for queries that come later: before and after they are
  * settled. */
 void hs_scene_make_room(hs_scene *scene, double *magnitude);
 void hs_scene_widen_errors(hs_scene *scene);
@@ -144,43 +148,43 @@ hs_status hs_scene_like(hs_account *account, hs_team *team, const hs_scene *kept
                         const hs_points *queries, const hs_options *options, hs_scene *asking,
                         hs_failure *failure);
 
-/* Points wrapped as those of a scene that was kept, however far away they are: for their cells
+/* Points wrapped into the box of a scene that was kept, however far away they are: for their cells
  * alone. On failure it holds nothing. */
 hs_status hs_scene_wrapped_like(hs_account *account, const hs_scene *kept, const hs_points *points,
                                 const hs_options *options, hs_scene *scene, hs_failure *failure);
 
-/* Cutoff, radius and what decides, for another cutoff of a scene that is not extreme. */
+/* Sets cutoff, radius and metric for another cutoff of a scene that is not extreme. */
 void hs_scene_set_cutoff(hs_scene *scene, const hs_options *options);
 
 /* Wraps columns that scaling would make infinite, or that lie more box vectors away than turns can
- * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled;
+ * tell, in the caller's unit. For scenes whose S is not wanted, before they are scaled. In
  * scene_wrap.c. */
 void hs_scene_fold_far(hs_scene *scene);
 
-/* Wraps the points into the box; scene_wrap.c. Sets x_largest, the range of t_k of the points in
- * lower and upper, and *magnitude as hs_wrap_point says. */
+/* Wraps the points into the box, in scene_wrap.c. Sets x_largest, the range of t_k of the points in
+ * lower and upper, and *magnitude, the largest sum of absolute terms. */
 hs_status hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options,
                         double *magnitude, hs_failure *failure);
 
-/* Steps of scene_bounds.c. x_error and t_error, from x_largest and what wrapping says. */
+/* Steps in scene_bounds.c. Sets x_error and t_error, from x_largest and *magnitude of wrapping. */
 void hs_scene_bound_errors(hs_scene *scene, double magnitude);
 
-/* Range of the grid coordinates: the points' own where open, one period where periodic. */
+/* Sets the range of the grid coordinates: the points' own where open, one period where periodic. */
 void hs_scene_settle_ranges(hs_scene *scene);
 
-/* formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
+/* Sets formula_error and radius, from the cutoff, the lattice and the largest |x|, scaled. */
 void hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest);
 
-/* Whether the formula's error passes both the cutoff and a small part of the box: then the images
- * that it might call near are too many to try, and its answer is noise; and the point or query to
- * blame for that. asking: NULL without queries. */
+/* Whether the error of the formula of precision="double" passes both the cutoff and a small part of
+ * the box: then it might call too many images near, and its answer is noise. hs_scene_name_farthest
+ * says which point or query is to blame; asking: NULL without queries. */
 bool hs_scene_is_drowned(const hs_scene *scene);
 void hs_scene_name_farthest(const hs_scene *scene, const hs_scene *asking, hs_failure *failure);
 
-/* What decides: X and B where they hold every digit, else the points and rows as given. */
+/* Sets what decides: X and B where they hold every digit, else points and box vectors as given. */
 void hs_scene_init_metric(hs_scene *scene, const hs_options *options);
 
-/* t_k of point i, as hs_lattice_coordinate. */
+/* t_k of point i, with the bits of hs_lattice_coordinate. */
 HS_ALWAYS_INLINE double
 hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
 {
@@ -195,7 +199,7 @@ hs_scene_coordinate(const hs_scene *scene, int64_t i, int k)
     return t;
 }
 
-/* Steps of scene_scale.c once the box is scaled. Whether a period of it has come to nothing. */
+/* Steps of scene_scale.c once the box is scaled. Whether one of its periods has become zero. */
 struct hs_condensed;
 bool hs_scene_box_vanishes(const hs_scene *scene);
 

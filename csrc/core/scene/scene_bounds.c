@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * scene_bounds.c: how far what the search computes with can be from the numbers that were given,
- * and what decides then. See scene.h.
- */
+/* scene_bounds.c: how far what the search computes with can be from the numbers that were given,
+ * and what decides then. */
 #include "scene.h"
 
 #include <math.h>

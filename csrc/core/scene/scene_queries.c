@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * scene_queries.c: two sets of points in one scene, at once or one after the other: what is known
- * of one must hold for both. See scene.h.
- */
+/* scene_queries.c: points and queries in one scene, at once or one after the other: bounds must
+ * hold for both. */
 #include "scene.h"
 
 #include <math.h>
@@ -96,7 +94,7 @@ hs_scene_make_room(hs_scene *scene, double *magnitude)
     scene->cloud.largest = hs_larger(FURTHER * scene->cloud.largest, away);
     *magnitude = hs_larger(FURTHER * *magnitude, away);
     for (int k = 0; k < scene->ndim; k++) {
-        double across = 0.0; /* what is wrapped lies within half of each row */
+        double across = 0.0; /* what is wrapped lies within half of each row of B */
         for (int r = 0; r < lattice->n_periodic; r++) {
             across += 0.5 * fabs(lattice->rows[r][k]);
         }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scene_scale.c: which power of two a scene is scaled by, and whether its points are drawn together
- * before. See scene.h, unit.h, close_gaps.h. */
+/* scene_scale.c: which power of two a scene is scaled by (unit.h), and whether gaps between its
+ * points are closed before that (close_gaps.h). */
 #include "scene.h"
 
 #include "close_gaps.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scene_wrap.c: the pass over all points that wraps them into the box. See scene.h, wrap.h. */
+/* scene_wrap.c: the pass over all points that wraps them into the box, axis by axis where
+ * it can. */
 #include "scene.h"
 
 #include "../box/box_skew.h"
@@ -97,7 +98,7 @@ wrap_slab(void *context, int slab, int64_t first, int64_t last)
     return folded->failed < 0 ? HS_OK : HS_ERR_SHIFT_RANGE;
 }
 
-/* Of all slabs together, and of the axes that were left alone. */
+/* What wrapping found in all slabs together, and on the axes that were left alone. */
 static hs_folded
 join_slabs(const wrapping *wrap)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* snapshot.c: see snapshot.h. */
+/* snapshot.c: one pass that copies each point, then finds the largest coordinate in the copy. */
 #include "snapshot.h"
 
 #include "../base/poll.h"
@@ -10,7 +10,7 @@
 /* Independent chains of the loop over all entries: one would wait for itself. */
 #define CHAINS 4
 
-/* Rows [first, last) without gaps. */
+/* Points [first, last), one behind another. */
 static void
 copy_rows(const hs_points *points, int64_t first, int64_t last, char *to)
 {
@@ -23,7 +23,7 @@ copy_rows(const hs_points *points, int64_t first, int64_t last, char *to)
                (size_t)(last - first) * row_size);
         return;
     }
-    for (int64_t i = first; i < last; i++) { /* no row behind the last: its address may overflow */
+    for (int64_t i = first; i < last; i++) { /* no address behind the last point: it may overflow */
         const char *row = (const char *)points->data + i * points->row_stride;
         for (int k = 0; k < points->ndim; k++, to += size) {
             memcpy(to, row + k * points->column_stride, size);

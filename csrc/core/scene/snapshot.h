@@ -7,7 +7,7 @@
 #include "../memory/growable.h"
 
 typedef struct hs_frame {
-    hs_points points; /* rows without gaps, of the caller's type */
+    hs_points points; /* one point behind another, of the caller's type */
     hs_store  store;
     void     *rows;    /* in it; what points.data is */
     double    largest; /* largest |x| of all coordinates, 0 without points */
@@ -38,7 +38,7 @@ hs_frame_box(const hs_frame *frame)
     return frame->has_box ? &frame->box : NULL;
 }
 
-/* Entry e of the rows, row by row. */
+/* Coordinate e, counted point after point. */
 HS_ALWAYS_INLINE double
 hs_frame_entry(const void *rows, hs_real real, int64_t e)
 {

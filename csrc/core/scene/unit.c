@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* unit.c: see unit.h. */
+/* unit.c: compares exponents, which are integers: no ratio of lengths can overflow. */
 #include "unit.h"
 
 #include <math.h>
@@ -10,7 +10,7 @@
 /* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
  * and a binary order apart. */
 #define WHOLE_EXPONENT 8
-/* Of zero, and of infinity less as much: sums with exponents of numbers stay integers. */
+/* Exponent of zero; that of infinity is its opposite. Sums with other exponents do not overflow. */
 #define NO_EXPONENT (INT32_MIN / 2)
 
 int

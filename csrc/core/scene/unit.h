@@ -9,20 +9,25 @@
  * How far is far? So many powers of two beyond a length, each for a reason of its own. hs_is_far
  * tells.
  */
-/* Beyond so many cutoffs the points of a search are drawn together (close_gaps.h): float64 numbers
- * are multiples of four cutoffs there. */
+/* Beyond so many cutoffs gaps between the points are closed (close_gaps.h): float64 numbers are
+ * multiples of four cutoffs there. */
 #define HS_FAR_EXPONENT 54
-/* Beyond so many largest distances those of a bounded search for the nearest are. Wrapped into a
+/*
+ * Beyond so many largest distances they are in a bounded search for the nearest. Wrapped into a
  * coupled box, coordinates err by 2^-52 of the largest one. The radius that is looked at is 2^10
  * times the error of two at least (nearest_block.c), so it passes the largest distance from here
- * on, and soon spans many images. */
+ * on, and soon spans many images.
+ */
 #define HS_FAR_BOUNDED_EXPONENT 40
 /* Points may be 2^51 box vectors away, where turns are integers that float64 holds; there is one
  * order to spare. What is further away is refused or wrapped before it is scaled. */
 #define HS_FAR_TURNS_EXPONENT 52
-/* Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
- * in float32. What close_gaps.h takes care of does; what remains, coupled by a skewed box, is known
- * to within 2^-53 of the largest only, so that a cutoff may well be smaller than 1 then. */
+/*
+ * Scaled coordinates and box entries stay below 2^57, so that squares of sums of a few are finite
+ * in float32. Closing gaps keeps to that along open and aligned axes; what remains, coupled by a
+ * skewed box, is known to within 2^-53 of the largest only, so that a cutoff may well be smaller
+ * than 1 then.
+ */
 #define HS_LARGEST_EXPONENT 56
 /* So many vectors of the box in a cutoff have more images than any memory holds. */
 #define HS_FAR_IMAGES_EXPONENT 64
@@ -41,11 +46,11 @@ bool hs_is_far(double size, int unit, int powers);
 
 /* Sizes of the periodic box entries. */
 typedef struct hs_box_size {
-    double   largest;    /* 0 without rows */
-    double   smallest;   /* not counting zeros; infinity without rows */
-    double   short_row;  /* the least of the rows' largest entries; infinity without rows */
-    unsigned moved;      /* bit k: some row has an entry in column k */
-    bool     is_coupled; /* a row has several entries, or a column has */
+    double   largest;    /* 0 without box vectors */
+    double   smallest;   /* not counting zeros; infinity without box vectors */
+    double   short_row;  /* the least of the vectors' largest entries; infinity without */
+    unsigned moved;      /* bit k: some vector has an entry in column k */
+    bool     is_coupled; /* a vector has several entries, or a column has */
 } hs_box_size;
 
 /* box: NULL for none. */
@@ -53,14 +58,14 @@ hs_box_size hs_box_size_of(const hs_box *box);
 
 /* What moves a column of coordinates besides the points' own values. */
 #define HS_OPEN    (-1) /* nothing */
-#define HS_COUPLED (-2) /* rows that have entries in other columns as well */
+#define HS_COUPLED (-2) /* box vectors that have entries in other columns as well */
 
-/* HS_OPEN, HS_COUPLED, or the row that alone has an entry in this column, and no other entry.
- * periodic: the rows that count; NULL: all. */
+/* HS_OPEN, HS_COUPLED, or the number of the row (a box vector) that alone has an entry in this
+ * column, and no other entry. periodic: the rows that count; NULL: all. */
 int hs_mover_among(const double rows[][HS_MAX_DIM], const bool *periodic, int n_rows, int ndim,
                    int column);
 
-/* The same for rows of a box. box: NULL for none. */
+/* hs_mover_among for the periodic rows of a box. box: NULL for none. */
 int hs_mover_of(const hs_box *box, int column);
 
 /* The cutoff, or a smaller one if that is beyond all distances as well. */
@@ -78,7 +83,7 @@ bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, 
 bool hs_open_drowns_box(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
 /* The exponent to scale by, so that no exponent is above `largest`; *extreme: whether that loses
- * digits. unit: as hs_unit_exponent. */
+ * digits. unit: from hs_unit_exponent. */
 int hs_choose_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff, int unit,
                        int largest, bool *extreme);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* cell_rows.c: see cell_rows.h. */
+/* cell_rows.c: dense rows go by cell ids, sparse rows by a search for their indices. */
 #include "cell_rows.h"
 
 #include <math.h>
@@ -20,7 +20,7 @@
 #define SHARED_PER_POINT 90.0
 #define SHARED           250.0
 
-/* The rows and cells of the points that ask, in a sparse grid. */
+/* The rows and cells of the asking points, in a sparse grid. */
 static const hs_sparse *
 asking_sparse(const hs_search *search)
 {
@@ -34,7 +34,7 @@ hs_row_count(const hs_search *search)
                              : search->grid.n_cells / search->grid.shape[0];
 }
 
-/* Its first point; of the row after the last, the number of points. */
+/* The first point of a row; of the row after the last, the number of points. */
 static int32_t
 first_point(const hs_search *search, int64_t number)
 {

@@ -27,9 +27,9 @@ typedef struct hs_row {
 
 /* A neighbouring row of the row being walked, with its image settled. */
 typedef struct hs_link {
-    int64_t          base;              /* as in hs_row */
+    int64_t          base;              /* id of its first cell; in a sparse grid, of the row */
     hs_sparse_cursor cursor;            /* sparse only */
-    int32_t          first, last;       /* as in hs_stencil_row */
+    int32_t          first, last;       /* neighbours of cell x: x + first to x + last */
     int32_t          image[HS_MAX_DIM]; /* shift over the rows of B */
     double           shift[HS_MAX_DIM]; /* image * B */
 } hs_link;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* decide.c: see decide.h. */
+/* decide.c: a batch of pairs at a time by the batch kernel; pairs that it leaves, one by one. */
 #include "decide.h"
 
 #include "../exact/metric_float.h"
@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of the square of the cutoff: far above what rounding can do to the sum of 8 squares. */
+/* A fraction of the square of the cutoff, far above the rounding of a sum of 8 squares. */
 #define SCALED_MARGIN 0x1p-47
 
 /* Takes the first n of scan->unsure from the hits of points [first, next). */
@@ -30,7 +30,7 @@ remove_hits(hs_scan *scan, int32_t n, int32_t first, int32_t next)
     }
 }
 
-/* The same when hits are only counted. */
+/* Takes the first n of scan->unsure from the counts, where hits are not listed. */
 static void
 remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
 {
@@ -43,7 +43,7 @@ remove_counts(hs_scan *scan, int32_t n, int32_t first, int32_t next)
     }
 }
 
-/* One pair of the batch, by all stages or by the last alone. */
+/* Decides one pair of the batch, by all stages or by the last alone. */
 static bool
 decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others_failed)
 {
@@ -58,9 +58,9 @@ decide_pair(hs_scanner *scanner, const hs_metric *metric, int32_t e, bool others
 }
 
 /*
- * Where squares would leave float64's range: the same on differences that are scaled so that the
- * cutoff is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is
- * near r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
+ * Where squares would leave float64's range: judges differences that are scaled so that the cutoff
+ * is r in [1, 2). Rounding and what scaling loses change the sum of d squares, where it is near
+ * r^2, by at most (d + 4) 2^-53 of it. Pairs without a shift only.
  */
 static void
 judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, hs_stages *stages)
@@ -137,7 +137,7 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         }
         hs_decide_traced(scanner, &scanner->search->scene.metric, within);
         for (int32_t e = 0; e < end - u; e++) {
-            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather at the front */
+            scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather in front */
             n_beyond += !within[e];
         }
     }

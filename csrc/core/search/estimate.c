@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* estimate.c: see estimate.h. */
+/* estimate.c: first by the density of the points, then by counting the neighbours of a sample. */
 #include "estimate.h"
 
 #include "../base/outcome.h"
@@ -15,7 +15,7 @@
 #define BYTES_OF_WALK        4e5
 #define SAMPLES              64     /* points that are counted: an error of some per cent */
 #define SAMPLE_WORK          4.0e6  /* candidates and rows that sampling may cost: milliseconds */
-#define MOST_PAIRS           0x1p62 /* more than int64 should be asked to count */
+#define MOST_PAIRS           0x1p62 /* close to the most that int64 counts */
 #define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
 #define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
 
@@ -66,15 +66,15 @@ bytes_per_pair_of(const hs_options *options, int ndim)
     return (double)bytes;
 }
 
-/* The same, or 0 when nothing is kept. */
+/* Bytes that one pair of this search's result takes, or 0 when none is kept. */
 static double
 find_bytes_per_pair(const hs_search *search)
 {
     return search->keeps_none ? 0.0 : bytes_per_pair_of(&search->call->options, search->scene.ndim);
 }
 
-/* Volume of the region that a search has to do with: of the periodic part, times the extents along
- * the coordinate axes that have none. */
+/* Volume of the space that a search covers: of the periodic part, times the extents along the
+ * coordinate axes that have none. */
 static double
 occupied_volume(const hs_points *points, const hs_box *box, double cutoff)
 {
@@ -242,7 +242,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
     if (status == HS_OK) {
         status = take_sample(&walker, n, &taken);
-        HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* who counts needs no S */
+        HS_ASSERT(status != HS_ERR_SHIFT_RANGE); /* counting needs no S */
         hs_walker_close(search, &walker);
     }
     if (status != HS_OK) {

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* estimate.h: will the result fit? Asked before the search, answered from a sample of points. */
+/* estimate.h: will the result fit? Estimated before the search from a sample of points. */
 #ifndef HS_ESTIMATE_H
 #define HS_ESTIMATE_H
 
 #include "search.h"
 
-/* What a search that was refused memory would have taken. HS_ERR_MEMORY only, and nothing where the
- * failure says it already. */
+/* What a search that was refused memory would have taken. For HS_ERR_MEMORY only; changes nothing
+ * where the failure says it already. */
 typedef struct hs_shortage {
-    double pairs; /* by the density of the points in the region that they occupy */
+    double pairs; /* by the density of the points in the space that they occupy */
     double bytes; /* of the search itself */
 } hs_shortage;
 
@@ -18,7 +18,7 @@ void hs_shortage_add(const hs_points *points, const hs_box *box, double cutoff,
 void hs_shortage_tell(const hs_shortage *shortage, const hs_options *options, int ndim,
                       double limit, hs_failure *failure);
 
-/* Both, for one search. */
+/* Pairs and bytes of one search. */
 void hs_shortage_of_search(const hs_points *points, const hs_box *box, const hs_search *search,
                            hs_failure *failure);
 

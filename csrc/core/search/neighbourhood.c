@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* neighbourhood.c: see neighbourhood.h. */
+/* neighbourhood.c: candidates are appended as runs of point numbers; then the kernel copies all
+ * runs at once. */
 #include "neighbourhood.h"
 
 #include "../base/poll.h"

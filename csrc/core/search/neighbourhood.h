@@ -24,11 +24,11 @@ typedef struct hs_block {
     float     *y[HS_MAX_DIM];
     float     *norm;    /* sum of y_k^2 */
     int32_t   *id;      /* point numbers of the candidates */
-    int32_t   *place;   /* 0, 1, 2, ...; NULL unless asked for */
+    int32_t   *place;   /* 0, 1, 2, ...; NULL unless hits are places */
     int32_t   *origin;  /* where candidates were before neighbourhood_sort.h put them in order; NULL
                         * when it did not */
     int32_t   *hits;    /* most_hits + HS_PADDING; NULL when only counting */
-    float     *squares; /* of the hits, the same; NULL unless asked for */
+    float     *squares; /* of the hits, as many; NULL without HS_BLOCK_LISTS_SQUARES */
     hs_unsure *unsure;  /* capacity */
     hs_run    *runs;    /* most_runs + 1; runs[n_runs].at is the number of candidates */
     int32_t    capacity, most_hits, most_runs;
@@ -73,15 +73,15 @@ void hs_group_load(const hs_bins *bins, hs_group *group);
 
 /*
  * Appends points [si, end) of one image to the block, as many as there is room for; returns how
- * many. shift: the image's displacement, ndim doubles; image: the same in rows of B.
+ * many. shift: the image's displacement, ndim doubles; image: that displacement over the rows of B.
  */
 int32_t hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, const double *shift,
                         const int32_t *image, const hs_group *group);
 
 /*
  * Copies what was appended. The first block of a group must begin with the group's own points, in
- * the image 0: they are kept as its q. Fails when poll() stops the search, which a large block
- * asks now and then.
+ * the image 0: they are kept as its q. Fails when poll() stops the search; it is called now and
+ * then for a large block.
  */
 hs_status hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
                           bool is_first, hs_block *block, hs_group *group);

@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * neighbourhood_sort.c: a radix sort from the least digit, stable, of numbers that share few bits:
- * those of some hundred candidates. See neighbourhood_sort.h.
- */
+/* neighbourhood_sort.c: a radix sort from the least digit, stable, of numbers that share few bits:
+ * those of some hundred candidates. */
 #include "neighbourhood_sort.h"
 
 #include "../base/poll.h"
 
 #include <string.h>
 
-#define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the nearest cache */
+#define DIGIT_BITS 10 /* of a digit, at most: four kB of counts stay in the first-level cache */
 #define LEAD_BITS  8  /* of the only digit that few candidates are sorted by; one more for others */
 #define FEW        24 /* candidates that are quicker sorted by insertion */
 #define MANY       160 /* from here on two digits are quicker than one and insertion */
@@ -58,7 +56,8 @@ sort_few(uint64_t *entries, int32_t n)
     }
 }
 
-/* From how many entries have each digit to where the first of them goes. Returns the most. */
+/* Turns the number of entries with each digit into the place of the first of them. Returns the
+ * largest number. */
 HS_ALWAYS_INLINE uint32_t
 sum_digits(uint32_t *start, uint32_t mask)
 {
@@ -72,7 +71,7 @@ sum_digits(uint32_t *start, uint32_t mask)
     return most;
 }
 
-/* Into the spare entries, which become the entries. */
+/* Distributes the entries to the spare ones, which become the entries. */
 HS_ALWAYS_INLINE void
 deal_out(hs_order *order, int32_t n, int shift, uint32_t mask, uint32_t *start)
 {
@@ -85,7 +84,7 @@ deal_out(hs_order *order, int32_t n, int shift, uint32_t mask, uint32_t *start)
     order->entries = to;
 }
 
-/* By one digit of the key. Returns the largest number of entries that agree in it. */
+/* Sorts by one digit of the key. Returns the largest number of entries that agree in it. */
 static uint32_t
 sort_digit(hs_order *order, int32_t n, int shift, int bits)
 {
@@ -100,7 +99,7 @@ sort_digit(hs_order *order, int32_t n, int shift, int bits)
     return most;
 }
 
-/* By two digits of `low` and `high` bits, which are the key: one look counts both. */
+/* Sorts by two digits of `low` and `high` bits, which are the key: one pass counts both. */
 static void
 sort_two_digits(hs_order *order, int32_t n, int low, int high)
 {
@@ -119,7 +118,7 @@ sort_two_digits(hs_order *order, int32_t n, int low, int high)
     deal_out(order, n, 32 + low, mask_high, start_high);
 }
 
-/* Stable, by the keys, none of which has a bit that `any` has not. */
+/* Sorts by the keys, stable. `any` has every bit that a key has. */
 static void
 sort_entries(hs_order *order, int32_t n, uint32_t any)
 {
@@ -153,7 +152,7 @@ sort_entries(hs_order *order, int32_t n, uint32_t any)
     }
 }
 
-/* Whether a key occurs twice in a row. */
+/* Whether two neighbouring entries have equal keys. */
 static bool
 has_twice(const hs_order *order, int32_t n)
 {
@@ -164,8 +163,7 @@ has_twice(const hs_order *order, int32_t n)
     return twice != 0;
 }
 
-/* By the candidates' numbers, those of the same number as they lie. Returns whether one occurs
- * twice. */
+/* Sorts by the candidates' numbers, stable. Returns whether a number occurs twice. */
 static bool
 sort_by_number(const hs_block *block, hs_order *order)
 {
@@ -180,7 +178,7 @@ sort_by_number(const hs_block *block, hs_order *order)
     return has_twice(order, n);
 }
 
-/* The same, stable, of entries that are in another order. */
+/* Sorts entries that are in some order by the candidates' numbers, stable. */
 static void
 sort_again_by_number(const hs_block *block, hs_order *order)
 {
@@ -194,7 +192,7 @@ sort_again_by_number(const hs_block *block, hs_order *order)
     sort_entries(order, block->n, any);
 }
 
-/* S of each run's image, over the rows as given. */
+/* Finds S of each run's image, over the box vectors as given. */
 static bool
 find_shifts(const hs_lattice *lattice, const hs_block *block, int64_t *shifts)
 {
@@ -210,7 +208,7 @@ find_shifts(const hs_lattice *lattice, const hs_block *block, int64_t *shifts)
     return true;
 }
 
-/* Stable, by one component of S: its lower 32 bits, or what lies above. */
+/* Sorts by one component of S, stable: by its lower 32 bits, or by the bits above. */
 static void
 sort_by_shift(const hs_block *block, const int64_t *shifts, bool upper, hs_order *order)
 {
@@ -237,14 +235,14 @@ sort_by_shift(const hs_block *block, const int64_t *shifts, bool upper, hs_order
     }
 }
 
-/* Between passes over a large block. */
+/* Polls between passes over a large block. */
 static hs_status
 poll_large(const hs_options *options, const hs_block *block)
 {
     return block->n > HS_POLL_CANDIDATES ? hs_poll(options, 0.0) : HS_OK;
 }
 
-/* Candidates in their order. */
+/* Puts the candidates in the order of the entries. */
 static hs_status
 arrange(int ndim, const hs_options *options, hs_block_use use, hs_block *block,
         const hs_order *order)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pair_batch.c: see pair_batch.h. */
+/* pair_batch.c: the candidates of a block are looked up once, run by run; each batch copies from
+ * there. */
 #include "pair_batch.h"
 
 #include "../base/poll.h"
@@ -12,7 +13,7 @@
 /* Turns and images up to here are few: sums of four of them are int32. */
 #define MOST_FEW 0x1p28
 
-/* Whether shifts over B are those over the rows as given. */
+/* Whether shifts over B are those over the box vectors as given. */
 static bool
 is_plain(const hs_lattice *lattice)
 {
@@ -55,8 +56,8 @@ new_arrays(hs_account *account, int n, int64_t length, size_t size, void **array
     return true;
 }
 
-/* The same for batches of doubles, zero at first: batch kernels read a little beyond the last pair,
- * where any finite number will do. */
+/* n arrays of `length` doubles for batches, zero at first: batch kernels read a little beyond the
+ * last pair, where any finite number will do. */
 static bool
 new_batches(hs_account *account, int n, double **arrays)
 {
@@ -130,7 +131,7 @@ turns_of(const hs_bins *bins, int r, int64_t si)
     return bins->turns.known ? hs_turns_get(&bins->turns, r, si) : 0;
 }
 
-/* The shifts of the candidates of one run, less their turns. */
+/* Looks up the shifts of the candidates of one run, less their turns. */
 static void
 load_given(hs_trace *trace, const hs_run *run, int32_t n)
 {
@@ -153,7 +154,7 @@ load_given(hs_trace *trace, const hs_run *run, int32_t n)
     }
 }
 
-/* What the metric needs of the candidates of one run. */
+/* Looks up what the metric needs of the candidates of one run. */
 static void
 load_metric(hs_trace *trace, const hs_run *run, int32_t n)
 {
@@ -253,9 +254,9 @@ look_up_narrow(hs_trace *trace)
     }
 }
 
-/* S = image + turns_i - turns_j over B, then over the rows as given. Without turns they are all
- * known to cancel or not to be needed. Returns the first pair whose S passes its range, or their
- * number. */
+/* S = image + turns_i - turns_j over B, then over the box vectors as given. Without turns they are
+ * all known to cancel or not to be needed. Returns the first pair whose S passes its range, or
+ * their number. */
 static int32_t
 look_up_given(hs_trace *trace)
 {
@@ -305,7 +306,7 @@ look_up_images(hs_trace *trace)
     trace->has_zeros = zero;
 }
 
-/* The metric's shift: of X over B, or of the points as given over the rows as given. */
+/* The metric's shift: of X over B, or of the points as given over the box vectors as given. */
 static void
 look_up_times(hs_trace *trace)
 {

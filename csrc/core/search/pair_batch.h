@@ -13,8 +13,8 @@
 typedef struct hs_trace_block {
     double  *q[HS_MAX_DIM];      /* what the metric measures to */
     int64_t *image[HS_MAX_DIM];  /* shift over B, of X */
-    int64_t *turned[HS_MAX_DIM]; /* the same less the turns by which the candidate was wrapped; */
-    int32_t *few[HS_MAX_DIM];    /* the same as int32, when is_narrow */
+    int64_t *turned[HS_MAX_DIM]; /* `image` less the turns by which the candidate was wrapped; */
+    int32_t *few[HS_MAX_DIM];    /* `turned` as int32, when is_narrow */
 } hs_trace_block;
 
 /* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more of doubles;
@@ -22,20 +22,21 @@ typedef struct hs_trace_block {
 typedef struct hs_trace {
     const hs_search  *search; /* borrowed */
     const hs_block   *block;  /* borrowed */
-    const hs_options *polls;  /* borrowed; asked while a large block is loaded */
+    const hs_options *polls;  /* borrowed; polled while a large block is loaded */
     hs_trace_block    of;
     bool              has_metric, has_given; /* `of` is the block's: q and image; turned or few */
-    bool              is_plain;              /* shifts over B are those over the rows as given */
+    bool              is_plain;              /* shifts over B are those over the box vectors as
+                                              * given */
     bool              needs_given;
     bool     is_narrow;  /* all S of the scene are few: `shift` has them, `given` is not set */
     bool     has_images; /* some candidate of the block is in another image */
     int32_t  n;
-    int32_t *place, *si;                    /* of the candidate, and of the point that asks */
+    int32_t *place, *si;                    /* of the candidate, and of the asking point */
     double  *p[HS_MAX_DIM], *q[HS_MAX_DIM]; /* what the metric measures between */
     double  *times[HS_MAX_DIM];             /* its shift */
     int64_t *image[HS_MAX_DIM];             /* shift over B, of X */
-    int64_t *given[HS_MAX_DIM]; /* S over the periodic rows as given; when needs_given */
-    int32_t *shift[HS_MAX_DIM]; /* the same, when is_narrow */
+    int64_t *given[HS_MAX_DIM]; /* S over the periodic box vectors as given; when needs_given */
+    int32_t *shift[HS_MAX_DIM]; /* S as int32, when is_narrow */
     bool     has_zeros;         /* image and times hold nothing but zeros */
     bool     is_shifted;        /* some entry of times is not zero */
     bool     is_wide;           /* some entry is too large for the batch kernels */
@@ -46,7 +47,7 @@ hs_status hs_trace_init(hs_search *search, const hs_block *block, bool needs_giv
                         hs_trace *trace);
 void      hs_trace_free(hs_account *account, hs_trace *trace);
 
-/* Before the first pair of a batch. */
+/* Empties the batch. */
 HS_ALWAYS_INLINE void
 hs_trace_clear(hs_trace *trace)
 {
@@ -54,7 +55,7 @@ hs_trace_clear(hs_trace *trace)
     trace->is_shifted = trace->is_wide = false;
 }
 
-/* When the block has new candidates. */
+/* Call when the block has new candidates: they will be looked up again. */
 HS_ALWAYS_INLINE void
 hs_trace_reset(hs_trace *trace)
 {
@@ -62,7 +63,7 @@ hs_trace_reset(hs_trace *trace)
 }
 
 /* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
- * many. They are looked up together, because the rows of one point are short. */
+ * many. They are looked up together, because one point has few hits. */
 int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n);
 
 /*
@@ -72,7 +73,7 @@ int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t
  */
 hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
 
-/* As the batch kernels take it. */
+/* The batch as the batch kernels take it. */
 hs_batch hs_trace_batch(const hs_trace *trace);
 
 /* Pair e as the functions of metric.h take it; returns shift, filled, or NULL for none. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scan.c: see scan.h. */
+/* scan.c: the extent of group and block decides the form of the scan and its thresholds. */
 #include "scan.h"
 
 #include "decide.h"
@@ -14,7 +14,7 @@
 #define POLL_WORK   (INT64_C(1) << 21)
 #define WORK_OF_RUN 32 /* candidates that could be tested while a run of them is found */
 
-/* Of a group that meets nobody, in candidates. */
+/* Work of a group without candidates, in candidates. */
 #define LONE_GROUP 64
 
 /* Blocks with subnormal numbers before the filter flushes: some lie behind the last candidate. */
@@ -27,7 +27,7 @@
  */
 #define BURST 128
 
-/* By one float32 comparison: nothing is decided again. */
+/* Thresholds of one float32 comparison: no hit is unsure. */
 static void
 set_single(hs_scanner *scanner)
 {
@@ -37,7 +37,7 @@ set_single(hs_scanner *scanner)
     scanner->direct.in = INFINITY;
 }
 
-/* Thresholds for the present extent. A scaled cutoff may be known between bounds only. */
+/* Sets thresholds for the present extent. A scaled cutoff may be known between bounds only. */
 static void
 set_thresholds(hs_scanner *scanner)
 {
@@ -54,7 +54,7 @@ set_thresholds(hs_scanner *scanner)
     }
 }
 
-/* Thresholds and form of the scan, by the size of the present group and block. */
+/* Chooses thresholds and form of the scan by the size of the present group and block. */
 static void
 set_form(hs_scanner *scanner)
 {
@@ -131,7 +131,7 @@ static void
 note_subnormals(hs_scanner *scanner)
 {
     if (!scanner->flushes && hs_fpenv_met_subnormal()) {
-        hs_fpenv_flush(false); /* forgets it */
+        hs_fpenv_flush(false); /* forgets the flag */
         scanner->flushes = scanner->options.precision != HS_SINGLE &&
                            ++scanner->n_subnormal > FEW_SUBNORMAL;
     }
@@ -149,7 +149,7 @@ visit_hits(hs_scanner *scanner, const hs_scan *scan, int32_t first, int32_t next
     return scanner->visit(scanner->visit_context, scanner, si, &hits);
 }
 
-/* The block as it was appended, ready to be scanned. */
+/* Makes the block ready to be scanned: gathers it, and sorts it where that is wanted. */
 static hs_status
 fill_block(hs_scanner *scanner)
 {
@@ -195,7 +195,7 @@ empty_block(hs_scanner *scanner)
     scanner->blocks++;
 }
 
-/* Of the block alone. */
+/* Adds the size of the block to that of the neighbourhood; scans nothing. */
 static hs_status
 note_size(hs_scanner *scanner)
 {
@@ -206,7 +206,7 @@ note_size(hs_scanner *scanner)
     return poll_sometimes(scanner);
 }
 
-/* Whether to go on. */
+/* Ends the walk if a limit or the visitor says so; else polls now and then. */
 static hs_status
 end_block(hs_scanner *scanner)
 {
@@ -216,7 +216,7 @@ end_block(hs_scanner *scanner)
     return poll_sometimes(scanner);
 }
 
-/* What was tested. */
+/* Counts what was tested, and empties the block. */
 static hs_status
 finish_block(hs_scanner *scanner, int64_t n_points)
 {
@@ -229,7 +229,7 @@ finish_block(hs_scanner *scanner, int64_t n_points)
     return end_block(scanner);
 }
 
-/* Nobody has been appended but the one point of the group itself, if that. */
+/* Nothing has been appended or, in a half list, only the one point of the group itself. */
 static bool
 is_lone(const hs_scanner *scanner)
 {

@@ -24,7 +24,8 @@ void hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last);
 
 /*
  * Appends points [si, end) of one image to the neighbourhood; a full block is tested first. shift:
- * the image's displacement, ndim doubles; image: the same in rows of B. Fails as hs_scan_block.
+ * the image's displacement, ndim doubles; image: that displacement over the rows of B. Any status
+ * of hs_scan_block.
  */
 hs_status hs_scanner_append(hs_scanner *scanner, int32_t si, int32_t end, const double *shift,
                             const int32_t *image);

@@ -27,7 +27,7 @@ typedef struct hs_neighbourhood {
     int64_t candidates, runs;
 } hs_neighbourhood;
 
-/* One at a time belongs to a thread. */
+/* Belongs to one thread. */
 struct hs_scanner {
     const hs_search *search;  /* borrowed, read only */
     hs_options       options; /* the search's, with a poll only for the caller's own thread */
@@ -39,12 +39,12 @@ struct hs_scanner {
     hs_trace         trace;
     hs_visit_fn      visit; /* NULL when counting */
     void            *visit_context;
-    hs_scan_fn       scan; /* these for groups of this extent: */
+    hs_scan_fn       scan; /* these are for groups of this extent: */
     hs_thresholds    direct;
     hs_expanded      expanded;
     double           extent;
     int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
-    bool             flushes; /* too many: gathering and scanning, nothing else, go on without */
+    bool             flushes;     /* too many: only gathering and scanning flush them from now on */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;

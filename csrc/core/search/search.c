@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search.c: see search.h. */
+/* search.c: begins a search, settles what follows from its parts, and frees them. */
 #include "search.h"
 
 #include <stddef.h>

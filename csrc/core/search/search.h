@@ -20,35 +20,35 @@ typedef struct hs_search {
     hs_bins    bins;
     hs_sparse  sparse;      /* when is_sparse: the rows and cells that bins follows */
     bool       is_full;     /* every asking point meets all its neighbours, not the half list */
-    bool       keeps_none;  /* as in hs_sets */
+    bool       keeps_none;  /* pairs are handed on and not kept: any number will fit */
     bool       is_borrowed; /* the cells and all of the scene belong to another search */
-    bool       has_queries; /* then these ask, in the cells of the same grid: */
+    bool       has_queries; /* the asking points are queries, in the cells of this grid: */
     hs_bins    query_bins;
     hs_sparse  query_sparse;
     bool       is_sparse;
     int32_t    first_point;    /* number of the first point */
-    int64_t    n_in_all;       /* points, of which these may be a part: for fractions done */
+    int64_t    n_in_all;       /* asking points, of which these may be a part: for fractions done */
     double     pairs_per_half; /* pairs to be found for each pair of the half list */
     double     filter_error;   /* bound on each component before rounding to float32 */
 } hs_search;
 
-/* Nothing in it yet; the call must outlive it. */
+/* An empty search; the call must outlive it. */
 void hs_search_begin(hs_call *call, hs_search *search);
 
 /* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
 void hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
 
-/* The points that ask, in cell order. */
+/* The asking points, in cell order. */
 HS_ALWAYS_INLINE const hs_bins *
 hs_search_asking(const hs_search *search)
 {
     return search->has_queries ? &search->query_bins : &search->bins;
 }
 
-/* Who asks, as the sets say. */
+/* Sets, from the sets, which points ask and whether lists are full. */
 void hs_search_set_asking(const hs_sets *sets, hs_search *search);
 
-/* What follows from scene and grid. */
+/* Sets what follows from scene and grid. */
 void hs_search_settle(hs_search *search);
 
 /* Frees what it has; harmless twice. The call goes on. */

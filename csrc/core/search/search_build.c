@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search_build.c: see search_build.h. */
+/* search_build.c: the scene first, then the grid, its stencil, and the points sorted into its
+ * cells. */
 #include "search_build.h"
 
 #include "../base/outcome.h"
 
 #include "estimate.h"
 
-/* The dense grid, with cells as wide as the caller wants them or as is best. Where points crowd in
- * few of its cells one that stores occupied cells only, unless the caller has what he wants. */
+/* Chooses the dense grid, with cells as wide as the caller wants them or as is quickest. Where
+ * points crowd in few of its cells, one that stores occupied cells only, unless the dense one has
+ * the caller's width. */
 static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {
@@ -32,7 +34,7 @@ choose_grid(hs_search *search, hs_failure *failure)
     return status;
 }
 
-/* Points into the cells of the grid. */
+/* Sorts the points into the cells of the grid. */
 static hs_status
 build_bins(hs_search *search, hs_scene *scene, hs_grid *grid, hs_sparse *sparse, hs_bins *bins)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search_open.c: cells that were kept, where they serve, or new ones. See search_open.h. */
+/* search_open.c: takes cells that were kept where they serve, and else makes new ones. */
 #include "search_open.h"
 
 #include "../base/outcome.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* search_reuse.c: see search_reuse.h. */
+/* search_reuse.c: a copy of the other search that borrows its arrays, with a reach and queries of
+ * its own. */
 #include "search_reuse.h"
 
 #include "../base/outcome.h"
@@ -10,7 +11,7 @@
 /* Scaled cutoffs as small as this keep all their digits. */
 #define SMALLEST_CUTOFF 0x1p-500
 
-/* What is shared, as the new search's own; what it must not free is marked as borrowed. */
+/* Takes what is shared as the new search's own, and marks as borrowed what it must not free. */
 static void
 borrow(const hs_search *built, bool is_untested, hs_search *search)
 {
@@ -46,7 +47,7 @@ serves(const hs_search *built, const hs_options *options, double least_cutoff)
            (cutoff == before || (cutoff >= 0.0 && cutoff < before && keeps_digits(built, cutoff)));
 }
 
-/* Cells for the cutoff of the options, and the queries in them. */
+/* Makes cells serve the cutoff of the options, and sorts the queries into them. */
 static hs_status
 adapt(const hs_sets *sets, hs_search *search, hs_failure *failure)
 {

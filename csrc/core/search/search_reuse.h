@@ -11,9 +11,9 @@
 
 /*
  * A search among the points of another one, which was made to be kept, stays as it is and must
- * outlive this one. The queries of the sets ask, or the points. HS_UNSERVED when
- * it cannot serve them: the cutoff is larger than its own, or its bounds do not hold for the
- * queries. Else as hs_search_open.
+ * outlive this one. The queries of the sets ask, or the points. HS_UNSERVED when it cannot serve
+ * them: the cutoff is larger than its own, or its bounds do not hold for the queries. Else any
+ * status of hs_search_open.
  */
 hs_status hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search,
                           hs_failure *failure);

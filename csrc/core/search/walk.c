@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* walk.c: see walk.h. */
+/* walk.c: finds the links of each row once; then each group has a window of cells in each link. */
 #include "walk.h"
 
 #include "scan.h"
@@ -182,7 +182,7 @@ hs_walker_bound(const hs_search *search, hs_neighbourhood *most)
     const hs_grid *grid = &search->grid;
     const double   candidates = most_candidates(search);
     const bool     turns = search->scene.lattice.row_of_axis[0] >= 0;
-    /* Of each row of the stencil, in each image along the first axis. */
+    /* A run for each row of the stencil and each image along the first axis. */
     const double runs = (double)search->stencil.n_rows *
                         (turns ? 2.0 * (double)(grid->reach[0] / grid->shape[0]) + 3.0 : 1.0);
     most->candidates = candidates < HS_BLOCK_CANDIDATES ? (int64_t)candidates : 0;
@@ -194,7 +194,7 @@ bool
 hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
 {
     const int ndim = search->scene.ndim, m = search->scene.lattice.n_periodic;
-    /* What each takes at least, gathered, in order and traced. */
+    /* Bytes that each candidate takes at least, gathered, sorted and looked up. */
     const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 3 * sizeof(int32_t)) +
                         (double)(ndim + 1) * sizeof(float) + (double)ndim * sizeof(double) +
                         (double)m * sizeof(int64_t);
@@ -238,7 +238,7 @@ init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_
     return status == HS_OK ? init_links(search, &walker->cursor) : status;
 }
 
-/* Tells whom the hits are for, or closes what could not be opened. */
+/* Sets the visitor, or closes what could not be opened. */
 static hs_status
 settle_walker(hs_search *search, hs_status status, hs_visit_fn visit, void *context,
               hs_walker *walker)
@@ -269,7 +269,7 @@ hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourho
         memset(walker, 0, sizeof *walker);
         return HS_ERR_MEMORY;
     }
-    /* One more of each: a block that is full is scanned before the next run. */
+    /* One more of each, because a full block is scanned before the next run. */
     const hs_status status = init_walker(search, use, (int32_t)most->candidates + 1,
                                          (int32_t)most->runs + 1, true, walker);
     return settle_walker(search, status, visit, context, walker);

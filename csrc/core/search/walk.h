@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * walk.h: the walk over groups of points. Rows of cells in order, cells along each row, at most
- * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every
- * point of the group, decided, and the hits are handed to a visitor. Groups depend on the scene
- * and on whether neighbourhoods are put in order, never on who walks them.
+ * HS_GROUP_POINTS points at a time; each group's neighbourhood is gathered, scanned for every point
+ * of the group, decided, and the hits are handed to a visitor. Groups depend on the scene and on
+ * whether neighbourhoods are put in order, never on the thread that walks them.
  */
 #ifndef HS_WALK_H
 #define HS_WALK_H
@@ -31,7 +31,7 @@ typedef struct hs_cursor {
     int64_t     *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
 } hs_cursor;
 
-/* One at a time belongs to a thread. */
+/* Belongs to one thread. */
 typedef struct hs_walker {
     const hs_search *search; /* borrowed, read only */
     hs_cursor        cursor;
@@ -56,9 +56,9 @@ hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit,
                          hs_walker *walker);
 
 /*
- * The same for a full search that lists: each point's hits come in one visit, ascending by the
- * candidate's number and then by S. most: the largest neighbourhood, as a walk with HS_BLOCK_SIZES
- * over all groups has found it.
+ * hs_walker_init for a full search that lists: each point's hits come in one visit, ascending by
+ * the candidate's number and then by S. most: the largest neighbourhood, as a walk with
+ * HS_BLOCK_SIZES over all groups has found it.
  */
 hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourhood *most,
                                  hs_visit_fn visit, void *context, hs_walker *walker);
@@ -66,7 +66,7 @@ hs_status hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_n
 /* Visit the groups whose first point is in [first, end), in cell order. */
 hs_status hs_walk(hs_walker *walker, int32_t first, int32_t end);
 
-/* The same; on HS_ERR_SHIFT_RANGE the failure names the point. */
+/* hs_walk; on HS_ERR_SHIFT_RANGE the failure names the point. */
 hs_status hs_walk_or_tell(hs_walker *walker, int32_t first, int32_t end, hs_failure *failure);
 
 /* Visit one point, as a group of its own. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* call.c: what a call has and does is kept in one place: each part adds to the same sums. */
+/* call.c: options, memory, threads and counters of a call are in one struct, to which every step
+ * adds. */
 #include "call.h"
 
 #include "../base/poll.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * call.h: one call of the library, from its first line to its last: what the caller wants, the
- * memory and the threads that it may use, and what it has done so far. All that works for a call
- * gets a pointer to it; what outlives it is the result.
+ * memory and the threads that it may use, and what it has done so far. Every function that works
+ * for a call gets a pointer to it; only the result outlives it.
  */
 #ifndef HS_CALL_H
 #define HS_CALL_H
@@ -16,7 +16,7 @@
 typedef struct hs_call {
     hs_account       account;
     hs_options       options;      /* the caller's; their poll counts how often it is called */
-    const hs_kernel *kernel;       /* NULL: this machine has none of that name */
+    const hs_kernel *kernel;       /* NULL: this CPU has none of that name */
     hs_team         *team;         /* owned; NULL: the caller's thread alone */
     hs_counters      done;         /* by walkers that have finished */
     hs_poll_fn       callers_poll; /* behind options.poll */
@@ -29,8 +29,9 @@ typedef struct hs_call {
  * used. */
 void hs_call_begin(const hs_options *options, hs_call *call);
 
-/* The same for a public function, in the library's floating-point environment. Returns where the
- * failure is to be written, cleared: `failure`, unless that is NULL. hs_call_leave must follow. */
+/* hs_call_begin for a public function, in the library's floating-point environment. Returns
+ * where the failure is to be written, cleared: `failure`, unless that is NULL.
+ * hs_call_leave must follow. */
 hs_failure *hs_call_enter(const hs_options *options, hs_failure *failure, hs_call *call);
 
 /* Ends the threads, writes the counters if they are wanted, and restores the caller's environment.

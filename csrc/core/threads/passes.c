@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* passes.c: see passes.h. */
+/* passes.c: each round is one job of the team. */
 #include "passes.h"
 
 typedef struct pass {

@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/*
- * passes.h: a pass over all points, cut into ranges that a team works on at once. Between the
- * rounds of a pass the caller is asked whether to go on, as poll.h says: once in HS_POLL_POINTS
- * points, however many threads there are.
- */
+/* passes.h: a pass over all points, cut into ranges that a team works on at once. Between its
+ * rounds the caller is polled: once in HS_POLL_POINTS points, however many threads there are. */
 #ifndef HS_PASSES_H
 #define HS_PASSES_H
 
@@ -23,8 +20,8 @@ typedef hs_status (*hs_slab_fn)(void *context, int slab, int64_t first, int64_t 
 hs_status hs_walk_slabs(hs_team *team, const hs_options *options, int64_t n, hs_slab_fn run,
                         void *context);
 
-/* The same, in n_strips long ranges of points, each of them in ascending order of its points:
- * `slab` is the strip. At most HS_SLABS strips. */
+/* Points 0 ... n - 1 in n_strips long ranges, at most HS_SLABS, each in ascending order of its
+ * points: `slab` is the strip. Ends as hs_walk_slabs does. */
 hs_status hs_walk_strips(hs_team *team, const hs_options *options, int64_t n, int n_strips,
                          hs_slab_fn run, void *context);
 

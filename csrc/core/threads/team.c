@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* team.c: see team.h. A job is open while its tasks are handed out; threads that wake up too late
- * for it go back to sleep, so nobody waits for them. */
+/* team.c: a job is open while its tasks are handed out. Threads that wake up too late for it go
+ * back to sleep, so the caller never waits for them. */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L /* pthread_sigmask */
 #endif
@@ -19,7 +19,7 @@ typedef struct job {
 struct hs_team {
     hs_mutex         mutex;  /* guards all but `next` */
     hs_condition     opened; /* a job is there, or the team ends */
-    hs_condition     left;   /* nobody works on the job any more */
+    hs_condition     left;   /* no thread works on the job any more */
     job              job;
     int64_t          job_number;
     bool             is_open;
@@ -42,7 +42,7 @@ do_tasks(hs_team *team, const job *doing)
     }
 }
 
-/* The life of one of the others. */
+/* What each thread but the caller's runs. */
 static hs_thread_result HS_THREAD_CALL
 work(void *context)
 {
@@ -120,7 +120,7 @@ hs_team_run(hs_team *team, int64_t n_tasks, hs_task_fn run, void *context)
     hs_mutex_lock(&team->mutex);
     team->job = doing;
     team->job_number++;
-    team->next = 0; /* nobody takes tasks now: the last job is closed and left */
+    team->next = 0; /* no thread takes tasks now: the last job is closed and left */
     team->is_open = true;
     hs_condition_wake(&team->opened);
     hs_mutex_unlock(&team->mutex);

@@ -16,16 +16,17 @@ typedef void (*hs_task_fn)(void *context, int64_t task);
 
 /*
  * A team of the caller and up to n_threads - 1 others, to be ended by hs_team_free. With fewer
- * threads than that where the system refuses them; NULL where there are none, or none was asked
- * for. The others block all signals, and compute in the floating-point environment of fpenv.h.
+ * threads than that where the system refuses them; NULL where there are none, or n_threads is 1 or
+ * less. The others block all signals, and compute in the floating-point environment of fpenv.h.
  */
 hs_team *hs_team_create(int n_threads);
 
 /* Threads that work for the team, the caller among them: at least 1, also of NULL. */
 int hs_team_size(const hs_team *team);
 
-/* Runs every task and returns when all are done. Tasks are handed out in ascending order; who gets
- * which is left to chance. Called by the thread that made the team, never from a task. */
+/* Runs every task and returns when all are done. Tasks are handed out in ascending order;
+ * which thread gets which is left to chance. Called by the thread that made the team, never
+ * from a task. */
 void hs_team_run(hs_team *team, int64_t n_tasks, hs_task_fn run, void *context);
 
 /* Ends the threads and waits for them. NULL-safe. */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * motion.c: see motion.h. The displacement of point i is u_i = r_i - r0_i F - k_i h - c: what is
- * left when the deformation of the box, whole box vectors and what all points share are taken away.
- * Any F, k and c are right; good ones make it small. c is `base`, taken away before box vectors are
- * looked for, and `drift`, taken away behind that.
+ * motion.c: the displacement of point i is u_i = r_i - r0_i F - k_i h - c: what is left when the
+ * deformation of the box, whole box vectors and what all points share are taken away. Any F, k and
+ * c are right; good ones make it small. c is `base`, taken away before box vectors are looked for,
+ * and `drift`, taken away behind that.
  */
 #include "motion.h"
 
@@ -236,7 +236,7 @@ take_sample(tracking *track, const double *drift, sample *found)
         find_displacements(track, &t);
         if (may_have_jumped(track, &t)) {
             int64_t given[HS_MAX_DIM];
-            (void)take_jump(track, &t, 0, given); /* the same again when it counts */
+            (void)take_jump(track, &t, 0, given); /* a failure shows again in the full pass */
         }
         for (int k = 0; k < d; k++) {
             const double u = t.u[k][0];
@@ -298,7 +298,7 @@ bound_rounding(const tracking *track)
     for (int k = 0; track->has_base && k < d; k++) { /* two differences */
         bound += 2.0 * UNIT * (sizes + fabs(track->base[k]));
     }
-    if (track->jump_of != NULL) { /* a difference, wrapped as wrap.h says */
+    if (track->jump_of != NULL) { /* a difference, wrapped: hs_wrap_point bounds its error */
         const double terms = 2 * track->m + 2;
         bound += 2.0 * UNIT * (sizes + track->magnitude) +
                  terms * terms * 0x1p-104 * track->magnitude + 0x1p-1050;

@@ -24,8 +24,8 @@ typedef struct hs_listing {
     int32_t  *order;  /* the caller's number of each place */
     int64_t  *counts; /* m for each place, when it was built; NULL: all zero */
     double    radius;
-    /* Where these are. Pairs are written when nothing can fail any more; the others are made beside
-     * those in use, and `turn` says which are. */
+    /* Where the arrays above are. Pairs are written when nothing can fail any more; the others are
+     * made beside those in use, and `turn` says which are in use. */
     hs_store for_i, for_j, for_code, for_order[2], for_counts[2];
     int      turn;
 } hs_listing;

@@ -51,7 +51,7 @@ options_of_build(const hs_options *options, double radius, int m)
     return searching;
 }
 
-/* By how many given box vectors each point was wrapped; none are stored where none was. */
+/* Stores by how many given box vectors each point was wrapped; nothing where none was. */
 static hs_status
 take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
 {
@@ -86,7 +86,7 @@ take_counts(const hs_search *search, hs_listing *listing, hs_failure *failure)
     return HS_OK;
 }
 
-/* From here on the search speaks of points by their places in cell order, and of images alone. */
+/* Renumbers the points by their places in cell order; shifts are images alone from here on. */
 static hs_status
 renumber(hs_search *search, hs_listing *listing)
 {
@@ -101,12 +101,12 @@ renumber(hs_search *search, hs_listing *listing)
         bins->order[si] = (int32_t)si;
     }
     if (!bins->keeps_originals) {
-        bins->turns.known = false; /* nobody needs them any more */
+        bins->turns.known = false; /* they are not needed any more */
     }
     return HS_OK;
 }
 
-/* All pairs within the radius; the search stays open. */
+/* Finds all pairs within the radius; the search stays open. */
 static hs_status
 find(building *built, hs_failure *failure)
 {
@@ -134,7 +134,7 @@ typedef struct placing {
     int64_t        *plain, *shifted; /* owned, one for each piece */
 } placing;
 
-/* A pair the way the caller's numbers have it: i < j. Half of them must be turned, without any
+/* Writes a pair with i < j in the caller's numbers. Half of them must be turned, without any
  * pattern: a branch would be mispredicted. */
 HS_ALWAYS_INLINE void
 put_pair(const int32_t *order, int32_t a, int32_t b, hs_listing *listing, int64_t to)
@@ -229,14 +229,15 @@ count_pairs(building *built, placing *place)
         n_shifted += piece->n_shifted;
     }
     listing->n_plain = listing->n_pairs - n_shifted;
-    /* The pieces, which nobody has counted, and the listing. */
+    /* The pieces, which are on no account, and the listing. */
     if (!hs_account_allows(account, 16.0 * (double)listing->n_pairs + 32.0 * (double)n_shifted)) {
         return false;
     }
     return true;
 }
 
-/* Room for the pairs: the last thing that can fail, for it may be that of the list in use, ... */
+/* Makes room for the pairs, which may be that of the list in use: so this is the last step that can
+ * fail, ... */
 static bool
 make_room(hs_listing *listing)
 {
@@ -257,7 +258,7 @@ make_room(hs_listing *listing)
     return true;
 }
 
-/* From what was found to the listing. */
+/* Writes what was found to the listing. */
 static hs_status
 settle_pairs(building *built)
 {

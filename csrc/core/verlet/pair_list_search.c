@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pair_list_search.c: see pair_list_search.h. */
+/* pair_list_search.c: each thread has a walker; shifts are looked up once for each run of a
+ * block. */
 #include "pair_list_search.h"
 
 #include "../collect/in_turn.h"
@@ -25,7 +26,7 @@ typedef struct worker {
     int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool     has_images;
     bool    *is_shifted; /* owned; whether a run is in another image ... */
-    int32_t *shift;      /* owned; ... and which, over the rows as given: m numbers */
+    int32_t *shift;      /* owned; ... and which, over the given box vectors: m numbers */
 } worker;
 
 struct crew {
@@ -35,7 +36,7 @@ struct crew {
     hs_commits *commits;
 };
 
-/* The shift of a run over the rows as given. */
+/* The shift of a run over the box vectors as given. */
 static bool
 shift_of_run(const hs_search *search, const hs_run *run, int32_t *shift)
 {
@@ -49,7 +50,7 @@ shift_of_run(const hs_search *search, const hs_run *run, int32_t *shift)
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
         shift[r] = (int32_t)given[r];
-        if (given[r] > INT32_MAX || given[r] < -INT32_MAX) { /* so that it can be turned round */
+        if (given[r] > INT32_MAX || given[r] < -INT32_MAX) { /* so that it can be negated */
             return false;
         }
     }
@@ -118,7 +119,7 @@ is_negative(const int32_t *shift, int m)
     return shift[r] < 0;
 }
 
-/* Finds out about the runs of a block, once. */
+/* Finds the shifts of the runs of a block, once. */
 static bool
 look_at_block(worker *me)
 {

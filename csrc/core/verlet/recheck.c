@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* recheck.c: see recheck.h. The list in slabs, rounds of them, and who works on them. */
+/* recheck.c: rounds of slabs of the list, worked on by the team; each round's pairs are written at
+ * its end. */
 #include "recheck.h"
 
 #include <string.h>
@@ -11,7 +12,7 @@
  * still lie in the second-level cache when they are written. */
 #define SLABS_A_THREAD 8
 #define MOST_SLABS     64
-/* Work between two questions to the caller, in pairs: a few milliseconds. */
+/* Work between two polls, in pairs: a few milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)
 /* A decision by integers takes as long as so many pairs, and d or D of a pair as so many. */
 #define INTEGER_WORK 1000
@@ -169,10 +170,10 @@ hs_refilter_run(hs_refilter *refilter, hs_failure *failure)
     return status;
 }
 
-/* The hits of a slab as pairs: i, j and S. See recheck.h. */
+/* The hits of a slab as pairs: i, j and S. */
 
-/* S over all box vectors, zero on open ones; where only sorting needs it the images alone, which
- * are in the same order and always fit. */
+/* S over all box vectors, zero on open ones; where only sorting needs it, the images alone, which
+ * sort as S does and always fit. */
 static void
 put_shifts(const hs_refilter *refilter, hs_sifted *slab)
 {

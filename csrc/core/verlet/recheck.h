@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * recheck.h: the pairs of a list that are within the cutoff now, decided as a search decides them:
- * in float32 (sift.h), and what that cannot tell by core/exact/metric.h. A slab of the list at a
+ * in float32 (sift.h), and by the exact metric where float32 cannot tell. A slab of the list at a
  * time; a team works on several, and what they find is written in the order of the list.
  */
 #ifndef HS_RECHECK_H
@@ -29,7 +29,7 @@ typedef struct hs_refilter {
     int64_t         *counts; /* owned; m a point, as those of the list, jumps included; or NULL */
     double           most_counts;    /* the largest of them, of either sign */
     float           *y;              /* owned; sift.h */
-    float           *offset;         /* owned; one row for each image */
+    float           *offset;         /* owned; stride for each image */
     hs_thresholds    plain, shifted; /* for pairs without and with an image */
     bool             measures;       /* d or D are wanted. Then: */
     hs_scene         scene;
@@ -51,21 +51,21 @@ typedef struct hs_sifted {
     uint16_t  hits[HS_SIFT + 4], unsure[HS_SIFT + 4];
 } hs_sifted;
 
-/* All that is within the cutoff, to the output. */
+/* Writes all pairs within the cutoff to the output. */
 hs_status hs_refilter_run(hs_refilter *refilter, hs_failure *failure);
 
-/* The points as floats, their counts and thresholds; recheck_points.c. */
+/* The points as floats, their counts and thresholds. In recheck_points.c. */
 hs_status hs_refilter_prepare(hs_refilter *refilter);
 
 /* Decides the unsure hits of a slab, of which there are some, and takes those that are beyond the
- * cutoff from the hits; recheck_decide.c. */
+ * cutoff from the hits. */
 void hs_refilter_settle(const hs_refilter *refilter, int32_t n_unsure, hs_sifted *slab);
 
-/* Writes the hits; recheck_put.c. */
+/* Writes the hits. */
 void hs_refilter_put(const hs_refilter *refilter, hs_sifted *slab);
 
 /* Makes the scene ready that d and D are measured in, so that they have the bits that a search
- * finds, and writes them; recheck_measure.c. */
+ * finds, and writes them. In recheck_measure.c. */
 hs_status hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure);
 void      hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab);
 
@@ -95,8 +95,8 @@ hs_refilter_shift(const hs_refilter *refilter, int64_t e, int64_t *shift)
     }
 }
 
-/* The pairs of the last step, into a result whose call has begun; recheck_find.c. Its options
- * are checked and have the cutoff of the list. Fails as hs_verlet_find. */
+/* The pairs of the last step, into a result whose call has begun. Its options are checked and have
+ * the cutoff of the list. Any status of hs_verlet_find. In recheck_find.c. */
 hs_status hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* recheck_find.c: the pairs of the last step from a list that is used for many. */
+/* recheck_find.c: from a list and its last step to a result: unsorted as found, or sorted at the
+ * end. */
 #include "../collect/sort_pairs.h"
 #include "recheck.h"
 

@@ -27,10 +27,8 @@ integer_of(double x)
     return exponent < 64 ? (int64_t)((uint64_t)significand << exponent) : 0;
 }
 
-/*
- * over[l][r]: the given row l has row r of B so many times. B is diagonal here, so that is a given
- * entry over a period: a quotient of doubles that is an integer, hence a double.
- */
+/* over[l][r]: given box vector l is made of so many times row r of B. B is diagonal here, so that
+ * is a given entry over a period: a quotient of doubles that is an integer, hence a double. */
 static void
 divide_rows(const hs_lattice *lattice, int64_t over[][HS_MAX_DIM])
 {
@@ -42,7 +40,7 @@ divide_rows(const hs_lattice *lattice, int64_t over[][HS_MAX_DIM])
     }
 }
 
-/* shift over the given rows to one over B, modulo 2^64. */
+/* A shift over the given box vectors to one over B, modulo 2^64. */
 HS_ALWAYS_INLINE void
 reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int64_t *reduced)
 {

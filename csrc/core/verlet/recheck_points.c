@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* recheck_points.c: the points of a step in the order of the list, as floats, and the thresholds
- * that hold for them. See recheck.h. */
+ * that hold for them. */
 #include "recheck.h"
 
 #include <math.h>
@@ -10,7 +10,7 @@
 #define AHEAD 16
 /* Points that the middle of all is guessed from. */
 #define SAMPLE 1024
-/* Cutoffs between 2^-20 and 2^20 are left alone, as in scene.c. */
+/* Cutoffs between 2^-20 and 2^20 are not scaled: float32 has room for their squares. */
 #define ORDINARY_EXPONENT 20
 
 /* Counts of the step: those of the list and the jumps since then. */

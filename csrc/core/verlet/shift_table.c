@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* shift_table.c: see shift_table.h. A hash table with open addressing. */
+/* shift_table.c: a hash table with open addressing. */
 #include "shift_table.h"
 
 #include "../memory/account.h"

@@ -7,14 +7,14 @@
 
 typedef struct hs_images {
     int      width; /* numbers of a shift */
-    int32_t *of;    /* owned; n rows of `width` */
+    int32_t *of;    /* owned; n shifts of `width` numbers */
     int64_t  n;
-    int64_t  capacity; /* rows */
+    int64_t  capacity; /* shifts */
     int32_t *slots;    /* owned; -1, or the number of a shift; twice the capacity, a power of two */
-    int32_t  last;     /* the one that was asked for last: most often the next as well */
+    int32_t  last;     /* number of the last shift: most often the next has it, too */
 } hs_images;
 
-/* None yet. */
+/* An empty table. */
 void hs_images_init(int width, hs_images *images);
 
 /* The number of this shift, a new one if it was not there. -1: out of memory. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* sift.c: see sift.h. Four pairs at a time with SSE2, which every x86-64 CPU has, else one by one:
- * which pairs are unsure may differ, what comes out in the end does not. */
+/* sift.c: four pairs at a time with SSE2, which every x86-64 CPU has, else one by one. Which pairs
+ * are unsure may differ; the pairs in the end do not. */
 #include "sift.h"
 
 #if defined(__SSE2__) || defined(_M_X64)
@@ -11,7 +11,7 @@
 #define HAS_SSE2 0
 #endif
 
-/* One pair to the lists. */
+/* Adds one pair to the lists. */
 HS_ALWAYS_INLINE void
 put(float square, hs_thresholds limit, int32_t e, uint16_t *hits, int32_t *n_hits, uint16_t *unsure,
     int32_t *n_unsure)

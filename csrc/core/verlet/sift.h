@@ -17,11 +17,11 @@ hs_sift_stride(int ndim)
 
 /* Pairs, and points as floats; all borrowed. */
 typedef struct hs_sift_pairs {
-    const float   *y; /* points: rows of `stride` */
+    const float   *y; /* points: `stride` floats each */
     int            stride;
     const int32_t *i, *j;
-    const int32_t *code;   /* numbers of rows of `offset`, or NULL: none is added */
-    const float   *offset; /* what is added to y_j - y_i */
+    const int32_t *code;   /* numbers of images, or NULL: nothing is added */
+    const float   *offset; /* of each image: `stride` floats, added to y_j - y_i */
     int32_t        n;      /* at most HS_SIFT */
     hs_thresholds  limit;
 } hs_sift_pairs;
