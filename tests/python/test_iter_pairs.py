@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._functions import pairs as pair_search
 from subprocesses import RESIDENT, run
 
 BOX = np.array([[1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.4, 0.2, 1.1]])
@@ -210,7 +209,7 @@ def test_progress_of_what_is_repeated_never_falls(rng, threads):
 @pytest.mark.parametrize("sort", [False, True])
 def test_progress_of_all_pairs_at_once_never_falls(rng, threads, sort):
     told = []
-    pair_search.pairs_with_progress(
+    hs.pairs(
         rng.random((60_000, 3)), 0.08, progress=told.append, threads=threads, sort=sort
     )
     assert len(told) > 3 and told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0

@@ -13,8 +13,8 @@ from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.options import Search
-from halfshell._convert.scene import as_sets
+from halfshell._convert.search import as_search
+from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike, Search
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
 _COPIES = 4
@@ -33,21 +33,21 @@ class Marks(NamedTuple):
 
 
 def pair_histogram(
-    points: Any,
+    points: PointsLike,
     edges: npt.ArrayLike,
     *,
-    queries: Any = None,
+    queries: PointsLike | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
     weights: npt.ArrayLike | None = None,
     query_weights: npt.ArrayLike | None = None,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-    """Sort all pairs of points into bins by their distance, without storing them.
+    """Count pairs in bins of distance, always exact, without storing them.
 
     Parameters
     ----------
@@ -116,11 +116,10 @@ def pair_histogram(
     >>> hs.pair_histogram(points, [0.0, 1.5, 3.0], weights=[1.0, -1.0, 0.5]).tolist()
     [-1.0, 0.0]
     """
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    search: Search = (
-        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
+    search, asking = as_search(
+        points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
-    marks = as_marks(len(array), asking, types, query_types, weights, query_weights)
+    marks = as_marks(len(search[0]), asking, types, query_types, weights, query_weights)
     return binned(search, as_edges(edges), asking, marks)
 
 

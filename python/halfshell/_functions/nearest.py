@@ -11,19 +11,20 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_number
-from halfshell._convert.options import Arrays, as_count, as_index_bytes
-from halfshell._convert.scene import as_sets
+from halfshell._convert.options import as_count, as_index_bytes
+from halfshell._convert.search import as_search
+from halfshell._convert.types import Arrays, BoxLike, Number, PeriodicLike, PointsLike
 
 _MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
 
 
 class _NearestOptions(TypedDict, total=False):
-    """The keywords of `nearest`, without `quantities`, on which the type of the result depends."""
+    """For overloads: the keywords of `nearest`, without `quantities`."""
 
-    queries: Any
-    max_distance: float
-    box: Any
-    periodic: Any
+    queries: PointsLike | None
+    max_distance: Number
+    box: BoxLike | None
+    periodic: PeriodicLike | None
     index_dtype: npt.DTypeLike
     kernel: str | None
     threads: int | None
@@ -32,11 +33,15 @@ class _NearestOptions(TypedDict, total=False):
 
 @overload
 def nearest(
-    points: Any, k: int, *, quantities: Literal["jd"] = "jd", **options: Unpack[_NearestOptions]
+    points: PointsLike,
+    k: int,
+    *,
+    quantities: Literal["jd"] = "jd",
+    **options: Unpack[_NearestOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def nearest(
-    points: Any,
+    points: PointsLike,
     k: int,
     *,
     quantities: Literal["j", "d", "D", "S"],
@@ -44,23 +49,23 @@ def nearest(
 ) -> npt.NDArray[Any]: ...
 @overload
 def nearest(
-    points: Any, k: int, *, quantities: str, **options: Unpack[_NearestOptions]
+    points: PointsLike, k: int, *, quantities: str, **options: Unpack[_NearestOptions]
 ) -> Arrays: ...
 def nearest(
-    points: Any,
+    points: PointsLike,
     k: int,
     *,
-    queries: Any = None,
-    max_distance: float = np.inf,
-    box: Any = None,
-    periodic: Any = None,
+    queries: PointsLike | None = None,
+    max_distance: Number = np.inf,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "jd",
     index_dtype: npt.DTypeLike = np.int64,
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
 ) -> Arrays:
-    """Find the k nearest points of each point or query, in order of their exact distances.
+    """Find the k nearest points of each point or query, in an order that is always exact.
 
     Parameters
     ----------
@@ -127,11 +132,20 @@ def nearest(
 
     Examples
     --------
+    >>> import numpy as np
     >>> import halfshell as hs
     >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
     >>> j, d = hs.nearest(points, 2)
     >>> j.tolist(), d.tolist()
     ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+
+    Rows that lack neighbours, masked:
+
+    >>> j, d = hs.nearest(points, 2, max_distance=1.5)
+    >>> j.tolist()
+    [[1, -1], [0, -1], [-1, -1]]
+    >>> np.ma.masked_equal(j, -1).tolist(), d[j >= 0].tolist()
+    ([[1, None], [0, None], [None, None]], [1.0, 1.0])
 
     In a periodic box, and for queries:
 
@@ -139,13 +153,12 @@ def nearest(
     >>> j.tolist(), d.tolist(), S.tolist()
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    k = as_k(k)
-    result = _core.nearest(
-        array, as_max_distance(max_distance), vectors, bits, True, "exact", kernel, memory_limit,
-        None, threads, quantities, as_index_bytes(index_dtype), asking, k,
+    k, reach = as_k(k), as_max_distance(max_distance)
+    search, asking = as_search(
+        points, reach, box, periodic, True, "exact", kernel, memory_limit, None, threads, queries
     )
-    return in_rows(result, len(array if asking is None else asking), k)
+    result = _core.nearest(*search, quantities, as_index_bytes(index_dtype), asking, k)
+    return in_rows(result, len(search[0] if asking is None else asking), k)
 
 
 def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:

@@ -160,7 +160,7 @@ class NeighborTable(TableRows):
 
     # ---- other forms -----------------------------------------------------------------------
 
-    def to_pairs(self, quantities: str = "ij", *, half: bool = False) -> Row:
+    def to_pairs(self, *, quantities: str = "ij", half: bool = False) -> Row:
         """The entries as arrays of pairs, as `pairs` and `pairs_between` return them.
 
         Parameters
