@@ -191,6 +191,7 @@ def test_npz_brings_box_and_periodic(summary, npz, tmp_path):
 def test_box_and_periodic_options_take_the_place_of_the_file(summary, npz, npy):
     lengths = summary(npy, "--cutoff", "2", "--box", "8,8,8")
     assert lengths["pairs"] == hs.count_pairs(POINTS, 2.0, box=[8.0] * 3)
+    assert summary(npy, "--cutoff", "2", "--box", "8")["box"] == lengths["box"]
     vectors = ",".join(map(str, BOX.ravel()))
     assert summary(npy, "--cutoff", "2", f"--box={vectors}")["box"] == BOX.tolist()
     mixed = summary(npz, "--cutoff", "2", "--periodic", "tfF")

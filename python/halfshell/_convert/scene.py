@@ -57,7 +57,8 @@ def as_box(values: Any, ndim: int) -> FloatArray:
     array = as_real_array(vectors_of(values), "box", "be lengths or vectors", check)
     if array.ndim == 2:
         return in_order(array, np.float64)
-    return np.diag(np.broadcast_to(array, ndim).astype(np.float64))
+    lengths = array.astype(np.float64)
+    return np.diag(lengths if lengths.ndim else np.full(ndim, lengths))
 
 
 def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
