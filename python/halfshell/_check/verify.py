@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check anybody's list of pairs: what it misses, what it invents, what it has twice."""
+"""Check a list of pairs from any library: what it misses, what it invents, what it has twice."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -152,24 +152,38 @@ def verify(
     else:
         found = find_between(asking, array, cutoff, **how)
     expected = np.column_stack(tuple(found)).astype(np.int64)
-    if full:
+    verdict = compare(expected, given, "directed" if asking is not None else LIST[full])
+    if S is not None:
+        _confirm(verdict, array, asking, cutoff, vectors, flags, inclusive)
+    return verdict
+
+
+#: What a list is, by whether it is full.
+LIST: dict[bool, Literal["half", "full"]] = {False: "half", True: "full"}
+
+
+def compare(
+    expected: IntArray, given: IntArray, kind: Literal["half", "full", "directed"]
+) -> Verdict:
+    """The verdict on rows (i, j, *S).
+
+    expected: each pair once. given: a half list in any orientation, a full list, or, of two sets,
+    rows that have one direction only.
+    """
+    if kind == "full":
         expected = np.concatenate([expected, _reversed(expected)])
-    elif asking is None:
-        given = _as_half(given)
-        expected = _as_half(expected)
+    elif kind == "half":
+        expected, given = _as_half(expected), _as_half(given)
     missed, surplus = _differences(expected, given)
     known = {tuple(row) for row in expected.tolist()} if len(surplus) else set()
     twice = np.array([tuple(row) in known for row in surplus.tolist()], dtype=bool)
-    verdict = Verdict(
+    return Verdict(
         n_expected=len(expected),
         n_given=len(given),
         missed=missed,
         spurious=surplus[~twice],
         duplicate=surplus[twice],
     )
-    if S is not None:
-        _confirm(verdict, array, asking, cutoff, vectors, flags, inclusive)
-    return verdict
 
 
 def _check_table(table: NeighborTable, n: int, q: int | None) -> None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.foreign import is_a, kind_of, shown, whole_number
 
-_SMALL = 1 << 26  # bytes; what is left is not asked for below
+_SMALL = 1 << 26  # bytes; below them the system is not asked what is left
 
 
 def refuse_unavailable(needed: int, what: str) -> None:

@@ -82,7 +82,8 @@ def count_pairs(
         (k searches where `precision` is not "exact"). With `batch`: one for all systems, or one
         for each.
     queries : array_like of float, shape (q, d), optional
-        Count pairs of a query and a point instead, as `pairs_between` finds them.
+        Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
+        finds them.
     memory_limit : float, optional
         Bytes that the search may take.
     batch : array_like of int, shape (n,), optional

@@ -196,7 +196,8 @@ def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
 
 def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, ...]:
     names = {"d": "distances", "D": "vectors", "S": "shifts"}
-    left = [f"{name}: not asked for" for letter, name in names.items() if letter not in quantities]
+    missing = [name for letter, name in names.items() if letter not in quantities]
+    left = [f"{name}: not in quantities" for name in missing]
     if plan["ndim"] < 3:
         axes = "y and z" if plan["ndim"] == 1 else "z"
         left.append(f"coordinates {axes}: the scene has {plan['ndim']} dimension(s)")
@@ -209,7 +210,7 @@ def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, .
     if not plan["keeps_originals"]:
         left.append("a second copy of the points: the wrapped ones hold every digit")
     if plan["threads"] == 1:
-        left.append("further threads: the scene is small, or one was asked for")
+        left.append("further threads: the scene is small, or threads=1")
     if plan["all_pairs"]:
         left.append("cells and sorting into them")
     elif plan["sparse"]:

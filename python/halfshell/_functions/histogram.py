@@ -58,7 +58,8 @@ def pair_histogram(
         spacing: ``np.linspace(0, 10, 101)``, ``np.geomspace(0.1, 10, 51)``. The largest is the
         cutoff and may be larger than the box. Pairs closer than the first edge are not counted.
     queries : array_like of float, shape (q, d), optional
-        Count pairs of a query and a point instead, as `pairs_between` finds them.
+        Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
+        finds them.
     types : array_like of int, shape (n,), optional
         The type of each point, from 0 on: one histogram for each pair of types.
     query_types : array_like of int, shape (q,), optional
@@ -102,8 +103,8 @@ def pair_histogram(
     Notes
     -----
     Bins are found from float32 squares with a proven error bound; only pairs too close to an edge
-    to tell are decided again, by the stages of `pairs`. So the result is the same for any kernel
-    and any number of threads. Memory: the bins, for each thread.
+    to tell are decided again, by the stages of `pairs`. So neither the kernel nor the number of
+    threads changes the result. Memory: the bins, for each thread.
 
     Examples
     --------

@@ -75,14 +75,14 @@ def nearest(
         How many; 1 or more. In a periodic box each image of a point counts for itself, so that k
         may be larger than n.
     queries : array_like of float, shape (q, d), optional
-        Who asks, in the unit of `points`; anywhere, also outside the box. Default: each point
-        asks, and is left out of its own row where S = 0; its own images are not. A query that is
-        equal to a point has it as a neighbour at distance 0.
+        Coordinates of queries, in the unit of `points`; they may lie anywhere, also outside the
+        box. A query on a point has it as a neighbour at distance 0. Default: the points, each
+        left out of its own row where S = 0; its images are not.
     max_distance : float, default infinity
         Largest distance that counts, this one included; not negative.
     quantities : str, default "jd"
         Any of the letters ``j d D S``, each at most once: number of the point, distance, vector,
-        shift. What is not asked for is not computed.
+        shift. Only these are computed.
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
@@ -95,8 +95,8 @@ def nearest(
         (q, k); ``D`` float64 (q, k, d); ``S`` int32 (q, k, d). In real arithmetic
         ``D = points[j] - queries[i] + S @ box``.
 
-        Rows ascend by the exact distance of the real numbers that the inputs are; where that is
-        the same, by (j, S). Where fewer than k points are there, or within `max_distance`, the
+        Rows ascend by the exact distance of the real numbers that the inputs are, and at equal
+        distances by (j, S). Where fewer than k points are there, or within `max_distance`, the
         rest of the row is j = -1, d = infinity, D = NaN and S = 0. d is within 1 ulp, ascends along
         the row and is never above `max_distance`; each component of D is within 1 ulp of d.
 

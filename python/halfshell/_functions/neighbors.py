@@ -41,11 +41,12 @@ def neighbors(
     cutoff : float
         Largest distance of a neighbour, in the unit of `points`; finite, not negative.
     queries : array_like of float, shape (q, d), optional
-        Who asks: the table then has a row for each query, as `pairs_between` finds them. Default:
-        the points themselves.
+        Coordinates of queries, in the unit of `points`; they may lie anywhere. The table then has
+        a row for each query, with the neighbours that `pairs_between` finds. Default: a row for
+        each point.
     quantities : str, default "j"
         Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
-        vectors, shifts. What is not asked for is not computed and the table does not have it.
+        vectors, shifts. Only these are computed, and the table has no others.
     box, periodic, inclusive, index_dtype, precision, kernel, threads, memory_limit
         As in `pairs`.
 
@@ -73,7 +74,7 @@ def neighbors(
     Notes
     -----
     The scene is searched twice, once to count and once to write each row to its place, so that
-    nothing is held beside the result. The table is the same for any number of threads.
+    nothing is held beside the result. The number of threads changes nothing in the table.
 
     Examples
     --------

@@ -99,7 +99,7 @@ def pairs(
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
-        both indices. What is not asked for is not computed.
+        both indices. Only these are computed.
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
     sort : bool, default False
@@ -170,9 +170,9 @@ def pairs(
         If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
         then.
     OverflowError
-        If there are 2**31 points or more, a number is too large for float64, or a shift that was
-        asked for does not fit int32; also if a point lies more than 2**51 box vectors away in a
-        box that is not axis-aligned, or in any box when S is asked for; and if, with `precision`
+        If there are 2**31 points or more, a number is too large for float64, or `quantities` has S
+        and a shift does not fit int32; also if a point lies more than 2**51 box vectors away in a
+        box that is not axis-aligned, or in any box with S in `quantities`; and if, with `precision`
         "double", points lie so many boxes away that rounding errors pass the cutoff.
     MemoryError
         If the result would not fit `memory_limit`: as a rule decided from a sample before the
@@ -182,7 +182,7 @@ def pairs(
     --------
     count_pairs : the number of pairs, without storing them.
     iter_pairs : the same pairs in blocks, where all of them would not fit.
-    verify : check anybody's list of pairs.
+    verify : check a list of pairs, from any library.
 
     Notes
     -----
@@ -296,12 +296,12 @@ def pairs_between(
     Parameters
     ----------
     queries : array_like of float, shape (q, d)
-        Coordinates that ask, in the unit of `points`, as many columns as these. They may lie
+        Coordinates of queries, in the unit of `points` and with as many columns. They may lie
         anywhere, also far from all points or outside the box. float32 beside float64 is fine:
         each number is used as it is.
     points : array_like of float, shape (n, d)
-        Coordinates that are found, as in `pairs`. An object such as ``ase.Atoms`` brings its box;
-        `queries` may be another one with the same box.
+        Coordinates of the points to find, as in `pairs`. An object such as ``ase.Atoms`` brings
+        its box; `queries` may be another one with the same box.
     cutoff, box, periodic, inclusive, index_dtype, out, precision, kernel, threads, memory_limit
         As in `pairs`.
     quantities : str, default "ij"
@@ -315,7 +315,7 @@ def pairs_between(
         arithmetic ``D = points[j] - queries[i] + S @ box``. Ascending (i, j, S).
 
         Nothing is left out: a query that lies on a point is its neighbour at distance 0, also
-        where both arrays are the same one, and each image of a point within the cutoff is a pair.
+        where one array is given for both, and each image of a point within the cutoff is a pair.
 
     Raises
     ------

@@ -183,13 +183,10 @@ def rdf(
     search, asking = as_search(
         points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
-    n, shares = len(search[0]), _shares(search[2], search[3], edges)
+    n, shares = len(search[0]), shell_shares(search[2], search[3], edges)
     marks = as_marks(n, asking, types, query_types)
     counts = binned(search, edges, asking, marks, "r_max")
-    g = np.zeros(counts.shape)
-    with np.errstate(over="ignore", under="ignore", divide="ignore"):
-        expected = _partners(n, asking, marks) * shares
-        np.divide(counts, expected, out=g, where=counts > 0)
+    g = over_ideal_gas(counts, _partners(n, asking, marks), shares)
     middle = 0.5 * (edges[1:] + edges[:-1])
     return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
 
@@ -202,7 +199,17 @@ def _edges(r_max: Any, bins: Any) -> FloatArray:
     return np.linspace(0.0, largest, n_bins + 1)
 
 
-def _shares(
+def over_ideal_gas(
+    counts: npt.NDArray[Any], partners: FloatArray | float, shares: FloatArray
+) -> FloatArray:
+    """g(r): counts over what each shell would have of so many pairs; 0 where there are none."""
+    g = np.zeros(counts.shape)
+    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+        np.divide(counts, partners * shares, out=g, where=counts > 0)
+    return g
+
+
+def shell_shares(
     vectors: FloatArray | None, bits: int, edges: FloatArray
 ) -> FloatArray:
     """The part of the box that lies between two spheres, for each bin.

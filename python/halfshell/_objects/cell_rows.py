@@ -87,7 +87,7 @@ class CellRows(KeptCells):
         Parameters
         ----------
         queries : array_like of float, shape (q, d)
-            Coordinates that ask; they may lie anywhere.
+            Coordinates of queries, in the unit of the points; they may lie anywhere.
         radius : float or array_like of float, shape (q,), optional
             One for all queries, or one for each. Default: the cutoff of the list. Up to that the
             kept cells answer; larger radii cost a search of their own.
@@ -151,7 +151,7 @@ class CellRows(KeptCells):
         k : int
             How many; 1 or more.
         queries : array_like of float, shape (q, d), optional
-            Who asks. Default: each point of the list, which is left out of its own row.
+            Coordinates of queries. Default: the points of the list, each left out of its own row.
         max_distance, quantities, index_dtype, kernel, memory_limit
             As in `halfshell.nearest`. The tree that is kept does not count for `memory_limit`
             together with the rest, but must fit it by itself.

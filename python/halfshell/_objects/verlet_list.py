@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import threading
 from time import perf_counter
-from typing import Any, Literal, NoReturn, overload
+from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,14 @@ from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import Arrays, BoxLike, Letter, Number, Out, PeriodicLike, PointsLike
 from halfshell._objects.skin import AutoSkin
+
+
+class _PairOptions(TypedDict, total=False):
+    """For overloads: the keywords of `pairs`, without `quantities`."""
+
+    sort: bool
+    index_dtype: npt.DTypeLike
+    out: Out | None
 
 
 class VerletList:
@@ -176,31 +184,14 @@ class VerletList:
 
     @overload
     def pairs(
-        self,
-        *,
-        quantities: Literal["ij"] = "ij",
-        sort: bool = False,
-        index_dtype: npt.DTypeLike = np.int64,
-        out: Out | None = None,
+        self, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
     ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
     @overload
     def pairs(
-        self,
-        *,
-        quantities: Letter,
-        sort: bool = False,
-        index_dtype: npt.DTypeLike = np.int64,
-        out: Out | None = None,
+        self, *, quantities: Letter, **options: Unpack[_PairOptions]
     ) -> npt.NDArray[Any]: ...
     @overload
-    def pairs(
-        self,
-        *,
-        quantities: str,
-        sort: bool = False,
-        index_dtype: npt.DTypeLike = np.int64,
-        out: Out | None = None,
-    ) -> Arrays: ...
+    def pairs(self, *, quantities: str, **options: Unpack[_PairOptions]) -> Arrays: ...
     def pairs(
         self,
         *,
