@@ -157,7 +157,8 @@ def pairs(
     ------
     TypeError
         If an argument is of the wrong kind: strings, complex numbers, long double, objects that
-        cannot be converted to an array, flags that are not bools.
+        cannot be converted to an array, flags that are not bools, a `progress` that cannot be
+        called.
     ValueError
         If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
         finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
