@@ -33,7 +33,7 @@ def test_methods_of_a_cell_list_are_documented(name):
     method = getattr(hs.CellList, name)
     doc = inspect.getdoc(method)
     head = doc.split("Returns\n")[0]
-    for argument in set(inspect.signature(method).parameters) - {"self", "options"}:
+    for argument in set(inspect.signature(method).parameters) - {"self"}:
         assert re.search(rf"\b{argument}\b", head), argument
     assert ">>>" in doc
 
