@@ -52,13 +52,14 @@ def as_box(values: Any, ndim: int) -> FloatArray:
                 f"in {ndim} dimensions, got {shape}{hint}"
             )
 
-    if is_a(values, (bool, np.bool_)):
-        raise TypeError(f"box must be lengths or vectors, got {values}; see periodic")
     array = as_real_array(vectors_of(values), "box", "be lengths or vectors", check)
     if array.ndim == 2:
         return in_order(array, np.float64)
-    lengths = array.astype(np.float64)
-    return np.diag(lengths if lengths.ndim else np.full(ndim, lengths))
+    if array.ndim == 1:
+        return np.diag(array.astype(np.float64))
+    if is_a(values, (bool, np.bool_)):
+        raise TypeError(f"box must be lengths or vectors, got {values}; see periodic")
+    return np.diag(np.full(ndim, array, np.float64))
 
 
 def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:

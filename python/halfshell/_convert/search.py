@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 from halfshell._convert.arrays import PointArray
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_sets
-from halfshell._convert.types import Precision, Progress, Rest, Search
+from halfshell._convert.types import Precision, Rest, Search
 
 
 def as_search(
@@ -40,14 +40,6 @@ def as_rest(
     threads: int | None,
 ) -> Rest:
     """Those that say how to search. What is not converted here the core checks."""
-    return (
-        as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, _as_progress(progress),
-        threads,
-    )  # fmt: skip
-
-
-def _as_progress(progress: Any) -> Progress:
-    """What can be called, or None."""
-    if progress is None or callable(progress):
-        return cast(Progress, progress)
-    raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    return as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress, threads

@@ -12,7 +12,7 @@ from halfshell import _core
 from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_number
 from halfshell._convert.options import as_count, as_index_bytes
-from halfshell._convert.search import as_search
+from halfshell._convert.scene import as_sets
 from halfshell._convert.types import Arrays, BoxLike, Number, PeriodicLike, PointsLike
 
 _MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
@@ -154,11 +154,12 @@ def nearest(
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
     k, reach = as_k(k), as_max_distance(max_distance)
-    search, asking = as_search(
-        points, reach, box, periodic, True, "exact", kernel, memory_limit, None, threads, queries
+    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+    result = _core.nearest(
+        array, reach, vectors, bits, True, "exact", kernel, memory_limit, None, threads,
+        quantities, as_index_bytes(index_dtype), asking, k,
     )
-    result = _core.nearest(*search, quantities, as_index_bytes(index_dtype), asking, k)
-    return in_rows(result, len(search[0] if asking is None else asking), k)
+    return in_rows(result, len(array if asking is None else asking), k)
 
 
 def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:
