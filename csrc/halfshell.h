@@ -534,6 +534,7 @@ typedef struct hs_plan {
     bool        reduced;           /* the box was replaced by an equivalent, less skewed one */
     bool        keeps_originals;   /* coordinates as given are kept beside the wrapped */
     bool        all_pairs;         /* one cell: every point meets every point */
+    bool        sparse;            /* only occupied cells are stored, out of those of shape */
     int64_t     shape[HS_MAX_DIM]; /* cells along each grid axis */
     double      cell_size[HS_MAX_DIM]; /* extent of a cell along each grid axis */
     int64_t     reach[HS_MAX_DIM];     /* cells to look at on either side */

@@ -19,7 +19,7 @@ SPACING = 1.2  # between them at first
 
 def forces_of(pair_list, n):
     """Forces on all particles and the potential energy, shifted to be zero at the cutoff."""
-    i, j, d, D = pair_list.pairs("ijdD")
+    i, j, d, D = pair_list.pairs(quantities="ijdD")
     sixth = d**-6
     energy = float(np.sum(4.0 * sixth * (sixth - 1.0))) - len(d) * 4.0 * CUTOFF**-6 * (
         CUTOFF**-6 - 1.0

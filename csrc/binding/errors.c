@@ -136,6 +136,13 @@ hs_format_bytes(double bytes, char *text, size_t size)
     return text;
 }
 
+bool
+hs_took_more(const hs_failure *failure)
+{
+    return !isinf(failure->limit_bytes) &&
+           failure->expected_bytes + failure->search_bytes <= failure->limit_bytes;
+}
+
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
@@ -148,6 +155,12 @@ raise_memory(const hs_failure *failure)
         snprintf(text, sizeof text,
                  "the result would not fit: the cutoff spans more images of the box than any "
                  "memory holds pairs; use a smaller cutoff");
+    } else if (failure->search_bytes > 0.0 && hs_took_more(failure)) {
+        snprintf(text, sizeof text,
+                 "the search would not fit: it needs more than the %s that are allowed, where "
+                 "about %.3g pairs%s%s%s and %s for the search itself were expected",
+                 limit, failure->expected_pairs, stored ? " (" : "", stored ? needed : "",
+                 stored ? ")" : "", search);
     } else if (failure->search_bytes > 0.0) {
         snprintf(text, sizeof text,
                  "the search would not fit: about %.3g pairs%s%s%s are expected and the search "
@@ -160,9 +173,10 @@ raise_memory(const hs_failure *failure)
                  limit, isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
     } else {
         snprintf(text, sizeof text,
-                 "the result would not fit: about %.3g pairs (%s) are expected, %s are allowed; "
+                 "the result would not fit: about %.3g pairs (%s) are expected, %s are allowed%s; "
                  "use a smaller cutoff, fewer quantities, iter_pairs or count_pairs",
-                 failure->expected_pairs, needed, limit);
+                 failure->expected_pairs, needed, limit,
+                 hs_took_more(failure) ? " for them and the search" : "");
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;

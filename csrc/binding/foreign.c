@@ -35,10 +35,24 @@ set_cause(PyObject *cause)
     PyErr_Restore(type, value, trace);
 }
 
+/* The text with one blank for each run of blanks and line breaks; takes ownership. NULL with an
+ * exception set, also for NULL. */
+static PyObject *
+on_one_line(PyObject *text)
+{
+    PyObject *words = text != NULL ? PyUnicode_Split(text, NULL, -1) : NULL;
+    PyObject *blank = words != NULL ? PyUnicode_FromString(" ") : NULL;
+    PyObject *joined = blank != NULL ? PyUnicode_Join(blank, words) : NULL;
+    Py_XDECREF(blank);
+    Py_XDECREF(words);
+    Py_XDECREF(text);
+    return joined;
+}
+
 void
 hs_refuse(PyObject *type, const char *must, PyObject *object)
 {
-    PyObject *text = PyObject_Repr(object);
+    PyObject *text = on_one_line(PyObject_Repr(object));
     if (text == NULL) {
         PyObject *fault = take_fault();
         if (fault == NULL) {

@@ -14,7 +14,8 @@
 
 #include <stdbool.h>
 
-/* Raises `type`: "<must>, got <repr>", the repr cut short, or the type where there is none. */
+/* Raises `type`: "<must>, got <repr>", the repr on one line and cut short, or the type
+ * where there is none. */
 void hs_refuse(PyObject *type, const char *must, PyObject *object);
 
 /* An integer, or what has __index__; no bool. Infinite where float64 does not hold it. */

@@ -49,6 +49,7 @@ static PyMethodDef methods[] = {
      "What control groups leave of them; a folder stands in for the root of all files."},
     {"clear_cache", hs_py_clear_cache, METH_NOARGS, "See halfshell.clear_cache."},
     {"set_cache_limit", hs_py_set_cache_limit, METH_O, "See halfshell.set_cache_limit."},
+    {"cache_limit", hs_py_cache_limit, METH_NOARGS, "Bytes that the cache holds at most."},
     {"cache_held", hs_py_cache_held, METH_NOARGS, "Bytes that the cache holds."},
     {"box_measure", FASTCALL(hs_py_box_measure), METH_FASTCALL, "See halfshell.Box."},
     {"box_wrap", FASTCALL(hs_py_box_wrap), METH_FASTCALL, "See halfshell.Box.wrap."},

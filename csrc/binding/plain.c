@@ -87,6 +87,7 @@ take_shared(PyObject *const *arguments, PyObject **taken)
     const int ndim = dimensions_of(arguments[0]);
     PyObject *box = arguments[2];
     if (ndim == IS_NOT_PLAIN || !PyFloat_Check(arguments[1]) || !is_flag(arguments[4]) ||
+        !(arguments[8] == Py_None || PyCallable_Check(arguments[8])) ||
         !(box == Py_None || is_plain_box(box, ndim))) {
         return false;
     }

@@ -8,6 +8,8 @@
 #include "foreign.h"
 #include "threads.h"
 
+#include <math.h>
+
 #define MOST_THREADS 1024 /* an explicit wish, but not any */
 #define THREADS_MUST_BE "threads must be a whole number from 1 to 1024 or None"
 
@@ -46,6 +48,7 @@ take_memory_limit(PyObject *object, hs_options *options)
         hs_refuse(PyExc_ValueError, "memory_limit must be a number of bytes", object);
         return false;
     }
+    options->memory_limit = fabs(options->memory_limit); /* -0.0 is 0 in messages, too */
     return true;
 }
 

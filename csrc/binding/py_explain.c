@@ -16,6 +16,7 @@ put_plan(PyObject *dict, const hs_plan *plan)
            hs_dict_put(dict, "reduced", PyBool_FromLong(plan->reduced)) &&
            hs_dict_put(dict, "keeps_originals", PyBool_FromLong(plan->keeps_originals)) &&
            hs_dict_put(dict, "all_pairs", PyBool_FromLong(plan->all_pairs)) &&
+           hs_dict_put(dict, "sparse", PyBool_FromLong(plan->sparse)) &&
            hs_dict_put(dict, "shape", hs_tuple_of_integers(plan->shape, plan->ndim)) &&
            hs_dict_put(dict, "cell_sizes", hs_tuple_of_reals(plan->cell_size, plan->ndim)) &&
            hs_dict_put(dict, "reach", hs_tuple_of_integers(plan->reach, plan->ndim)) &&

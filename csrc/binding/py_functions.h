@@ -74,6 +74,7 @@ PyObject *hs_py_group_memory(PyObject *module, PyObject *root);
 PyObject *hs_py_clear_cache(PyObject *module, PyObject *ignored);
 /* A number of bytes -> the limit before. */
 PyObject *hs_py_set_cache_limit(PyObject *module, PyObject *limit);
+PyObject *hs_py_cache_limit(PyObject *module, PyObject *ignored);
 PyObject *hs_py_cache_held(PyObject *module, PyObject *ignored);
 
 /* py_box.c. box, periodic -> (heights, volume). */

@@ -115,6 +115,14 @@ hs_py_set_cache_limit(PyObject *module, PyObject *limit)
 }
 
 PyObject *
+hs_py_cache_limit(PyObject *module, PyObject *ignored)
+{
+    (void)module;
+    (void)ignored;
+    return PyLong_FromSize_t(hs_pool_limit());
+}
+
+PyObject *
 hs_py_cache_held(PyObject *module, PyObject *ignored)
 {
     (void)module;

@@ -20,9 +20,10 @@ raise_memory(const hs_failure *failure)
     if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
         hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
         snprintf(text, sizeof text,
-                 "the result would not fit: %.3g entries (%s), %s %s; use a smaller k, fewer "
+                 "the result would not fit: %.3g entries (%s), %s %s%s; use a smaller k, fewer "
                  "quantities, or fewer queries at a time",
-                 failure->expected_pairs, needed, limit, verb);
+                 failure->expected_pairs, needed, limit, verb,
+                 hs_took_more(failure) ? " for them and the search" : "");
     } else {
         snprintf(text, sizeof text,
                  "no memory for the search: %s %s; perhaps a point is so far from the others, or "

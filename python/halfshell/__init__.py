@@ -4,7 +4,7 @@
 import importlib
 from typing import TYPE_CHECKING
 
-from halfshell._convert.memory import clear_cache, set_cache_limit
+from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
 from halfshell._convert.options import kernels
 from halfshell._errors import CapacityError
 from halfshell._functions.counts import count_pairs
@@ -30,6 +30,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Box",
+    "CacheInfo",
     "CapacityError",
     "CellList",
     "Explanation",
@@ -38,6 +39,7 @@ __all__ = [
     "RadialDistribution",
     "Verdict",
     "VerletList",
+    "cache_info",
     "clear_cache",
     "coordination",
     "count_pairs",

@@ -35,7 +35,7 @@ class Case:
     periodic: tuple[bool, ...] | None = None
     inclusive: bool = True
 
-    def find(self, kernel: str | None, quantities: str, **options: Any) -> Any:
+    def find(self, kernel: str | None, quantities: str, sort: bool = False) -> Any:
         """Run the search on this scene."""
         return hs.pairs(
             self.points,
@@ -44,8 +44,8 @@ class Case:
             periodic=self.periodic,
             quantities=quantities,
             inclusive=self.inclusive,
+            sort=sort,
             kernel=kernel,
-            **options,
         )
 
 

@@ -65,7 +65,7 @@ def verlet(threads=None):
     steps = hs.VerletList(1.5, 0.3, **PERIODIC, threads=threads)
     for shift in (0.0, 0.01, BOX[1], 1.0):
         points += shift * (1.0 + 0.001 * TYPES[:, None])
-        found.append((steps.update(points), *steps.pairs("ijdDS", sort=True)))
+        found.append((steps.update(points), *steps.pairs(quantities="ijdDS", sort=True)))
     return found, steps.n_points, steps.cutoff
 
 
@@ -145,10 +145,10 @@ CALLS = {
     "cells.pairs, few cells": lambda: SPARSE.pairs(1.0, quantities="ijdDS", sort=True),
     "cells.query": lambda: CELLS.query(OTHER, quantities="jd")._arrays,
     "cells.neighbors": lambda: CELLS.neighbors(1.2)._arrays,
-    "cells.nearest": lambda: CELLS.nearest(3, OTHER),
+    "cells.nearest": lambda: CELLS.nearest(3, queries=OTHER),
     "cells.count_pairs": lambda: CELLS.count_pairs(queries=OTHER),
     "cells.coordination": lambda: CELLS.coordination(),
-    "cells.histogram": lambda: CELLS.histogram(EDGES[:5]),
+    "cells.pair_histogram": lambda: CELLS.pair_histogram(EDGES[:5]),
     "cells.iter_pairs": lambda: list(CELLS.iter_pairs(max_pairs=64)),
     "cells.for_each_pair": lambda: CELLS.for_each_pair(lambda *pair: False),
     "cells.candidates": lambda: fields(CELLS.candidates(OTHER), "offsets start stop"),

@@ -276,7 +276,7 @@ def test_lists_of_many_steps(seed):
     for _ in range(3):
         kept.update(points)
         brute = scene.brute(points=points, cutoff=cutoff)
-        i, j, S, d, D = kept.pairs("ijSdD", sort=True)
+        i, j, S, d, D = kept.pairs(quantities="ijSdD", sort=True)
         assert rows_of_arrays(i, j, S) == keys(brute.half())
         for pair, length, vector in zip(brute.half(), d.tolist(), D, strict=True):
             brute.check_numbers(pair, length, vector, cutoff)

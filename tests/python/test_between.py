@@ -271,11 +271,10 @@ def test_any_form_of_input_gives_the_same():
              (QUERIES.astype(">f8"), np.asfortranarray(POINTS)), (QUERIES, POINTS.tolist()),
              (memoryview(QUERIES), POINTS[::-1][::-1])]  # fmt: skip
     for queries, points in forms:
-        for sort in (True, False):
-            found = hs.pairs_between(
-                queries, points, 1.5, box=LENGTHS.tolist(), quantities="ijdS", sort=sort
-            )
-            assert same_arrays(found, expected)
+        found = hs.pairs_between(
+            queries, points, 1.5, box=LENGTHS.tolist(), quantities="ijdS"
+        )
+        assert same_arrays(found, expected)
         assert hs.count_pairs(points, 1.5, queries=queries, box=LENGTHS) == len(expected[0])
 
 
@@ -398,9 +397,6 @@ def test_two_sets_need_queries():
     )  # fmt: skip
     assert_refused(
         lambda: hs.pairs_between(QUERIES, POINTS, 1.0, quantities="x"), ValueError, "i j d D S P"
-    )
-    assert_refused(
-        lambda: hs.pairs_between(QUERIES, POINTS, 1.0, sort="yes"), TypeError, "sort"
     )
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Boxes: constructors, measures, and wrapping by whole vectors."""
 
+import inspect
 import itertools
 import math
 from fractions import Fraction
@@ -324,3 +325,74 @@ def test_six_dimensions_stay_usable(rng):
     assert len(expected[0]) > 0
     for given in ([1.0] * 6, np.ones(6), np.eye(6)):
         assert all(map(np.array_equal, hs.pairs(points, 0.4, box=given), expected))
+
+
+def results(value):
+    """All numbers of a result, to be compared."""
+    if isinstance(value, hs.NeighborTable):
+        return value.to_pairs(quantities="ijd")
+    if isinstance(value, hs.RadialDistribution):
+        return value.g, value.counts
+    if isinstance(value, (hs.Verdict, hs.Explanation, int)):
+        return (np.array(str(value)),)
+    return value if isinstance(value, tuple) else (value,)
+
+
+def blocks(*arguments, **how):
+    return tuple(map(np.concatenate, zip(*hs.iter_pairs(*arguments, **how))))
+
+
+def visits(points, cutoff, **how):
+    seen = []
+    hs.for_each_pair(points, cutoff, lambda *pair: seen.append(pair), **how)
+    return np.array([(i, j, *S, *D) for i, j, S, D, _ in seen])
+
+
+def steps(points, cutoff, box):
+    pair_list = hs.VerletList(cutoff, box=box)
+    pair_list.update(points)
+    first = pair_list.pairs(quantities="ijS")
+    pair_list.update(points, box=box)
+    return (*first, *pair_list.pairs(quantities="ijS"))
+
+
+WITH_BOX = {
+    "pairs": lambda p, box: hs.pairs(p, 0.5, box=box, quantities="ijdDS"),
+    "batch": lambda p, box: hs.pairs(p, 0.5, box=box, batch=np.arange(len(p)) // 20),
+    "pairs_between": lambda p, box: hs.pairs_between(p[:9], p, 0.5, box=box),
+    "neighbors": lambda p, box: hs.neighbors(p, 0.5, box=box, quantities="jd").sort(),
+    "coordination": lambda p, box: hs.coordination(p, 0.5, box=box),
+    "count_pairs": lambda p, box: hs.count_pairs(p, 0.5, box=box),
+    "counts of a batch": lambda p, box: hs.count_pairs(p, 0.5, box=box, batch=[0] * len(p)),
+    "iter_pairs": lambda p, box: blocks(p, 0.5, box=box),
+    "for_each_pair": lambda p, box: visits(p, 0.5, box=box),
+    "pair_histogram": lambda p, box: hs.pair_histogram(p, [0.0, 0.2, 0.5], box=box),
+    "rdf": lambda p, box: hs.rdf(p, 0.5, box=box),
+    "nearest": lambda p, box: hs.nearest(p, 3, box=box, quantities="jdS"),
+    "verify": lambda p, box: hs.verify(p, 0.5, [0], [1], [[0] * p.shape[1]], box=box),
+    "explain": lambda p, box: hs.explain(p, 0.5, box=box),
+    "CellList": lambda p, box: hs.CellList(p, 0.5, box=box).pairs(quantities="ijd"),
+    "VerletList": lambda p, box: steps(p, 0.5, box),
+}
+
+
+@pytest.mark.parametrize("name", WITH_BOX)
+@pytest.mark.parametrize("ndim", [1, 3, 6])
+def test_one_number_is_a_cube(name, ndim, rng):
+    points = rng.random((80, ndim)) * 6.0
+    expected = results(WITH_BOX[name](points, [1.5] * ndim))
+    for box in (1.5, np.float32(1.5), np.array(1.5)):
+        assert same_arrays(results(WITH_BOX[name](points, box)), expected)
+    whole = results(WITH_BOX[name](points, [2] * ndim))
+    assert same_arrays(results(WITH_BOX[name](points, 2)), whole)
+    for wrong in ("2", True, np.nan, 0.0):
+        with pytest.raises((TypeError, ValueError), match="box"):
+            WITH_BOX[name](points, wrong)
+
+
+def test_every_function_with_a_box_takes_one_number():
+    takes = {
+        name for name in hs.__all__
+        if callable(value := getattr(hs, name)) and "box" in inspect.signature(value).parameters
+    }  # fmt: skip
+    assert takes <= set(WITH_BOX)

@@ -32,8 +32,18 @@ def test_deleted_results_are_kept_and_cleared():
     del found
     gc.collect()
     assert _core.cache_held() >= size // 2
+    assert hs.cache_info() == (_core.cache_held(), 256 << 20)
     hs.clear_cache()
     assert _core.cache_held() == 0
+
+
+def test_the_limit_can_be_asked_for():
+    hs.set_cache_limit(12345)
+    assert hs.cache_info() == hs.CacheInfo(held=0, limit=12345)
+    found = search()
+    assert hs.cache_info().held == 0 and found  # what is in use is not kept
+    hs.set_cache_limit(0)
+    assert hs.cache_info().limit == 0
 
 
 def test_results_that_live_are_not_touched_by_later_ones():

@@ -42,7 +42,7 @@ def test_histograms_are_those_of_a_search_of_its_own(name, factor):
         {**asked, "weights": weights, "query_weights": rng.normal(size=len(queries))},
     ):
         expected = hs.pair_histogram(points, edges, **marks, **scene)
-        assert_same(cells.histogram(edges, **marks), expected)
+        assert_same(cells.pair_histogram(edges, **marks), expected)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -79,7 +79,7 @@ def test_shells_of_a_lattice_by_whole_numbers():
         sum(a <= s < b or (b == 9 and s == 9) for s in squares)
         for a, b in itertools.pairwise([0, *limits])
     ]
-    assert cells.histogram(edges).tolist() == expected
+    assert cells.pair_histogram(edges).tolist() == expected
     within = [sum(s <= limit for s in squares) for limit in (1, 4, 9)]
     assert cells.count_pairs([1.0, 2.0, 3.0]).tolist() == within
 
@@ -89,7 +89,7 @@ def test_histograms_are_exact_for_any_precision(precision):
     points = np.stack(np.meshgrid(*[np.arange(6.0) * 0.1] * 3), -1).reshape(-1, 3)
     box, edges = [0.6] * 3, np.array([0.0, 0.1, 0.2, 0.3])
     cells = hs.CellList(points, 0.3, box=box, precision=precision)
-    assert_array_equal(cells.histogram(edges), hs.pair_histogram(points, edges, box=box))
+    assert_array_equal(cells.pair_histogram(edges), hs.pair_histogram(points, edges, box=box))
     # Counts are by the precision of the list, for one cutoff and for several.
     assert cells.count_pairs(edges).tolist() == [cells.count_pairs(one) for one in edges]
     if precision == "double":  # single depends on the cells
@@ -104,8 +104,8 @@ def test_neither_kernel_nor_threads_matter(kernel, threads):
     weights = np.random.default_rng(6).normal(size=len(points))
     edges = np.linspace(0.0, 0.05, 12)
     expected = hs.pair_histogram(points, edges, weights=weights, box=[1.0] * 3, kernel="scalar")
-    assert_same(cells.histogram(edges, weights=weights, kernel=kernel), expected)
-    assert_same(cells.histogram(edges, weights=weights, kernel=kernel, threads=2), expected)
+    assert_same(cells.pair_histogram(edges, weights=weights, kernel=kernel), expected)
+    assert_same(cells.pair_histogram(edges, weights=weights, kernel=kernel, threads=2), expected)
 
 
 def test_nothing_is_changed():
@@ -114,44 +114,50 @@ def test_nothing_is_changed():
     edges, types = np.array([0.0, 0.5, 1.0]), np.zeros(len(points), dtype=np.int64)
     for array in (edges, types):
         array.flags.writeable = False
-    first = cells.histogram(edges, types=types)
+    first = cells.pair_histogram(edges, types=types)
     assert first.flags.writeable and first.shape == (1, 1, 2)
     first[:] = -1
-    assert (cells.histogram(edges, types=types) >= 0).all()
+    assert (cells.pair_histogram(edges, types=types) >= 0).all()
 
 
 CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 2.0)
 BAD = {
-    "edges that descend": (lambda: CELLS.histogram([0.0, 2.0, 1.0]), ValueError, r"edges\[1\]"),
-    "one edge": (lambda: CELLS.histogram([1.0]), ValueError, "edges must have shape"),
-    "a negative edge": (lambda: CELLS.histogram([-1.0, 1.0]), ValueError, r"edges\[0\] = -1.0"),
-    "an edge that is NaN": (lambda: CELLS.histogram([0.0, np.nan]), ValueError, r"edges\[1\]"),
-    "edges that are words": (lambda: CELLS.histogram(["a", "b"]), TypeError, "edges"),
-    "no edges": (lambda: CELLS.histogram(), TypeError, "edges"),
+    "edges that descend": (
+        lambda: CELLS.pair_histogram([0.0, 2.0, 1.0]), ValueError, r"edges\[1\]",
+    ),
+    "one edge": (lambda: CELLS.pair_histogram([1.0]), ValueError, "edges must have shape"),
+    "a negative edge": (
+        lambda: CELLS.pair_histogram([-1.0, 1.0]), ValueError, r"edges\[0\] = -1.0",
+    ),
+    "an edge that is NaN": (lambda: CELLS.pair_histogram([0.0, np.nan]), ValueError, r"edges\[1\]"),
+    "edges that are words": (lambda: CELLS.pair_histogram(["a", "b"]), TypeError, "edges"),
+    "no edges": (lambda: CELLS.pair_histogram(), TypeError, "edges"),
     "queries of another dimension": (
-        lambda: CELLS.histogram([0.0, 1.0], queries=[[1.0]]), ValueError, "2 columns",
+        lambda: CELLS.pair_histogram([0.0, 1.0], queries=[[1.0]]), ValueError, "2 columns",
     ),
     "too few types": (
-        lambda: CELLS.histogram([0.0, 1.0], types=[0]), ValueError, r"types must have shape \(2,\)",
+        lambda: CELLS.pair_histogram([0.0, 1.0], types=[0]),
+        ValueError, r"types must have shape \(2,\)",
     ),
     "types of one set": (
-        lambda: CELLS.histogram([0.0, 1.0], types=[0, 1], queries=[[0.0, 0.0]]),
+        lambda: CELLS.pair_histogram([0.0, 1.0], types=[0, 1], queries=[[0.0, 0.0]]),
         ValueError, "together",
     ),
     "query_weights alone": (
-        lambda: CELLS.histogram([0.0, 1.0], query_weights=[1.0]), ValueError, "needs queries",
+        lambda: CELLS.pair_histogram([0.0, 1.0], query_weights=[1.0]), ValueError, "needs queries",
     ),
     "a weight that is NaN": (
-        lambda: CELLS.histogram([0.0, 1.0], weights=[1.0, np.nan]), ValueError, r"weights\[1\]",
+        lambda: CELLS.pair_histogram([0.0, 1.0], weights=[1.0, np.nan]),
+        ValueError, r"weights\[1\]",
     ),
     "inclusive": (
-        lambda: CELLS.histogram([0.0, 1.0], inclusive=True), TypeError, "inclusive",
+        lambda: CELLS.pair_histogram([0.0, 1.0], inclusive=True), TypeError, "inclusive",
     ),
     "no such kernel": (
-        lambda: CELLS.histogram([0.0, 1.0], kernel="none"), ValueError, "kernel",
+        lambda: CELLS.pair_histogram([0.0, 1.0], kernel="none"), ValueError, "kernel",
     ),
     "no memory": (
-        lambda: CELLS.histogram(np.linspace(0.0, 1.0, 100_000), memory_limit=1e4),
+        lambda: CELLS.pair_histogram(np.linspace(0.0, 1.0, 100_000), memory_limit=1e4),
         MemoryError, "counts: 10 kB are allowed",
     ),
     "cutoffs that descend": (

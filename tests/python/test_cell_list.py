@@ -218,7 +218,7 @@ def test_nearest_are_those_of_a_search_of_its_own(name):
                 expected = hs.nearest(
                     points, k, queries=asking, max_distance=limit, quantities="jdDS", **scene
                 )
-                found = cells.nearest(k, asking, max_distance=limit, quantities="jdDS")
+                found = cells.nearest(k, queries=asking, max_distance=limit, quantities="jdDS")
                 assert_same(found, expected)
 
 
@@ -230,7 +230,7 @@ def test_nearest_do_not_depend_on_what_the_cells_are_for():
     scene = np.array([[1e300, 0.0], [1e-300, 0.0], [0.0, 3e-300], [0.0, 0.0]])
     cells = hs.CellList(scene, 1.0)
     assert_same(cells.nearest(2), hs.nearest(scene, 2))
-    assert_same(cells.nearest(2, scene), hs.nearest(scene, 2, queries=scene))
+    assert_same(cells.nearest(2, queries=scene), hs.nearest(scene, 2, queries=scene))
     assert_same(
         cells.nearest(2, max_distance=2e-300), hs.nearest(scene, 2, max_distance=2e-300)
     )
@@ -243,7 +243,8 @@ def test_nearest_of_many_threads_at_once():
         cells, found = hs.CellList(points, 1.0), []
 
         def ask(cells=cells, found=found):
-            found.extend(cells.nearest(5, queries, quantities="j").tobytes() for _ in range(3))
+            for _ in range(3):
+                found.append(cells.nearest(5, queries=queries, quantities="j").tobytes())
 
         asking = [threading.Thread(target=ask) for _ in range(4)]
         for thread in asking:
@@ -256,9 +257,9 @@ def test_nearest_of_many_threads_at_once():
 def test_nearest_of_nothing():
     cells = hs.CellList(np.empty((0, 2)), 1.0, box=[3.0, 3.0])
     assert cells.nearest(3)[0].shape == (0, 3)
-    j, d = cells.nearest(3, [[0.0, 0.0]])
+    j, d = cells.nearest(3, queries=[[0.0, 0.0]])
     assert j.tolist() == [[-1] * 3] and np.isinf(d).all()
-    assert hs.CellList([[1.0]], 1.0).nearest(2, np.empty((0, 1)))[0].shape == (0, 2)
+    assert hs.CellList([[1.0]], 1.0).nearest(2, queries=np.empty((0, 1)))[0].shape == (0, 2)
 
 
 def test_float32_and_ase_atoms():
@@ -372,8 +373,8 @@ CELLS = hs.CellList([[0.0, 0.0], [1.0, 1.0]], 1.0)
         (lambda: CELLS.count_pairs(kernel="none"), ValueError, "kernel"),
         (lambda: CELLS.nearest(0), ValueError, "k must be 1 or more"),
         (lambda: CELLS.nearest(1.0), TypeError, "k must be a whole number"),
-        (lambda: CELLS.nearest(1, [[0.0]]), ValueError, "queries must have 2 columns"),
-        (lambda: CELLS.nearest(1, [[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
+        (lambda: CELLS.nearest(1, queries=[[0.0]]), ValueError, "queries must have 2 columns"),
+        (lambda: CELLS.nearest(1, queries=[[np.nan, 0.0]]), ValueError, r"queries\[0, 0\]"),
         (lambda: CELLS.nearest(1, max_distance=-1.0), ValueError, "max_distance"),
         (lambda: CELLS.nearest(1, quantities="ij"), ValueError, "quantities"),
         (lambda: CELLS.nearest(1, inclusive=False), TypeError, "inclusive"),

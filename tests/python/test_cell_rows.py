@@ -11,7 +11,8 @@ from cell_scenes import SCENES, queries_of, scene_of
 
 def assert_same_table(found, expected):
     assert_array_equal(found.offsets, expected.offsets)
-    for a, b in zip(found.to_pairs("jdDS"), expected.to_pairs("jdDS"), strict=True):
+    tables = (table.to_pairs(quantities="jdDS") for table in (found, expected))
+    for a, b in zip(*tables, strict=True):
         assert a.tobytes() == b.tobytes() and a.dtype == b.dtype and a.shape == b.shape
     assert found.n_points == expected.n_points
 

@@ -37,10 +37,10 @@ def test_no_answer_depends_on_it(name, factor):
         expected = hs.neighbors(points, within, queries=queries, quantities="jdDS", **scene)
         rows = cells.query(queries, within, quantities="jdDS")
         assert_array_equal(rows.offsets, expected.offsets)
-        assert_same(rows.to_pairs("jdDS"), expected.to_pairs("jdDS"))
+        assert_same(rows.to_pairs(quantities="jdDS"), expected.to_pairs(quantities="jdDS"))
         assert_array_equal(cells.coordination(within), hs.coordination(points, within, **scene))
     edges = [0.0, 0.5 * cutoff, cutoff]
-    assert_array_equal(cells.histogram(edges), hs.pair_histogram(points, edges, **scene))
+    assert_array_equal(cells.pair_histogram(edges), hs.pair_histogram(points, edges, **scene))
 
 
 @pytest.mark.parametrize("name", SCENES)

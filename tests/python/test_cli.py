@@ -20,7 +20,6 @@ from halfshell._cli import peers as cli_peers
 from halfshell._cli import scene as cli_scene
 from halfshell._cli import verify as cli_verify
 from halfshell._cli.files import InputError, Scene, read_scene, replacing
-from halfshell._functions import pairs as pair_search
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
@@ -192,6 +191,7 @@ def test_npz_brings_box_and_periodic(summary, npz, tmp_path):
 def test_box_and_periodic_options_take_the_place_of_the_file(summary, npz, npy):
     lengths = summary(npy, "--cutoff", "2", "--box", "8,8,8")
     assert lengths["pairs"] == hs.count_pairs(POINTS, 2.0, box=[8.0] * 3)
+    assert summary(npy, "--cutoff", "2", "--box", "8")["box"] == lengths["box"]
     vectors = ",".join(map(str, BOX.ravel()))
     assert summary(npy, "--cutoff", "2", f"--box={vectors}")["box"] == BOX.tolist()
     mixed = summary(npz, "--cutoff", "2", "--periodic", "tfF")
@@ -795,14 +795,14 @@ class Terminal(io.StringIO):
 
 def searching(seconds, clock):
     """A search that takes some seconds of a clock and tells its progress every 10 ms."""
-    search = pair_search.pairs_with_progress
+    search = hs.pairs
 
-    def pairs(*args, progress, **options):
+    def pairs(*args, progress=None, **options):
         for k in range(round(seconds * 100)):
             clock.now += 0.01
             if progress is not None:
                 progress(k / (seconds * 100))
-        return search(*args, progress=None, **options)
+        return search(*args, **options)
 
     return pairs
 
@@ -826,7 +826,7 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
     screen = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setattr(cli_pairs, "time", time)
-    monkeypatch.setattr(pair_search, "pairs_with_progress", searching(seconds, clock))
+    monkeypatch.setattr(hs, "pairs", searching(seconds, clock))
     monkeypatch.setenv("TERM", "xterm")
     assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
     assert ("searching" in screen.getvalue()) == shown
@@ -834,6 +834,6 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
 
 def test_progress_comes_from_the_search(monkeypatch, npz):
     told = []
-    i, j = pair_search.pairs_with_progress(POINTS, 3.0, progress=told.append, box=BOX)
+    i, j = hs.pairs(POINTS, 3.0, progress=told.append, box=BOX)
     np.testing.assert_array_equal([i, j], hs.pairs(POINTS, 3.0, box=BOX))
     assert all(0 <= fraction <= 1 for fraction in told)

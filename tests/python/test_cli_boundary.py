@@ -279,7 +279,7 @@ def test_names_that_cannot_be_written_to_the_terminal(tmp_path, name, encoding):
     with open(path, "wb") as file:
         file.write(valid_bytes("npy"))
     environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "1"}
-    for more, status in (([], 0), (["--json"], 0), (["--box", "1"], 2)):
+    for more, status in (([], 0), (["--json"], 0), (["--box", "1,2"], 2)):
         command = [sys.executable, "-m", "halfshell", "pairs", path, "--cutoff", "1.0", *more]
         done = subprocess.run(command, capture_output=True, env=environment, timeout=60)
         assert done.returncode == status, done.stderr

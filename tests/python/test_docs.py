@@ -33,7 +33,7 @@ def test_methods_of_a_cell_list_are_documented(name):
     method = getattr(hs.CellList, name)
     doc = inspect.getdoc(method)
     head = doc.split("Returns\n")[0]
-    for argument in set(inspect.signature(method).parameters) - {"self", "options"}:
+    for argument in set(inspect.signature(method).parameters) - {"self"}:
         assert re.search(rf"\b{argument}\b", head), argument
     assert ">>>" in doc
 
@@ -107,10 +107,14 @@ def test_example_of_histograms_runs():
 
 def test_examples_of_nearest_run():
     text = (ROOT / "docs/nearest.md").read_text()
-    searches, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    searches, masks, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     names = {}
     exec(compile(ast.parse(searches), "nearest.md", "exec"), names)
     assert names["j"].shape == (1, 4) and names["S"].shape == (1, 4, 3)
+    exec(compile(ast.parse(masks), "nearest.md", "exec"), names)
+    i, j, d, points = (names[name] for name in ("i", "j", "d", "points"))
+    assert len(i) == len(j) == names["masked"].count() > 0 and d.max() <= 0.03
+    assert not hs.verify(points, 0.03, i, j, queries=points, box=1.0).spurious.size
     exec(compile(ast.parse(cells), "nearest.md", "exec"), names)
     assert names["j"].shape == (10, 3) and (np.diff(names["d"]) >= 0.0).all()
 

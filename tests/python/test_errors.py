@@ -204,7 +204,7 @@ def test_a_list_of_cutoffs_is_for_counting_only():
 
 
 @pytest.mark.parametrize(
-    "box", [2.0, [1.0, 2.0], [1.0] * 4, np.ones((2, 3)), np.ones((3, 2)), np.ones((1, 3, 3)), []]
+    "box", [[1.0, 2.0], [1.0] * 4, np.ones((2, 3)), np.ones((3, 2)), np.ones((1, 3, 3)), []]
 )
 def test_boxes_of_a_wrong_shape(box):
     shape = re.escape(str(np.shape(box)))
@@ -212,7 +212,9 @@ def test_boxes_of_a_wrong_shape(box):
 
 
 @pytest.mark.parametrize(
-    "box", ["cubic", [["a"] * 3] * 3, np.eye(3) * 1j, [[None] * 3] * 3, np.zeros((3, 3), "M8[s]")]
+    "box",
+    ["cubic", True, np.False_, 1j, [["a"] * 3] * 3, np.eye(3) * 1j, [[None] * 3] * 3,
+     np.zeros((3, 3), "M8[s]")],
 )
 def test_boxes_of_a_wrong_kind(box):
     assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), TypeError, "box")

@@ -296,7 +296,8 @@ def test_rows_are_sorted_a_few_at_a_time(at_a_time, monkeypatch):
     whole = table.sort()
     monkeypatch.setattr(table_rows, "_SORTED_AT_A_TIME", at_a_time)
     parts = table.sort()
-    assert same_arrays(parts.to_pairs("ijdS"), whole.to_pairs("ijdS"))
+    assert same_arrays(parts.to_pairs(quantities="ijdS"), whole.to_pairs(quantities="ijdS"))
     assert_in_exact_order(parts[5:9], points, None, first=5)
-    assert same_arrays(table[3:90].sort().to_pairs("ijdS"), whole[3:90].to_pairs("ijdS"))
+    rows = table[3:90].sort()
+    assert same_arrays(rows.to_pairs(quantities="ijdS"), whole[3:90].to_pairs(quantities="ijdS"))
     assert hs.neighbors(points[:0], 0.2, quantities="jd").sort().n_entries == 0

@@ -103,6 +103,18 @@ def test_counters_do_not_depend_on_the_kernel(scene):
     assert all(result == results[0] for result in results)
 
 
+def test_the_choice_to_store_occupied_cells_only_is_named(rng):
+    cloud = rng.random((4000, 3))
+    crowded = np.concatenate([cloud, cloud + 1e9])
+    plan = hs.explain(crowded, 0.1)
+    assert plan.algorithm == "sparse" and "only those are stored" in plan.reason
+    assert np.prod(np.array(plan.shape, float)) > 1e20
+    assert "empty cells: only occupied ones are stored" in plan.leaves_out
+    assert hs.CellList(crowded, 0.1).cell_ids is not None
+    even = hs.explain(cloud, 0.1)
+    assert even.algorithm == "grid" and "stored" not in even.reason + "".join(even.leaves_out)
+
+
 def test_what_is_not_asked_for_costs_no_byte(scene):
     points, cutoff, box = scene
     measured = hs.explain(points, cutoff, box=box, quantities="ij", measure=True).measured

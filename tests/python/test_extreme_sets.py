@@ -150,7 +150,7 @@ def test_queries_that_meet_nobody(rng):
         assert np.array_equal(hs.coordination(points, 1.5, box=box), table.counts)
         half = exact_pairs(np.concatenate([queries, points]), 1.5, box)
         between = half[(half[:, 0] < 3000) & (half[:, 1] >= 3000)]
-        i, j, S = hs.pairs_between(queries, points, 1.5, box=box, quantities="ijS", sort=True)
+        i, j, S = hs.pairs_between(queries, points, 1.5, box=box, quantities="ijS")
         assert np.array_equal(np.column_stack([i, j - 0, S]), between - [0, 3000, 0, 0, 0])
     nobody = hs.neighbors(points, 1.5, queries=queries + 1e4)
     assert nobody.n_entries == 0 and len(nobody.offsets) == 3001

@@ -281,8 +281,8 @@ def check_cells(scene):
         ]
         asked = cells.query(queries, radius)
         assert pairs_of(asked) == indices(between)
-        assert cells.histogram([0.0, radius]).tolist() == [len(half)]
-        assert cells.histogram([0.0, radius], queries=queries).tolist() == [len(between)]
+        assert cells.pair_histogram([0.0, radius]).tolist() == [len(half)]
+        assert cells.pair_histogram([0.0, radius], queries=queries).tolist() == [len(between)]
         for search, expected in (
             (partial(set_of_pairs, cells, radius), set(half)),
             (partial(entries_of, cells.neighbors, radius), full),

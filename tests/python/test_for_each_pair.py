@@ -188,7 +188,7 @@ def pointers_to(table):
 def test_a_ctypes_function_and_its_data(which):
     table = np.zeros(46)
     user_data = [*pointers_to(table)][which]
-    check_table(table, hs.for_each_pair(POINTS, 0.5, write_pair, user_data, box=BOX))
+    check_table(table, hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data, box=BOX))
 
 
 def test_a_low_level_callable_of_ctypes():
@@ -198,7 +198,7 @@ def test_a_low_level_callable_of_ctypes():
     callback = scipy.LowLevelCallable(write_pair, user)
     check_table(table, hs.for_each_pair(POINTS, 0.5, callback, box=BOX))
     with pytest.raises(TypeError, match="user_data"):
-        hs.for_each_pair(POINTS, 0.5, callback, table)
+        hs.for_each_pair(POINTS, 0.5, callback, user_data=table)
     for declared in (
         "int (int64_t, int64_t, int32_t const *, double const *, double, void *)",
         "int32_t(long long,long long,const int *,const double*,double,double *)",
@@ -234,14 +234,14 @@ def test_a_numba_cfunc():
     )
     sums = np.zeros(3)
     compiled = numba.cfunc(signature)(add)
-    n = hs.for_each_pair(POINTS, 0.5, compiled, sums, box=BOX)
+    n = hs.for_each_pair(POINTS, 0.5, compiled, user_data=sums, box=BOX)
     i, j, S, d = hs.pairs(POINTS, 0.5, box=BOX, quantities="ijSd")
     assert n == len(i)
     assert math.isclose(sums[0], (d * d).sum(), rel_tol=1e-12)
     assert math.isclose(sums[1], (d * d).sum(), rel_tol=1e-12)
     assert sums[2] == ((i + j) * (S @ [1, 2, 5])).sum()
     again = np.zeros(3)
-    assert hs.for_each_pair(POINTS, 0.5, compiled.ctypes, again, box=BOX) == n
+    assert hs.for_each_pair(POINTS, 0.5, compiled.ctypes, user_data=again, box=BOX) == n
     assert (again == sums).all()
 
     wrong = types.int64(*signature.args), types.int32(*signature.args[:5])
@@ -314,13 +314,13 @@ def test_other_things_are_refused():
         with pytest.raises(TypeError, match=r"const int32_t \*S, const double \*D"):
             hs.for_each_pair(POINTS, 0.5, callback)
     with pytest.raises(TypeError, match="user_data"):
-        hs.for_each_pair(POINTS, 0.5, print, np.zeros(3))
+        hs.for_each_pair(POINTS, 0.5, print, user_data=np.zeros(3))
     for user_data in (1.5, True, object(), "text"):
         with pytest.raises(TypeError, match="user_data"):
-            hs.for_each_pair(POINTS, 0.5, write_pair, user_data)
+            hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data)
     for user_data in (-1, 2**70, np.zeros((4, 4))[:, 1]):
         with pytest.raises(ValueError, match="user_data"):
-            hs.for_each_pair(POINTS, 0.5, write_pair, user_data)
+            hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data)
 
 
 @pytest.mark.parametrize(
@@ -415,4 +415,4 @@ def test_odd_types_of_ctypes_are_refused(types):
 )
 def test_other_data_are_refused(data):
     with pytest.raises(TypeError, match="user_data"):
-        hs.for_each_pair(POINTS, 0.1, SIGNATURE(lambda *_: 0), data)
+        hs.for_each_pair(POINTS, 0.1, SIGNATURE(lambda *_: 0), user_data=data)

@@ -15,7 +15,7 @@ import halfshell as hs
 OWN = {
     "_core", "_errors", "_extras",
     "_convert", "_convert.arrays", "_convert.batch", "_convert.foreign", "_convert.lengths",
-    "_convert.memory", "_convert.options", "_convert.scene",
+    "_convert.memory", "_convert.options", "_convert.scene", "_convert.search", "_convert.types",
     "_functions", "_functions.counts", "_functions.neighbors", "_functions.pairs",
     "_objects", "_objects.box", "_objects.exact_order", "_objects.graph",
     "_objects.neighbor_table", "_objects.origin", "_objects.table_forms", "_objects.table_rows",

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._functions import pairs as pair_search
 from subprocesses import RESIDENT, run
 
 BOX = np.array([[1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.4, 0.2, 1.1]])
@@ -210,10 +209,40 @@ def test_progress_of_what_is_repeated_never_falls(rng, threads):
 @pytest.mark.parametrize("sort", [False, True])
 def test_progress_of_all_pairs_at_once_never_falls(rng, threads, sort):
     told = []
-    pair_search.pairs_with_progress(
+    hs.pairs(
         rng.random((60_000, 3)), 0.08, progress=told.append, threads=threads, sort=sort
     )
     assert len(told) > 3 and told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
+
+
+def test_progress_of_batches_and_of_cells_never_falls(rng):
+    points, batch = rng.random((60_000, 3)), np.arange(60_000) // 20_000
+    cells = hs.CellList(points, 0.08)
+    for search in (
+        lambda **how: hs.pairs(points, 0.08, batch=batch, **how),
+        lambda **how: hs.pairs(points.tolist(), 0.08, **how),
+        cells.pairs,
+    ):
+        told = []
+        found = search(progress=told.append)
+        assert len(told) > 1 and told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
+        assert all(map(np.array_equal, found, search()))
+
+
+def test_exceptions_of_the_hook_end_the_search(rng):
+    points = rng.random((60_000, 3))
+
+    def hook(fraction):
+        raise KeyError(fraction)
+
+    for search in (lambda **how: hs.pairs(points, 0.08, **how), hs.CellList(points, 0.08).pairs):
+        with pytest.raises(KeyError):
+            search(progress=hook)
+        with pytest.raises(TypeError, match="progress must be callable, got int"):
+            search(progress=1)
+    for few in (points[:4], points[:4].tolist()):
+        with pytest.raises(TypeError, match="progress must be callable, got str"):
+            hs.pairs(few, 0.1, progress="yes")
 
 
 def test_an_exception_of_the_hook_arrives_and_the_iterator_goes_on(rng):

@@ -109,7 +109,7 @@ def test_neighbors_are_pairs_both_ways(scene):
     how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
     table = hs.neighbors(scene.points, scene.cutoff, quantities="jdDS", **how)
     assert entries(table) == both_ways(scene.found())
-    half = table.to_pairs("ijdDS", half=True)
+    half = table.to_pairs(quantities="ijdDS", half=True)
     for ours, theirs in zip(half, scene.arrays("ijdDS", sort=True), strict=True):
         assert np.array_equal(ours, theirs)
     assert table.counts.tolist() == hs.coordination(scene.points, scene.cutoff, **how).tolist()
@@ -123,7 +123,7 @@ def test_neighbors_are_pairs_both_ways(scene):
 def test_half_of_the_full_list_is_the_half_list(rng):
     points, cutoff, box, _ = random_scene(rng, 500, neighbours=25, kind="triclinic")
     table = hs.neighbors(points, cutoff, box=box, quantities="jS")
-    found = as_set(*table.to_pairs("ijS", half=True))
+    found = as_set(*table.to_pairs(quantities="ijS", half=True))
     assert found == as_set(*hs.pairs(points, cutoff, box=box, quantities="ijS"))
     assert table.n_entries == 2 * hs.count_pairs(points, cutoff, box=box)
 

@@ -17,7 +17,7 @@ ALLOWED = {
     "_convert": {""},
     "_objects": {"", "_convert", "_functions"},
     "_functions": {"", "_convert", "_objects", "_report"},  # of the report its signature only
-    "_check": {"", "_convert", "_functions"},
+    "_check": {"", "_convert", "_functions", "_objects"},
     "_peers": {""},
     "_report": {"", "_peers", "scenes"},
     "_cli": {"", "_convert", "_functions", "_check", "_peers", "_report", "scenes"},

@@ -8,8 +8,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import _core
-from halfshell._convert import scene
-from halfshell._functions import pairs as pair_search
+from halfshell._convert import scene, search
 
 POINTS = np.random.default_rng(31).random((40, 3)) * 4.0
 LENGTHS = np.array([4.0, 4.5, 5.0])
@@ -47,7 +46,7 @@ def test_same_answer_as_converted_arguments(box, periodic, real, index_dtype):
     options = {"box": box, "periodic": periodic, "quantities": "ijdDSP", "sort": True}
     options["index_dtype"] = index_dtype
     direct = plain(points, **options)
-    converted = pair_search.pairs_with_progress(points, 1.5, progress=None, **options)
+    converted = hs.pairs(points.view(Subclass), 1.5, **options)
     public = hs.pairs(points, 1.5, **options)
     for a, b, c in zip(direct, converted, public, strict=True):
         assert a.dtype == b.dtype == c.dtype
@@ -172,8 +171,8 @@ def test_box_object_is_plain_to_the_public_functions(monkeypatch):
         raise AssertionError("arguments were converted")
 
     expected = hs.pairs(POINTS, 1.5, box=LENGTHS.tolist(), quantities="P")
-    for module in (scene, pair_search):
-        monkeypatch.setattr(module, "as_scene", refuse)
+    for module in (scene, search):
+        monkeypatch.setattr(module, "as_sets", refuse)
     assert (hs.pairs(POINTS, 1.5, box=hs.Box(LENGTHS), quantities="P") == expected).all()
     assert hs.count_pairs(POINTS, 1.5, box=hs.Box(LENGTHS)) == len(expected)
 

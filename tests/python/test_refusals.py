@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Refusals: shapes before copies, the argument by its own name, one short line."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -76,7 +78,7 @@ def test_numbers_of_systems_beyond_memory_are_refused_by_name():
     "call",
     [
         lambda q: hs.CellList(P, 0.2).query(q),
-        lambda q: hs.CellList(P, 0.2).nearest(1, q),
+        lambda q: hs.CellList(P, 0.2).nearest(1, queries=q),
         lambda q: hs.pairs_between(q, P, 0.1),
         lambda q: hs.neighbors(P, 0.1, queries=q),
         lambda q: hs.count_pairs(P, 0.1, queries=q),
@@ -95,7 +97,7 @@ def test_too_long_a_length_has_its_own_name():
         with pytest.raises(MemoryError, match=r"fit: edges\[-1\] spans .* smaller edges\[-1\]$"):
             hs.pair_histogram(P, [0.0, length], box=BOX)
         with pytest.raises(MemoryError, match=r"fit: edges\[-1\] spans"):
-            hs.CellList(P, 0.2, box=BOX).histogram([0.0, length])
+            hs.CellList(P, 0.2, box=BOX).pair_histogram([0.0, length])
         with pytest.raises(MemoryError, match=r"fit: cutoff \+ skin spans"):
             hs.VerletList(0.1, skin=length, box=BOX).update(P)
         with pytest.raises(MemoryError, match=r"fit: (the )?cutoff spans .* smaller cutoff$"):
@@ -136,3 +138,43 @@ def test_values_in_messages_stand_on_one_line():
         with pytest.raises(TypeError, match=rf"^{name} must") as refused:
             call()
         assert "\n" not in str(refused.value)
+
+
+def test_arrays_in_messages_stand_on_one_line():
+    matrix = np.eye(3)
+    for how in ({"precision": matrix}, {"threads": matrix}, {"memory_limit": matrix}):
+        with pytest.raises(TypeError) as refused:
+            hs.pairs(P, 0.2, **how)
+        assert "\n" not in str(refused.value) and next(iter(how)) in str(refused.value)
+
+
+def test_no_memory_at_all_has_no_sign():
+    for zero in (-0.0, 0.0, 0):
+        with pytest.raises(MemoryError, match=r"\b0 bytes are allowed") as refused:
+            hs.pairs(P, 0.2, memory_limit=zero)
+        assert "-0" not in str(refused.value)
+
+
+UNITS = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}
+
+
+def test_what_does_not_fit_is_more_than_is_allowed(rng):
+    """Or the message says that the search took more than was expected."""
+    crowd = rng.normal(size=(5000, 3)) * 0.2
+    points = np.concatenate([crowd, rng.random((5000, 3)) * 100.0])
+    forms = set()
+    for limit in np.geomspace(1e5, 3e7, 80):
+        try:
+            hs.pairs(points, 0.1, quantities="ijS", memory_limit=float(limit))
+        except MemoryError as refused:
+            text = str(refused)
+            numbers = re.findall(r"([\d.e+]+) (bytes|kB|MB|GB)\b", text)
+            sizes = [float(number) * UNITS[unit] for number, unit in numbers]
+            if "needs more than" in text:
+                allowed, *expected = sizes
+            else:
+                *expected, allowed = sizes
+            is_more = sum(expected) > allowed
+            assert is_more != ("needs more than" in text or "for them and the search" in text), text
+            forms.add((text[:10], is_more))
+    assert ("the search", False) in forms and ("the search", True) in forms

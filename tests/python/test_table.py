@@ -208,16 +208,16 @@ def test_sort_needs_distances(table):
 
 def test_to_pairs(table):
     i = np.repeat(np.arange(30), table.counts)
-    found = table.to_pairs("SPDdji")
+    found = table.to_pairs(quantities="SPDdji")
     expected = (table.shifts, np.stack((i, table.indices), axis=1), table.vectors,
                 table.distances, table.indices, i)  # fmt: skip
     assert same_arrays(found, expected)
     assert same_arrays(table.to_pairs(), (i, table.indices))
-    assert np.shares_memory(table.to_pairs("d"), table.distances)
-    assert np.array_equal(table.to_pairs("i"), i)
-    narrow = hs.neighbors(POINTS, 1.0, index_dtype=np.int32).to_pairs("ijP")
+    assert np.shares_memory(table.to_pairs(quantities="d"), table.distances)
+    assert np.array_equal(table.to_pairs(quantities="i"), i)
+    narrow = hs.neighbors(POINTS, 1.0, index_dtype=np.int32).to_pairs(quantities="ijP")
     assert [array.dtype for array in narrow] == [np.int32] * 3
-    assert hs.neighbors(POINTS, 1.0, quantities="d").to_pairs("i").dtype == np.int64
+    assert hs.neighbors(POINTS, 1.0, quantities="d").to_pairs(quantities="i").dtype == np.int64
 
 
 def test_half_of_the_pairs(table, tiny):
@@ -225,8 +225,8 @@ def test_half_of_the_pairs(table, tiny):
                                       (tiny, 1.7, POINTS[:3], [1.0, 1.1])):  # fmt: skip
         letters = "ijdS"
         expected = hs.pairs(points, cutoff, box=box, quantities=letters, sort=True)
-        assert same_arrays(some.to_pairs(letters, half=True), expected)
-        unordered = some.sort().to_pairs("ijS", half=True)
+        assert same_arrays(some.to_pairs(quantities=letters, half=True), expected)
+        unordered = some.sort().to_pairs(quantities="ijS", half=True)
         assert np.array_equal(as_rows(*unordered), as_rows(*expected[:2], expected[3]))
 
 
@@ -242,12 +242,14 @@ def test_half_needs_shifts_only_for_own_images():
 
 def test_to_pairs_refuses_other_letters(table):
     for letters in ("", "x", "ii", "i j"):
-        assert_refused(lambda letters=letters: table.to_pairs(letters), ValueError, "i j d D S P")
-    assert_refused(lambda: table.to_pairs(None), TypeError, "quantities")
+        assert_refused(
+            lambda letters=letters: table.to_pairs(quantities=letters), ValueError, "i j d D S P"
+        )
+    assert_refused(lambda: table.to_pairs(quantities=None), TypeError, "quantities")
     bare = hs.neighbors(POINTS, 1.0, quantities="d")
     assert_refused(lambda: bare.to_pairs(), AttributeError, "'j' in quantities")
-    assert_refused(lambda: bare.to_pairs("iS"), AttributeError, "'S' in quantities")
-    assert_refused(lambda: bare.to_pairs("P"), AttributeError, "'j' in quantities")
+    assert_refused(lambda: bare.to_pairs(quantities="iS"), AttributeError, "'S' in quantities")
+    assert_refused(lambda: bare.to_pairs(quantities="P"), AttributeError, "'j' in quantities")
 
 
 # ---- graphs and matrices -------------------------------------------------------------------

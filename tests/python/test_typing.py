@@ -68,6 +68,26 @@ box = hs.Box.orthorhombic(1.0, 1.0)
 assert_type(box.vectors, npt.NDArray[np.float64])
 assert_type(box.wrap(p), tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]])
 assert_type(hs.get_include(), str)
+
+class Atoms:
+    positions = p
+    cell = [1.0, 1.0, 1.0]
+    pbc = True
+
+class Tensor:
+    def __dlpack__(self, *, stream: None = None) -> object:
+        return p.__dlpack__()
+
+total = hs.pairs(Atoms(), 1.0, quantities="d").sum() + hs.nearest(Tensor(), 2)[1].sum()
+hs.pairs(p.tolist(), 1.0, box=10.0, periodic=[True, True, False], progress=print)
+hs.neighbors(p, 1.0, box=box, queries=[[0.0, 0.0, 0.0]])
+cells = hs.CellList(p, 1, box=np.float32(2.0))
+assert_type(cells.count_pairs(), int)
+assert_type(cells.count_pairs([0.5, 1.0], threads=1), npt.NDArray[np.int64])
+assert_type(cells.neighbors(queries=p, inclusive=False), hs.NeighborTable)
+i, j = hs.VerletList(1.0, skin="auto", box=10.0).pairs(sort=True)
+verdict = hs.verify(p, 1.0, table, queries=p)
+assert_type(hs.cache_info().held, int)
 """
 
 BAD = {
@@ -83,6 +103,13 @@ BAD = {
     "hs.iter_pairs(p, 1.0, sort=True)": "call-overload",
     "hs.for_each_pair(p, 1.0, print, sort=True)": "call-arg",
     "hs.Box([1.0]).vectors = p": "misc",
+    "hs.pairs_between(p, p, 1.0, sort=True)": "call-overload",
+    "hs.neighbors(p, 'far')": "arg-type",
+    "hs.neighbors(object(), 1.0)": "arg-type",
+    "hs.neighbors(p, 1.0, box=object())": "arg-type",
+    "hs.CellList(p, 1.0).neighbors(boks=1)": "call-arg",
+    "hs.CellList(p, 1.0).nearest(1, p)": "call-arg|misc",
+    "hs.VerletList(1.0).pairs('ij')": "call-overload",
 }
 
 needs_mypy = pytest.mark.skipif(

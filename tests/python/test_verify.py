@@ -225,3 +225,70 @@ def test_bad_lists(change, exception, fragment):
 def test_pairs_without_points():
     with pytest.raises(ValueError, match=r"^i must be empty: there are no points$"):
         hs.verify([], 1.0, [0], [1])
+
+
+# Tables -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("quantities", ["j", "jS", "dSj"])
+def test_a_table_of_neighbours_is_a_full_list(scene, quantities):
+    points, cutoff, box = scene
+    table = hs.neighbors(points, cutoff, box=box, quantities=quantities)
+    verdict = hs.verify(points, cutoff, table, box=box)
+    assert verdict and verdict.n_given == table.n_entries == 2 * len(listed(scene)[0])
+    mask = np.ones(table.n_entries, bool)
+    mask[[0, 5]] = False
+    verdict = hs.verify(points, cutoff, table.filter(mask), box=box)
+    left_out = np.stack(table.to_pairs(), axis=1)[~mask]
+    assert not verdict and sorted(rows(verdict.missed[:, :2])) == sorted(rows(left_out))
+
+
+@pytest.mark.parametrize("quantities", ["j", "jS"])
+def test_lists_and_tables_of_two_sets(scene, rng, quantities):
+    points, cutoff, box = scene
+    queries = points[:7].astype(np.float32)
+    table = hs.neighbors(points, cutoff, queries=queries, box=box, quantities=quantities)
+    assert hs.verify(points, cutoff, table, queries=queries, box=box)
+    found = hs.pairs_between(queries, points, cutoff, box=box, quantities="ijS")
+    assert len(found[0]) == table.n_entries > 7
+    order = rng.permutation(len(found[0]))
+    i, j, S = (column[order] for column in found)
+    assert hs.verify(points, cutoff, i, j, S, queries=queries, box=box)
+    verdict = hs.verify(points, cutoff, i[1:], j[1:], S[1:], queries=queries, box=box)
+    assert rows(verdict.missed) == [(i[0], j[0], *S[0].tolist())]
+    assert not len(verdict.spurious)
+    swapped = hs.verify(points, cutoff, j, i % 7, S, queries=points, box=box)
+    assert len(swapped.missed) and swapped.n_expected > len(i)
+
+
+def test_a_query_on_a_point_is_its_neighbour():
+    points = [[0.0], [1.0]]
+    assert hs.verify(points, 0.0, [0, 1], [0, 1], queries=points)
+    verdict = hs.verify(points, 0.0, [0, 0], [0, 1], queries=points)
+    assert rows(verdict.missed) == [(1, 1)] and rows(verdict.spurious) == [(0, 1)]
+
+
+TABLE = hs.neighbors([[0.0], [1.0], [3.0]], 2.0)
+OF_QUERIES = hs.neighbors([[0.0], [1.0], [3.0]], 2.0, queries=[[0.0], [1.0]])
+
+
+@pytest.mark.parametrize(
+    ("how", "exception", "fragment"),
+    [
+        ({"i": TABLE, "j": [0]}, TypeError, "leave j, S and full out"),
+        ({"i": TABLE, "S": [[0]]}, TypeError, "leave j, S and full out"),
+        ({"i": TABLE, "full": True}, TypeError, "leave j, S and full out"),
+        ({"i": TABLE, "points": [[0.0]]}, ValueError, "table of 3 points, got 1 points"),
+        ({"i": OF_QUERIES}, ValueError, "rows of this one are of queries"),
+        ({"i": TABLE[:2]}, ValueError, "rows of this one are of queries"),
+        ({"i": OF_QUERIES, "queries": [[0.0]]}, ValueError, "table of 2 rows, got 1 queries"),
+        ({"i": [0]}, TypeError, "j must be given"),
+        ({"i": [0], "j": [0], "queries": [[0.0]], "full": True}, ValueError, "full is about"),
+        ({"i": [1], "j": [0], "queries": [[0.0]]}, ValueError, "i must be numbers of queries"),
+        ({"i": [0], "j": [0], "queries": []}, ValueError, "there are no queries"),
+        ({"i": hs.neighbors([[0.0], [1.0], [3.0]], 2.0, quantities="d")}, AttributeError, "'j'"),
+    ],
+)
+def test_bad_tables_and_sets(how, exception, fragment):
+    with pytest.raises(exception, match=fragment):
+        hs.verify(**{"points": [[0.0], [1.0], [3.0]], "cutoff": 2.0, **how})

@@ -24,8 +24,8 @@ def check(pair_list, points, box=None, periodic=None, inclusive=True):
     """The list has what a search finds, to the last bit; returns the number of pairs."""
     options = {"box": box, "periodic": periodic, "inclusive": inclusive}
     expected = hs.pairs(points, pair_list.cutoff, quantities="ijdDS", sort=True, **options)
-    assert same_arrays(pair_list.pairs("ijdDS", sort=True), expected)
-    as_listed = pair_list.pairs("ijS")
+    assert same_arrays(pair_list.pairs(quantities="ijdDS", sort=True), expected)
+    as_listed = pair_list.pairs(quantities="ijS")
     order = np.lexsort([*as_listed[2].T[::-1], as_listed[1], as_listed[0]])
     assert same_arrays(
         tuple(np.ascontiguousarray(a[order]) for a in as_listed),
@@ -100,7 +100,7 @@ def test_order_is_that_of_the_list_and_of_no_thread_or_kernel(rng):
         found = []
         for pair_list in lists:
             pair_list.update(points)
-            found.append(pair_list.pairs("ijdDSP"))
+            found.append(pair_list.pairs(quantities="ijdDSP"))
         assert all(same_arrays(found[0], other) for other in found[1:])
         points = (points + rng.normal(0.0, 0.01, points.shape)) % 20.0
     assert {pair_list.n_builds for pair_list in lists} == {1}
@@ -237,12 +237,12 @@ def test_shifts_beyond_int32_matter_only_where_they_are_asked_for():
     points = np.array([[0.25, 0.5], [0.5 + 2.0**33, 0.5]])
     pair_list = hs.VerletList(0.5, 0.1, box=[1.0, 1.0])
     pair_list.update(points)
-    i, d = pair_list.pairs("id", sort=True)
+    i, d = pair_list.pairs(quantities="id", sort=True)
     expected = hs.pairs(points, 0.5, box=[1.0, 1.0], quantities="id", sort=True)
     assert len(i) == 1 and same_arrays((i, d), expected)
     with pytest.raises(OverflowError, match="too many box vectors away"):
-        pair_list.pairs("S")
-    assert len(pair_list.pairs("i")) == 1
+        pair_list.pairs(quantities="S")
+    assert len(pair_list.pairs(quantities="i")) == 1
 
 
 # ---- boxes that change ---------------------------------------------------------------------
@@ -413,7 +413,7 @@ def test_objects_that_bring_their_box():
     atoms = ase.Atoms("Ar4", positions=np.eye(4, 3), cell=[3.0, 3.0, 3.0], pbc=[True, True, False])
     pair_list = hs.VerletList(1.6, 0.2)
     pair_list.update(atoms)
-    assert len(pair_list.pairs("i")) == len(hs.pairs(atoms, 1.6, quantities="i")) > 3
+    assert len(pair_list.pairs(quantities="i")) == len(hs.pairs(atoms, 1.6, quantities="i")) > 3
 
 
 # ---- the interface -------------------------------------------------------------------------
@@ -462,9 +462,9 @@ def test_bad_options(rng):
     pair_list = hs.VerletList(0.3, 0.1)
     pair_list.update(rng.random((10, 3)))
     with pytest.raises(ValueError, match="quantities"):
-        pair_list.pairs("ix")
+        pair_list.pairs(quantities="ix")
     with pytest.raises(ValueError, match="index_dtype"):
-        pair_list.pairs("i", index_dtype=np.int16)
+        pair_list.pairs(quantities="i", index_dtype=np.int16)
     with pytest.raises(ValueError, match="kernel"):
         hs.VerletList(0.3, kernel="none").update([[0.0]])
     with pytest.raises(TypeError, match="inclusive"):
@@ -478,8 +478,9 @@ def test_quantities_and_types(rng, quantities, sort, index_dtype):
     points = rng.random((200, 3))
     pair_list = hs.VerletList(0.3, 0.1, box=[1.0] * 3)
     pair_list.update(points)
-    whole = dict(zip("ijdDSP", pair_list.pairs("ijdDSP", sort=sort, index_dtype=index_dtype)))
-    found = pair_list.pairs(quantities, sort=sort, index_dtype=index_dtype)
+    how = {"sort": sort, "index_dtype": index_dtype}
+    whole = dict(zip("ijdDSP", pair_list.pairs(quantities="ijdDSP", **how)))
+    found = pair_list.pairs(quantities=quantities, **how)
     expected = tuple(whole[letter] for letter in quantities)
     assert same_arrays(found, expected if len(quantities) > 1 else expected[0])
 
@@ -488,15 +489,15 @@ def test_out(rng):
     points = rng.random((200, 3))
     pair_list = hs.VerletList(0.3, 0.1, box=[1.0] * 3)
     pair_list.update(points)
-    expected = pair_list.pairs("iD")
+    expected = pair_list.pairs(quantities="iD")
     n = len(expected[0])
     for sort in (False, True):
         out = np.full(n + 5, -7), np.full((n + 9, 3), -7.0)
-        found = pair_list.pairs("iD", out=out, sort=sort)
-        assert same_arrays(found, pair_list.pairs("iD", sort=sort))
+        found = pair_list.pairs(quantities="iD", out=out, sort=sort)
+        assert same_arrays(found, pair_list.pairs(quantities="iD", sort=sort))
         assert np.shares_memory(found[0], out[0]) and (out[0][n:] == -7).all()
         with pytest.raises(hs.CapacityError) as caught:
-            pair_list.pairs("i", out=np.empty(n - 1, np.int64), sort=sort)
+            pair_list.pairs(quantities="i", out=np.empty(n - 1, np.int64), sort=sort)
         assert caught.value.needed == n
 
 
@@ -524,13 +525,13 @@ def test_threads_take_turns(rng):
     points = rng.random((400, 3))
     pair_list = hs.VerletList(0.2, 0.1)
     pair_list.update(points)
-    expected = pair_list.pairs("ij", sort=True)
+    expected = pair_list.pairs(quantities="ij", sort=True)
     wrong = []
 
     def use():
         for _ in range(30):
             pair_list.update(points)
-            if not same_arrays(pair_list.pairs("ij", sort=True), expected):
+            if not same_arrays(pair_list.pairs(quantities="ij", sort=True), expected):
                 wrong.append(1)
 
     threads = [threading.Thread(target=use) for _ in range(4)]

@@ -16,6 +16,7 @@ fill_plan(const hs_search *search, hs_plan *plan)
                       .reduced = scene->lattice.reduced,
                       .keeps_originals = search->bins.keeps_originals,
                       .all_pairs = grid->n_cells == 1,
+                      .sparse = search->is_sparse,
                       .stencil_rows = search->stencil.n_rows,
                       .expected_pairs = grid->expected_pairs,
                       .threads = hs_team_size(search->call->team),

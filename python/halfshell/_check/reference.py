@@ -37,7 +37,7 @@ def reference_pairs(
         Floats of any width, integers or Fractions; all finite.
     cutoff : float
         Largest distance, not negative.
-    box : array_like, shape (d,) or (d, d), optional
+    box : float or array_like, shape (d,) or (d, d), optional
         Edge lengths, or edge vectors as rows; the rows of axes that do not repeat are not
         used. None: open space.
     periodic : bool or sequence of bool, shape (d,), optional
@@ -217,7 +217,7 @@ def _box_rows(box: Any, periodic: Any, ndim: int) -> tuple[list[list[Fraction]],
             raise ValueError("periodic needs a box")
         return [[Fraction(0)] * ndim] * ndim, [False] * ndim
     table = np.asarray(box)
-    rows = _fractions(np.diag(table) if table.ndim == 1 else table)
+    rows = _fractions(table if table.ndim == 2 else np.diag(np.broadcast_to(table, ndim)))
     flags = np.broadcast_to(True if periodic is None else np.asarray(periodic), ndim)
     return rows, [bool(flag) for flag in flags]
 

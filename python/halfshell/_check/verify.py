@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check anybody's list of pairs: what it misses, what it invents, what it has twice."""
+"""Check a list of pairs from any library: what it misses, what it invents, what it has twice."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_array
-from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.arrays import PointArray, as_array
 from halfshell._convert.options import as_flag
-from halfshell._convert.scene import as_scene
+from halfshell._convert.search import as_search
+from halfshell._convert.types import ArrayLike, BoxLike, Number, PeriodicLike, PointsLike
 from halfshell._functions.pairs import pairs as find_pairs
+from halfshell._functions.pairs import pairs_between as find_between
+from halfshell._objects.neighbor_table import NeighborTable
 
 IntArray = npt.NDArray[np.int64]
 _CONFIRMED = 1000  # differences of each kind that are confirmed by rational arithmetic
@@ -61,30 +63,36 @@ class Verdict:
 
 
 def verify(
-    points: Any,
-    cutoff: float,
-    i: Any,
-    j: Any,
-    S: Any = None,
+    points: PointsLike,
+    cutoff: Number,
+    i: ArrayLike | NeighborTable,
+    j: ArrayLike | None = None,
+    S: ArrayLike | None = None,
     *,
-    box: Any = None,
-    periodic: Any = None,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     full: bool = False,
 ) -> Verdict:
-    """Check a list of pairs, from any library, by exact arithmetic.
+    """Check a list of pairs, from any library; always exact.
 
     Parameters
     ----------
     points, cutoff, box, periodic, inclusive
         The scene, as in `pairs`. `inclusive` must be the rule of the list.
     i, j : array_like of int, shape (m,)
-        The pairs, in any order and orientation.
+        The pairs, in any order and orientation. Or, as `i` alone, a `NeighborTable`: its rows, with
+        their shifts if it has any; without `queries` they must be a full list.
     S : array_like of int, shape (m, d), optional
         Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, several images
         of one pair of points are told apart by their number only.
+    queries : array_like of float, shape (q, d), optional
+        The list is one of two sets, with i in `queries` and j in `points`, as from `pairs_between`
+        or from `neighbors` with queries.
     full : bool, default False
-        Whether the list should have both (i, j, S) and (j, i, -S).
+        Whether the list should have both (i, j, S) and (j, i, -S). Of arrays for one set of
+        points; a table tells by itself.
 
     Returns
     -------
@@ -97,7 +105,8 @@ def verify(
         If `i`, `j` or `S` does not hold whole numbers, `inclusive` or `full` is not a bool, or a
         part of the scene is of the wrong kind.
     ValueError
-        If `i`, `j` and `S` do not fit each other or the points, or the scene is refused by
+        If `i`, `j` and `S` do not fit each other or the points, a table is of other points, or of
+        queries and these are not given, `full` is asked of two sets, or the scene is refused by
         `pairs`.
     OverflowError, MemoryError
         As `pairs`, for the right list.
@@ -111,56 +120,106 @@ def verify(
     >>> verdict = hs.verify(points, 2.0, [0], [2])
     >>> verdict.missed.tolist(), verdict.spurious.tolist()
     ([[0, 1], [1, 2]], [[0, 2]])
+    >>> print(hs.verify(points, 2.0, hs.neighbors(points, 2.0)))
+    correct: 4 pairs
     """
     full = as_flag(full, "full")
-    inclusive = as_flag(inclusive, "inclusive")
-    cutoff = as_cutoff(cutoff)
-    array, vectors, bits = as_scene(points, box, periodic)
-    ndim = array.shape[1]
-    given = _rows(i, j, S, len(array), ndim)
-    flags = [bool(bits >> axis & 1) for axis in range(ndim)]
-    found = find_pairs(
-        array,
-        cutoff,
-        box=vectors,
-        periodic=flags if vectors is not None else None,
-        quantities="ij" if S is None else "ijS",
-        inclusive=inclusive,
+    search, asking = as_search(
+        points, cutoff, box, periodic, inclusive, "exact", None, None, None, None, queries
     )
-    expected = np.column_stack(tuple(found)).astype(np.int64)
-    if full:
-        expected = np.concatenate([expected, _reversed(expected)])
+    array, cutoff, vectors, bits, inclusive = search[:5]
+    ndim = array.shape[1]
+    flags = [bool(bits >> axis & 1) for axis in range(ndim)]
+    if isinstance(i, NeighborTable):
+        if j is not None or S is not None or full:
+            raise TypeError("a table has j, S and both directions itself: leave j, S and full out")
+        _check_table(i, len(array), None if asking is None else len(asking))
+        full = asking is None
+        i, j, S = _columns(i)
+    elif j is None:
+        raise TypeError("j must be given, unless i is a NeighborTable")
+    elif full and asking is not None:
+        raise ValueError("full is about one set of points: leave it out, or queries")
+    given = _rows(i, j, S, array, asking)
+    how: Any = {
+        "box": vectors,
+        "periodic": flags if vectors is not None else None,
+        "quantities": "ij" if S is None else "ijS",
+        "inclusive": inclusive,
+    }
+    if asking is None:
+        found = find_pairs(array, cutoff, **how)
     else:
-        given = _as_half(given)
-        expected = _as_half(expected)
+        found = find_between(asking, array, cutoff, **how)
+    expected = np.column_stack(tuple(found)).astype(np.int64)
+    verdict = compare(expected, given, "directed" if asking is not None else LIST[full])
+    if S is not None:
+        _confirm(verdict, array, asking, cutoff, vectors, flags, inclusive)
+    return verdict
+
+
+#: What a list is, by whether it is full.
+LIST: dict[bool, Literal["half", "full"]] = {False: "half", True: "full"}
+
+
+def compare(
+    expected: IntArray, given: IntArray, kind: Literal["half", "full", "directed"]
+) -> Verdict:
+    """The verdict on rows (i, j, *S).
+
+    expected: each pair once. given: a half list in any orientation, a full list, or, of two sets,
+    rows that have one direction only.
+    """
+    if kind == "full":
+        expected = np.concatenate([expected, _reversed(expected)])
+    elif kind == "half":
+        expected, given = _as_half(expected), _as_half(given)
     missed, surplus = _differences(expected, given)
     known = {tuple(row) for row in expected.tolist()} if len(surplus) else set()
     twice = np.array([tuple(row) in known for row in surplus.tolist()], dtype=bool)
-    verdict = Verdict(
+    return Verdict(
         n_expected=len(expected),
         n_given=len(given),
         missed=missed,
         spurious=surplus[~twice],
         duplicate=surplus[twice],
     )
-    if S is not None:
-        _confirm(verdict, array, cutoff, vectors, flags, inclusive)
-    return verdict
 
 
-def _rows(i: Any, j: Any, S: Any, n: int, ndim: int) -> IntArray:
+def _check_table(table: NeighborTable, n: int, q: int | None) -> None:
+    """ValueError unless rows and points of a table are as many as those of the scene."""
+    if table.n_points != n:
+        raise ValueError(f"i is a table of {table.n_points} points, got {n} points")
+    if q is None:
+        table._refuse_queries("verify without queries")
+    elif table.n_rows != q:
+        raise ValueError(f"i is a table of {table.n_rows} rows, got {q} queries")
+
+
+def _columns(table: NeighborTable) -> tuple[Any, Any, Any]:
+    """i, j and S of the entries; None for shifts that the table does not have."""
+    if "S" in table.quantities:
+        i, j, S = table.to_pairs(quantities="ijS")
+        return i, j, S
+    return *table.to_pairs(quantities="ij"), None
+
+
+def _rows(i: Any, j: Any, S: Any, points: PointArray, queries: PointArray | None) -> IntArray:
     """The list as rows (i, j) or (i, j, *S), checked."""
+    ndim = points.shape[1]
+    numbered = {"i": "points" if queries is None else "queries", "j": "points"}
     columns = []
     for name, values in (("i", i), ("j", j)):
+        n = len(points if numbered[name] == "points" or queries is None else queries)
         column = as_array(values, name)
         if column.size and column.dtype.kind not in "iu":
             raise TypeError(f"{name} must hold integers, got dtype {column.dtype}")
         if column.ndim != 1:
             raise ValueError(f"{name} must have shape (m,), got {column.shape}")
         if column.size and n == 0:
-            raise ValueError(f"{name} must be empty: there are no points")
+            raise ValueError(f"{name} must be empty: there are no {numbered[name]}")
         if column.size and (int(column.min()) < 0 or int(column.max()) >= n):
-            raise ValueError(f"{name} must be point numbers from 0 to {n - 1}")
+            raise ValueError(f"{name} must be numbers of {numbered[name]}, from 0 to {n - 1}")
         columns.append(column.astype(np.int64))
     if columns[0].shape != columns[1].shape:
         raise ValueError(
@@ -212,7 +271,13 @@ def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArra
 
 
 def _confirm(
-    verdict: Verdict, points: Any, cutoff: float, box: Any, periodic: list[bool], inclusive: bool
+    verdict: Verdict,
+    points: Any,
+    queries: Any,
+    cutoff: float,
+    box: Any,
+    periodic: list[bool],
+    inclusive: bool,
 ) -> None:
     """Recompute the differences in rational arithmetic, which shares nothing with the search."""
     # Here, because importing fractions takes longer than the rest.
@@ -223,11 +288,12 @@ def _confirm(
     square = Fraction(float(cutoff)) ** 2
     for rows, should_be_within in ((verdict.missed, True), (verdict.spurious, False)):
         for i, j, *shift in rows[:_CONFIRMED].tolist():
-            if i == j and not any(shift):
+            if queries is None and i == j and not any(shift):
                 continue  # a point with itself is never a pair
             if any(s and not repeats for s, repeats in zip(shift, periodic)):
                 continue  # nor is anything across an axis that does not repeat
-            distance = exact_square(points, i, j, shift, box)
+            ends = points[i] if queries is None else queries[i], points[j]
+            distance = exact_square(ends, 0, 1, shift, box)
             within = distance <= square if inclusive else distance < square
             if within != should_be_within:
                 raise AssertionError(

@@ -269,6 +269,7 @@ def _with_overrides(
     """Put --box and --periodic in the place of what the file says."""
     ndim = scene.points.shape[1]
     if box is not None:
+        box = np.repeat(box, ndim) if box.size == 1 else box
         if box.size not in (ndim, ndim * ndim):
             raise InputError(
                 f"--box has {box.size} numbers; points with {ndim} coordinates need "

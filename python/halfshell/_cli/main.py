@@ -110,7 +110,7 @@ def _add_scene_options(command: argparse.ArgumentParser) -> None:
         "--box",
         type=_box,
         metavar="LX,LY,LZ",
-        help="edge lengths, or all components of the edge vectors, in place of the file's",
+        help="edge lengths, or one for all edges, or all components of the edge vectors",
     )
     command.add_argument(
         "--periodic",

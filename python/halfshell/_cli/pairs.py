@@ -28,7 +28,6 @@ from halfshell._cli.scene import (
     require_matplotlib,
     unit_suffix,
 )
-from halfshell._functions import pairs as pair_search
 from halfshell._terminal import printable
 
 __all__ = ["run", "write_csv"]
@@ -130,11 +129,7 @@ def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[
     }
     try:
         with _progress_bar(args.progress and not args.json) as advance:
-            if advance is None:
-                found = hs.pairs(scene.points, cutoff, **options)
-            else:
-                search = pair_search.pairs_with_progress
-                found = search(scene.points, cutoff, progress=advance, **options)
+            found = hs.pairs(scene.points, cutoff, progress=advance, **options)
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise InputError(f"{scene.source}: {one_line(error)}") from None
     return dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from halfshell._cli.files import InputError, Scene, missing_extra, read_scene
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._functions.rdf import unit_ball
+from halfshell._functions.rdf import over_ideal_gas, shell_shares, unit_ball
 from halfshell._terminal import printable
 
 __all__ = [
@@ -153,14 +153,11 @@ def radial_distribution(
     """
     n, ndim = scene.points.shape
     counts, edges = np.histogram(d, bins=BINS, range=(0.0, cutoff))
-    neighbors = 2.0 * counts / n
     middle = (edges[1:] + edges[:-1]) / 2
-    rows = scene.box_rows
-    volume = abs(float(np.linalg.det(rows))) if rows is not None and all(scene.periodic) else 0.0
-    if not 0 < volume < math.inf:
-        return middle, neighbors / np.diff(edges), False
-    shells = unit_ball(ndim) * np.diff(edges**ndim)
-    return middle, neighbors / (shells * (n / volume)), True
+    if scene.box_rows is None or not all(scene.periodic):
+        return middle, 2.0 * counts / n / np.diff(edges), False
+    shares = shell_shares(scene.box_rows, (1 << ndim) - 1, edges)
+    return middle, over_ideal_gas(counts, 0.5 * n * n, shares), True
 
 
 def plot_distribution(

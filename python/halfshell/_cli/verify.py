@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
-from collections import Counter
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell._check.reference import exact_square, reference_pairs
+from halfshell._check.verify import LIST, compare
 from halfshell._cli.files import InputError, Scene, one_line
 from halfshell._cli.peers import PairList, ask_peer, find_peer
 from halfshell._cli.scene import load_scene, unit_suffix
@@ -27,9 +27,6 @@ BLOCKS = 4  # neighbourhoods that a sample is made of
 EXAMPLES = 5  # wrong pairs that are shown
 POINTS_BY_INTEGERS = 400  # some 80,000 pairs of points: a few seconds in Python
 SEARCH_ROWS = 2_000_000  # rows that are compared with the search: some seconds
-
-
-_Row = tuple[int, int, tuple[int, ...]]
 
 
 # Two checks --------------------------------------------------------------------------------
@@ -73,8 +70,7 @@ def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> Check:
         inclusive=pairs.inclusive,
         full=pairs.full,
     )
-    found = (verdict.missed, verdict.spurious, verdict.duplicate)
-    return Check("search", len(points), *(_as_given(wrong, rows) for wrong in found))
+    return _check("search", verdict, rows, len(points))
 
 
 def check_by_integers(
@@ -94,34 +90,20 @@ def check_by_integers(
     points = scene.points if rows is None else scene.points[rows]
     periodic = scene.periodic if scene.box is not None else None
     truth = reference_pairs(points, cutoff, scene.box, periodic, pairs.inclusive)
-    given = list(zip(part.i.tolist(), part.j.tolist(), map(tuple, part.S.tolist()), strict=True))
-    expected = Counter(truth)
-    if pairs.full:
-        expected.update(_reversed(row) for row in truth)
-        present = Counter(given)
-    else:  # a half list may have its pairs either way round
-        present = Counter(min(row, _reversed(row), key=_is_backward) for row in given)
-    surplus = present - expected
-    wrong = (
-        list((expected - present).elements()),
-        [row for row in surplus.elements() if row not in expected],
-        [row for row in surplus.elements() if row in expected],
+    rows_of_truth = [(i, j, *shift) for i, j, shift in truth]
+    verdict = compare(
+        np.array(rows_of_truth, dtype=np.int64).reshape(-1, 2 + ndim),
+        np.column_stack((part.i, part.j, part.S)),
+        LIST[pairs.full],
     )
-    tables = (
-        np.array([(i, j, *shift) for i, j, shift in kind], dtype=np.int64).reshape(-1, 2 + ndim)
-        for kind in wrong
-    )
-    return Check("integers", len(points), *(_as_given(table, rows) for table in tables))
+    return _check("integers", verdict, rows, len(points))
 
 
-def _reversed(row: _Row) -> _Row:
-    i, j, shift = row
-    return j, i, tuple(-s for s in shift)
-
-
-def _is_backward(row: _Row) -> bool:
-    i, j, shift = row
-    return i > j or (i == j and shift < (0,) * len(shift))
+def _check(
+    by: str, verdict: hs.Verdict, rows: NDArray[np.intp] | None, n: int
+) -> Check:
+    found = (verdict.missed, verdict.spurious, verdict.duplicate)
+    return Check(by, n, *(_as_given(wrong, rows) for wrong in found))
 
 
 def sample_points(scene: Scene, limit: int) -> NDArray[np.intp] | None:

@@ -6,14 +6,14 @@ The core looks after its own.
 
 from __future__ import annotations
 
-from typing import Any, SupportsIndex
+from typing import Any, NamedTuple, SupportsIndex
 
 import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.foreign import is_a, kind_of, shown, whole_number
 
-_SMALL = 1 << 26  # bytes; what is left is not asked for below
+_SMALL = 1 << 26  # bytes; below them the system is not asked what is left
 
 
 def refuse_unavailable(needed: int, what: str) -> None:
@@ -32,6 +32,58 @@ def refuse_large(needed: int, array: npt.NDArray[Any], name: str) -> None:
     refuse_unavailable(needed, f"{name} of shape {array.shape} and dtype {array.dtype}, copied,")
 
 
+class CacheInfo(NamedTuple):
+    """What `cache_info` returns.
+
+    Attributes
+    ----------
+    held : int
+        Bytes of deleted results that are kept for the next ones.
+    limit : int
+        Bytes that may be kept: what `set_cache_limit` said last, 256 MB at first.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> hs.clear_cache()
+    >>> held, limit = hs.cache_info()
+    >>> held
+    0
+    """
+
+    held: int
+    limit: int
+
+
+def cache_info() -> CacheInfo:
+    """Say how much memory of deleted results is kept for the next ones, and how much may be.
+
+    Returns
+    -------
+    CacheInfo
+        A named tuple ``(held, limit)``, in bytes, for the whole process. Arrays that are still in
+        use do not count.
+
+    See Also
+    --------
+    clear_cache : give back what is held now, and what is held at all.
+    set_cache_limit : how much may be kept.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import halfshell as hs
+    >>> i, j = hs.pairs(np.random.default_rng(0).random((5000, 3)), 0.1)
+    >>> del i, j
+    >>> hs.cache_info().held > 0
+    True
+    >>> hs.clear_cache()
+    >>> hs.cache_info().held
+    0
+    """
+    return CacheInfo(_core.cache_held(), _core.cache_limit())
+
+
 def clear_cache() -> None:
     """Give the memory that is kept for the next results back to the system.
 
@@ -41,6 +93,7 @@ def clear_cache() -> None:
 
     See Also
     --------
+    cache_info : how much is kept now.
     set_cache_limit : how much may be kept.
 
     Examples
@@ -74,6 +127,7 @@ def set_cache_limit(limit: SupportsIndex) -> int:
 
     See Also
     --------
+    cache_info : how much is kept now, and the limit.
     clear_cache : give back what is held now.
 
     Examples

@@ -1,54 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Options that searches share, and what they return: types, conversions, and the kernels."""
+"""Options that searches share, converted, and the kernels."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Literal, TypedDict
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
-
-Precision = Literal["exact", "double", "single"]
-
-# What functions return that take `quantities`, and one of its letters.
-Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
-Letter = Literal["i", "j", "d", "D", "S", "P"]
-
-Progress = Callable[[float], object] | None
-
-# What the core takes from `inclusive` to `threads`.
-Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
-
-# The first arguments of all its searches: points, cutoff, box and periodic before these, or cells
-# in place of points and box.
-Search = tuple[
-    Any, float, npt.NDArray[np.float64] | None, int,
-    bool, Precision, str | None, float | None, Progress, int | None,
-]  # fmt: skip
-
-
-class SearchOptions(TypedDict, total=False):
-    """For type checkers: the keywords that all searches share."""
-
-    box: Any
-    periodic: Any
-    inclusive: bool
-    precision: Precision
-    kernel: str | None
-    threads: int | None
-    memory_limit: float | None
-
-
-class ArrayOptions(SearchOptions, total=False):
-    """The same, and those of functions that return arrays of pairs, without `quantities`."""
-
-    sort: bool
-    index_dtype: npt.DTypeLike
-    out: Any
 
 
 def kernels() -> list[str]:
@@ -65,6 +25,8 @@ def kernels() -> list[str]:
 
 def as_flag(value: Any, name: str) -> bool:
     """A bool; also one of NumPy's, and the integers 0 and 1."""
+    if value is True or value is False:
+        return value
     number = exact_number(value)
     if is_a(number, int) and number in (0, 1):
         return bool(number)

@@ -39,20 +39,27 @@ def vectors_of(values: Any, name: str = "box") -> Any:
 
 
 def as_box(values: Any, ndim: int) -> FloatArray:
-    """Box vectors as the rows of a float64 array (ndim, ndim), from rows, lengths or a Box."""
+    """Box vectors as the rows of a float64 array (ndim, ndim).
+
+    values: rows, lengths, the length of all edges, or a Box.
+    """
 
     def check(shape: tuple[int, ...]) -> None:
-        if shape not in ((ndim,), (ndim, ndim)):
+        if shape not in ((), (ndim,), (ndim, ndim)):
             hint = f": {LENGTHS_AND_ANGLES}" if shape == (6,) else ""
             raise ValueError(
-                f"box must have shape ({ndim},) or ({ndim}, {ndim}) for points in {ndim} "
-                f"dimensions, got {shape}{hint}"
+                f"box must have shape ({ndim},) or ({ndim}, {ndim}), or be one length, for points "
+                f"in {ndim} dimensions, got {shape}{hint}"
             )
 
-    array = as_real_array(vectors_of(values), "box", check_shape=check)
+    array = as_real_array(vectors_of(values), "box", "be lengths or vectors", check)
+    if array.ndim == 2:
+        return in_order(array, np.float64)
     if array.ndim == 1:
         return np.diag(array.astype(np.float64))
-    return in_order(array, np.float64)
+    if is_a(values, (bool, np.bool_)):
+        raise TypeError(f"box must be lengths or vectors, got {values}; see periodic")
+    return np.diag(np.full(ndim, array, np.float64))
 
 
 def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:

@@ -14,45 +14,56 @@ from halfshell._convert.arrays import FloatArray, PointArray
 from halfshell._convert.batch import as_systems
 from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.options import Precision, Rest, SearchOptions, as_flag
 from halfshell._convert.scene import as_sets
+from halfshell._convert.search import as_rest
+from halfshell._convert.types import (
+    BoxLike,
+    Number,
+    PeriodicLike,
+    PointsLike,
+    Precision,
+    Rest,
+    SearchOptions,
+)
 from halfshell._objects.box import Box
 
 _MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 
 
 class _CountOptions(SearchOptions, total=False):
-    """The keywords of `count_pairs`, as far as its type does not depend on them."""
+    """For overloads: the keywords of `count_pairs`, without those its type depends on."""
 
-    queries: Any
+    queries: PointsLike | None
     batch: None
 
 
 @overload
 def count_pairs(
-    points: Any,
-    cutoff: float | np.floating[Any] | np.integer[Any],
-    **options: Unpack[_CountOptions],
+    points: PointsLike, cutoff: Number, **options: Unpack[_CountOptions]
 ) -> int: ...
 @overload
 def count_pairs(
-    points: Any, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
+    points: PointsLike, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
-    points: Any, cutoff: Any, *, batch: npt.ArrayLike, **options: Unpack[SearchOptions]
+    points: PointsLike,
+    cutoff: npt.ArrayLike,
+    *,
+    batch: npt.ArrayLike,
+    **options: Unpack[SearchOptions],
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
-    points: Any, cutoff: Any, **options: Unpack[_CountOptions]
+    points: PointsLike, cutoff: npt.ArrayLike, **options: Unpack[_CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
 def count_pairs(
-    points: Any,
-    cutoff: Any,
+    points: PointsLike,
+    cutoff: npt.ArrayLike,
     *,
-    queries: Any = None,
-    box: Any = None,
-    periodic: Any = None,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     precision: Precision = "exact",
     kernel: str | None = None,
@@ -71,7 +82,8 @@ def count_pairs(
         (k searches where `precision` is not "exact"). With `batch`: one for all systems, or one
         for each.
     queries : array_like of float, shape (q, d), optional
-        Count pairs of a query and a point instead, as `pairs_between` finds them.
+        Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
+        finds them.
     memory_limit : float, optional
         Bytes that the search may take.
     batch : array_like of int, shape (n,), optional
@@ -122,9 +134,7 @@ def count_pairs(
         )
         if result is not NotImplemented:
             return cast(int, result)
-    rest = (
-        as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None, threads,
-    )
+    rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
     if batch is not None:
         if queries is not None:
             raise ValueError("batch and queries cannot be given together")

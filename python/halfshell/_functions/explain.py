@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import Precision, as_flag, as_index_bytes
-from halfshell._convert.scene import as_scene
+from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.search import as_search
+from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Explanation:
 
     Attributes
     ----------
-    algorithm : {"all-pairs", "grid"}
-        Whether there is one cell or a grid of cells.
+    algorithm : {"all-pairs", "grid", "sparse"}
+        One cell, a grid of cells, or a grid of which only the occupied cells are stored.
     reason : str
         Why.
     n, ndim : int
@@ -92,11 +92,11 @@ class Explanation:
 
 
 def explain(
-    points: Any,
-    cutoff: float,
+    points: PointsLike,
+    cutoff: Number,
     *,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "ij",
     inclusive: bool = True,
     sort: bool = False,
@@ -135,20 +135,16 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
-    inclusive = as_flag(inclusive, "inclusive")
-    sort = as_flag(sort, "sort")
-    measure = as_flag(measure, "measure")
-    array, vectors, bits = as_scene(points, box, periodic)
-    index_bytes = as_index_bytes(index_dtype)
-    plan = _core.explain(
-        array, as_cutoff(cutoff), vectors, bits, inclusive, precision, kernel, memory_limit, None,
-        threads, quantities, sort, index_bytes, measure,
+    search, _ = as_search(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
     )
+    sort, index_bytes = as_flag(sort, "sort"), as_index_bytes(index_dtype)
+    plan = _core.explain(*search, quantities, sort, index_bytes, as_flag(measure, "measure"))
     ndim = plan["ndim"]
     return Explanation(
-        algorithm="all-pairs" if plan["all_pairs"] else "grid",
+        algorithm="all-pairs" if plan["all_pairs"] else "sparse" if plan["sparse"] else "grid",
         reason=_reason(plan),
-        n=len(array),
+        n=len(search[0]),
         ndim=ndim,
         shape=plan["shape"],
         cell_sizes=plan["cell_sizes"],
@@ -180,7 +176,10 @@ def _reason(plan: dict[str, Any]) -> str:
         return "testing every pair costs less than sorting into cells"
     n_rows = plan["stencil_rows"]
     rows = "row" if n_rows == 1 else "rows"
-    return f"each point is compared with {n_rows} {rows} of cells (forward half)"
+    compared = f"each point is compared with {n_rows} {rows} of cells (forward half)"
+    if plan["sparse"]:
+        return f"points fill few of the cells, only those are stored; {compared}"
+    return compared
 
 
 def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
@@ -197,7 +196,8 @@ def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:
 
 def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, ...]:
     names = {"d": "distances", "D": "vectors", "S": "shifts"}
-    left = [f"{name}: not asked for" for letter, name in names.items() if letter not in quantities]
+    missing = [name for letter, name in names.items() if letter not in quantities]
+    left = [f"{name}: not in quantities" for name in missing]
     if plan["ndim"] < 3:
         axes = "y and z" if plan["ndim"] == 1 else "z"
         left.append(f"coordinates {axes}: the scene has {plan['ndim']} dimension(s)")
@@ -210,9 +210,11 @@ def _left_out(plan: dict[str, Any], quantities: str, sort: bool) -> tuple[str, .
     if not plan["keeps_originals"]:
         left.append("a second copy of the points: the wrapped ones hold every digit")
     if plan["threads"] == 1:
-        left.append("further threads: the scene is small, or one was asked for")
+        left.append("further threads: the scene is small, or threads=1")
     if plan["all_pairs"]:
         left.append("cells and sorting into them")
+    elif plan["sparse"]:
+        left.append("empty cells: only occupied ones are stored")
     if not sort:
         left.append("sorting of pairs")
     return tuple(left)

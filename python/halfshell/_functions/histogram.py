@@ -13,8 +13,8 @@ from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.options import Search
-from halfshell._convert.scene import as_sets
+from halfshell._convert.search import as_search
+from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike, Search
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
 _COPIES = 4
@@ -33,21 +33,21 @@ class Marks(NamedTuple):
 
 
 def pair_histogram(
-    points: Any,
+    points: PointsLike,
     edges: npt.ArrayLike,
     *,
-    queries: Any = None,
+    queries: PointsLike | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
     weights: npt.ArrayLike | None = None,
     query_weights: npt.ArrayLike | None = None,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-    """Sort all pairs of points into bins by their distance, without storing them.
+    """Count pairs in bins of distance, always exact, without storing them.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ def pair_histogram(
         spacing: ``np.linspace(0, 10, 101)``, ``np.geomspace(0.1, 10, 51)``. The largest is the
         cutoff and may be larger than the box. Pairs closer than the first edge are not counted.
     queries : array_like of float, shape (q, d), optional
-        Count pairs of a query and a point instead, as `pairs_between` finds them.
+        Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
+        finds them.
     types : array_like of int, shape (n,), optional
         The type of each point, from 0 on: one histogram for each pair of types.
     query_types : array_like of int, shape (q,), optional
@@ -102,8 +103,8 @@ def pair_histogram(
     Notes
     -----
     Bins are found from float32 squares with a proven error bound; only pairs too close to an edge
-    to tell are decided again, by the stages of `pairs`. So the result is the same for any kernel
-    and any number of threads. Memory: the bins, for each thread.
+    to tell are decided again, by the stages of `pairs`. So neither the kernel nor the number of
+    threads changes the result. Memory: the bins, for each thread.
 
     Examples
     --------
@@ -116,11 +117,10 @@ def pair_histogram(
     >>> hs.pair_histogram(points, [0.0, 1.5, 3.0], weights=[1.0, -1.0, 0.5]).tolist()
     [-1.0, 0.0]
     """
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    search: Search = (
-        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
+    search, asking = as_search(
+        points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
-    marks = as_marks(len(array), asking, types, query_types, weights, query_weights)
+    marks = as_marks(len(search[0]), asking, types, query_types, weights, query_weights)
     return binned(search, as_edges(edges), asking, marks)
 
 

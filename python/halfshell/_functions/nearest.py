@@ -11,19 +11,20 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.foreign import shown
 from halfshell._convert.lengths import as_number
-from halfshell._convert.options import Arrays, as_count, as_index_bytes
+from halfshell._convert.options import as_count, as_index_bytes
 from halfshell._convert.scene import as_sets
+from halfshell._convert.types import Arrays, BoxLike, Number, PeriodicLike, PointsLike
 
 _MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
 
 
 class _NearestOptions(TypedDict, total=False):
-    """The keywords of `nearest`, without `quantities`, on which the type of the result depends."""
+    """For overloads: the keywords of `nearest`, without `quantities`."""
 
-    queries: Any
-    max_distance: float
-    box: Any
-    periodic: Any
+    queries: PointsLike | None
+    max_distance: Number
+    box: BoxLike | None
+    periodic: PeriodicLike | None
     index_dtype: npt.DTypeLike
     kernel: str | None
     threads: int | None
@@ -32,11 +33,15 @@ class _NearestOptions(TypedDict, total=False):
 
 @overload
 def nearest(
-    points: Any, k: int, *, quantities: Literal["jd"] = "jd", **options: Unpack[_NearestOptions]
+    points: PointsLike,
+    k: int,
+    *,
+    quantities: Literal["jd"] = "jd",
+    **options: Unpack[_NearestOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def nearest(
-    points: Any,
+    points: PointsLike,
     k: int,
     *,
     quantities: Literal["j", "d", "D", "S"],
@@ -44,23 +49,23 @@ def nearest(
 ) -> npt.NDArray[Any]: ...
 @overload
 def nearest(
-    points: Any, k: int, *, quantities: str, **options: Unpack[_NearestOptions]
+    points: PointsLike, k: int, *, quantities: str, **options: Unpack[_NearestOptions]
 ) -> Arrays: ...
 def nearest(
-    points: Any,
+    points: PointsLike,
     k: int,
     *,
-    queries: Any = None,
-    max_distance: float = np.inf,
-    box: Any = None,
-    periodic: Any = None,
+    queries: PointsLike | None = None,
+    max_distance: Number = np.inf,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "jd",
     index_dtype: npt.DTypeLike = np.int64,
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
 ) -> Arrays:
-    """Find the k nearest points of each point or query, in order of their exact distances.
+    """Find the k nearest points of each point or query, in an order that is always exact.
 
     Parameters
     ----------
@@ -70,14 +75,14 @@ def nearest(
         How many; 1 or more. In a periodic box each image of a point counts for itself, so that k
         may be larger than n.
     queries : array_like of float, shape (q, d), optional
-        Who asks, in the unit of `points`; anywhere, also outside the box. Default: each point
-        asks, and is left out of its own row where S = 0; its own images are not. A query that is
-        equal to a point has it as a neighbour at distance 0.
+        Coordinates of queries, in the unit of `points`; they may lie anywhere, also outside the
+        box. A query on a point has it as a neighbour at distance 0. Default: the points, each
+        left out of its own row where S = 0; its images are not.
     max_distance : float, default infinity
         Largest distance that counts, this one included; not negative.
     quantities : str, default "jd"
         Any of the letters ``j d D S``, each at most once: number of the point, distance, vector,
-        shift. What is not asked for is not computed.
+        shift. Only these are computed.
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
@@ -90,8 +95,8 @@ def nearest(
         (q, k); ``D`` float64 (q, k, d); ``S`` int32 (q, k, d). In real arithmetic
         ``D = points[j] - queries[i] + S @ box``.
 
-        Rows ascend by the exact distance of the real numbers that the inputs are; where that is
-        the same, by (j, S). Where fewer than k points are there, or within `max_distance`, the
+        Rows ascend by the exact distance of the real numbers that the inputs are, and at equal
+        distances by (j, S). Where fewer than k points are there, or within `max_distance`, the
         rest of the row is j = -1, d = infinity, D = NaN and S = 0. d is within 1 ulp, ascends along
         the row and is never above `max_distance`; each component of D is within 1 ulp of d.
 
@@ -127,11 +132,20 @@ def nearest(
 
     Examples
     --------
+    >>> import numpy as np
     >>> import halfshell as hs
     >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
     >>> j, d = hs.nearest(points, 2)
     >>> j.tolist(), d.tolist()
     ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
+
+    Rows that lack neighbours, masked:
+
+    >>> j, d = hs.nearest(points, 2, max_distance=1.5)
+    >>> j.tolist()
+    [[1, -1], [0, -1], [-1, -1]]
+    >>> np.ma.masked_equal(j, -1).tolist(), d[j >= 0].tolist()
+    ([[1, None], [0, None], [None, None]], [1.0, 1.0])
 
     In a periodic box, and for queries:
 
@@ -139,11 +153,11 @@ def nearest(
     >>> j.tolist(), d.tolist(), S.tolist()
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
+    k, reach = as_k(k), as_max_distance(max_distance)
     asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    k = as_k(k)
     result = _core.nearest(
-        array, as_max_distance(max_distance), vectors, bits, True, "exact", kernel, memory_limit,
-        None, threads, quantities, as_index_bytes(index_dtype), asking, k,
+        array, reach, vectors, bits, True, "exact", kernel, memory_limit, None, threads,
+        quantities, as_index_bytes(index_dtype), asking, k,
     )
     return in_rows(result, len(array if asking is None else asking), k)
 

@@ -9,22 +9,21 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import FloatArray, PointArray
-from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import Precision, as_flag, as_index_bytes
-from halfshell._convert.scene import as_sets
+from halfshell._convert.options import as_index_bytes
+from halfshell._convert.search import as_search
+from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
 from halfshell._objects.box import Box
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin, shifts_of_search
 
 
 def neighbors(
-    points: Any,
-    cutoff: Any,
+    points: PointsLike,
+    cutoff: Number,
     *,
-    queries: Any = None,
-    box: Any = None,
-    periodic: Any = None,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "j",
     inclusive: bool = True,
     index_dtype: npt.DTypeLike = np.int64,
@@ -42,11 +41,12 @@ def neighbors(
     cutoff : float
         Largest distance of a neighbour, in the unit of `points`; finite, not negative.
     queries : array_like of float, shape (q, d), optional
-        Who asks: the table then has a row for each query, as `pairs_between` finds them. Default:
-        the points themselves.
+        Coordinates of queries, in the unit of `points`; they may lie anywhere. The table then has
+        a row for each query, with the neighbours that `pairs_between` finds. Default: a row for
+        each point.
     quantities : str, default "j"
         Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
-        vectors, shifts. What is not asked for is not computed and the table does not have it.
+        vectors, shifts. Only these are computed, and the table has no others.
     box, periodic, inclusive, index_dtype, precision, kernel, threads, memory_limit
         As in `pairs`.
 
@@ -74,7 +74,7 @@ def neighbors(
     Notes
     -----
     The scene is searched twice, once to count and once to write each row to its place, so that
-    nothing is held beside the result. The table is the same for any number of threads.
+    nothing is held beside the result. The number of threads changes nothing in the table.
 
     Examples
     --------
@@ -96,32 +96,35 @@ def neighbors(
     """
     if type(box) is Box:
         box = box.vectors
-    vectors, periods, asking = box, periodic, queries
+    found: Any = points  # these four as the core has them
+    vectors: Any = box
+    periods: Any = periodic
+    asking: Any = queries
     arrays: Any = _core.plain_neighbors(
         points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
         quantities, index_dtype, queries,
     )
     if arrays is NotImplemented:
-        scene, points, asking = _scene(points, cutoff, queries, box, periodic)
-        vectors, periods = scene[2:]
-        arrays = _core.neighbors(
-            *scene, as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
-            threads, quantities, as_index_bytes(index_dtype), asking,
+        search, asking = as_search(
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None,
+            threads, queries,
         )
+        arrays = _core.neighbors(*search, quantities, as_index_bytes(index_dtype), asking)
+        found, _, vectors, periods = search[:4]
     origin = None
     if "d" in quantities and "j" in quantities:  # else it cannot be sorted
         find_shifts = shifts_of_search(cutoff, inclusive, precision, threads)
-        origin = Origin(points, asking, vectors, periods, find_shifts)
-    return NeighborTable(arrays, quantities, len(points), queries is None, origin=origin)
+        origin = Origin(found, asking, vectors, periods, find_shifts)
+    return NeighborTable(arrays, quantities, len(found), queries is None, origin=origin)
 
 
 def coordination(
-    points: Any,
-    cutoff: Any,
+    points: PointsLike,
+    cutoff: Number,
     *,
-    queries: Any = None,
-    box: Any = None,
-    periodic: Any = None,
+    queries: PointsLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     precision: Precision = "exact",
     kernel: str | None = None,
@@ -166,20 +169,8 @@ def coordination(
     )
     if counts is not NotImplemented:
         return cast("npt.NDArray[np.int64]", counts)
-    scene, _, asking = _scene(points, cutoff, queries, box, periodic)
-    return _core.coordination(
-        *scene, as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, None,
-        threads, asking,
+    search, asking = as_search(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
+        queries,
     )
-
-
-def _scene(
-    points: Any, cutoff: Any, queries: Any, box: Any, periodic: Any
-) -> tuple[
-    tuple[PointArray, float, FloatArray | None, int],
-    PointArray,
-    PointArray | None,
-]:
-    """The first arguments of the core, the points among them, and the queries or None."""
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    return (array, as_cutoff(cutoff), vectors, bits), array, asking
+    return _core.coordination(*search, asking)

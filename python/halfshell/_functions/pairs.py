@@ -11,52 +11,71 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.batch import as_systems
-from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import (
+from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.scene import check_apart
+from halfshell._convert.search import as_rest, as_search
+from halfshell._convert.types import (
     ArrayOptions,
     Arrays,
+    BoxLike,
     Letter,
+    Number,
+    Out,
+    PeriodicLike,
+    PointsLike,
     Precision,
-    as_flag,
-    as_index_bytes,
 )
-from halfshell._convert.scene import as_scene, as_two_sets, check_apart
 from halfshell._objects.box import Box
 
 
 class _PairOptions(ArrayOptions, total=False):
-    """The keywords of `pairs`, without `quantities`, on which the type of the result depends."""
+    """For overloads: the keywords of `pairs`, without `quantities`."""
 
+    sort: bool
+    progress: Callable[[float], object] | None
     batch: npt.ArrayLike | None
 
 
 @overload
 def pairs(
-    points: Any, cutoff: Any, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
+    points: PointsLike,
+    cutoff: npt.ArrayLike,
+    *,
+    quantities: Literal["ij"] = "ij",
+    **options: Unpack[_PairOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def pairs(
-    points: Any, cutoff: Any, *, quantities: Letter, **options: Unpack[_PairOptions]
+    points: PointsLike,
+    cutoff: npt.ArrayLike,
+    *,
+    quantities: Letter,
+    **options: Unpack[_PairOptions],
 ) -> npt.NDArray[Any]: ...
 @overload
 def pairs(
-    points: Any, cutoff: Any, *, quantities: str, **options: Unpack[_PairOptions]
+    points: PointsLike,
+    cutoff: npt.ArrayLike,
+    *,
+    quantities: str,
+    **options: Unpack[_PairOptions],
 ) -> Arrays: ...
 def pairs(
-    points: Any,
-    cutoff: Any,
+    points: PointsLike,
+    cutoff: npt.ArrayLike,
     *,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "ij",
     inclusive: bool = True,
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
-    out: Any = None,
+    out: Out | None = None,
     precision: Precision = "exact",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    progress: Callable[[float], object] | None = None,
     batch: npt.ArrayLike | None = None,
 ) -> Arrays:
     """Find every pair of points within a cutoff, each once.
@@ -72,14 +91,15 @@ def pairs(
     cutoff : float
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box.
-    box : array_like of float, shape (d,) or (d, d), or Box, optional
-        Edge lengths, or edge vectors as rows, in the unit of `points`; finite. None: open
-        space. Rows of axes that are not periodic may be anything finite, such as zero.
+    box : float, array_like of float, shape (d,) or (d, d), or Box, optional
+        The length of all edges, their lengths, or edge vectors as rows, in the unit of `points`;
+        finite. None: open space. Rows of axes that are not periodic may be anything finite, such
+        as zero.
     periodic : bool or sequence of bool, shape (d,), optional
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
-        both indices. What is not asked for is not computed.
+        both indices. Only these are computed.
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
     sort : bool, default False
@@ -107,6 +127,10 @@ def pairs(
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
+    progress : callable, optional
+        Called now and then as ``progress(fraction)``, with the part of the work that is done, from
+        0 to 1; it never falls. A search that takes but some milliseconds may not call it. An
+        exception ends the search and is raised here.
     batch : array_like of int, shape (n,), optional
         Many systems in one call: the system of each point, ascending from 0 or above; numbers may
         be left out. Points pair within their system only, and the result is that of one call for
@@ -133,7 +157,8 @@ def pairs(
     ------
     TypeError
         If an argument is of the wrong kind: strings, complex numbers, long double, objects that
-        cannot be converted to an array, flags that are not bools.
+        cannot be converted to an array, flags that are not bools, a `progress` that cannot be
+        called.
     ValueError
         If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
         finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
@@ -146,9 +171,9 @@ def pairs(
         If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
         then.
     OverflowError
-        If there are 2**31 points or more, a number is too large for float64, or a shift that was
-        asked for does not fit int32; also if a point lies more than 2**51 box vectors away in a
-        box that is not axis-aligned, or in any box when S is asked for; and if, with `precision`
+        If there are 2**31 points or more, a number is too large for float64, or `quantities` has S
+        and a shift does not fit int32; also if a point lies more than 2**51 box vectors away in a
+        box that is not axis-aligned, or in any box with S in `quantities`; and if, with `precision`
         "double", points lie so many boxes away that rounding errors pass the cutoff.
     MemoryError
         If the result would not fit `memory_limit`: as a rule decided from a sample before the
@@ -158,7 +183,7 @@ def pairs(
     --------
     count_pairs : the number of pairs, without storing them.
     iter_pairs : the same pairs in blocks, where all of them would not fit.
-    verify : check anybody's list of pairs.
+    verify : check a list of pairs, from any library.
 
     Notes
     -----
@@ -169,8 +194,7 @@ def pairs(
     pairs, strongly clustered ones more. Memory does not depend on the volume.
 
     If you come from ASE: its lists are full and strict, so ask for ``inclusive=False``, and note
-    that each pair is here once. If you come from SciPy: ``boxsize`` may be a scalar there, but
-    lengths have shape (d,) here.
+    that each pair is here once. If you come from SciPy: `box` may be one number, as ``boxsize``.
 
     References
     ----------
@@ -204,93 +228,65 @@ def pairs(
         # A small search takes as long as a handful of Python operations: none are made where the
         # arguments need no conversion.
         result: Any = _core.plain_pairs(
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None,
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress,
             threads, quantities, sort, index_dtype, out,
         )
         if result is not NotImplemented:
             return cast(Arrays, result)
-    return pairs_with_progress(
-        points,
-        cutoff,
-        progress=None,
-        box=box,
-        periodic=periodic,
-        quantities=quantities,
-        inclusive=inclusive,
-        sort=sort,
-        index_dtype=index_dtype,
-        out=out,
-        precision=precision,
-        kernel=kernel,
-        threads=threads,
-        memory_limit=memory_limit,
-        batch=batch,
-    )
-
-
-def pairs_with_progress(
-    points: Any,
-    cutoff: Any,
-    *,
-    progress: Callable[[float], object] | None,
-    box: Any = None,
-    periodic: Any = None,
-    quantities: str = "ij",
-    inclusive: bool = True,
-    sort: bool = False,
-    index_dtype: npt.DTypeLike = np.int64,
-    out: Any = None,
-    precision: Precision = "exact",
-    kernel: str | None = None,
-    threads: int | None = None,
-    memory_limit: float | None = None,
-    batch: npt.ArrayLike | None = None,
-) -> Arrays:
-    """`pairs` of what must be converted, calling ``progress(fraction)`` now and then."""
-    own = None
     check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch)
     if batch is None:
-        array, vectors, bits = as_scene(points, box, periodic)
-        scene = array, as_cutoff(cutoff), vectors, bits
-    else:
-        scene, own = as_systems(points, cutoff, box, periodic, batch)
-    shared = (
-        *scene, as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress,
-        threads, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype),
-        out,
+        search, _ = as_search(
+            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress,
+            threads,
+        )
+        return _core.pairs(
+            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
+        )
+    scene, own = as_systems(points, cutoff, box, periodic, batch)
+    rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
+    return _core.batch_pairs(
+        *(*scene, *rest, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, *own)
     )
-    return _core.pairs(*shared) if own is None else _core.batch_pairs(*(*shared, *own))
 
 
 @overload
 def pairs_between(
-    queries: Any,
-    points: Any,
-    cutoff: Any,
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: Number,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[ArrayOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def pairs_between(
-    queries: Any, points: Any, cutoff: Any, *, quantities: Letter, **options: Unpack[ArrayOptions]
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: Number,
+    *,
+    quantities: Letter,
+    **options: Unpack[ArrayOptions],
 ) -> npt.NDArray[Any]: ...
 @overload
 def pairs_between(
-    queries: Any, points: Any, cutoff: Any, *, quantities: str, **options: Unpack[ArrayOptions]
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: Number,
+    *,
+    quantities: str,
+    **options: Unpack[ArrayOptions],
 ) -> Arrays: ...
 def pairs_between(
-    queries: Any,
-    points: Any,
-    cutoff: Any,
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: Number,
     *,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "ij",
     inclusive: bool = True,
-    sort: bool = True,
     index_dtype: npt.DTypeLike = np.int64,
-    out: Any = None,
+    out: Out | None = None,
     precision: Precision = "exact",
     kernel: str | None = None,
     threads: int | None = None,
@@ -301,28 +297,26 @@ def pairs_between(
     Parameters
     ----------
     queries : array_like of float, shape (q, d)
-        Coordinates that ask, in the unit of `points`, as many columns as these. They may lie
+        Coordinates of queries, in the unit of `points` and with as many columns. They may lie
         anywhere, also far from all points or outside the box. float32 beside float64 is fine:
         each number is used as it is.
     points : array_like of float, shape (n, d)
-        Coordinates that are found, as in `pairs`. An object such as ``ase.Atoms`` brings its box;
-        `queries` may be another one with the same box.
+        Coordinates of the points to find, as in `pairs`. An object such as ``ase.Atoms`` brings
+        its box; `queries` may be another one with the same box.
     cutoff, box, periodic, inclusive, index_dtype, out, precision, kernel, threads, memory_limit
         As in `pairs`.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once, as in `pairs`.
-    sort : bool, default True
-        The order is ascending (i, j, S) in any case; False allows another one in later versions.
 
     Returns
     -------
     ndarray or tuple of ndarray
         One array per letter of `quantities`, in that order; a bare array for one letter. Types and
         shapes are those of `pairs`: i is the number of a query, j that of a point, and in real
-        arithmetic ``D = points[j] - queries[i] + S @ box``.
+        arithmetic ``D = points[j] - queries[i] + S @ box``. Ascending (i, j, S).
 
         Nothing is left out: a query that lies on a point is its neighbour at distance 0, also
-        where both arrays are the same one, and each image of a point within the cutoff is a pair.
+        where one array is given for both, and each image of a point within the cutoff is a pair.
 
     Raises
     ------
@@ -353,14 +347,15 @@ def pairs_between(
         box = box.vectors
     result: Any = _core.plain_between(
         points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        quantities, sort, index_dtype, out, queries,
+        quantities, True, index_dtype, out, queries,
     )
     if result is not NotImplemented:
         return cast(Arrays, result)
     check_apart(out, queries=queries, points=points, box=box)
-    asking, array, vectors, bits = as_two_sets(queries, points, box, periodic)
+    search, asking = as_search(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
+        queries,
+    )
     return _core.pairs_between(
-        array, as_cutoff(cutoff), vectors, bits, as_flag(inclusive, "inclusive"),
-        precision, kernel, memory_limit, None, threads, quantities, as_flag(sort, "sort"),
-        as_index_bytes(index_dtype), out, asking,
+        *search, quantities, True, as_index_bytes(index_dtype), out, asking
     )

@@ -14,8 +14,9 @@ from halfshell import _core
 from halfshell._convert.arrays import FloatArray, PointArray
 from halfshell._convert.lengths import as_positive
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.options import Search, as_count
-from halfshell._convert.scene import as_sets
+from halfshell._convert.options import as_count
+from halfshell._convert.search import as_search
+from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike
 from halfshell._extras import needs
 from halfshell._functions.histogram import Marks, as_marks, binned
 
@@ -101,20 +102,20 @@ def _new_axes() -> Axes:
 
 
 def rdf(
-    points: Any,
-    r_max: float,
+    points: PointsLike,
+    r_max: Number,
     bins: int = 100,
     *,
-    queries: Any = None,
+    queries: PointsLike | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
 ) -> RadialDistribution:
-    """Compute the radial distribution function g(r) of points in a periodic box.
+    """Compute the radial distribution function g(r) of a periodic box; counts are always exact.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def rdf(
     query_types : array_like of int, shape (q,), optional
         The types of the queries: given if both `types` and `queries` are. [a, b] is then g(r) of
         points of type b around queries of type a.
-    box : array_like of float, shape (d,) or (d, d), or Box
+    box : float, array_like of float, shape (d,) or (d, d), or Box
         As in `pairs`. It must repeat along every axis, for a density is needed.
     periodic : bool or sequence of bool, shape (d,), optional
         As in `pairs`; all True, which is the default.
@@ -179,17 +180,13 @@ def rdf(
     True
     """
     edges = _edges(r_max, bins)
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    shares = _shares(vectors, bits, edges)
-    search: Search = (
-        array, 0.0, vectors, bits, False, "exact", kernel, memory_limit, None, threads
+    search, asking = as_search(
+        points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
-    marks = as_marks(len(array), asking, types, query_types)
+    n, shares = len(search[0]), shell_shares(search[2], search[3], edges)
+    marks = as_marks(n, asking, types, query_types)
     counts = binned(search, edges, asking, marks, "r_max")
-    g = np.zeros(counts.shape)
-    with np.errstate(over="ignore", under="ignore", divide="ignore"):
-        expected = _partners(len(array), asking, marks) * shares
-        np.divide(counts, expected, out=g, where=counts > 0)
+    g = over_ideal_gas(counts, _partners(n, asking, marks), shares)
     middle = 0.5 * (edges[1:] + edges[:-1])
     return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
 
@@ -202,7 +199,17 @@ def _edges(r_max: Any, bins: Any) -> FloatArray:
     return np.linspace(0.0, largest, n_bins + 1)
 
 
-def _shares(
+def over_ideal_gas(
+    counts: npt.NDArray[Any], partners: FloatArray | float, shares: FloatArray
+) -> FloatArray:
+    """g(r): counts over what each shell would have of so many pairs; 0 where there are none."""
+    g = np.zeros(counts.shape)
+    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+        np.divide(counts, partners * shares, out=g, where=counts > 0)
+    return g
+
+
+def shell_shares(
     vectors: FloatArray | None, bits: int, edges: FloatArray
 ) -> FloatArray:
     """The part of the box that lies between two spheres, for each bin.

@@ -10,17 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import (
+from halfshell._convert.options import as_count, as_flag, as_index_bytes
+from halfshell._convert.search import as_search
+from halfshell._convert.types import (
     Arrays,
+    BoxLike,
     Letter,
+    Number,
+    PeriodicLike,
+    PointsLike,
     Precision,
     SearchOptions,
-    as_count,
-    as_flag,
-    as_index_bytes,
 )
-from halfshell._convert.scene import as_scene
 
 Block = TypeVar("Block", covariant=True)
 
@@ -37,7 +38,7 @@ class PairBlocks(Protocol[Block]):
 
 
 class _StreamOptions(SearchOptions, total=False):
-    """The keywords of `iter_pairs`, without `quantities`."""
+    """For overloads: the keywords of `iter_pairs`, without `quantities`."""
 
     max_pairs: int
     index_dtype: npt.DTypeLike
@@ -46,22 +47,26 @@ class _StreamOptions(SearchOptions, total=False):
 
 @overload
 def iter_pairs(
-    points: Any, cutoff: Any, *, quantities: Literal["ij"] = "ij", **options: Unpack[_StreamOptions]
+    points: PointsLike,
+    cutoff: Number,
+    *,
+    quantities: Literal["ij"] = "ij",
+    **options: Unpack[_StreamOptions],
 ) -> PairBlocks[tuple[npt.NDArray[Any], npt.NDArray[Any]]]: ...
 @overload
 def iter_pairs(
-    points: Any, cutoff: Any, *, quantities: Letter, **options: Unpack[_StreamOptions]
+    points: PointsLike, cutoff: Number, *, quantities: Letter, **options: Unpack[_StreamOptions]
 ) -> PairBlocks[npt.NDArray[Any]]: ...
 @overload
 def iter_pairs(
-    points: Any, cutoff: Any, *, quantities: str, **options: Unpack[_StreamOptions]
+    points: PointsLike, cutoff: Number, *, quantities: str, **options: Unpack[_StreamOptions]
 ) -> PairBlocks[Arrays]: ...
 def iter_pairs(
-    points: Any,
-    cutoff: Any,
+    points: PointsLike,
+    cutoff: Number,
     *,
-    box: Any = None,
-    periodic: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     quantities: str = "ij",
     max_pairs: int = 1 << 20,
     inclusive: bool = True,
@@ -137,23 +142,21 @@ def iter_pairs(
     True
     """
     most = most_pairs(max_pairs)
-    array, vectors, bits = as_scene(points, box, periodic)
-    blocks = _core.iter_pairs(
-        array, as_cutoff(cutoff), vectors, bits, as_flag(inclusive, "inclusive"),
-        precision, kernel, memory_limit, as_progress(progress), threads, quantities,
-        as_index_bytes(index_dtype), most,
+    search, _ = as_search(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress, threads
     )
+    blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most)
     return cast("PairBlocks[Any]", blocks)
 
 
 def for_each_pair(
-    points: Any,
-    cutoff: Any,
+    points: PointsLike,
+    cutoff: Number,
     callback: Any,
-    user_data: Any = None,
     *,
-    box: Any = None,
-    periodic: Any = None,
+    user_data: Any = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     precision: Precision = "exact",
     kernel: str | None = None,
@@ -238,21 +241,14 @@ def for_each_pair(
     from halfshell._convert.callbacks import target_of  # here: iter_pairs does without
 
     target = target_of(callback, user_data)
-    array, vectors, bits = as_scene(points, box, periodic)
+    search, _ = as_search(
+        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
+    )
     return _core.for_each_pair(
-        array, as_cutoff(cutoff), vectors, bits, as_flag(inclusive, "inclusive"),
-        precision, kernel, memory_limit, None, threads, target.function, target.user,
-        as_flag(thread_safe, "thread_safe"),
+        *search, target.function, target.user, as_flag(thread_safe, "thread_safe")
     )
 
 
 def most_pairs(max_pairs: Any) -> int:
     """A number of pairs from 1 on, as the core takes it."""
     return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
-
-
-def as_progress(progress: Any) -> Callable[[float], object] | None:
-    """What can be called, or None."""
-    if progress is None or callable(progress):
-        return cast("Callable[[float], object] | None", progress)
-    raise TypeError(f"progress must be callable, got {type(progress).__name__}")

@@ -20,6 +20,7 @@ from halfshell._convert.scene import (
     as_points,
     vectors_of,
 )
+from halfshell._convert.types import ArrayLike, BoxLike, PeriodicLike, PointsLike
 
 
 class Box:
@@ -63,7 +64,7 @@ class Box:
 
     __slots__ = ("_heights", "_vectors", "_volume")
 
-    def __init__(self, vectors: Any) -> None:
+    def __init__(self, vectors: BoxLike) -> None:
         array = as_real_array(vectors_of(vectors), "box")
         if (
             array.ndim not in (1, 2)
@@ -86,7 +87,7 @@ class Box:
         self._heights.flags.writeable = False
 
     @classmethod
-    def from_matrix(cls, matrix: Any) -> Box:
+    def from_matrix(cls, matrix: ArrayLike) -> Box:
         """Box vectors as the rows of a matrix.
 
         Parameters
@@ -151,7 +152,7 @@ class Box:
         return cls(np.diag(array) if 1 <= len(array) <= MAX_DIM else array)
 
     @classmethod
-    def from_lengths_angles(cls, lengths: Any, angles: Any) -> Box:
+    def from_lengths_angles(cls, lengths: ArrayLike, angles: ArrayLike) -> Box:
         """Crystallographic cell: the first vector along x, the second in the xy plane.
 
         Parameters
@@ -214,7 +215,7 @@ class Box:
         return self._heights
 
     def wrap(
-        self, points: Any, periodic: Any = None
+        self, points: PointsLike, periodic: PeriodicLike | None = None
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
         """Move points into the box by whole box vectors.
 

@@ -4,16 +4,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Unpack, overload
+from typing import Any, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.lengths import as_cutoffs, as_edges
+from halfshell._convert.types import Number, PointsLike
 from halfshell._functions.counts import count_within
 from halfshell._functions.histogram import as_marks, binned
-from halfshell._objects.kept_cells import Asking, KeptCells
+from halfshell._objects.kept_cells import KeptCells
+
+
+class _CountOptions(TypedDict, total=False):
+    """For overloads: the keywords of `count_pairs`."""
+
+    queries: PointsLike | None
+    inclusive: bool
+    kernel: str | None
+    threads: int | None
+    memory_limit: float | None
 
 
 class CellCounts(KeptCells):
@@ -23,22 +34,21 @@ class CellCounts(KeptCells):
 
     @overload
     def count_pairs(
-        self,
-        cutoff: float | np.floating[Any] | np.integer[Any] | None = None,
-        *,
-        queries: Any = None,
-        **options: Unpack[Asking],
+        self, cutoff: Number | None = None, **options: Unpack[_CountOptions]
     ) -> int: ...
     @overload
     def count_pairs(
-        self,
-        cutoff: Sequence[float] | npt.NDArray[Any],
-        *,
-        queries: Any = None,
-        **options: Unpack[Asking],
+        self, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
     ) -> npt.NDArray[np.int64]: ...
     def count_pairs(
-        self, cutoff: Any = None, *, queries: Any = None, **options: Unpack[Asking]
+        self,
+        cutoff: npt.ArrayLike | None = None,
+        *,
+        queries: PointsLike | None = None,
+        inclusive: bool = True,
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
     ) -> int | npt.NDArray[np.int64]:
         """Count the pairs within one or several cutoffs, as `halfshell.count_pairs` does.
 
@@ -48,8 +58,10 @@ class CellCounts(KeptCells):
             One, or several in ascending order. Default: that of the list.
         queries : array_like of float, shape (q, d), optional
             Count pairs of a query and a point instead.
-        inclusive, kernel, threads, memory_limit
+        inclusive, kernel, memory_limit
             As in `halfshell.count_pairs`.
+        threads : int, optional
+            As in `halfshell.count_pairs`. Default: that of the list.
 
         Returns
         -------
@@ -66,7 +78,8 @@ class CellCounts(KeptCells):
         """
         cutoffs = self._cutoff if cutoff is None else as_cutoffs(cutoff)
         asking = None if queries is None else self._queries(queries)
-        search = self._arguments(cutoffs if isinstance(cutoffs, float) else None, options)
+        reach = cutoffs if isinstance(cutoffs, float) else None
+        search = self._arguments(reach, (inclusive, kernel, threads, memory_limit))
         if not isinstance(cutoffs, float):
             return count_within(cutoffs, self._cells, None, 0, search[4:], asking)
         if asking is None:
@@ -74,7 +87,14 @@ class CellCounts(KeptCells):
         return _core.count_between(*search, asking)
 
     def coordination(
-        self, cutoff: Any = None, *, queries: Any = None, **options: Unpack[Asking]
+        self,
+        cutoff: Number | None = None,
+        *,
+        queries: PointsLike | None = None,
+        inclusive: bool = True,
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
     ) -> npt.NDArray[np.int64]:
         """Count the neighbours of each point, or of each query.
 
@@ -96,13 +116,14 @@ class CellCounts(KeptCells):
         [1, 2, 1]
         """
         asking = None if queries is None else self._queries(queries)
+        options = inclusive, kernel, threads, memory_limit
         return _core.coordination(*self._arguments(cutoff, options), asking)
 
-    def histogram(
+    def pair_histogram(
         self,
         edges: npt.ArrayLike,
         *,
-        queries: Any = None,
+        queries: PointsLike | None = None,
         types: npt.ArrayLike | None = None,
         query_types: npt.ArrayLike | None = None,
         weights: npt.ArrayLike | None = None,
@@ -111,7 +132,7 @@ class CellCounts(KeptCells):
         threads: int | None = None,
         memory_limit: float | None = None,
     ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-        """Sort the pairs into bins by their distance, as `halfshell.pair_histogram` does.
+        """Count the pairs by distance, as `halfshell.pair_histogram` does; always exact.
 
         Parameters
         ----------
@@ -120,22 +141,23 @@ class CellCounts(KeptCells):
             a search of its own.
         queries, types, query_types, weights, query_weights
             As in `halfshell.pair_histogram`.
-        kernel, threads, memory_limit
-            As in `halfshell.pair_histogram`; `threads` None: as many as the list was made with.
+        kernel, memory_limit
+            As in `halfshell.pair_histogram`.
+        threads : int, optional
+            As in `halfshell.pair_histogram`. Default: that of the list.
 
         Returns
         -------
         ndarray of int64, or with weights float64
-            Shape (bins,), or (t, t, bins) with types. Always decided exactly, whatever `precision`
-            the list was made with.
+            Shape (bins,), or (t, t, bins) with types. The `precision` of the list plays no part.
 
         Examples
         --------
         >>> import halfshell as hs
         >>> cells = hs.CellList([[0.0], [1.0], [3.0]], 3.0)
-        >>> cells.histogram([0.0, 1.0, 2.0, 3.0]).tolist()
+        >>> cells.pair_histogram([0.0, 1.0, 2.0, 3.0]).tolist()
         [0, 1, 2]
-        >>> cells.histogram([0.0, 1.5, 3.0], weights=[1.0, -1.0, 0.5]).tolist()
+        >>> cells.pair_histogram([0.0, 1.5, 3.0], weights=[1.0, -1.0, 0.5]).tolist()
         [-1.0, 0.0]
         """
         asking = None if queries is None else self._queries(queries)
@@ -143,7 +165,8 @@ class CellCounts(KeptCells):
         marks = as_marks(
             self._n_points, asking, types, query_types, weights, query_weights
         )
-        own: Asking = {"inclusive": False, "kernel": kernel, "memory_limit": memory_limit}
-        if threads is not None:
-            own["threads"] = threads
-        return binned(self._arguments(None, own), limits, asking, marks)
+        search = self._arguments(None, (False, kernel, threads, memory_limit))
+        return binned(search, limits, asking, marks)
+
+    #: A shorter name for it.
+    histogram = pair_histogram

@@ -14,9 +14,8 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.lengths import as_cutoff, as_positive
-from halfshell._convert.options import Precision
 from halfshell._convert.scene import as_scene
-from halfshell._objects.box import Box
+from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
 from halfshell._objects.cell_counts import CellCounts
 from halfshell._objects.cell_pairs import CellPairs
 from halfshell._objects.cell_rows import CellRows
@@ -118,18 +117,16 @@ class CellList(CellPairs, CellRows, CellCounts):
 
     def __init__(
         self,
-        points: Any,
-        cutoff: Any,
+        points: PointsLike,
+        cutoff: Number,
         *,
-        box: Any = None,
-        periodic: Any = None,
-        cell_size: Any = None,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
+        cell_size: Number | None = None,
         precision: Precision = "exact",
         threads: int | None = None,
         memory_limit: float | None = None,
     ) -> None:
-        if type(box) is Box:
-            box = box.vectors
         array, vectors, bits = as_scene(points, box, periodic)
         self._cutoff = as_cutoff(cutoff)
         self._cells = _core.cells_build(
@@ -186,7 +183,7 @@ class CellList(CellPairs, CellRows, CellCounts):
     def cell_ids(self) -> npt.NDArray[np.int64] | None:
         return cast("npt.NDArray[np.int64] | None", self._layout["cell_ids"])
 
-    def cell_of(self, points: Any) -> npt.NDArray[np.int64]:
+    def cell_of(self, points: PointsLike) -> npt.NDArray[np.int64]:
         """Find the cell that each of some points would be in.
 
         Parameters
@@ -211,7 +208,7 @@ class CellList(CellPairs, CellRows, CellCounts):
         """
         return _core.cells_find(self._cells, self._queries(points, "points"))
 
-    def candidates(self, queries: Any = None) -> Candidates:
+    def candidates(self, queries: PointsLike | None = None) -> Candidates:
         """The raw block of cells around each query, without a distance test.
 
         Parameters
@@ -243,4 +240,5 @@ class CellList(CellPairs, CellRows, CellCounts):
         True
         """
         asking = None if queries is None else self._queries(queries)
-        return Candidates(*_core.cells_candidates(*self._arguments(None, {}), asking))
+        search = self._arguments(None, (True, None, None, None))
+        return Candidates(*_core.cells_candidates(*search, asking))

@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Unpack, cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
-from halfshell._convert.options import Arrays, as_flag, as_index_bytes
-from halfshell._functions.stream import PairBlocks, as_progress, most_pairs
-from halfshell._objects.kept_cells import Asking, KeptCells
+from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.types import Arrays, Number, Out
+from halfshell._functions.stream import PairBlocks, most_pairs
+from halfshell._objects.kept_cells import KeptCells
 
 
 class CellPairs(KeptCells):
@@ -23,13 +24,17 @@ class CellPairs(KeptCells):
 
     def pairs(
         self,
-        cutoff: Any = None,
+        cutoff: Number | None = None,
         *,
         quantities: str = "ij",
+        inclusive: bool = True,
         sort: bool = False,
         index_dtype: npt.DTypeLike = np.int64,
-        out: Any = None,
-        **options: Unpack[Asking],
+        out: Out | None = None,
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
+        progress: Callable[[float], object] | None = None,
     ) -> Arrays:
         """Find every pair of points within a cutoff, as `halfshell.pairs` does.
 
@@ -37,8 +42,10 @@ class CellPairs(KeptCells):
         ----------
         cutoff : float, optional
             Default: that of the list.
-        quantities, sort, index_dtype, out, inclusive, kernel, threads, memory_limit
+        quantities, inclusive, sort, index_dtype, out, kernel, memory_limit, progress
             As in `halfshell.pairs`.
+        threads : int, optional
+            As in `halfshell.pairs`. Default: that of the list.
 
         Returns
         -------
@@ -52,20 +59,24 @@ class CellPairs(KeptCells):
         >>> cells.pairs(1.0, quantities="P").tolist()
         [[0, 1]]
         """
+        options = inclusive, kernel, threads, memory_limit
         return _core.pairs(
-            *self._arguments(cutoff, options), quantities, as_flag(sort, "sort"),
+            *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
             as_index_bytes(index_dtype), out,
         )
 
     def iter_pairs(
         self,
-        cutoff: Any = None,
+        cutoff: Number | None = None,
         *,
-        max_pairs: int = 1 << 20,
         quantities: str = "ij",
+        max_pairs: int = 1 << 20,
+        inclusive: bool = True,
         index_dtype: npt.DTypeLike = np.int64,
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
         progress: Callable[[float], object] | None = None,
-        **options: Unpack[Asking],
     ) -> PairBlocks[Any]:
         """Iterate over the pairs in blocks of bounded size, as `halfshell.iter_pairs` does.
 
@@ -73,8 +84,10 @@ class CellPairs(KeptCells):
         ----------
         cutoff : float, optional
             Default: that of the list.
-        max_pairs, quantities, index_dtype, progress, inclusive, kernel, threads, memory_limit
+        quantities, max_pairs, inclusive, index_dtype, kernel, memory_limit, progress
             As in `halfshell.iter_pairs`.
+        threads : int, optional
+            As in `halfshell.iter_pairs`. Default: that of the list.
 
         Returns
         -------
@@ -90,31 +103,34 @@ class CellPairs(KeptCells):
         2
         """
         most = most_pairs(max_pairs)
-        blocks = _core.iter_pairs(
-            *self._arguments(cutoff, options, as_progress(progress)), quantities,
-            as_index_bytes(index_dtype), most,
+        search = self._arguments(
+            cutoff, (inclusive, kernel, threads, memory_limit), progress
         )
+        blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most)
         return cast("PairBlocks[Any]", blocks)
 
     def for_each_pair(
         self,
         callback: Any,
-        cutoff: Any = None,
+        cutoff: Number | None = None,
         *,
         user_data: Any = None,
+        inclusive: bool = True,
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
         thread_safe: bool = False,
-        **options: Unpack[Asking],
     ) -> int:
         """Call a function for each pair, as `halfshell.for_each_pair` does.
 
         Parameters
         ----------
-        callback, user_data, thread_safe
+        callback, user_data, inclusive, kernel, memory_limit, thread_safe
             As in `halfshell.for_each_pair`.
         cutoff : float, optional
             Default: that of the list.
-        inclusive, kernel, threads, memory_limit
-            As in `halfshell.for_each_pair`.
+        threads : int, optional
+            As in `halfshell.for_each_pair`. Default: that of the list.
 
         Returns
         -------
@@ -131,6 +147,7 @@ class CellPairs(KeptCells):
         2
         """
         target = target_of(callback, user_data)
+        options = inclusive, kernel, threads, memory_limit
         return _core.for_each_pair(
             *self._arguments(cutoff, options), target.function, target.user,
             as_flag(thread_safe, "thread_safe"),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Unpack, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,10 @@ from halfshell import _core
 from halfshell._convert.arrays import PointArray
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_radii
-from halfshell._convert.options import Arrays, as_flag, as_index_bytes
+from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.types import Arrays, Number, PointsLike
 from halfshell._functions.nearest import as_k, as_max_distance, in_rows
-from halfshell._objects.kept_cells import Asking, KeptCells, Running
+from halfshell._objects.kept_cells import KeptCells, Options
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin
 from halfshell._objects.radii import Columns, search_each
@@ -28,25 +29,35 @@ class CellRows(KeptCells):
 
     def neighbors(
         self,
-        cutoff: Any = None,
+        cutoff: Number | None = None,
         *,
+        queries: PointsLike | None = None,
         quantities: str = "j",
+        inclusive: bool = True,
         index_dtype: npt.DTypeLike = np.int64,
-        **options: Unpack[Asking],
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
     ) -> NeighborTable:
-        """All neighbours of each point, as `halfshell.neighbors` finds them.
+        """All neighbours of each point, or of each query, as `halfshell.neighbors` finds them.
 
         Parameters
         ----------
         cutoff : float, optional
             Default: that of the list.
-        quantities, index_dtype, inclusive, kernel, threads, memory_limit
+        queries, quantities, inclusive, index_dtype, kernel, memory_limit
             As in `halfshell.neighbors`.
+        threads : int, optional
+            As in `halfshell.neighbors`. Default: that of the list.
 
         Returns
         -------
         NeighborTable
-            A row for each point, ascending by (j, S).
+            A row for each point or query, ascending by (j, S).
+
+        See Also
+        --------
+        query : a radius for each query.
 
         Examples
         --------
@@ -55,28 +66,35 @@ class CellRows(KeptCells):
         >>> [row.tolist() for row in cells.neighbors()]
         [[1], [0, 2], [1]]
         """
-        return self._rows(None, cutoff, quantities, index_dtype, options)
+        asking = None if queries is None else self._queries(queries)
+        options = inclusive, kernel, threads, memory_limit
+        return self._rows(asking, cutoff, quantities, index_dtype, options)
 
     def query(
         self,
-        queries: Any,
-        radius: Any = None,
+        queries: PointsLike,
+        radius: npt.ArrayLike | None = None,
         *,
         quantities: str = "j",
+        inclusive: bool = True,
         index_dtype: npt.DTypeLike = np.int64,
-        **options: Unpack[Asking],
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
     ) -> NeighborTable:
         """All points within a radius of each query.
 
         Parameters
         ----------
         queries : array_like of float, shape (q, d)
-            Coordinates that ask; they may lie anywhere.
+            Coordinates of queries, in the unit of the points; they may lie anywhere.
         radius : float or array_like of float, shape (q,), optional
             One for all queries, or one for each. Default: the cutoff of the list. Up to that the
             kept cells answer; larger radii cost a search of their own.
-        quantities, index_dtype, inclusive, kernel, threads, memory_limit
+        quantities, inclusive, index_dtype, kernel, memory_limit
             As in `halfshell.neighbors`.
+        threads : int, optional
+            As in `halfshell.neighbors`. Default: that of the list.
 
         Returns
         -------
@@ -94,6 +112,7 @@ class CellRows(KeptCells):
         [[0], [0, 1, 2]]
         """
         asking = self._queries(queries)
+        options = inclusive, kernel, threads, memory_limit
         radii = as_radii(radius, len(asking))
         if radii is None:
             return self._rows(asking, radii, quantities, index_dtype, options)
@@ -101,7 +120,7 @@ class CellRows(KeptCells):
             with of_argument("radius"):
                 return self._rows(asking, radii, quantities, index_dtype, options)
 
-        inclusive = as_flag(options.get("inclusive", True), "inclusive")
+        inclusive = as_flag(inclusive, "inclusive")
         is_exact = self._precision == "exact"
         searches = _Searches(self, index_dtype, options)
         arrays = search_each(searches, asking, radii, quantities, inclusive, is_exact)
@@ -113,28 +132,31 @@ class CellRows(KeptCells):
     def nearest(
         self,
         k: int,
-        queries: Any = None,
         *,
-        max_distance: float = np.inf,
+        queries: PointsLike | None = None,
+        max_distance: Number = np.inf,
         quantities: str = "jd",
         index_dtype: npt.DTypeLike = np.int64,
-        **options: Unpack[Running],
+        kernel: str | None = None,
+        threads: int | None = None,
+        memory_limit: float | None = None,
     ) -> Arrays:
-        """Find the k nearest points of each point or query, as `halfshell.nearest` does.
+        """Find the k nearest points, as `halfshell.nearest` does; always exact.
 
         The first call makes a tree of the points, which is kept; later calls, with any `k` and
-        any queries, spare that. The cutoff and the precision of the list play no part: the order is
-        always exact.
+        any queries, spare that. The cutoff and the precision of the list play no part.
 
         Parameters
         ----------
         k : int
             How many; 1 or more.
         queries : array_like of float, shape (q, d), optional
-            Who asks. Default: each point of the list, which is left out of its own row.
-        max_distance, quantities, index_dtype, kernel, threads, memory_limit
+            Coordinates of queries. Default: the points of the list, each left out of its own row.
+        max_distance, quantities, index_dtype, kernel, memory_limit
             As in `halfshell.nearest`. The tree that is kept does not count for `memory_limit`
             together with the rest, but must fit it by itself.
+        threads : int, optional
+            As in `halfshell.nearest`. Default: that of the list.
 
         Returns
         -------
@@ -148,17 +170,15 @@ class CellRows(KeptCells):
         >>> j, d = cells.nearest(2)
         >>> j.tolist(), d.tolist()
         ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
-        >>> cells.nearest(1, [[7.0]], quantities="jS")
+        >>> cells.nearest(1, queries=[[7.0]], quantities="jS")
         (array([[0]]), array([[[1]]], dtype=int32))
         """
-        if "inclusive" in options:
-            raise TypeError("unexpected keyword argument 'inclusive'")
         asking = None if queries is None else self._queries(queries)
         number = as_k(k)
-        arrays = _core.nearest(
-            *self._arguments(as_max_distance(max_distance), cast(Asking, options)), quantities,
-            as_index_bytes(index_dtype), asking, number,
+        search = self._arguments(
+            as_max_distance(max_distance), (True, kernel, threads, memory_limit)
         )
+        arrays = _core.nearest(*search, quantities, as_index_bytes(index_dtype), asking, number)
         return in_rows(arrays, self._n_points if asking is None else len(asking), number)
 
     def _arrays(
@@ -167,12 +187,11 @@ class CellRows(KeptCells):
         cutoff: Any,
         quantities: str,
         index_dtype: npt.DTypeLike,
-        options: Asking,
+        options: Options,
     ) -> tuple[npt.NDArray[Any], ...]:
         """Offsets of the rows and an array for each quantity."""
         return _core.neighbors(
-            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype),
-            asking,
+            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype), asking
         )
 
     def _rows(
@@ -181,7 +200,7 @@ class CellRows(KeptCells):
         cutoff: Any,
         quantities: str,
         index_dtype: npt.DTypeLike,
-        options: Asking,
+        options: Options,
     ) -> NeighborTable:
         cutoff = None if cutoff is None else as_cutoff(cutoff)
         arrays = self._arrays(asking, cutoff, quantities, index_dtype, options)
@@ -205,18 +224,18 @@ class CellRows(KeptCells):
 class _Searches:
     """The searches that rows with a radius each are made of."""
 
-    def __init__(self, cells: CellRows, index_dtype: npt.DTypeLike, options: Asking) -> None:
+    def __init__(self, cells: CellRows, index_dtype: npt.DTypeLike, options: Options) -> None:
         self._cells = cells
         self._index_dtype = index_dtype
         self._options = options
-        self.limit = options.get("memory_limit")
+        self.limit = options[-1]
 
     def rows(
         self, queries: PointArray, radius: float, quantities: str, room: float | None
     ) -> Columns:
         options = self._options
         if room is not None:
-            options = cast(Asking, {**options, "memory_limit": room})
+            options = *options[:-1], room
         with of_argument("radius"):
             return self._cells._arrays(queries, radius, quantities, self._index_dtype, options)
 

@@ -3,27 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import Any
 
 from halfshell._convert.arrays import PointArray
 from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import Precision, Progress, Search, as_flag
 from halfshell._convert.scene import as_points
+from halfshell._convert.search import as_rest
+from halfshell._convert.types import Precision, Progress, Search
 from halfshell._objects.origin import Origin
 
-
-class Running(TypedDict, total=False):
-    """Keywords of all methods that search."""
-
-    kernel: str | None
-    threads: int | None
-    memory_limit: float | None
-
-
-class Asking(Running, total=False):
-    """Those of methods with a cutoff."""
-
-    inclusive: bool
+# Of methods that search: inclusive, kernel, threads, memory_limit.
+Options = tuple[bool, str | None, int | None, float | None]
 
 
 class KeptCells:
@@ -50,14 +40,11 @@ class KeptCells:
             )
         return array
 
-    def _arguments(
-        self, cutoff: Any, options: Asking, progress: Progress = None
-    ) -> Search:
-        for name in options.keys() - {"inclusive", "kernel", "threads", "memory_limit"}:
-            raise TypeError(f"unexpected keyword argument {name!r}")
+    def _arguments(self, cutoff: Any, options: Options, progress: Progress = None) -> Search:
+        inclusive, kernel, threads, memory_limit = options
         reach = self._cutoff if cutoff is None else as_cutoff(cutoff)
-        inclusive = as_flag(options.get("inclusive", True), "inclusive")
+        threads = self._threads if threads is None else threads
         return (
-            self._cells, reach, None, 0, inclusive, self._precision, options.get("kernel"),
-            options.get("memory_limit"), progress, options.get("threads", self._threads),
-        )
+            self._cells, reach, None, 0,
+            *as_rest(inclusive, self._precision, kernel, memory_limit, progress, threads),
+        )  # fmt: skip

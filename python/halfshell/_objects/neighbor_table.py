@@ -35,16 +35,16 @@ class NeighborTable(TableRows):
     shifts : ndarray of int32, shape (m, d)
         Its shift S; with 'S' in `quantities`.
     quantities : str
-        What the table holds: some of the letters ``j d D S``, in the order asked for.
+        What the table holds: some of the letters ``j d D S``, in the order of `quantities`.
     n_rows, n_points, n_entries : int
-        Points or queries that ask; points that can be found; neighbours in all rows, m.
+        Points or queries with a row; points to find; neighbours in all rows, m.
     shape : tuple of int
         (n_rows, n_points).
 
     Raises
     ------
     AttributeError
-        If a quantity is asked for that the table was made without.
+        If the table was made without that quantity.
 
     See Also
     --------
@@ -160,7 +160,7 @@ class NeighborTable(TableRows):
 
     # ---- other forms -----------------------------------------------------------------------
 
-    def to_pairs(self, quantities: str = "ij", *, half: bool = False) -> Row:
+    def to_pairs(self, *, quantities: str = "ij", half: bool = False) -> Row:
         """The entries as arrays of pairs, as `pairs` and `pairs_between` return them.
 
         Parameters

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The skin of a `VerletList` that nobody chose: measured, changed a few times, then left alone."""
+"""The skin of a `VerletList` with skin="auto": measured, changed a few times, then left alone."""
 
 from __future__ import annotations
 

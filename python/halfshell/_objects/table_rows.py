@@ -101,12 +101,12 @@ class TableRows:
 
     @property
     def n_rows(self) -> int:
-        """Points or queries that ask."""
+        """Points or queries with a row."""
         return len(self._arrays[0]) - 1
 
     @property
     def n_points(self) -> int:
-        """Points that can be found."""
+        """Points to find."""
         return self._n_points
 
     @property

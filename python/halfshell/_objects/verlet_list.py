@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import threading
 from time import perf_counter
-from typing import Any, Literal, NoReturn, overload
+from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +14,22 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_number
-from halfshell._convert.options import Arrays, Letter, as_flag, as_index_bytes
+from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._convert.scene import as_scene
+from halfshell._convert.types import Arrays, BoxLike, Letter, Number, Out, PeriodicLike, PointsLike
 from halfshell._objects.skin import AutoSkin
 
 
+class _PairOptions(TypedDict, total=False):
+    """For overloads: the keywords of `pairs`, without `quantities`."""
+
+    sort: bool
+    index_dtype: npt.DTypeLike
+    out: Out | None
+
+
 class VerletList:
-    """A list of pairs that is kept over many steps, and exact in each.
+    """A list of pairs that is kept over many steps, and always exact.
 
     The list is built with a larger cutoff, `cutoff` + `skin`. As long as no point can have come
     near enough for a pair to be missing from it, a new step costs only a pass over the points and
@@ -39,7 +48,7 @@ class VerletList:
         As in `pairs`; `update` may give others.
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
-    threads, kernel, memory_limit : optional
+    kernel, threads, memory_limit : optional
         As in `pairs`.
 
     Raises
@@ -76,7 +85,7 @@ class VerletList:
     >>> pair_list = hs.VerletList(2.0, skin=0.5, box=[10.0] * 3)
     >>> for step in range(5):
     ...     rebuilt = pair_list.update(points)
-    ...     i, j, d = pair_list.pairs("ijd")
+    ...     i, j, d = pair_list.pairs(quantities="ijd")
     ...     assert len(i) == hs.count_pairs(points, 2.0, box=[10.0] * 3)
     ...     points += rng.uniform(-0.02, 0.02, points.shape)
     >>> pair_list.n_updates, pair_list.n_builds
@@ -85,14 +94,14 @@ class VerletList:
 
     def __init__(
         self,
-        cutoff: float,
-        skin: float | Literal["auto"] = "auto",
+        cutoff: Number,
+        skin: Number | Literal["auto"] = "auto",
         *,
-        box: Any = None,
-        periodic: Any = None,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
         inclusive: bool = True,
-        threads: int | None = None,
         kernel: str | None = None,
+        threads: int | None = None,
         memory_limit: float | None = None,
     ) -> None:
         self._cutoff = _as_length(as_cutoff(cutoff), "cutoff")
@@ -110,7 +119,12 @@ class VerletList:
         self._n_builds = 0
         self._n_updates = 0
 
-    def update(self, points: Any, box: Any = None, periodic: Any = None) -> bool:
+    def update(
+        self,
+        points: PointsLike,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
+    ) -> bool:
         """Take the points of the next step.
 
         Parameters
@@ -139,7 +153,7 @@ class VerletList:
         True
         >>> pair_list.update([[0.0, 0.0], [0.95, 0.0]])
         False
-        >>> pair_list.pairs("d").tolist()
+        >>> pair_list.pairs(quantities="d").tolist()
         [0.95]
         """
         with _Alone(self):
@@ -170,38 +184,21 @@ class VerletList:
 
     @overload
     def pairs(
-        self,
-        quantities: Literal["ij"] = "ij",
-        *,
-        sort: bool = False,
-        index_dtype: npt.DTypeLike = np.int64,
-        out: Any = None,
+        self, *, quantities: Literal["ij"] = "ij", **options: Unpack[_PairOptions]
     ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
     @overload
     def pairs(
-        self,
-        quantities: Letter,
-        *,
-        sort: bool = False,
-        index_dtype: npt.DTypeLike = np.int64,
-        out: Any = None,
+        self, *, quantities: Letter, **options: Unpack[_PairOptions]
     ) -> npt.NDArray[Any]: ...
     @overload
+    def pairs(self, *, quantities: str, **options: Unpack[_PairOptions]) -> Arrays: ...
     def pairs(
         self,
-        quantities: str,
         *,
-        sort: bool = False,
-        index_dtype: npt.DTypeLike = np.int64,
-        out: Any = None,
-    ) -> Arrays: ...
-    def pairs(
-        self,
         quantities: str = "ij",
-        *,
         sort: bool = False,
         index_dtype: npt.DTypeLike = np.int64,
-        out: Any = None,
+        out: Out | None = None,
     ) -> Arrays:
         """The pairs of the last step: what `halfshell.pairs` finds for its points.
 
@@ -232,7 +229,7 @@ class VerletList:
         >>> pair_list = hs.VerletList(1.5, box=[4.0, 4.0])
         >>> pair_list.update([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])
         True
-        >>> i, j, S = pair_list.pairs("ijS", sort=True)
+        >>> i, j, S = pair_list.pairs(quantities="ijS", sort=True)
         >>> i.tolist(), j.tolist(), S.tolist()
         ([0, 0], [1, 2], [[0, 0], [-1, 0]])
         """

@@ -75,7 +75,7 @@ class Verlet:
     def pairs(self, points: Floats) -> Answer:
         """Update, and return the pairs within the cutoff."""
         self._list.update(points)
-        i, j, d, D, S = self._list.pairs("ijdDS")
+        i, j, d, D, S = self._list.pairs(quantities="ijdDS")
         return Answer(i, j, S, d, D, inclusive=self._inclusive)
 
 

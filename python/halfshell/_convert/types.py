@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Types of arguments and results, for signatures and type checkers; nothing here is called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, Protocol, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+Precision = Literal["exact", "double", "single"]
+
+# What functions return that take `quantities`, and one of its letters.
+Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+Letter = Literal["i", "j", "d", "D", "S", "P"]
+
+Progress = Callable[[float], object] | None
+
+# What the core takes from `inclusive` to `threads`.
+Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
+
+# The first arguments of all its searches: points, cutoff, box and periodic before these, or cells
+# in place of points and box.
+Search = tuple[
+    Any, float, npt.NDArray[np.float64] | None, int,
+    bool, Precision, str | None, float | None, Progress, int | None,
+]  # fmt: skip
+
+
+class _HandsOver(Protocol):
+    """An array of another library, such as a tensor on the CPU."""
+
+    @property
+    def __dlpack__(self) -> Callable[..., Any]: ...
+
+
+class _BringsBox(Protocol):
+    """An object like ``ase.Atoms``."""
+
+    @property
+    def positions(self) -> Any: ...
+    @property
+    def cell(self) -> Any: ...
+    @property
+    def pbc(self) -> Any: ...
+
+
+class _HasVectors(Protocol):
+    """An object like `Box`."""
+
+    @property
+    def vectors(self) -> Any: ...
+
+
+Number = float | np.floating[Any] | np.integer[Any]
+ArrayLike = npt.ArrayLike | _HandsOver
+PointsLike = ArrayLike | _BringsBox
+BoxLike = ArrayLike | _HasVectors
+PeriodicLike = ArrayLike
+Out = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
+
+
+class SearchOptions(TypedDict, total=False):
+    """For overloads: the keywords that all searches share."""
+
+    box: BoxLike | None
+    periodic: PeriodicLike | None
+    inclusive: bool
+    precision: Precision
+    kernel: str | None
+    threads: int | None
+    memory_limit: float | None
+
+
+class ArrayOptions(SearchOptions, total=False):
+    """The same, and those of functions that return arrays of pairs, without `quantities`."""
+
+    index_dtype: npt.DTypeLike
+    out: Out | None

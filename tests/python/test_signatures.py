@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Public signatures: every keyword is spelled out, and alike in functions and methods."""
+
+import inspect
+import re
+
+import pytest
+
+import halfshell as hs
+from halfshell import scenes, selftest, structures
+
+CLASSES = [value for name in hs.__all__ if inspect.isclass(value := getattr(hs, name))]
+FUNCTIONS = {
+    name: value for name in hs.__all__ if inspect.isfunction(value := getattr(hs, name))
+}
+OF_MODULES = {
+    f"{module.__name__}.{name}": value
+    for module in (scenes, selftest, structures)
+    for name in module.__all__
+    if inspect.isfunction(value := getattr(module, name))
+}
+METHODS = {
+    f"{owner.__name__}.{name}": value
+    for owner in (*CLASSES, selftest.Case)
+    for name, value in inspect.getmembers(owner, callable)
+    if (name[0] != "_" or name == "__init__") and inspect.getmodule(value) is not None
+    if inspect.getmodule(value).__name__.startswith("halfshell")
+}
+CALLABLES = FUNCTIONS | OF_MODULES | METHODS
+
+#: The order of keywords, wherever two of them meet.
+ORDER = """
+    user_data queries max_distance types query_types weights query_weights box periodic quantities
+    max_pairs inclusive full sort index_dtype out cell_size precision kernel threads memory_limit
+    progress batch measure thread_safe
+""".split()
+
+#: Any is the type of what is passed on or told by its behaviour.
+UNTYPED = {"callback", "user_data", "fill", "dtype"}
+
+
+def parameters(function):
+    return inspect.signature(function).parameters
+
+
+def keywords(function):
+    return [
+        name for name, one in parameters(function).items() if one.kind is one.KEYWORD_ONLY
+    ]
+
+
+def test_what_is_public_was_found():
+    assert len(FUNCTIONS) > 15
+    assert {"CellList.pairs", "CellList.query", "VerletList.update", "NeighborTable.sort",
+            "Box.wrap", "VerletList.__init__", "Case.find"} <= set(METHODS)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_every_keyword_is_spelled_out(name):
+    kinds = {one.kind for one in parameters(CALLABLES[name]).values()}
+    assert inspect.Parameter.VAR_KEYWORD not in kinds
+    assert inspect.Parameter.VAR_POSITIONAL not in kinds or name == "Box.orthorhombic"
+
+
+@pytest.mark.parametrize("name", FUNCTIONS | METHODS)
+def test_keywords_come_in_one_order(name):
+    known = [keyword for keyword in keywords(CALLABLES[name]) if keyword in ORDER]
+    assert known == sorted(known, key=ORDER.index)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in METHODS if name.split(".")[1] in FUNCTIONS and "Verdict" not in name]
+)
+def test_methods_have_the_keywords_of_the_functions(name):
+    method, function = METHODS[name], FUNCTIONS[name.split(".")[1]]
+    common = set(keywords(method)) & set(keywords(function))
+    assert common
+    for keyword in common:
+        ours, theirs = parameters(method)[keyword], parameters(function)[keyword]
+        assert (ours.default, ours.annotation) == (theirs.default, theirs.annotation), keyword
+    known = parameters(function)
+    assert all(keyword in known for keyword in keywords(method))
+    if name.startswith("CellList."):  # the rest belongs to the list
+        of_the_list = {"box", "periodic", "precision", "batch"}
+        assert set(keywords(function)) - set(keywords(method)) <= of_the_list
+
+
+@pytest.mark.parametrize("name", FUNCTIONS | METHODS)
+def test_quantities_and_queries_are_keywords(name):
+    for one in ("quantities", "queries"):
+        if one in parameters(CALLABLES[name]) and (one, name) not in {
+            ("queries", "pairs_between"), ("queries", "CellList.query"),
+            ("queries", "CellList.candidates"), ("quantities", "NeighborTable.__init__"),
+            ("quantities", "Case.find"),
+        }:  # fmt: skip
+            assert one in keywords(CALLABLES[name])
+
+
+@pytest.mark.parametrize("name", FUNCTIONS | METHODS)
+def test_public_arguments_have_types(name):
+    for one in parameters(CALLABLES[name]).values():
+        if one.name not in UNTYPED | {"self"}:
+            assert one.annotation is not one.empty, one
+            assert not re.search(r"^Any\b", str(one.annotation)), one
+
+
+def test_functions_without_precision_say_that_they_are_exact():
+    named = {**FUNCTIONS, "VerletList": hs.VerletList}
+    named |= {name: METHODS[name] for name in ("CellList.nearest", "CellList.pair_histogram")}
+    searches = [
+        name for name, value in named.items()
+        if {"points", "cutoff"} & set(parameters(value)) or name.startswith("CellList.")
+    ]  # fmt: skip
+    assert {"nearest", "pair_histogram", "rdf", "verify", "VerletList"} <= set(searches)
+    for name in searches:
+        if "precision" not in parameters(named[name]):
+            assert "always exact" in inspect.getdoc(named[name]).split("\n\n")[0], name
+
+
+def test_histogram_of_a_cell_list_has_a_short_name_too():
+    assert hs.CellList.histogram is hs.CellList.pair_histogram
