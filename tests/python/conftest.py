@@ -2,13 +2,12 @@
 """Shared fixtures: every kernel of this CPU, a hypothesis profile that never wavers, and whose
 warnings are errors."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import settings
 
 import halfshell as hs
+from checkout import BENCHMARKS, TESTS
 
 settings.register_profile(
     "halfshell", derandomize=True, deadline=None, database=None, max_examples=100
@@ -22,8 +21,7 @@ def pytest_configure(config):
     All other warnings are errors, as pyproject.toml says: those of our code and of its calls (they
     count as the caller's), of floating-point arithmetic inside NumPy, and of pytest.
     """
-    checkout = Path(__file__).resolve().parents[2]
-    files = [path for name in ("tests", "benchmarks") for path in (checkout / name).rglob("*.py")]
+    files = [path for folder in (TESTS, BENCHMARKS) for path in folder.rglob("*.py")]
     ours = "|".join(sorted({"halfshell", "__main__", *(path.stem for path in files)}))
     for line in (
         rf"default:::(?!({ours})(\.|$))",
