@@ -56,7 +56,7 @@ every_kind_of_box_in_every_dimension(void)
     static random_scene s;
     int                 compared = 0;
     int64_t             pairs = 0;
-    for (int trial = 0; trial < 1440; trial++) {
+    for (int trial = 0; trial < TRIALS(1440); trial++) {
         const int kind = trial % SCENE_KINDS, ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
         const int n = random_below(&random, ndim <= 3 ? 30 : ndim <= 5 ? 10 : 6);
         make_scene(&random, kind, ndim, n, 4.0, 0, &s);
@@ -64,8 +64,8 @@ every_kind_of_box_in_every_dimension(void)
         compared += found >= 0;
         pairs += found > 0 ? found : 0;
     }
-    CHECK(compared > 1000);
-    CHECK(pairs > 20000);
+    CHECK(compared > TRIALS(1000));
+    CHECK(pairs > TRIALS(20000));
 }
 
 static void
@@ -94,7 +94,7 @@ clusters_far_from_the_origin(void)
     harness_random      random = {60221};
     static random_scene s;
     int64_t             pairs = 0;
-    for (int trial = 0; trial < 120; trial++) {
+    for (int trial = 0; trial < TRIALS(120); trial++) {
         const int ndim = 1 + trial % 4;
         make_scene(&random, trial % 2 ? SCENE_OPEN : SCENE_MIXED, ndim, 120, 4.0, 0, &s);
         for (int e = 0; e < 120 * ndim; e++)
@@ -105,7 +105,7 @@ clusters_far_from_the_origin(void)
         const int64_t found = compare_scene(&s.scene, 200000.0, 11);
         pairs += found > 0 ? found : 0;
     }
-    CHECK(pairs > 20000);
+    CHECK(pairs > TRIALS(20000));
 }
 
 static void

@@ -73,7 +73,7 @@ static void
 large_results_are_left_and_taken_up(void)
 {
     static const int64_t sizes[] = {1 << 16, 100003, 300000, 4000000};
-    const int            n = IS_SLOW ? 2500 : 5000;
+    const int            n = IS_SLOW ? 1500 : 3000;
     double              *x = random_points(n, 2, 1.0);
     for (int c = 0; c < 3; c++) {
         const brute_scene scene = {.ndim = 2, .n = n, .x = x, .inclusive = true,
