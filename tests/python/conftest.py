@@ -2,6 +2,8 @@
 """Shared fixtures: every kernel of this CPU, a hypothesis profile that never wavers, and whose
 warnings are errors."""
 
+import gc
+
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -31,7 +33,14 @@ def pytest_configure(config):
         config.addinivalue_line("filterwarnings", line)
 
 
-@pytest.fixture(params=hs.kernels(), scope="session")
+def pytest_collection_finish(session):
+    """Thousands of tests are many objects, which no later collection of garbage need look at."""
+    gc.collect()
+    gc.freeze()
+
+
+# For modules: tests of a wider scope would be sorted by kernel, and oracles asked again.
+@pytest.fixture(params=hs.kernels(), scope="module")
 def kernel(request):
     """The name of one kernel; a test that takes it runs once per kernel."""
     return request.param

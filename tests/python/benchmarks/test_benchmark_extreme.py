@@ -14,7 +14,7 @@ import halfshell as hs
 from benchmark_modules import bench, only_in_a_checkout  # noqa: F401
 from halfshell import scenes
 
-pytestmark = only_in_a_checkout
+pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from benchmark_modules import (  # noqa: F401
     write_results,
 )
 
-pytestmark = only_in_a_checkout
+pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
 
 def rows_of(bench: SimpleNamespace, ours: float, peer: float, **other: Any) -> list[Any]:

@@ -14,7 +14,7 @@ import pytest
 
 from benchmark_modules import bench, only_in_a_checkout  # noqa: F401
 
-pytestmark = only_in_a_checkout
+pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
 
 def heights(rows: Any) -> Any:

@@ -18,7 +18,7 @@ import pytest
 
 from benchmark_modules import bench, measurement, only_in_a_checkout  # noqa: F401
 
-pytestmark = only_in_a_checkout
+pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
 
 def test_keys_do_not_depend_on_the_form_of_a_list(bench: SimpleNamespace) -> None:

@@ -19,7 +19,7 @@ DOCS = (ROOT / "docs/c-interface.md").read_text()
 EXAMPLES = ROOT / "examples" / "c"
 SANITIZE = "-std=c11 -O0 -g -fsanitize=address,undefined -fno-sanitize-recover=all"
 
-pytestmark = needs_c
+pytestmark = [pytest.mark.slow, needs_c]
 
 
 def run(program, *arguments):

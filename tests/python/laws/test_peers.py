@@ -17,6 +17,8 @@ import halfshell as hs
 from halfshell._check.reference import exact_square
 from oracles import BOX_KINDS, as_set, lattice, random_box, random_scene, rotation
 
+pytestmark = pytest.mark.slow
+
 
 def half(i, j, S):
     """The half list of a full list (i, j, S)."""

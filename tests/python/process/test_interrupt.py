@@ -5,6 +5,8 @@ import pytest
 
 from subprocesses import RESIDENT, run
 
+pytestmark = pytest.mark.slow
+
 SEARCHES = {
     "pairs": "hs.pairs(points, 0.16, memory_limit=1e13)",
     "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS', memory_limit=1e13)",

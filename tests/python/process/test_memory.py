@@ -8,6 +8,8 @@ import pytest
 
 from subprocesses import RESIDENT, run
 
+pytestmark = pytest.mark.slow
+
 CALLS = {
     "pairs": 'hs.pairs(points, 0.3, box=box, quantities="ijdDSP")',
     "sorted pairs": 'hs.pairs(points, 0.3, box=box, quantities="PS", sort=True)',

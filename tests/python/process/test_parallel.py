@@ -22,7 +22,7 @@ SCENES = {
     "open": (CLOUD, 2.0, None),
     "periodic": (CLOUD, 2.0, np.array([20.0, 20.0, 20.0])),
     "triclinic": (CLOUD * 3.0, 2.0, TRICLINIC),
-    "images": (CLOUD[:300], 15.0, np.array([8.0, 9.0, 10.0])),
+    "images": (CLOUD[:150], 12.0, np.array([8.0, 9.0, 10.0])),
     "clusters": (CLUSTERS, 0.3, None),
     "plane": (CLOUD[:, :2], 0.8, np.array([20.0, 20.0])),
     "one spot": (np.zeros((700, 3)), 1.0, None),

@@ -13,6 +13,8 @@ import halfshell as hs
 from checkout import CSRC, ROOT
 from halfshell import _include
 
+pytestmark = pytest.mark.slow
+
 HEADERS = ["halfshell.h", "halfshell_capi.h"]
 
 

@@ -10,6 +10,8 @@ import pytest
 
 import halfshell as hs
 
+pytestmark = pytest.mark.slow
+
 GOOD = """
 from typing import Any, assert_type
 

@@ -18,6 +18,8 @@ from halfshell._report.page.rows import STATUSES, ReportRow, read_csv, write_csv
 from halfshell._report.truth.pairs import true_pairs
 from oracles import remembered
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def rows():

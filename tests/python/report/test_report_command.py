@@ -15,6 +15,8 @@ from halfshell._report.measure.peers import PeerProcess
 from halfshell._report.page.rows import read_csv
 from report_helpers import fake, parse, row
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def command(capsys, tmp_path, monkeypatch):

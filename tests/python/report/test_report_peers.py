@@ -11,6 +11,8 @@ from halfshell._peers import LIBRARIES, Library, Question, wrapped
 from halfshell._report.measure.peers import PeerProcess
 from report_helpers import fake, question
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_library_answers_from_its_own_process():
     command = fake("print('noise'); return lambda: (np.array([0]), np.array([1]))")

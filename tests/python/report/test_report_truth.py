@@ -17,6 +17,8 @@ from halfshell._report.truth.lattice import short_basis
 from halfshell._report.truth.pairs import exact_vectors, true_pairs
 from oracles import BOX_KINDS, lattice, random_scene, rotation
 
+pytestmark = pytest.mark.slow
+
 
 def assert_true(points, cutoff, box=None, periodic=None):
     """Both rules give what rational arithmetic over all points gives; returns the truth."""
