@@ -81,22 +81,22 @@ def test_turns_are_all_taken_and_results_held(bench: SimpleNamespace) -> None:
         return np.zeros(1000)
 
     turns = {
-        "a": bench.measure.Turn(lambda: call("a"), calls=2, repeats=5),
-        "b": bench.measure.Turn(lambda: call("b"), calls=1, repeats=3),
+        "a": bench.turns.Turn(lambda: call("a"), calls=2, repeats=5),
+        "b": bench.turns.Turn(lambda: call("b"), calls=1, repeats=3),
     }
-    held = bench.measure.take_turns(turns, keep=True)
+    held = bench.turns.take_turns(turns, keep=True)
     assert (made.count("a"), made.count("b")) == (10, 3)
     assert [len(held[name].seconds) for name in "ab"] == [5, 3]
     assert all(timing.all_held and timing.minimum > 0.0 for timing in held.values())
-    some = bench.measure.take_turns(turns, keep=True, budget=90_000, yields=("a",))
+    some = bench.turns.take_turns(turns, keep=True, budget=90_000, yields=("a",))
     assert (some["a"].all_held, some["b"].all_held) == (True, False)
-    dropped = bench.measure.take_turns(turns, keep=False)
+    dropped = bench.turns.take_turns(turns, keep=False)
     assert dropped["a"].median >= dropped["a"].minimum
 
 
 def test_short_calls_are_repeated_and_long_ones_are_not(bench: SimpleNamespace) -> None:
-    assert bench.measure.plan_turn(lambda: None, 7, 60.0).calls > 10
-    slow = bench.measure.plan_turn(lambda: bench.measure.time.sleep(0.02), 7, 0.1)
+    assert bench.turns.plan_turn(lambda: None, 7, 60.0).calls > 10
+    slow = bench.turns.plan_turn(lambda: bench.turns.time.sleep(0.02), 7, 0.1)
     assert slow.calls == 1
     assert 1 <= slow.repeats < 7
 
@@ -219,7 +219,7 @@ def test_result_files_of_other_columns_are_left_alone(
 def test_a_scene_is_measured_with_its_limits_and_single_calls(
     bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench.measure, "touch_memory", lambda n_bytes: None)
+    monkeypatch.setattr(bench.turns, "touch_memory", lambda n_bytes: None)
     scene = replace(
         bench.scenes.load("single-30"),
         limits=(
@@ -247,19 +247,19 @@ def test_a_scene_is_measured_with_its_limits_and_single_calls(
 
 def test_single_calls_give_median_and_percentile(bench: SimpleNamespace) -> None:
     made: list[int] = []
-    single = bench.measure.single_calls({"a": lambda: made.append(1), "b": list}, samples=50)
+    single = bench.turns.single_calls({"a": lambda: made.append(1), "b": list}, samples=50)
     assert len(made) == 50
     assert all(high >= middle > 0.0 for middle, high in single.values())
-    bench.measure.single_calls({"a": lambda: made.append(1)}, samples=50, patience=0.0)
+    bench.turns.single_calls({"a": lambda: made.append(1)}, samples=50, patience=0.0)
     assert len(made) == 51
 
 
 def test_memory_of_dropped_results_is_not_used_again(bench: SimpleNamespace) -> None:
     called: list[bool] = []
-    turns = {"a": bench.measure.Turn(lambda: np.zeros(1000), repeats=5)}
-    bench.measure.take_turns(turns, True, 20_000, dropped=lambda: called.append(True))
+    turns = {"a": bench.turns.Turn(lambda: np.zeros(1000), repeats=5)}
+    bench.turns.take_turns(turns, True, 20_000, dropped=lambda: called.append(True))
     assert len(called) == 3
-    bench.measure.take_turns(turns, True, 1 << 20, dropped=lambda: called.append(True))
+    bench.turns.take_turns(turns, True, 1 << 20, dropped=lambda: called.append(True))
     assert len(called) == 3
 
 
@@ -373,7 +373,7 @@ def test_nearest_points_are_compared_by_their_distances(bench: SimpleNamespace) 
 def test_nearest_points_are_measured_like_pairs(
     bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench.measure, "touch_memory", lambda n_bytes: None)
+    monkeypatch.setattr(bench.turns, "touch_memory", lambda n_bytes: None)
     whole = bench.scenes.load("nearest-1e5-periodic")
     scene = replace(whole, points=whole.points[:500], n_pairs=6000)
     patience = bench.runner.Patience(repeats=2, seconds=0.05, quick=True)

@@ -14,26 +14,35 @@ import pytest
 
 from checkout import BENCHMARKS
 
-MODULES = (
-    "scenes", "agreement", "contestant", "peers", "histogram_peers", "nearest_peers", "full_peers",
-    "measure", "machine", "report",
-    "results", "runner", "run", "stages", "footprint", "check_scenes", "extreme", "compare",
-    "plot", "marks", "fill_docs", "fill_errors", "reproduce",
+PACKAGES = {
+    "libraries": (
+        "agreement", "contestant", "full_peers", "histogram_peers", "nearest_peers", "peers",
+    ),
+    "measure": ("machine", "runner", "turns"),
+    "pages": ("marks", "report", "results"),
+}  # fmt: skip
+COMMANDS = (
+    "check_scenes", "compare", "extreme", "fill_docs", "fill_errors", "footprint", "plot",
+    "reproduce", "run", "stages",
 )  # fmt: skip
+MODULES = {name: name for name in ("scenes", *COMMANDS)}
+MODULES |= {name: f"{folder}.{name}" for folder, names in PACKAGES.items() for name in names}
 
 only_in_a_checkout = pytest.mark.skipif(not BENCHMARKS.exists(), reason="only in a checkout")
 
 
 @pytest.fixture(scope="module")
 def bench() -> Iterator[SimpleNamespace]:
-    """The modules of benchmarks/, which is a folder of scripts and no package."""
+    """The modules of benchmarks/, commands and packages beside them, by their last names."""
     sys.path.insert(0, str(BENCHMARKS))
     try:
-        yield SimpleNamespace(**{name: importlib.import_module(name) for name in MODULES})
+        yield SimpleNamespace(
+            **{name: importlib.import_module(module) for name, module in MODULES.items()}
+        )
     finally:
         sys.path.remove(str(BENCHMARKS))
         for name in list(sys.modules):
-            if name.partition(".")[0] in MODULES:
+            if name.partition(".")[0] in MODULES.keys() | PACKAGES.keys():
                 del sys.modules[name]
 
 

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from machine import available_bytes, touch_memory
+from measure.machine import available_bytes, touch_memory
 
 __all__ = ["Timing", "Turn", "bytes_held", "plan_turn", "single_calls", "take_turns"]
 

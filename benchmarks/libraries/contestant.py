@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from agreement import Keys, half_keys
 from halfshell._peers import Call, Library
+from libraries.agreement import Keys, half_keys
 from scenes import Scene
 
 __all__ = ["Call", "Contestant", "Halfshell", "Looped", "pin_threads"]

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from contestant import Call, Contestant, Halfshell
 from halfshell._peers.adapters import columns
-from peers import CKDTree, Freud, PyKDTree
+from libraries.contestant import Call, Contestant, Halfshell
+from libraries.peers import CKDTree, Freud, PyKDTree
 from scenes import Scene
 
 __all__ = ["PEERS", "OwnNearest"]

@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
-import histogram_peers
-import nearest_peers
-from contestant import Call, Contestant, Halfshell
 from halfshell._peers import in_space
 from halfshell._peers.adapters import columns
-from peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin
+from libraries import histogram_peers, nearest_peers
+from libraries.contestant import Call, Contestant, Halfshell
+from libraries.peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin
 from scenes import Scene
 
 __all__ = ["for_scene", "ours_for"]

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from contestant import Call, Contestant, Halfshell
 from halfshell._peers.adapters import columns
 from halfshell._peers.library import Floats
-from peers import CKDTree, Corrfunc, Freud
+from libraries.contestant import Call, Contestant, Halfshell
+from libraries.peers import CKDTree, Corrfunc, Freud
 from scenes import Scene
 
 __all__ = ["PEERS", "OwnHistogram"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from report import OURS, Measurement
+from pages.report import OURS, Measurement
 
 __all__ = ["Row", "is_ours", "is_reference", "read_csv"]
 

@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
-from agreement import Verdict, compare, compare_counts, compare_nearest
-from contestant import Call, Contestant, Halfshell
-from full_peers import for_scene, ours_for
-from measure import Turn, plan_turn, single_calls, take_turns
-from report import OURS, Measurement
+from libraries.agreement import Verdict, compare, compare_counts, compare_nearest
+from libraries.contestant import Call, Contestant, Halfshell
+from libraries.full_peers import for_scene, ours_for
+from measure.turns import Turn, plan_turn, single_calls, take_turns
+from pages.report import OURS, Measurement
 from scenes import Scene, load
 
 __all__ = ["Patience", "measure_scene"]

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from contestant import Call, Contestant
 from halfshell._peers import adapters
+from libraries.contestant import Call, Contestant
 from scenes import Scene
 
 __all__ = ["PEERS"]
@@ -104,13 +104,13 @@ class Corrfunc(Contestant):
 
 
 class PyKDTree(Contestant):
-    """pykdtree: the nearest points alone (nearest_peers.py)."""
+    """pykdtree: the nearest points alone (`nearest_peers`)."""
 
     name = distribution = module = "pykdtree"
     counts_alone = True
 
     def refuses(self, scene: Scene) -> str | None:
-        """Refuse all that nearest_peers.py does not ask for."""
+        """Refuse all that `nearest_peers` does not ask for."""
         return "no pairs"
 
     def prepare(self, scene: Scene) -> Call:
