@@ -74,7 +74,7 @@ points_far_outside_the_box(void)
     harness_random      random = {31337};
     static random_scene s;
     int64_t             pairs = 0;
-    for (int trial = 0; trial < 300; trial++) {
+    for (int trial = 0; trial < TRIALS(300); trial++) {
         const double spread = trial % 3 == 0 ? 40.0 : trial % 3 == 1 ? 1e5 : 1e8;
         make_scene(&random, trial % SCENE_KINDS, 1 + trial / SCENE_KINDS % 3, 8, spread, 0, &s);
         if (spread > 1e7) { /* keep S within int32 in sheared boxes, too */
@@ -84,7 +84,7 @@ points_far_outside_the_box(void)
         const int64_t found = compare_scene(&s.scene, 20000.0, 1);
         pairs += found > 0 ? found : 0;
     }
-    CHECK(pairs > 1000);
+    CHECK(pairs > TRIALS(1000));
 }
 
 /* Coordinates that float32 cannot tell apart, and a cutoff that some of their distances are at. */
@@ -115,13 +115,13 @@ every_scale_has_the_same_answer(void)
     harness_random      random = {4242};
     static random_scene s;
     int                 compared = 0;
-    for (int trial = 0; trial < 600; trial++) {
+    for (int trial = 0; trial < TRIALS(600); trial++) {
         const int exponent = exponents[trial / 2 % 10];
         make_scene(&random, random_below(&random, SCENE_KINDS), 1 + trial % 4, 7, 4.0, exponent,
                    &s);
         compared += compare_scene(&s.scene, 4000.0, 1) >= 0;
     }
-    CHECK(compared > 400);
+    CHECK(compared > TRIALS(400));
 }
 
 /* One scene holds numbers of very different size: the cutoff, the points or the box. */
@@ -131,7 +131,7 @@ scenes_of_several_scales(void)
     harness_random      random = {909};
     static random_scene s;
     int                 compared = 0;
-    for (int trial = 0; trial < 600; trial++) {
+    for (int trial = 0; trial < TRIALS(600); trial++) {
         make_scene(&random, random_below(&random, SCENE_KINDS), 1 + trial % 3, 7, 4.0, 0, &s);
         const int exponent = random_below(&random, 2000) - 1000;
         if (trial % 3 == 0) {
@@ -150,7 +150,7 @@ scenes_of_several_scales(void)
         }
         compared += compare_scene(&s.scene, 4000.0, 1) >= 0;
     }
-    CHECK(compared > 400);
+    CHECK(compared > TRIALS(400));
 }
 
 /* A distant coordinate leaves no exponents for the square of a tiny cutoff; images still count. */
