@@ -48,7 +48,7 @@ blocks_are_the_pairs_in_their_order(void)
     static const int64_t sizes[] = {1, 2, 7, 101, 1 << 20, INT64_MAX};
     harness_random       random = {20261122};
     static random_scene  s;
-    for (int trial = 0; trial < 360; trial++) {
+    for (int trial = 0; trial < TRIALS(360); trial++) {
         const int ndim = 1 + trial / SCENE_KINDS % 5;
         const int n = random_below(&random, ndim <= 3 ? 50 : 10);
         make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, trial % 13 ? 0 : 200, &s);
