@@ -226,6 +226,7 @@ def test_python_must_be_included_before(tmp_path):
         compile("-fsyntax-only", f"-I{CSRC}", source, compiler=C_COMPILER)
 
 
+@pytest.mark.slow
 @needs_c
 def test_the_cython_example_builds_and_agrees(tmp_path, rng):
     if importlib.util.find_spec("Cython") is None:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from halfshell import cli
 from halfshell._cli import numpy_files
 
+pytestmark = pytest.mark.slow
 POINTS = np.arange(30.0).reshape(10, 3) % 7.0
 
 

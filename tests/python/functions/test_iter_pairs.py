@@ -264,6 +264,7 @@ def test_refusals_of_pairs_point_here(rng):
         hs.pairs(rng.random((4000, 2)), 2.0, memory_limit=20e6)
 
 
+@pytest.mark.slow
 def test_abandoning_it_leaves_nothing_behind():
     grown = run(
         RESIDENT
@@ -311,6 +312,7 @@ print(json.dumps(min(rounds(20), rounds(20)) - before))
     assert grown < 4_000_000
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_result():
     peak, n = run(
         RESIDENT

@@ -16,6 +16,7 @@ def test_thousands_of_points_in_every_kind_of_box(kind, rng, kernel):
         check_large(points, cutoff, box, flags, kernel=kernel)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_a_hundred_thousand_points(dtype, rng):
     points, cutoff, box, _ = random_scene(rng, 100_000, 3, "triclinic", neighbours=10)

@@ -47,6 +47,7 @@ print(json.dumps(sorted(set(sys.modules) - before)))
     assert not {"argparse", "ctypes", "dataclasses", "inspect", "re"} & set(loaded)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(hs.__all__)))
 def test_every_name_is_there_when_it_is_first_used(name):
     script = """

@@ -150,6 +150,7 @@ def test_the_key_is_whole_for_any_methods(n):
         assert figure.bbox.width == pytest.approx(7.6 * figure.dpi)
 
 
+@pytest.mark.slow
 def test_no_figure_of_the_committed_report_is_cut():
     with (ROOT / "docs" / "report" / "report.csv").open(newline="", encoding="utf-8") as stream:
         rows = read_csv(stream)[1]
