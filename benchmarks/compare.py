@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from report import Table, duration, render
-from results import Row, is_ours, is_reference, read_csv
+from pages.report import Table, duration, render
+from pages.results import Row, is_ours, is_reference, read_csv
 
 __all__ = ["Change", "changes", "main", "table_of_changes"]
 

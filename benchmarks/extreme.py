@@ -26,8 +26,8 @@ import numpy as np
 
 import halfshell as hs
 from halfshell import scenes as extreme
-from machine import facts, pin_to_cores, usable_cores
-from measure import Timing, Turn, plan_turn, take_turns
+from measure.machine import facts, pin_to_cores, usable_cores
+from measure.turns import Timing, Turn, plan_turn, take_turns
 from scenes.make import uniform
 
 __all__ = ["COLUMNS", "main", "measure", "twin"]

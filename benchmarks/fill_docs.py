@@ -14,15 +14,14 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from marks import EMPTY, Lines, fill, table
-from report import OURS, duration, limit_rows, ratio_rows
-from results import Row, is_ours, read_csv
+from pages.marks import EMPTY, Lines, fill, table
+from pages.report import OURS, duration, limit_rows, ratio_rows
+from pages.results import Row, is_ours, read_csv
 from scenes import GROUPS, SCENES, Limit, load
 
 __all__ = ["EMPTY", "SECTIONS", "fill", "main"]
 
 _PAGE = Path(__file__).resolve().parents[1] / "docs" / "performance.md"
-
 
 
 def _limits(rows: Sequence[Row], kinds: Sequence[str]) -> list[tuple[Limit, str, float]]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from halfshell._report.page.rows import ReportRow, read_csv
 from halfshell._report.page.table import SUMMARY, method_label, summary_cells
 from halfshell._report.page.words import duration, findings, methods_of, number, ratios
-from marks import Lines, fill, table
+from pages.marks import Lines, fill, table
 
 __all__ = ["SECTIONS", "fill_page", "main"]
 

@@ -21,8 +21,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from machine import available_bytes, facts
-from report import duration, render
+from measure.machine import available_bytes, facts
+from pages.report import duration, render
 from scenes import SCENES, Scene, load
 
 __all__ = ["COLUMNS", "allowance", "main", "parse_case"]
@@ -46,8 +46,8 @@ _MEMORY = """
 import json, sys
 from dataclasses import replace
 sys.path.insert(0, {here!r})
-from contestant import Halfshell
-from measure import bytes_held
+from libraries.contestant import Halfshell
+from measure.turns import bytes_held
 from scenes import load
 
 def kilobytes(key):

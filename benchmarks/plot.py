@@ -18,8 +18,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from report import OURS
-from results import Row, is_ours, is_reference, read_csv
+from pages.report import OURS
+from pages.results import Row, is_ours, is_reference, read_csv
 
 __all__ = ["main", "series"]
 

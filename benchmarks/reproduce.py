@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-import machine
+from measure import machine
 from scenes import GROUPS
 
 __all__ = ["commands", "main", "result_stem"]

@@ -18,12 +18,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import machine
-import report
-from contestant import Halfshell, pin_threads
-from peers import PEERS
-from report import Measurement
-from runner import Patience, measure_scene
+from libraries.contestant import Halfshell, pin_threads
+from libraries.peers import PEERS
+from measure import machine
+from measure.runner import Patience, measure_scene
+from pages import report
+from pages.report import Measurement
 from scenes import GROUPS, QUICK, SCENES, TITLES, Limit, load
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from report import render
+from pages.report import render
 from scenes import SCENES, Scene, load
 
 __all__ = ["COLUMNS", "main", "shares"]

@@ -92,7 +92,8 @@ class PythonTests(Judge):
         """That the package is found, and passes what comes first."""
         tree = self.free.get()
         self.link_in(tree, self.objects)
-        failed = self.first_failure(tree, [TESTS / f"test_{name}.py" for name in FIRST])
+        first = [path for name in FIRST for path in TESTS.rglob(f"test_{name}.py")]
+        failed = self.first_failure(tree, first)
         self.free.put(tree)
         if failed:
             sys.exit(f"the tests fail as they are: {failed}")
@@ -103,7 +104,7 @@ class PythonTests(Judge):
         themes = [*THEMES.get(stem, "").split(), stem.removeprefix("py_"), *FIRST]
         files = [
             path
-            for path in sorted(TESTS.glob("test_*.py"))
+            for path in sorted(TESTS.rglob("test_*.py"))
             if not any(word in path.stem for word in LEFT_OUT)
         ]
 

@@ -2,13 +2,14 @@
 """Shared fixtures: every kernel of this CPU, a hypothesis profile that never wavers, and whose
 warnings are errors."""
 
-from pathlib import Path
+import gc
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
 import halfshell as hs
+from checkout import BENCHMARKS, TESTS
 
 settings.register_profile(
     "halfshell", derandomize=True, deadline=None, database=None, max_examples=100
@@ -22,8 +23,7 @@ def pytest_configure(config):
     All other warnings are errors, as pyproject.toml says: those of our code and of its calls (they
     count as the caller's), of floating-point arithmetic inside NumPy, and of pytest.
     """
-    checkout = Path(__file__).resolve().parents[2]
-    files = [path for name in ("tests", "benchmarks") for path in (checkout / name).rglob("*.py")]
+    files = [path for folder in (TESTS, BENCHMARKS) for path in folder.rglob("*.py")]
     ours = "|".join(sorted({"halfshell", "__main__", *(path.stem for path in files)}))
     for line in (
         rf"default:::(?!({ours})(\.|$))",
@@ -33,7 +33,14 @@ def pytest_configure(config):
         config.addinivalue_line("filterwarnings", line)
 
 
-@pytest.fixture(params=hs.kernels(), scope="session")
+def pytest_collection_finish(session):
+    """Thousands of tests are many objects, which no later collection of garbage need look at."""
+    gc.collect()
+    gc.freeze()
+
+
+# For modules: tests of a wider scope would be sorted by kernel, and oracles asked again.
+@pytest.fixture(params=hs.kernels(), scope="module")
 def kernel(request):
     """The name of one kernel; a test that takes it runs once per kernel."""
     return request.param

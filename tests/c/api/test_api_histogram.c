@@ -231,7 +231,7 @@ histograms_are_those_of_the_brute_force(void)
     const int           n_names = hs_kernel_names(names, 16);
     static const int    exponents[] = {0, 0, 0, -400, 400, -1000, 60};
     int64_t             found = 0;
-    for (int trial_number = 0; trial_number < 900; trial_number++) {
+    for (int trial_number = 0; trial_number < TRIALS(900); trial_number++) {
         const int ndim = 1 + trial_number / SCENE_KINDS % 5;
         const int n = random_below(&random, ndim <= 3 ? 30 : 8);
         kernel_to_check = names[random_below(&random, n_names)];
@@ -244,7 +244,7 @@ histograms_are_those_of_the_brute_force(void)
         found += compare(&t, 1 + trial_number % 2);
     }
     kernel_to_check = NULL;
-    CHECK(found > 20000);
+    CHECK(found > TRIALS(20000));
 }
 
 /* A group of points so far apart that the squares of what lies between them leave float32. */

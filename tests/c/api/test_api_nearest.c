@@ -121,7 +121,7 @@ rows_are_the_neighbours_in_order(void)
     const char         *names[16];
     const int           n_names = hs_kernel_names(names, 16);
     int64_t             found = 0;
-    for (int trial = 0; trial < 700; trial++) {
+    for (int trial = 0; trial < TRIALS(700); trial++) {
         const int ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
         const int n = random_below(&random, ndim <= 3 ? 50 : ndim <= 5 ? 10 : 5);
         kernel_to_check = names[random_below(&random, n_names)];
@@ -132,7 +132,7 @@ rows_are_the_neighbours_in_order(void)
                               1 + random_below(&random, 40), 1 + trial % 2);
     }
     kernel_to_check = NULL;
-    CHECK(found > 30000);
+    CHECK(found > TRIALS(30000));
 }
 
 static void

@@ -57,7 +57,7 @@ every_kind_of_box_in_every_dimension(void)
     static random_scene s;
     int                 compared = 0;
     int64_t             pairs = 0;
-    for (int trial = 0; trial < 1440; trial++) {
+    for (int trial = 0; trial < TRIALS(1440); trial++) {
         const int kind = trial % SCENE_KINDS, ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
         const int n = random_below(&random, ndim <= 3 ? 30 : ndim <= 5 ? 10 : 6);
         make_scene(&random, kind, ndim, n, 4.0, 0, &s);
@@ -65,8 +65,8 @@ every_kind_of_box_in_every_dimension(void)
         compared += found >= 0;
         pairs += found > 0 ? found : 0;
     }
-    CHECK(compared > 1000);
-    CHECK(pairs > 20000);
+    CHECK(compared > TRIALS(1000));
+    CHECK(pairs > TRIALS(20000));
 }
 
 static void
@@ -75,7 +75,7 @@ points_far_outside_the_box(void)
     harness_random      random = {31337};
     static random_scene s;
     int64_t             pairs = 0;
-    for (int trial = 0; trial < 300; trial++) {
+    for (int trial = 0; trial < TRIALS(300); trial++) {
         const double spread = trial % 3 == 0 ? 40.0 : trial % 3 == 1 ? 1e5 : 1e8;
         make_scene(&random, trial % SCENE_KINDS, 1 + trial / SCENE_KINDS % 3, 8, spread, 0, &s);
         if (spread > 1e7) { /* keep S within int32 in sheared boxes, too */
@@ -85,7 +85,7 @@ points_far_outside_the_box(void)
         const int64_t found = compare_scene(&s.scene, 20000.0, 1);
         pairs += found > 0 ? found : 0;
     }
-    CHECK(pairs > 1000);
+    CHECK(pairs > TRIALS(1000));
 }
 
 /* Coordinates that float32 cannot tell apart, and a cutoff that some of their distances are at. */
@@ -95,7 +95,7 @@ clusters_far_from_the_origin(void)
     harness_random      random = {60221};
     static random_scene s;
     int64_t             pairs = 0;
-    for (int trial = 0; trial < 120; trial++) {
+    for (int trial = 0; trial < TRIALS(120); trial++) {
         const int ndim = 1 + trial % 4;
         make_scene(&random, trial % 2 ? SCENE_OPEN : SCENE_MIXED, ndim, 120, 4.0, 0, &s);
         for (int e = 0; e < 120 * ndim; e++)
@@ -106,7 +106,7 @@ clusters_far_from_the_origin(void)
         const int64_t found = compare_scene(&s.scene, 200000.0, 11);
         pairs += found > 0 ? found : 0;
     }
-    CHECK(pairs > 20000);
+    CHECK(pairs > TRIALS(20000));
 }
 
 static void
@@ -116,13 +116,13 @@ every_scale_has_the_same_answer(void)
     harness_random      random = {4242};
     static random_scene s;
     int                 compared = 0;
-    for (int trial = 0; trial < 600; trial++) {
+    for (int trial = 0; trial < TRIALS(600); trial++) {
         const int exponent = exponents[trial / 2 % 10];
         make_scene(&random, random_below(&random, SCENE_KINDS), 1 + trial % 4, 7, 4.0, exponent,
                    &s);
         compared += compare_scene(&s.scene, 4000.0, 1) >= 0;
     }
-    CHECK(compared > 400);
+    CHECK(compared > TRIALS(400));
 }
 
 /* One scene holds numbers of very different size: the cutoff, the points or the box. */
@@ -132,7 +132,7 @@ scenes_of_several_scales(void)
     harness_random      random = {909};
     static random_scene s;
     int                 compared = 0;
-    for (int trial = 0; trial < 600; trial++) {
+    for (int trial = 0; trial < TRIALS(600); trial++) {
         make_scene(&random, random_below(&random, SCENE_KINDS), 1 + trial % 3, 7, 4.0, 0, &s);
         const int exponent = random_below(&random, 2000) - 1000;
         if (trial % 3 == 0) {
@@ -151,7 +151,7 @@ scenes_of_several_scales(void)
         }
         compared += compare_scene(&s.scene, 4000.0, 1) >= 0;
     }
-    CHECK(compared > 400);
+    CHECK(compared > TRIALS(400));
 }
 
 /* A distant coordinate leaves no exponents for the square of a tiny cutoff; images still count. */

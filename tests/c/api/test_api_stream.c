@@ -49,7 +49,7 @@ blocks_are_the_pairs_in_their_order(void)
     static const int64_t sizes[] = {1, 2, 7, 101, 1 << 20, INT64_MAX};
     harness_random       random = {20261122};
     static random_scene  s;
-    for (int trial = 0; trial < 360; trial++) {
+    for (int trial = 0; trial < TRIALS(360); trial++) {
         const int ndim = 1 + trial / SCENE_KINDS % 5;
         const int n = random_below(&random, ndim <= 3 ? 50 : 10);
         make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, trial % 13 ? 0 : 200, &s);
@@ -74,7 +74,7 @@ static void
 large_results_are_left_and_taken_up(void)
 {
     static const int64_t sizes[] = {1 << 16, 100003, 300000, 4000000};
-    const int            n = IS_SLOW ? 2500 : 5000;
+    const int            n = IS_SLOW ? 1500 : 3000;
     double              *x = random_points(n, 2, 1.0);
     for (int c = 0; c < 3; c++) {
         const brute_scene scene = {.ndim = 2, .n = n, .x = x, .inclusive = true,

@@ -104,7 +104,7 @@ static void
 the_same_as_single_calls(void)
 {
     static batch made;
-    for (uint64_t seed = 1; seed <= 20; seed++) {
+    for (uint64_t seed = 1; seed <= TRIALS(20); seed++) {
         make_batch(seed, &made);
         for (int kind = 0; kind < 8; kind++) {
             hs_options options = hs_options_default();

@@ -46,7 +46,7 @@ small_fractions_are_exact(void)
     const char    *names[16];
     const int      n_names = hs_kernel_names(names, 16);
     int64_t        wrong = 0;
-    for (int trial = 0; trial < 120; trial++) {
+    for (int trial = 0; trial < TRIALS(120); trial++) {
         const int   ndim = 1 + trial % 3;
         hs_box      box = {.ndim = ndim};
         brute_scene scene = {.ndim = ndim, .n = N, .x = x, .cutoff = cutoffs[trial / 3 % 5]};

@@ -44,7 +44,7 @@ any_size_of_cells_gives_the_same_pairs(void)
 {
     harness_random random = {90210};
     int64_t        n_pairs = 0;
-    for (int trial = 0; trial < 300; trial++) {
+    for (int trial = 0; trial < TRIALS(300); trial++) {
         const int d = 1 + trial % HS_MAX_DIM;
         make_scene(&random, trial % SCENE_KINDS, d, random_below(&random, d > 3 ? 12 : 150), 4.0,
                    trial % 5 == 4 ? 900 : 0, &shared);
@@ -53,7 +53,7 @@ any_size_of_cells_gives_the_same_pairs(void)
         const double sizes[] = {c, 0.3 * c, 0.01 * c, 1e-300, c * (1.0 + 1e-13), 2.0 * c, 0x1p1000};
         CHECK(sizes_agree(&shared.scene, sizes, 7, &n_pairs));
     }
-    CHECK(n_pairs > 50000);
+    CHECK(n_pairs > TRIALS(50000));
 }
 
 /* In many dimensions small cells have more neighbours than are worth a list: they become larger. */
@@ -118,7 +118,7 @@ faces_at_multiples_of_the_cutoff_lose_no_pair(void)
 {
     harness_random random = {1234};
     int64_t        n_pairs = 0;
-    for (int trial = 0; trial < 400; trial++) {
+    for (int trial = 0; trial < TRIALS(400); trial++) {
         const int d = 1 + trial % 3, kind = trial % 2 ? SCENE_OPEN : SCENE_ALIGNED;
         make_scene(&random, kind, d, 300, 4.0, 0, &shared);
         const double length = random_below(&random, 2) ? 1.0 : 0.5 + random_unit(&random);
@@ -142,7 +142,7 @@ faces_at_multiples_of_the_cutoff_lose_no_pair(void)
         const double sizes[] = {shared.scene.cutoff, 0.7 * shared.scene.cutoff};
         CHECK(sizes_agree(&shared.scene, sizes, 2, &n_pairs));
     }
-    CHECK(n_pairs > 100000);
+    CHECK(n_pairs > TRIALS(100000));
 }
 
 /* -n: so many threads, where there are points enough for them. */

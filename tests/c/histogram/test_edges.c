@@ -111,7 +111,7 @@ slots_are_those_of_the_bands(void)
     static const int counts[] = {1, 2, 7, 64, 500, 3000};
     harness_random   random = {8128};
     int              n_sure = 0;
-    for (int trial = 0; trial < 240; trial++) {
+    for (int trial = 0; trial < TRIALS(240); trial++) {
         const int n = counts[trial % 6], kind = trial / 6 % 5;
         double    edge = kind == 1 ? 0.0 : 0.1;
         for (int k = 0; k < n; k++) {
@@ -129,7 +129,7 @@ slots_are_those_of_the_bands(void)
         const hs_edges edges = edges_of(n, trial % 2 || at[n - 1] == 0.0);
         n_sure += check_edges(&random, &edges, kind == 3 ? 1.0 : 4.0 * at[n - 1] + 1.0);
     }
-    CHECK(n_sure > 5000);
+    CHECK(n_sure > TRIALS(5000));
 }
 
 /* An edge that no distance is below, alone. */

@@ -127,7 +127,7 @@ differences_are_kept_or_beyond_the_cutoff(void)
     harness_random random = {3141};
     column_case    test;
     int            scaled = 0, shorter = 0;
-    for (int trial = 0; trial < 3000; trial++) {
+    for (int trial = 0; trial < TRIALS(3000); trial++) {
         if (!condense_random(&random, &test) || test.periodic)
             continue;
         bool right = true;
@@ -139,8 +139,8 @@ differences_are_kept_or_beyond_the_cutoff(void)
         scaled += test.condensed.is_scaled;
         shorter += test.after[0] != test.given[0] && !test.condensed.is_scaled;
     }
-    CHECK(scaled > 400);
-    CHECK(shorter > 100);
+    CHECK(scaled > TRIALS(400));
+    CHECK(shorter > TRIALS(100));
 }
 
 static void
@@ -149,7 +149,7 @@ images_are_kept_or_beyond_the_cutoff(void)
     harness_random random = {5926};
     column_case    test;
     int            short_boxes = 0, ties = 0;
-    for (int trial = 0; trial < 3000; trial++) {
+    for (int trial = 0; trial < TRIALS(1500); trial++) {
         if (!condense_random(&random, &test) || !test.periodic)
             continue;
         bool right = true;
@@ -174,8 +174,8 @@ images_are_kept_or_beyond_the_cutoff(void)
         CHECK(right);
         short_boxes += test.length_after != test.length && ties > 0;
     }
-    CHECK(ties > 100);
-    CHECK(short_boxes > 100);
+    CHECK(ties > TRIALS(100));
+    CHECK(short_boxes > TRIALS(100));
 }
 
 /* An outlier is all that moves in a scene that is dense but for it. */

@@ -30,7 +30,7 @@ every_layout_is_the_same_points(void)
     static unsigned char buffer[N * HS_MAX_DIM * 11];
     static random_scene  shared;
     harness_random       random = {91};
-    for (int trial = 0; trial < 160; trial++) {
+    for (int trial = 0; trial < TRIALS(160); trial++) {
         const int d = 1 + trial % HS_MAX_DIM;
         make_scene(&random, trial % SCENE_KINDS, d, d > 4 ? 12 : N, 4.0, 0, &shared);
         for (int e = 0; e < N * d; e++) {

@@ -14,17 +14,21 @@
 #include <string.h>
 #include <time.h>
 
-/* Under the thread sanitizer or in an emulator, which make programs some thirty times slower. */
-#if defined(__SANITIZE_THREAD__) || defined(HS_EMULATED)
+/* Under a sanitizer or in an emulator, which make programs four to thirty times slower. */
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__) || defined(HS_EMULATED)
 #define IS_SLOW 1
 #elif defined(__has_feature)
-#if __has_feature(thread_sanitizer)
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer) || \
+    __has_feature(memory_sanitizer)
 #define IS_SLOW 1
 #endif
 #endif
 #ifndef IS_SLOW
 #define IS_SLOW 0
 #endif
+
+/* So many random trials, or results that they must have; a tenth of them where that is slow. */
+#define TRIALS(n) (IS_SLOW ? ((n) + 9) / 10 : (n))
 
 extern int         harness_failures; /* failed checks so far */
 extern int         harness_tests;    /* tests run so far */

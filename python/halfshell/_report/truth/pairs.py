@@ -5,7 +5,7 @@ Nothing here calls the compiled core of this package. SciPy's k-d tree proposes 
 the cutoff and a margin (`replicas` says what it is made of and why it suffices); those nearer to
 the cutoff than the margin are decided by Python integers, on the numbers as given. The cost is
 that of the tree plus some microseconds for each pair in the band, so that a perfect crystal with
-a million ties is a matter of seconds. `tests/python/test_report_truth.py` holds this against
+a million ties is a matter of seconds. `tests/python/report/test_report_truth.py` holds this against
 full rational brute force (`halfshell._check.reference`).
 """
 

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every measured library is to the runner, and our own search as one of them.
+
+How a library is called is said in `halfshell._peers`; here is what the runner needs besides:
+keys to compare answers by, counts, batches, and how far rounding may lead it astray.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Mapping
+from functools import cache, partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from halfshell._peers import Call, Library
+from libraries.agreement import Keys, half_keys
+from scenes import Scene
+
+__all__ = ["Call", "Contestant", "Halfshell", "Looped", "pin_threads"]
+
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "RAYON_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "TBB_NUM_THREADS",
+)
+
+
+def pin_threads() -> None:
+    """Hold every library to one thread. To be called before any of them is imported."""
+    for name in _THREAD_VARIABLES:
+        os.environ[name] = "1"
+
+
+class Contestant(Library):
+    """What the runner needs to know about a library."""
+
+    most_pairs: ClassVar[float] = np.inf  # half pairs that it can list in reasonable time
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Say why this library cannot do `scene`, or return None."""
+        reason = super().refuses(scene)
+        if reason is None and scene.task == "pairs" and (scene.n_pairs or 0) > self.most_pairs:
+            return "too many pairs for its speed"
+        return reason
+
+    def keys(self, scene: Scene, result: Any) -> Keys:
+        """Turn a result into keys that can be compared."""
+        shift = self.shifts(result) if scene.has_images else None
+        return half_keys(scene, *self.indices(result), shift, self.full)
+
+    def count(self, scene: Scene, result: Any) -> int:
+        """Return the number of pairs of a result, each counted once."""
+        if isinstance(result, (int, np.integer)):
+            return int(result)
+        return len(self.indices(result)[0]) // (2 if self.full else 1)
+
+    def nearest(self, scene: Scene, result: Any) -> tuple[Any, Any]:
+        """Return distances and numbers of the nearest, shape (n, k), where it finds these."""
+        raise ValueError(f"{self.name} finds no nearest points")
+
+    def for_batch(self) -> Contestant:
+        """Return the contestant for scenes of many systems. Default: a loop over them."""
+        return Looped(self)
+
+    def band(self, scene: Scene) -> float:
+        """Return how far off the cutoff its rounding may misplace a pair, as a fraction."""
+        if scene.n == 0 or scene.cutoff == 0.0:
+            return 0.0
+        extent = float(np.abs(scene.points).max()) + scene.cutoff
+        return 8.0 * 2.0**-self.float_bits * extent / scene.cutoff + self.tolerance
+
+
+class Looped(Contestant):
+    """A library that knows no batches: one call for each system, one after the other."""
+
+    def __init__(self, one: Contestant) -> None:
+        self.one = one
+        self.name = one.name  # type: ignore[misc]
+        self.inclusive = one.inclusive  # type: ignore[misc]
+
+    def version(self) -> str | None:
+        """Return the version of the library."""
+        return self.one.version()
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Say why the library cannot do one of the systems, or return None."""
+        if scene.has_images and not self.one.images:
+            return "several images of one pair"
+        return self.one.refuses(scene.systems()[0])
+
+    def prepare(self, scene: Scene) -> Call:
+        """Convert the input of each system beforehand."""
+        calls = [self.one.prepare(system) for system in scene.systems()]
+        return lambda: [call() for call in calls]
+
+    def keys(self, scene: Scene, result: Any) -> Keys:
+        """Number the points of all systems through, and join the lists."""
+        sizes = [system.n for system in scene.systems()]
+        starts = np.cumsum([0, *sizes[:-1]])
+        parts = [self.one.indices(part) for part in result]
+        i = np.concatenate([start + part[0] for start, part in zip(starts, parts)])
+        j = np.concatenate([start + part[1] for start, part in zip(starts, parts)])
+        shift = None
+        if scene.has_images:
+            shift = np.concatenate([self.one.shifts(part) for part in result])
+        return half_keys(scene, i, j, shift, self.one.full)
+
+    def count(self, scene: Scene, result: Any) -> int:
+        """Return the number of pairs in all systems."""
+        return sum(self.one.count(scene, part) for part in result)
+
+    def band(self, scene: Scene) -> float:
+        """Return what rounding may misplace, by the extent of all systems."""
+        return self.one.band(scene)
+
+
+@cache
+def _accepts(function: str, keyword: str, value: Any) -> bool:
+    """Whether the installed halfshell knows a keyword, found out by using it."""
+    hs = importlib.import_module("halfshell")
+    value = np.zeros(1, dtype=np.int64) if keyword == "batch" else value
+    try:
+        getattr(hs, function)(np.zeros((1, 3)), 1.0, **{keyword: value})
+    except TypeError:
+        return False
+    return True
+
+
+class Halfshell(Contestant):
+    """Our own search; `options` are passed on to the call."""
+
+    name = "halfshell"
+    distribution = module = "halfshell"
+    inclusive = True
+    quantities = "ijdDSP"
+    dims = tuple(range(1, 9))
+
+    def __init__(self, options: Mapping[str, Any] | None = None) -> None:
+        self.options = dict(options or {})
+
+    def for_batch(self) -> Contestant:
+        """Return itself: a batch is one call."""
+        return self
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Refuse what the installed version does not have yet."""
+        function = "count_pairs" if scene.task == "count" else "pairs"
+        threads = self.options.get("threads", scene.threads)
+        if threads != 1 and not _accepts(function, "threads", threads):
+            return "no threads in this version"
+        if scene.batch is not None and not _accepts(function, "batch", None):
+            return "no batches in this version"
+        return None
+
+    def prepare(self, scene: Scene) -> Call:
+        """Return our call with the keywords of the scene."""
+        hs = importlib.import_module("halfshell")
+        function = "count_pairs" if scene.task == "count" else "pairs"
+        options: dict[str, Any] = {}
+        if _accepts(function, "threads", scene.threads):
+            options["threads"] = scene.threads
+        if scene.box is not None:
+            options.update(box=scene.box, periodic=scene.periodic)
+        if scene.batch is not None:
+            options["batch"] = scene.batch
+        if scene.task == "pairs":
+            options.update(quantities=scene.quantities, index_dtype=np.dtype(scene.index_dtype))
+        options.update(self.options)
+        return partial(getattr(hs, function), scene.points, scene.cutoff, **options)

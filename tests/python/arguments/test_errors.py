@@ -1,0 +1,567 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every bad input: the right exception, a message that names the argument, and no waiting."""
+
+import datetime
+import decimal
+import fractions
+import re
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from refused_calls import INF, NAN, assert_refused, with_value
+
+POINTS = np.arange(12.0).reshape(4, 3) / 8
+CUBE = np.eye(3) * 2
+
+WRONG_KIND_OF_POINTS = {
+    "string": "points",
+    "strings": [["a", "b", "c"]],
+    "bytes": b"123456789",
+    "string array": np.array([["1", "2", "3"]]),
+    "complex": np.zeros((4, 3), complex),
+    "complex list": [[1j, 0, 0]],
+    "None": None,
+    "list of None": [[None, 0.0, 0.0]],
+    "Fractions": [[fractions.Fraction(1, 3), 0, 0]],
+    "Decimals": [[decimal.Decimal("0.1"), 0, 0]],
+    "datetimes": np.zeros((4, 3), "datetime64[s]"),
+    "time spans": np.zeros((4, 3), "timedelta64[s]"),
+    "date objects": [[datetime.date(2020, 1, 1)] * 3],
+    "structured": np.zeros(4, [("x", float), ("y", float), ("z", float)]),
+    "void": np.zeros((4, 3), "V8"),
+    "dict": {"x": [1.0]},
+    "set": {1.0, 2.0},
+    "generator": ((x, x) for x in (1.0, 2.0)),
+    "function": len,
+}
+
+
+@pytest.mark.parametrize("points", WRONG_KIND_OF_POINTS.values(), ids=WRONG_KIND_OF_POINTS)
+def test_points_of_a_wrong_kind(points):
+    assert_refused(lambda: hs.pairs(points, 1.0), TypeError, "points")
+    assert_refused(lambda: hs.count_pairs(points, 1.0), TypeError, "points")
+
+
+def test_long_double_is_refused_because_it_would_be_rounded():
+    if np.dtype(np.longdouble).itemsize == 8:
+        return  # a plain double here
+    for points in (POINTS.astype(np.longdouble), [[np.longdouble(1) / 3] * 3]):
+        assert_refused(lambda points=points: hs.pairs(points, 1.0), TypeError, "points")
+    assert_refused(lambda: hs.pairs(POINTS, np.longdouble(1)), TypeError, "cutoff")
+    box = CUBE.astype(np.longdouble)
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), TypeError, "box")
+
+
+@pytest.mark.parametrize(
+    "points, fragment",
+    [
+        (1.0, r"\(\)"),
+        ([1.0, 2.0, 3.0], r"\(3,\)"),
+        (np.zeros((2, 3, 4)), r"\(2, 3, 4\)"),
+        (np.zeros((4, 0)), r"\(4, 0\)"),
+        (np.zeros((4, 9)), r"\(4, 9\)"),
+        (np.zeros((0, 0)), r"\(0, 0\)"),
+    ],
+)
+def test_points_of_a_wrong_shape(points, fragment):
+    assert_refused(lambda: hs.pairs(points, 1.0), ValueError, "points", fragment)
+
+
+def test_ragged_points():
+    assert_refused(lambda: hs.pairs([[0.0, 0.0], [1.0]], 1.0), (ValueError, TypeError), "points")
+
+
+@pytest.mark.parametrize("value, word", [(NAN, "nan"), (INF, "inf"), (-INF, "-inf")])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32, np.float16, ">f8"])
+def test_coordinates_that_are_not_finite(value, word, dtype):
+    for row, column in ((0, 0), (3, 1), (4, 2)):
+        points = with_value(row, column, value, dtype=dtype)
+        for box in (None, CUBE):
+            assert_refused(
+                lambda points=points, box=box: hs.pairs(points, 1.0, box=box),
+                ValueError,
+                "points",
+                word,
+                rf"row {row}|\[{row}, {column}\]",
+                rf"column {column}|\[{row}, {column}\]",
+            )
+
+
+def test_a_nan_among_many_points_is_found():
+    for row in (0, 77_777, 99_999):
+        points = with_value(row, 1, NAN, shape=(100_000, 3))
+        points[:, 0] = np.arange(100_000)
+        assert_refused(lambda points=points: hs.pairs(points, 1e-3), ValueError, str(row), "nan")
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64])
+def test_integers_that_float64_cannot_hold(dtype):
+    for value in (2**53 + 1, 2**62 + 1, 2**63 - 1):
+        points = with_value(2, 1, value, dtype=dtype)
+        assert_refused(
+            lambda points=points: hs.pairs(points, 1.0), ValueError, "points", str(value)
+        )
+    assert_refused(lambda: hs.pairs(POINTS, 2**53 + 1), ValueError, "cutoff")
+    box = np.diag([5, 5, 2**53 + 1])
+    assert_refused(lambda: hs.pairs(POINTS, 1, box=box), ValueError, "box")
+
+
+def test_numbers_too_large_for_float64():
+    assert_refused(lambda: hs.pairs(POINTS, 10**400), OverflowError, "cutoff")
+    for points in ([[10**400, 0, 0]], [[-(10**400), 0.5, 0]]):
+        assert_refused(lambda points=points: hs.pairs(points, 1.0), OverflowError, "points")
+
+
+def test_masked_elements():
+    points = np.ma.array(POINTS, mask=POINTS == POINTS[2, 1])
+    assert_refused(lambda: hs.pairs(points, 1.0), ValueError, "points", "mask")
+    box = np.ma.array(CUBE, mask=CUBE > 0)
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", "mask")
+
+
+def test_two_billion_points():
+    points = np.broadcast_to(np.float64(0.0), (2**31, 1))  # takes no memory
+    assert_refused(
+        lambda: hs.pairs(points, 1.0), OverflowError, "points", "2147483648|2\\^31|2\\*\\*31"
+    )
+    points = np.broadcast_to(np.float32(0.0), (2**40, 3))
+    assert_refused(lambda: hs.count_pairs(points, 1.0), OverflowError, "points")
+
+
+@pytest.mark.parametrize(
+    "cutoff, exception, fragment",
+    [
+        (NAN, ValueError, "nan"),
+        (INF, ValueError, "inf"),
+        (-INF, ValueError, "-inf"),
+        (-1.0, ValueError, "-1"),
+        (-5e-324, ValueError, "-5e-324|negative"),
+        (-1, ValueError, "-1"),
+        (np.float32(NAN), ValueError, "nan"),
+        ("1", TypeError, "str"),
+        (b"1", TypeError, "bytes"),
+        (None, TypeError, "None"),
+        (1j, TypeError, "complex"),
+        (np.complex128(1), TypeError, "complex"),
+        (fractions.Fraction(1, 3), TypeError, "Fraction"),
+        (decimal.Decimal("0.1"), TypeError, "Decimal"),
+        (np.datetime64("2020-01-01"), TypeError, "datetime"),
+        ({"H": 1.0}, TypeError, "dict"),
+        ([[1.0, 2.0]], (TypeError, ValueError), ""),
+    ],
+)
+def test_bad_cutoffs(cutoff, exception, fragment):
+    for box in (None, CUBE):
+        for call in (hs.pairs, hs.count_pairs):
+            assert_refused(
+                lambda call=call, box=box: call(POINTS, cutoff, box=box),
+                exception,
+                "cutoff",
+                fragment,
+            )
+
+
+def test_a_list_of_cutoffs_is_for_counting_only():
+    assert_refused(lambda: hs.pairs(POINTS, [1.0, 2.0]), (TypeError, ValueError), "cutoff")
+    for cutoffs in ([2.0, 1.0], [0.5, 1.0, 0.75]):
+        assert_refused(
+            lambda cutoffs=cutoffs: hs.count_pairs(POINTS, cutoffs),
+            ValueError,
+            "cutoff",
+            "ascending",
+        )
+    for cutoffs in ([-1.0, 2.0], [1.0, NAN], [1.0, INF]):
+        assert_refused(
+            lambda cutoffs=cutoffs: hs.count_pairs(POINTS, cutoffs), ValueError, "cutoff"
+        )
+    assert_refused(lambda: hs.count_pairs(POINTS, ["1", "2"]), TypeError, "cutoff")
+
+
+@pytest.mark.parametrize(
+    "box", [[1.0, 2.0], [1.0] * 4, np.ones((2, 3)), np.ones((3, 2)), np.ones((1, 3, 3)), []]
+)
+def test_boxes_of_a_wrong_shape(box):
+    shape = re.escape(str(np.shape(box)))
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", shape)
+
+
+@pytest.mark.parametrize(
+    "box",
+    ["cubic", True, np.False_, 1j, [["a"] * 3] * 3, np.eye(3) * 1j, [[None] * 3] * 3,
+     np.zeros((3, 3), "M8[s]")],
+)
+def test_boxes_of_a_wrong_kind(box):
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), TypeError, "box")
+
+
+@pytest.mark.parametrize("value, word", [(NAN, "nan"), (INF, "inf"), (-INF, "-inf")])
+def test_box_entries_that_are_not_finite(value, word):
+    box = CUBE.copy()
+    box[2, 1] = value
+    row_and_column = r"row 2.*column 1|\[2, 1\]"
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", word, row_and_column)
+    lengths = [1.0, value, 1.0]
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=lengths), ValueError, "box", word)
+    for periodic in (False, [True, False, True]):  # also where the axis does not repeat
+        given = {"box": lengths, "periodic": periodic}
+        assert_refused(lambda given=given: hs.pairs(POINTS, 1.0, **given), ValueError, "box", word)
+
+
+DEPENDENT = {
+    "zero box": np.zeros((3, 3)),
+    "zero length": [1.0, 0.0, 1.0],
+    "zero row": [[1, 0, 0], [0, 0, 0], [0, 0, 1]],
+    "equal rows": [[0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [0, 0, 1]],
+    "a double": [[0.1, 0.2, 0.3], [1, 0, 0], [0.2, 0.4, 0.6]],
+    "a sum": [[0.375, 0.75, 0.125], [0.25, 1.5, 3.5], [0.625, 2.25, 3.625]],
+    "flat": [[1, 2, 0], [3, 4, 0], [5, 7, 0]],
+    "tiny": [[1e-300, 2e-300, 0], [2e-300, 4e-300, 0], [0, 0, 1]],
+    "huge": [[1e300, 2e300, 0], [2e300, 4e300, 0], [0, 0, 1]],
+    "subnormal": [[5e-324, 0, 0], [1e-323, 0, 0], [0, 0, 1]],
+}
+
+
+@pytest.mark.parametrize("box", DEPENDENT.values(), ids=DEPENDENT)
+def test_dependent_box_vectors(box):
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, box=box), ValueError, "box", "dependent|zero|0")
+
+
+def test_dependence_is_decided_exactly(rng):
+    # The third row is an exact combination of two others; the rounded determinant is not 0.
+    hidden = 0
+    for _ in range(50):
+        a, b = rng.integers(-(2**26), 2**26, (2, 3)) / 2.0**20
+        s, t = rng.integers(-50, 50, 2)
+        box = np.array([a, b, s * a + t * b])
+        hidden += np.linalg.det(box) != 0
+        assert_refused(lambda box=box: hs.pairs(POINTS, 1.0, box=box), ValueError, "box")
+    assert hidden > 0
+    for scale in (2.0**-1000, 2.0**900):
+        small = box * scale
+        assert_refused(lambda small=small: hs.pairs(POINTS, 1.0, box=small), ValueError, "box")
+
+
+def test_nearly_dependent_box_vectors_are_independent():
+    above = 1 + 2.0**-52
+    box = [[1.0, 1.0], [1.0, above]]  # contains the vector (0, 2**-52)
+    found = hs.pairs([[0.0, 0.0]], 2.0**-51, box=box, quantities="S", sort=True)
+    assert found.tolist() == [[1, -1], [2, -2]]
+    for scale in (1e-200, 1e-110, 1e110, 1e200):  # the determinant leaves the float range
+        box = np.eye(3) * scale
+        assert hs.count_pairs([[0.0, 0.0, 0.0]], scale, box=box) == 3
+
+
+def test_rows_of_open_axes_may_be_anything_finite_and_dependent():
+    box = [[1.0, 0, 0], [2.0, 0, 0], [0, 0, 1.0]]
+    periodic = [True, False, True]
+    assert hs.count_pairs([[0.0, 0.0, 0.0]], 1.0, box=box, periodic=periodic) == 2
+
+
+@pytest.mark.parametrize("periodic", [True, [True, False, False], np.array([False, False, True])])
+def test_periodic_without_a_box(periodic):
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, periodic=periodic), ValueError, "periodic", "box")
+
+
+@pytest.mark.parametrize("periodic", ["xyz", "TFT", "True", ["T", "F", "T"], b"TFT"])
+def test_a_string_is_not_periodic(periodic):
+    assert_refused(
+        lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=periodic), TypeError, "periodic"
+    )
+
+
+@pytest.mark.parametrize("periodic", [[True, True], [True] * 4, [[True] * 3], []])
+def test_periodic_of_a_wrong_shape(periodic):
+    assert_refused(
+        lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=periodic),
+        (ValueError, TypeError),
+        "periodic",
+    )
+
+
+@pytest.mark.parametrize("periodic", [[0.5, 1.0, 1.0], [1, 0, 2], [None, True, True], [1j, 0, 0]])
+def test_periodic_of_values_that_are_not_flags(periodic):
+    assert_refused(
+        lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=periodic),
+        (TypeError, ValueError),
+        "periodic",
+    )
+
+
+@pytest.mark.parametrize("quantities", ["", "x", "ijk", "iJ", "i j", "ij,d", "ijé"])
+def test_unknown_quantities(quantities):
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, quantities=quantities), ValueError, "quantities")
+
+
+@pytest.mark.parametrize("quantities", [None, 3, b"ij", object()])
+def test_quantities_of_a_wrong_kind(quantities):
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, quantities=quantities), TypeError, "quantities")
+
+
+@pytest.mark.parametrize(
+    "dtype", [np.uint64, np.uint32, np.int16, np.float64, ">i8", "banana", object, [1], complex]
+)
+def test_index_dtypes_that_are_not_offered(dtype):
+    assert_refused(
+        lambda: hs.pairs(POINTS, 1.0, index_dtype=dtype), (TypeError, ValueError), "index_dtype"
+    )
+
+
+@pytest.mark.parametrize("precision", ["half", "", "EXACT", None, 64, float])
+def test_unknown_precision(precision):
+    for call in (hs.pairs, hs.count_pairs):
+        assert_refused(
+            lambda call=call: call(POINTS, 1.0, precision=precision),
+            (TypeError, ValueError),
+            "precision",
+        )
+
+
+@pytest.mark.parametrize("kernel", ["sse9", "", "SCALAR", 3, b"scalar", "scalar\0", "x" * 10**6])
+def test_unknown_kernels(kernel):
+    for call in (hs.pairs, hs.count_pairs):
+        assert_refused(
+            lambda call=call: call(POINTS, 1.0, kernel=kernel), (TypeError, ValueError), "kernel"
+        )
+
+
+@pytest.mark.parametrize("limit", [-1, NAN, "10GB", 1j, [1]])
+def test_bad_memory_limits(limit):
+    for call in (hs.pairs, hs.count_pairs):
+        assert_refused(
+            lambda call=call: call(POINTS, 1.0, memory_limit=limit),
+            (TypeError, ValueError),
+            "memory_limit",
+        )
+
+
+def test_unknown_and_missing_arguments():
+    assert_refused(lambda: hs.pairs(POINTS), TypeError, "cutoff")
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, CUBE), TypeError)
+    assert_refused(lambda: hs.pairs(POINTS, 1.0, boks=CUBE), TypeError, "boks")
+
+
+def test_atoms_bring_their_own_box():
+    class Atoms:
+        positions, cell, pbc = POINTS, CUBE, np.array([True, True, False])
+
+    assert hs.count_pairs(Atoms(), 1.0) == hs.count_pairs(
+        POINTS, 1.0, box=CUBE, periodic=[True, True, False]
+    )
+    for extra in ({"box": CUBE}, {"periodic": True}, {"box": CUBE, "periodic": [True] * 3}):
+        assert_refused(
+            lambda extra=extra: hs.pairs(Atoms(), 1.0, **extra),
+            (TypeError, ValueError),
+            "box|periodic",
+        )
+
+
+# ---- results that cannot be --------------------------------------------------------------
+
+
+def test_a_shift_beyond_int32_is_refused_only_when_asked_for():
+    points = np.array([[0.25], [2.0**33 + 0.5]])
+    assert_refused(
+        lambda: hs.pairs(points, 0.25, box=[1.0], quantities="S"), OverflowError, "S|shift"
+    )
+    i, j, d, D = hs.pairs(points, 0.25, box=[1.0], quantities="ijdD")
+    assert (i.tolist(), j.tolist(), d.tolist(), D.tolist()) == ([0], [1], [0.25], [[0.25]])
+    assert hs.count_pairs(points, 0.25, box=[1.0]) == 1
+    edge = np.array([[0.0], [2.0**31 - 1]])
+    assert hs.pairs(edge, 0.0, box=[1.0], quantities="S").tolist() == [[1 - 2**31]]
+    edge = np.array([[2.0**31], [0.0]])
+    assert_refused(lambda: hs.pairs(edge, 0.0, box=[1.0], quantities="S"), OverflowError, "S|shift")
+
+
+def test_points_beyond_any_integer_shift_are_right_or_refused():
+    for far in (2.0**52, 2.0**60, 1e30, 1e300, -1.7e308):
+        points = np.array([[0.0], [far]])
+        try:
+            assert hs.pairs(points, 0.0, box=[1.0], quantities="d").tolist() == [0.0]
+        except OverflowError as error:
+            assert "points" in str(error) or "shift" in str(error)
+
+
+def test_results_that_do_not_fit_are_refused_before_the_search():
+    crowd = np.zeros((200_000, 3))
+    assert_refused(lambda: hs.pairs(crowd, 1.0), MemoryError, "pairs", "byte|B")
+    assert_refused(lambda: hs.pairs(crowd, 0.0), MemoryError, "pairs")
+    cloud = np.random.default_rng(3).random((200_000, 3))
+    assert_refused(lambda: hs.pairs(cloud, 2.0), MemoryError, "pairs")
+    assert_refused(lambda: hs.pairs(cloud, 0.9, box=[1.0] * 3, quantities="ijdDS"), MemoryError)
+    assert_refused(lambda: hs.pairs(cloud, 0.2, memory_limit=10**8), MemoryError, "pairs")
+
+
+def test_images_of_a_tiny_box_are_refused_before_the_search():
+    for length in (1e-3, 1e-9, 1e-100, 5e-324):
+        box = [length] * 3
+        assert_refused(lambda box=box: hs.pairs(POINTS, 1.0, box=box), (MemoryError, OverflowError))
+        assert_refused(
+            lambda box=box: hs.pairs([[0.0, 0.0, 0.0]], 1.0, box=box), (MemoryError, OverflowError)
+        )
+    for cutoff in (1e6, 1e100, 1.7e308):
+        assert_refused(
+            lambda cutoff=cutoff: hs.pairs(POINTS, cutoff, box=CUBE), (MemoryError, OverflowError)
+        )
+
+
+def test_memory_limit_counts_what_is_asked_for(rng):
+    points = rng.random((4000, 3))
+    m = hs.count_pairs(points, 0.3)
+    assert len(hs.pairs(points, 0.3, memory_limit=100 * m)[0]) == m
+    assert_refused(lambda: hs.pairs(points, 0.3, memory_limit=4 * m), MemoryError, "pairs")
+    everything = "ijdDSP"
+    assert_refused(
+        lambda: hs.pairs(points, 0.3, quantities=everything, memory_limit=40 * m), MemoryError
+    )
+
+
+def test_a_generous_bound_alone_refuses_nothing(rng):
+    # One dense spot and two far corners: any bound from the volume is wildly off.
+    points = np.concatenate([rng.random((3000, 3)) * 1e-3, [[1e6] * 3, [-1e6] * 3]])
+    assert len(hs.pairs(points, 1e-5, memory_limit=20_000_000)[0]) < 10_000
+    # Many candidates in neighbouring cells, no pairs: a shell around a point.
+    shell = rng.normal(size=(3000, 3))
+    shell /= np.linalg.norm(shell, axis=1)[:, None]
+    left, right = shell * 0.01, shell * 0.01 + [1.0, 0, 0]
+    both = np.concatenate([left, right])
+    d = hs.pairs(both, 1e-4, quantities="d", memory_limit=20_000_000)
+    assert (d <= 1e-4).all()
+
+
+def test_a_refused_call_leaves_the_next_one_right():
+    expected = hs.pairs(POINTS, 0.5, quantities="ijd")
+    for bad in (with_value(1, 1, NAN), "x", np.zeros((3, 9))):
+        with pytest.raises((TypeError, ValueError)):
+            hs.pairs(bad, 1.0)
+        found = hs.pairs(POINTS, 0.5, quantities="ijd")
+        assert all(np.array_equal(a, b) for a, b in zip(found, expected))
+
+
+class Hostile:
+    """An object whose conversion raises, or lies about its shape."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def __array__(self, *args, **how):
+        raise self.error
+
+
+# ---- conversions that fail, single numbers, flags ----------------------------------------
+
+
+@pytest.mark.parametrize("error", [RuntimeError("needs grad"), AttributeError("mine")])
+def test_an_input_that_cannot_be_converted_is_named_with_the_cause(error):
+    hostile = Hostile(error)
+    calls = {
+        "points": lambda: hs.pairs(hostile, 1.0),
+        "cutoff": lambda: hs.count_pairs(POINTS, hostile),
+        "box": lambda: hs.pairs(POINTS, 1.0, box=hostile),
+        "periodic": lambda: hs.pairs(POINTS, 1.0, box=CUBE, periodic=hostile),
+        "i": lambda: hs.verify(POINTS, 1.0, hostile, [1]),
+        "S": lambda: hs.verify(POINTS, 1.0, [0], [1], hostile),
+        "matrix": lambda: hs.Box.from_matrix(hostile),
+    }
+    for name, call in calls.items():
+        with pytest.raises(TypeError, match=rf"^{name} .*Hostile.*{error}") as caught:
+            call()
+        assert caught.value.__cause__ is error
+
+
+@pytest.mark.parametrize("error", [MemoryError("mine"), KeyboardInterrupt("mine")])
+def test_what_is_not_the_fault_of_the_input_passes(error):
+    with pytest.raises(type(error), match="mine"):
+        hs.pairs(Hostile(error), 1.0)
+
+
+def test_a_tensor_that_only_speaks_dlpack_may_fail_too():
+    class Elsewhere:
+        def __dlpack__(self, **how):
+            raise BufferError("on a device")
+
+        def __dlpack_device__(self):
+            return (1, 0)
+
+    assert_refused(lambda: hs.pairs(Elsewhere(), 1.0), TypeError, "points", "on a device")
+
+
+def test_a_single_number_has_no_place():
+    refused = [
+        (None, TypeError, "^cutoff must be a number, got NoneType$"),
+        ("1", TypeError, "^cutoff must be a number, got str$"),
+        (object(), TypeError, "^cutoff must be a number, got object$"),
+        (1j, TypeError, "^cutoff must be a number, got dtype complex128$"),
+        (10**400, OverflowError, "^cutoff = "),
+        (-(10**5000), OverflowError, "^cutoff = "),
+        (2**53 + 1, ValueError, f"^cutoff = {2**53 + 1} "),
+        (2**64 + 1, ValueError, f"^cutoff = {2**64 + 1} "),
+        (np.ma.array(1.0, mask=True), ValueError, "^cutoff must not be masked"),
+    ]
+    for cutoff, exception, message in refused:
+        for call in (hs.pairs, hs.count_pairs, hs.explain):
+            assert_refused(
+                lambda call=call, cutoff=cutoff: call(POINTS, cutoff), exception, message
+            )
+
+
+@pytest.mark.parametrize(
+    "cutoffs, message",
+    [
+        ([1.0, NAN, 2.0], r"finite.*cutoff\[1\] = nan"),
+        ([NAN, 1.0], r"finite.*cutoff\[0\] = nan"),
+        ([1.0, 2.0, -INF], r"finite.*cutoff\[2\] = -inf"),
+        ([1.0, -1.0], r"not negative.*cutoff\[1\] = -1"),
+        ([1.0, 3.0, 2.0], r"ascending.*cutoff\[1\] = 3.0 before cutoff\[2\] = 2.0"),
+    ],
+)
+def test_the_bad_one_of_several_cutoffs_is_named(cutoffs, message):
+    assert_refused(lambda: hs.count_pairs(POINTS, cutoffs), ValueError, message)
+
+
+@pytest.mark.parametrize("flag", ["no", "True", b"", None, 2, -1, 1.0, [True], np.array([True])])
+def test_flags_are_bools(flag):
+    calls = [
+        ("inclusive", hs.pairs),
+        ("inclusive", hs.count_pairs),
+        ("inclusive", hs.explain),
+        ("sort", hs.pairs),
+        ("sort", hs.explain),
+        ("measure", hs.explain),
+        ("full", lambda *scene, **how: hs.verify(*scene, [0], [1], **how)),
+        ("inclusive", lambda *scene, **how: hs.verify(*scene, [0], [1], **how)),
+    ]
+    for name, call in calls:
+        assert_refused(
+            lambda call=call, name=name: call(POINTS, 1.0, **{name: flag}), TypeError, name
+        )
+
+
+@pytest.mark.parametrize("no", [False, 0, np.False_, np.int8(0)])
+def test_flags_of_numpy_and_of_c(no):
+    touching = np.array([[0.0], [1.0]])
+    yes = type(no)(1)
+    assert hs.count_pairs(touching, 1.0, inclusive=no) == 0
+    assert hs.count_pairs(touching, 1.0, inclusive=yes) == 1
+    assert len(hs.pairs(touching, 1.0, sort=yes)[0]) == 1
+    assert not hs.explain(touching, 1.0, measure=no).measured
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")
+def test_subclasses_of_arrays_are_arrays():
+    class Mine(np.ndarray):
+        pass
+
+    expected = hs.count_pairs(POINTS, 1.0, box=CUBE)
+    assert hs.count_pairs(np.asmatrix(POINTS), 1.0, box=np.asmatrix(CUBE)) == expected
+    assert hs.count_pairs(POINTS.view(Mine), 1.0, box=CUBE.view(Mine)) == expected
+
+
+def test_shifts_too_large_for_int32_name_their_point_at_any_scale():
+    far = np.array([[0.10], [0.15], [3e9 + 0.5], [0.55]])
+    with pytest.raises(OverflowError, match=r"points\[[23]\]"):
+        hs.pairs(far, 0.1, box=[1.0], quantities="S")
+    box = [2.0**25] * 3
+    with pytest.raises(OverflowError):
+        hs.pairs([[0.0] * 3, [2.0**65 + 2.0**13, 0.0, 0.0]], 2.0**22, box=box, quantities="S")

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Any file and any arguments: done, or one line on standard error and exit status 2."""
+
+import contextlib
+import io
+import os
+import random
+import subprocess
+import sys
+import warnings
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from halfshell import cli
+from halfshell._cli import numpy_files
+
+pytestmark = pytest.mark.slow
+POINTS = np.arange(30.0).reshape(10, 3) % 7.0
+
+
+def check(*arguments):
+    """Run the command line; assert how it ended; return (status, standard error)."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # ours would be lines on standard error too
+            try:
+                status = cli.main([str(argument) for argument in arguments])
+            except SystemExit as end:  # --help, --version
+                status = end.code
+    err = err.getvalue()
+    assert status in (0, 2), (status, err)
+    if status == 2:
+        assert out.getvalue() == ""
+        assert err.startswith("halfshell: error: ") and err.count("\n") == 1, err
+        assert len(err) < 2000
+    return status, err
+
+
+def refused(*arguments):
+    status, err = check(*arguments)
+    assert status == 2
+    return err
+
+
+# ---- files ---------------------------------------------------------------------------------
+
+
+def valid_bytes(kind):
+    """A good file of a kind that NumPy reads."""
+    stream = io.BytesIO()
+    if kind == "npy":
+        np.save(stream, POINTS)
+    elif kind == "npz":
+        np.savez(stream, points=POINTS, box=np.eye(3) * 7, periodic=[True, True, False])
+    else:
+        np.savez_compressed(stream, points=POINTS, box=np.full(3, 7.0))
+    return stream.getvalue()
+
+
+@st.composite
+def broken(draw):
+    """A file that was cut short, written over in places, or added to."""
+    kind = draw(st.sampled_from(["npy", "npz", "compressed"]))
+    data = bytearray(valid_bytes(kind))
+    how = draw(st.sampled_from(["cut", "flip", "fill", "insert"]))
+    if how == "cut":
+        data = data[: draw(st.integers(1, len(data)))]
+    for _ in range(draw(st.integers(1, 4)) if how != "cut" else 0):
+        place = draw(st.integers(0, len(data) - 1) | st.integers(0, min(160, len(data) - 1)))
+        if how == "flip":
+            data[place] ^= 1 << draw(st.integers(0, 7))
+        elif how == "fill":
+            data[place : place + 8] = draw(st.sampled_from([b"\xff" * 8, b"\0" * 8, b"9" * 8]))
+        else:
+            data[place:place] = draw(st.binary(min_size=1, max_size=9))
+    return "npy" if kind == "npy" else "npz", bytes(data)
+
+
+@given(broken())
+def test_broken_numpy_files(tmp_path_factory, drawn):
+    suffix, data = drawn
+    path = tmp_path_factory.getbasetemp() / f"broken.{suffix}"
+    path.write_bytes(data)
+    check("pairs", path, "--cutoff", "1.5")
+
+
+SUFFIXES = ("npy", "npz", "csv", "xyz", "extxyz", "cif", "pdb", "gen", "traj", "json", "dat", "")
+JUNK = {
+    "empty": b"",
+    "zeros": bytes(4096),
+    "binary": random.Random(5).randbytes(4096),
+    "text": b"what is this?\n" * 50,
+    "NaN": b"x,y,z\n0.0,nan,1.0\n1.0,2.0,inf\n",
+    "numbers": b"3\n\n1 2 3\n4 5 6\n",
+    "xyz with NaN": b"2\nprops\nH 0 0 nan\nH 0 0 1\n",
+    "xyz that lies": b"1000000\nprops\nH 0 0 0\n",
+    "newlines": b"\n" * 100,
+    "zip of nothing": b"PK\x05\x06" + bytes(18),
+    "latin": "\xe9\xe8".encode("latin-1") * 30,
+}
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("name", JUNK)
+def test_junk(tmp_path, name, suffix):
+    path = tmp_path / (f"junk.{suffix}" if suffix else "junk")
+    path.write_bytes(JUNK[name])
+    refused("pairs", path, "--cutoff", "1.0")
+
+
+CONTENTS = {
+    "strings": np.array(["a", "b"]),
+    "number": np.array(1.0),
+    "flat": np.zeros(5),
+    "cube": np.zeros((2, 2, 2)),
+    "none": np.zeros((0, 3)),
+    "no columns": np.zeros((3, 0)),
+    "nine columns": np.zeros((3, 9)),
+    "complex": np.zeros((2, 3), complex),
+    "dates": np.zeros((2, 3), "M8[s]"),
+    "structured": np.zeros(3, "f8,f8"),
+    "long double": np.zeros((2, 3), np.longdouble),
+    "NaN": np.array([[0.0, np.nan]]),
+    "infinite": np.array([[0.0, -np.inf]], np.float16),
+    "big integers": np.array([[2**53 + 1, 0]]),
+    "objects": np.array([[None, 1.0]], object),
+}
+
+
+@pytest.mark.parametrize("content", CONTENTS.values(), ids=CONTENTS)
+def test_arrays_that_are_no_points(tmp_path, content):
+    np.save(tmp_path / "points.npy", content)
+    np.savez(tmp_path / "points.npz", points=content)
+    np.savez(tmp_path / "box.npz", points=POINTS, box=content)
+    for name in ("points.npy", "points.npz", "box.npz"):
+        assert name in refused("pairs", tmp_path / name, "--cutoff", "1.0")
+    if content.dtype.kind == "O":
+        return
+    np.savez(tmp_path / "periodic.npz", points=POINTS, box=np.full(3, 7.0), periodic=content)
+    assert "periodic" in refused("pairs", tmp_path / "periodic.npz", "--cutoff", "1.0")
+
+
+def test_archives_that_zipfile_cannot_open(tmp_path):
+    path = tmp_path / "a.npz"
+    data = bytearray(valid_bytes("npz"))
+    for name, value in (("encrypted", (6, 1)), ("method", (8, 77)), ("needs 9.9", (4, 99))):
+        changed = data.copy()
+        at = changed.find(b"PK\x01\x02")  # the central directory: its offsets are 2 further
+        changed[at + value[0] + 2] = changed[value[0]] = value[1]
+        path.write_bytes(changed)
+        assert "a.npz" in refused("pairs", path, "--cutoff", "1.0"), name
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("points.npy", b"\x93NUMPY\x01\x00\x08\x00" + b"((((((((")
+    refused("pairs", path, "--cutoff", "1.0")
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("points.npy", b"not an array")
+    refused("pairs", path, "--cutoff", "1.0")
+
+
+@pytest.mark.parametrize("version", [b"\x01\x00", b"\x02\x00", b"\x03\x00", b"\x09\x09"])
+def test_headers_of_arrays(tmp_path, version):
+    path = tmp_path / "a.npy"
+    headers = [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999, 3)}",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3)}",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (10L, 3L)}",
+        "{'descr': '|O', 'fortran_order': False, 'shape': (1, 3)}",
+        "{'descr': 'a,b', 'fortran_order': 0, 'shape': 3}",
+        "(" * 500,
+        "[" * 5000 + "]" * 5000,
+        "{}",
+        "\0" * 20,
+        "9" * 5000,
+    ]
+    for header in headers:
+        size = len(header).to_bytes(2 if version == b"\x01\x00" else 4, "little")
+        path.write_bytes(b"\x93NUMPY" + version + size + header.encode() + bytes(240))
+        check("pairs", path, "--cutoff", "1.0")
+
+
+def test_places_that_are_no_files(tmp_path):
+    (tmp_path / "folder.npz").mkdir()
+    for name in (tmp_path, tmp_path / "folder.npz", tmp_path / "none", "/", "", "\0", "a\nb", "~"):
+        for command in ("pairs", "verify"):
+            refused(command, name, "--cutoff", "1.0")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    refused("pairs", tmp_path / "loop", "--cutoff", "1.0")
+    refused("pairs", "x" * 5000, "--cutoff", "1.0")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    for suffix in (".npy", ".npz"):
+        os.mkfifo(tmp_path / f"pipe{suffix}")
+        for command in ("pairs", "verify"):
+            error = refused(command, tmp_path / f"pipe{suffix}", "--cutoff", "1.0")
+            assert error.endswith(f"pipe{suffix}: cannot be read: not a regular file\n")
+
+
+def test_line_breaks_of_names_are_escaped(tmp_path):
+    assert r"/a\nb\x1bc.npy: no such file" in refused("pairs", tmp_path / "a\nb\x1bc.npy")
+    (tmp_path / "a\nb.npy").write_bytes(b"")
+    assert r"/a\nb.npy: is empty" in refused("pairs", tmp_path / "a\nb.npy")
+
+
+def test_negative_lengths_are_named(tmp_path):
+    path = tmp_path / "a.npy"
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 3)}"
+    path.write_bytes(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(240))
+    assert "a.npy: 'points' has shape (-1, 3); no length is negative" in refused("pairs", path)
+
+
+def test_a_file_that_must_not_be_read(tmp_path, monkeypatch):
+    path = tmp_path / "a.npy"
+    path.write_bytes(valid_bytes("npy"))
+
+    def refuse(*arguments, **options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(numpy_files, "open", refuse, raising=False)  # also where root may read all
+    assert "Permission denied" in refused("pairs", path, "--cutoff", "1.0")
+
+
+def test_places_that_cannot_be_written(tmp_path):
+    for name in ("folder.npz", "folder.png"):
+        (tmp_path / name).mkdir()
+    path = tmp_path.parent / "source.npy"
+    path.write_bytes(valid_bytes("npy"))
+    outputs = [tmp_path / "none" / "a.npz", tmp_path / "folder.npz", "a.txt", "", "\0.npz"]
+    for name in [*outputs, "x" * 5000 + ".npz", tmp_path / ("x" * 300 + ".csv"), "/proc/a.npz"]:
+        refused("pairs", path, "-o", name)
+        refused("pairs", path, "--plot", str(name).replace(".npz", ".png"))
+        refused("pairs", "-o", name)
+    assert sorted(os.listdir(tmp_path)) == ["folder.npz", "folder.png"]
+
+
+# ---- arguments -----------------------------------------------------------------------------
+
+WORDS = st.sampled_from(
+    [
+        *("", "0", "1.5", "-1", "nan", "inf", "1e400", "1e308", "1e-320", "0x10", "1_0", "abc"),
+        *("\0", "\ud800", "é", "\uff11", "T", "TF", "TFTFTFTFT", "1,2,3", ",", "5,5,5", "ijd"),
+        *("9" * 5000, "1 " * 100, "-", "--", "--help", "--cutoff", "--json", "scalar", "exact"),
+    ]
+)
+OPTIONS = st.sampled_from(
+    [
+        *("--cutoff", "--box", "--periodic", "--format", "--index", "--strict", "--kernel"),
+        *("--json", "-o", "--quantities", "--sort", "--plot", "--precision", "--no-progress"),
+        *("--sample", "--against", "--nothing", "-x", "--version"),
+    ]
+)
+
+
+COMMANDS = st.sampled_from(["pairs", "pairs", "verify", "info"])
+
+
+@given(st.lists(st.tuples(OPTIONS, WORDS), max_size=3), COMMANDS)
+def test_any_arguments(tmp_path_factory, options, command):
+    path = tmp_path_factory.getbasetemp() / "good.npy"
+    if not path.exists():
+        np.save(path, POINTS)
+    flat = [word for option in options for word in option]
+    folder = os.getcwd()
+    os.chdir(tmp_path_factory.getbasetemp())  # where a word may become a file
+    try:
+        check(command, path, *flat)
+    finally:
+        os.chdir(folder)
+
+
+@pytest.mark.parametrize("name", [b"\xff\xfe.npy", b"a\nb.npy", "é.npy".encode()])
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_names_that_cannot_be_written_to_the_terminal(tmp_path, name, encoding):
+    path = os.path.join(os.fsencode(tmp_path), name)
+    with open(path, "wb") as file:
+        file.write(valid_bytes("npy"))
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "1"}
+    for more, status in (([], 0), (["--json"], 0), (["--box", "1,2"], 2)):
+        command = [sys.executable, "-m", "halfshell", "pairs", path, "--cutoff", "1.0", *more]
+        done = subprocess.run(command, capture_output=True, env=environment, timeout=60)
+        assert done.returncode == status, done.stderr
+        assert done.stderr.count(b"\n") == (1 if status else 0), done.stderr

@@ -1,0 +1,418 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`for_each_pair` calls functions of every sort for the pairs of `pairs`, and checks them."""
+
+import ctypes
+import math
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from stream_scenes import BOX, SCENES
+from subprocesses import run
+
+I64, F64 = ctypes.c_int64, ctypes.c_double
+I32_POINTER, F64_POINTER = ctypes.POINTER(ctypes.c_int32), ctypes.POINTER(ctypes.c_double)
+SIGNATURE = ctypes.CFUNCTYPE(
+    ctypes.c_int, I64, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p
+)
+POINTS = np.random.default_rng(3).random((50, 3))
+
+
+def visited(points, cutoff, **options):
+    """What a Python callable sees, as the arrays of `pairs`, and how many that was."""
+    seen = []
+    n = hs.for_each_pair(points, cutoff, lambda *pair: seen.append(pair), **options)
+    d = np.shape(points)[1]
+    i, j, S, D, d2 = zip(*seen) if seen else [()] * 5
+    return (
+        n, np.array(i, dtype=np.int64), np.array(j, dtype=np.int64),
+        np.array(S, dtype=np.int32).reshape(-1, d), np.array(D).reshape(-1, d), np.array(d2),
+    )
+
+
+def assert_visits_the_pairs(points, cutoff, **options):
+    n, i, j, S, D, d2 = visited(points, cutoff, **options)
+    of_pairs = hs.pairs(points, cutoff, quantities="ijSDd", **options)
+    assert n == len(i) == len(of_pairs[0])
+    for got, wanted in zip((i, j, S, D), of_pairs):
+        assert got.tobytes() == wanted.tobytes()
+    d = of_pairs[4]
+    assert d2.tobytes() == (d * d).tobytes()
+    assert np.sqrt(d2).tobytes() == d.tobytes()
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_a_callable_sees_the_pairs_in_their_order(scene):
+    points, cutoff, options = scene
+    assert_visits_the_pairs(points, cutoff, **options)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("precision", ["exact", "double", "single"])
+def test_any_kernel_precision_and_number_of_threads(kernel, precision, threads, rng):
+    assert_visits_the_pairs(
+        rng.random((1500, 3)), 0.12, box=BOX, kernel=kernel, precision=precision, threads=threads
+    )
+
+
+def test_what_a_callable_gets():
+    def callback(i, j, S, D, d2):
+        assert [type(x) for x in (i, j, S, D, d2)] == [int, int, tuple, tuple, float]
+        assert len(S) == len(D) == 3
+        assert all(type(x) is int for x in S) and all(type(x) is float for x in D)
+
+    assert hs.for_each_pair(POINTS, 0.3, callback) > 0
+
+
+@pytest.mark.parametrize("result", [True, 1, "stop", [0]])
+def test_a_true_result_stops(result):
+    calls = []
+
+    def callback(*pair):
+        calls.append(pair)
+        return result if len(calls) == 10 else 0
+
+    assert hs.for_each_pair(POINTS, 0.5, callback) == 10 == len(calls)
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+@pytest.mark.parametrize("thread_safe", [False, True])
+def test_an_exception_stops_and_arrives(threads, thread_safe, rng):
+    points = rng.random((3000, 3))
+    calls = []
+
+    def callback(i, j, S, D, d2):
+        calls.append(i)
+        if len(calls) == 1000:
+            raise LookupError(i)
+
+    with pytest.raises(LookupError):
+        hs.for_each_pair(points, 0.2, callback, threads=threads, thread_safe=thread_safe)
+    assert len(calls) == 1000 if not thread_safe else 1000 <= len(calls) < 100_000
+
+
+def test_an_exception_of_another_thread_arrives(rng):
+    here = threading.get_ident()
+
+    def callback(i, j, S, D, d2):
+        if threading.get_ident() != here:
+            raise ArithmeticError("from a thread")
+
+    with pytest.raises(ArithmeticError, match="from a thread"):
+        for _ in range(100):
+            hs.for_each_pair(rng.random((8000, 3)), 0.1, callback, threads=4, thread_safe=True)
+
+
+def test_a_result_without_truth_is_an_error():
+    class Undecided:
+        def __bool__(self):
+            raise RuntimeError("undecided")
+
+    with pytest.raises(RuntimeError, match="undecided"):
+        hs.for_each_pair(POINTS, 0.5, lambda *pair: Undecided())
+
+
+def test_threads_visit_each_pair_once(rng):
+    points = rng.random((3000, 3))
+    seen = []
+    n = hs.for_each_pair(
+        points, 0.12, lambda i, j, *rest: seen.append((i, j)), threads=4, thread_safe=True
+    )
+    i, j = hs.pairs(points, 0.12, sort=True)
+    assert n == len(i) and sorted(seen) == list(zip(i.tolist(), j.tolist()))
+
+
+def test_without_the_declaration_only_this_thread_calls(rng):
+    idents = set()
+    hs.for_each_pair(
+        rng.random((3000, 3)), 0.1, lambda *pair: idents.add(threading.get_ident()), threads=4
+    )
+    assert idents == {threading.get_ident()}
+
+
+def test_a_callback_may_search_itself():
+    expected = hs.pairs(POINTS, 0.4)
+    inner = []
+
+    def callback(i, j, S, D, d2):
+        i, j = hs.pairs(POINTS, 0.4)
+        inner.append((i == expected[0]).all() and (j == expected[1]).all())
+        return hs.for_each_pair(POINTS, 0.1, lambda *pair: None) < 0
+
+    assert hs.for_each_pair(POINTS, 0.2, callback) == len(inner) == hs.count_pairs(POINTS, 0.2)
+    assert all(inner)
+
+
+# Function pointers.
+
+
+@SIGNATURE
+def write_pair(i, j, S, D, d2, user):
+    """Row number user[0] of a table of 2 + 3 + 3 + 1 numbers, which begins at user[1]."""
+    table = ctypes.cast(user, F64_POINTER)
+    at = 1 + 9 * int(table[0])
+    for k, value in enumerate([i, j, *S[:3], *D[:3], d2]):
+        table[at + k] = value
+    table[0] += 1
+    return int(table[0] == 5)
+
+
+def check_table(table, n):
+    i, j, S, D, d = hs.pairs(POINTS, 0.5, box=BOX, quantities="ijSDd")
+    rows = table[1:].reshape(-1, 9)[:n]
+    assert n == 5 and table[0] == n
+    assert (rows[:, 0] == i[:n]).all() and (rows[:, 1] == j[:n]).all()
+    assert (rows[:, 2:5] == S[:n]).all() and (rows[:, 5:8] == D[:n]).all()
+    assert (rows[:, 8] == (d * d)[:n]).all()
+
+
+def pointers_to(table):
+    """The same memory in all the ways that user_data may be given."""
+    pointer = table.ctypes.data_as(F64_POINTER)
+    yield table
+    yield memoryview(table)
+    yield table.ctypes.data
+    yield np.uint64(table.ctypes.data)
+    yield pointer
+    yield ctypes.cast(pointer, ctypes.c_void_p)
+    yield (ctypes.c_double * len(table)).from_buffer(table)
+    cffi = pytest.importorskip("cffi")
+    yield cffi.FFI().from_buffer("double[]", table)
+    yield cffi.FFI().cast("void *", table.ctypes.data)
+
+
+@pytest.mark.parametrize("which", range(9))
+def test_a_ctypes_function_and_its_data(which):
+    table = np.zeros(46)
+    user_data = [*pointers_to(table)][which]
+    check_table(table, hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data, box=BOX))
+
+
+def test_a_low_level_callable_of_ctypes():
+    scipy = pytest.importorskip("scipy")
+    table = np.zeros(46)
+    user = table.ctypes.data_as(ctypes.c_void_p)
+    callback = scipy.LowLevelCallable(write_pair, user)
+    check_table(table, hs.for_each_pair(POINTS, 0.5, callback, box=BOX))
+    with pytest.raises(TypeError, match="user_data"):
+        hs.for_each_pair(POINTS, 0.5, callback, user_data=table)
+    for declared in (
+        "int (int64_t, int64_t, int32_t const *, double const *, double, void *)",
+        "int32_t(long long,long long,const int *,const double*,double,double *)",
+        "int (__pyx_t_5numpy_int64_t, npy_int64, void *, void *, double, void *)",
+    ):
+        table[:] = 0
+        callback = scipy.LowLevelCallable(write_pair, user, declared)
+        check_table(table, hs.for_each_pair(POINTS, 0.5, callback, box=BOX))
+    for declared in (
+        "double (double)", "int (int64_t)", "nonsense", "", "int (int (*)(int), int)",
+        "int (uint64_t, int64_t, int32_t *, double *, double, void *)",
+        "int (int64_t, int64_t, int32_t *, float *, double, void *)",
+        "int (int64_t, int64_t, int32_t *, double *, double, long)",
+    ):
+        callback = scipy.LowLevelCallable(write_pair, user, declared)
+        with pytest.raises(TypeError, match=r"const int32_t \*S, const double \*D"):
+            hs.for_each_pair(POINTS, 0.5, callback)
+
+
+def test_a_numba_cfunc():
+    numba = pytest.importorskip("numba")
+    types = numba.types
+
+    def add(i, j, S, D, d2, user):
+        user[0] += d2
+        user[1] += D[0] * D[0] + D[1] * D[1] + D[2] * D[2]
+        user[2] += (i + j) * (S[0] + 2 * S[1] + 5 * S[2])
+        return 0
+
+    signature = types.int32(
+        types.int64, types.int64, types.CPointer(types.int32), types.CPointer(types.float64),
+        types.float64, types.CPointer(types.float64),
+    )
+    sums = np.zeros(3)
+    compiled = numba.cfunc(signature)(add)
+    n = hs.for_each_pair(POINTS, 0.5, compiled, user_data=sums, box=BOX)
+    i, j, S, d = hs.pairs(POINTS, 0.5, box=BOX, quantities="ijSd")
+    assert n == len(i)
+    assert math.isclose(sums[0], (d * d).sum(), rel_tol=1e-12)
+    assert math.isclose(sums[1], (d * d).sum(), rel_tol=1e-12)
+    assert sums[2] == ((i + j) * (S @ [1, 2, 5])).sum()
+    again = np.zeros(3)
+    assert hs.for_each_pair(POINTS, 0.5, compiled.ctypes, user_data=again, box=BOX) == n
+    assert (again == sums).all()
+
+    wrong = types.int64(*signature.args), types.int32(*signature.args[:5])
+    for other in (wrong[0], types.float64(types.float64)):
+        function = numba.cfunc(other)(add if other is wrong[0] else (lambda x: x))
+        with pytest.raises(TypeError, match=r"const int32_t \*S, const double \*D.*got"):
+            hs.for_each_pair(POINTS, 0.5, function)
+
+
+def test_a_cffi_function():
+    cffi = pytest.importorskip("cffi")
+    ffi = cffi.FFI()
+    seen = []
+
+    def callback(i, j, S, D, d2, user):
+        seen.append((i, j, [*S[0:3]], [*D[0:3]], d2))
+        return 0
+
+    declared = "int(int64_t, int64_t, const int32_t *, const double *, double, void *)"
+    n = hs.for_each_pair(POINTS, 0.5, ffi.callback(declared, callback), box=BOX)
+    i, j, S, D, d = hs.pairs(POINTS, 0.5, box=BOX, quantities="ijSDd")
+    assert n == len(seen) == len(i)
+    assert [s[0] for s in seen] == i.tolist() and [s[1] for s in seen] == j.tolist()
+    assert [s[2] for s in seen] == S.tolist() and [s[3] for s in seen] == D.tolist()
+    assert [s[4] for s in seen] == (d * d).tolist()
+    for wrong in ("int(int64_t)", "void(int64_t, int64_t, int32_t *, double *, double, void *)"):
+        with pytest.raises(TypeError, match=r"const int32_t \*S, const double \*D"):
+            hs.for_each_pair(POINTS, 0.5, ffi.callback(wrong, lambda *a: 0))
+    with pytest.raises(TypeError, match="got"):
+        hs.for_each_pair(POINTS, 0.5, ffi.new("int[3]"))
+    with pytest.raises(ValueError, match="NULL"):
+        hs.for_each_pair(POINTS, 0.5, ffi.cast(declared.replace("(", "(*)(", 1), 0))
+
+
+@pytest.mark.parametrize(
+    "types",
+    [
+        (),
+        (ctypes.c_int,),
+        (None, I64, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p),
+        (ctypes.c_int, I64, I64, I32_POINTER, F64_POINTER, F64),
+        (ctypes.c_int, ctypes.c_int32, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p),
+        (ctypes.c_int, ctypes.c_uint64, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p),
+        (ctypes.c_int, I64, I64, F64_POINTER, I32_POINTER, F64, ctypes.c_void_p),
+        (ctypes.c_int, I64, I64, I32_POINTER, F64_POINTER, ctypes.c_float, ctypes.c_void_p),
+        (ctypes.c_int, I64, I64, I32_POINTER, F64_POINTER, F64, I64),
+    ],
+)
+def test_another_signature_of_ctypes_is_refused(types):
+    result, *arguments = types or (None,)
+    function = ctypes.CFUNCTYPE(result, *arguments)(lambda *arguments: 0)
+    with pytest.raises(TypeError, match=r"int \(int64_t i, int64_t j, const int32_t \*S"):
+        hs.for_each_pair(POINTS, 0.5, function)
+
+
+def test_other_functions_of_ctypes_are_refused():
+    untyped = ctypes.CFUNCTYPE(ctypes.c_int)(lambda: 0)
+    with pytest.raises(TypeError, match="signature"):
+        hs.for_each_pair(POINTS, 0.5, untyped)
+    types = (ctypes.c_int, I64, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p)
+    needs_lock = ctypes.PYFUNCTYPE(*types)(lambda *arguments: 0)
+    with pytest.raises(TypeError, match="lock"):
+        hs.for_each_pair(POINTS, 0.5, needs_lock)
+    with pytest.raises(ValueError, match="NULL"):
+        hs.for_each_pair(POINTS, 0.5, SIGNATURE())
+
+
+def test_other_things_are_refused():
+    for callback in (None, 5, "f", object(), (1, 2)):
+        with pytest.raises(TypeError, match=r"const int32_t \*S, const double \*D"):
+            hs.for_each_pair(POINTS, 0.5, callback)
+    with pytest.raises(TypeError, match="user_data"):
+        hs.for_each_pair(POINTS, 0.5, print, user_data=np.zeros(3))
+    for user_data in (1.5, True, object(), "text"):
+        with pytest.raises(TypeError, match="user_data"):
+            hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data)
+    for user_data in (-1, 2**70, np.zeros((4, 4))[:, 1]):
+        with pytest.raises(ValueError, match="user_data"):
+            hs.for_each_pair(POINTS, 0.5, write_pair, user_data=user_data)
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"cutoff": -1.0}, ValueError),
+        ({"points": [[np.inf]]}, ValueError),
+        ({"box": [0.0] * 3}, ValueError),
+        ({"kernel": "none"}, ValueError),
+        ({"threads": 0}, ValueError),
+        ({"thread_safe": "yes"}, TypeError),
+        ({"memory_limit": 10}, MemoryError),
+        ({"points": [[0.0], [1e10], [0.5]], "box": [1.0]}, OverflowError),
+    ],
+)
+def test_wrong_arguments_are_refused(change, error):
+    arguments = {"points": POINTS, "cutoff": 0.5, "callback": lambda *pair: None} | change
+    with pytest.raises(error):
+        hs.for_each_pair(**arguments)
+
+
+def test_results_of_any_size_are_visited():
+    total = hs.for_each_pair(
+        np.zeros((300, 1)), 0.0, lambda *pair: None, memory_limit=3e6, threads=1
+    )
+    assert total == 300 * 299 // 2
+
+
+def test_ctrl_c_stops_compiled_functions_and_callables():
+    outcomes = run(
+        """
+import json, signal, threading, time
+import numpy as np
+import halfshell as hs
+points = np.random.default_rng(1).random((60_000, 3))
+calls = {"callable": lambda *pair: None}
+try:
+    import numba
+    from numba import types
+    signature = types.int32(types.int64, types.int64, types.CPointer(types.int32),
+                            types.CPointer(types.float64), types.float64, types.voidptr)
+    calls["compiled"] = numba.cfunc(signature)(lambda i, j, S, D, d2, user: 0)
+except ImportError:
+    pass
+outcomes = []
+for callback in calls.values():
+    sent = []
+    def interrupt():
+        sent.append(time.perf_counter())
+        signal.raise_signal(signal.SIGINT)
+    threading.Timer(0.3, interrupt).start()
+    try:
+        hs.for_each_pair(points, 2.0, callback)
+        outcome = "finished"
+    except KeyboardInterrupt:
+        outcome = "interrupted"
+    outcomes.append([outcome, time.perf_counter() - sent[0]])
+print(json.dumps(outcomes))
+"""
+    )
+    for outcome, delay in outcomes:
+        assert outcome == "interrupted"
+        assert delay < 1.0
+
+
+@pytest.mark.parametrize(
+    "types",
+    [
+        (lambda value: value, I64),
+        (ctypes.c_int, I64.__ctype_le__ if sys.byteorder == "big" else I64.__ctype_be__),
+        (ctypes.c_int, object()),
+        (ctypes.c_int, np.ctypeslib.ndpointer(np.int64)),
+    ],
+    ids=["result is converted", "byte order", "no type", "ndpointer"],
+)
+def test_odd_types_of_ctypes_are_refused(types):
+    class Function:
+        def from_param(self, value):
+            return value
+
+    function = ctypes.CDLL(None).abs if sys.platform != "win32" else ctypes.cdll.msvcrt.abs
+    restype, first = types
+    function.restype = restype
+    first = Function() if type(first) is object else first
+    function.argtypes = [first, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p]
+    with pytest.raises(TypeError, match="callback must have the C signature"):
+        hs.for_each_pair(POINTS, 0.1, function)
+
+
+@pytest.mark.parametrize(
+    "data", [np.timedelta64(1, "s"), np.zeros(2, "M8[s]"), True, 1.5, "text", [1]], ids=str
+)
+def test_other_data_are_refused(data):
+    with pytest.raises(TypeError, match="user_data"):
+        hs.for_each_pair(POINTS, 0.1, SIGNATURE(lambda *_: 0), user_data=data)

@@ -1,0 +1,442 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The k nearest points: order and ties by rational arithmetic, images, clusters, bad arguments."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+import halfshell as hs
+from oracles import (
+    BOX_KINDS,
+    EXACT_ROTATION,
+    full_box,
+    lattice,
+    random_box,
+    remembered,
+    same_arrays,
+)
+
+
+def rational(rows):
+    return [[Fraction(x) for x in row] for row in np.asarray(rows, np.float64).tolist()]
+
+
+def within(point, owner, points, rows, axes, radius):
+    """All (square, j, S) of one query up to a radius, the images found through dual vectors."""
+    exact, box = rational(points), rational(rows)
+    query = [Fraction(x) for x in np.asarray(point, np.float64).tolist()]
+    ndim = len(query)
+    used = rows[axes]
+    size = np.abs(used).max(initial=0.0) or 1.0
+    dual = np.linalg.pinv(used / size).T / size if len(axes) else np.zeros((0, ndim))
+    lengths = np.array([math.hypot(*row) for row in dual])
+    found = []
+    for j, target in enumerate(exact):
+        along = dual @ np.array([float(a - b) for a, b in zip(target, query)])
+        reach = radius * lengths * (1 + 1e-6) + 1e-6
+        ranges = [
+            range(math.ceil(-a - r), math.floor(-a + r) + 1) for a, r in zip(along, reach)
+        ]
+        for s in itertools.product(*ranges):
+            S = [0] * ndim
+            for axis, value in zip(axes, s):
+                S[axis] = value
+            if j == owner and not any(S):
+                continue
+            D = [
+                target[c] - query[c] + sum(S[axis] * box[axis][c] for axis in axes)
+                for c in range(ndim)
+            ]
+            square = sum(x * x for x in D)
+            if not len(axes) or square <= Fraction(radius) ** 2:
+                found.append((square, j, tuple(S)))
+    return found
+
+
+def expected_rows(points, k, queries=None, box=None, periodic=None, max_distance=math.inf):
+    """Rows of (square, j, S) in order."""
+    points = np.asarray(points, np.float64)
+    n, ndim = points.shape
+    asking = points if queries is None else np.asarray(queries, np.float64)
+    rows, flags = full_box(box, periodic, ndim)
+    axes = np.flatnonzero(flags)
+    result = []
+    for i, point in enumerate(asking):
+        radius = min((math.hypot(*rows[axis]) for axis in axes), default=1.0)
+        owner = i if queries is None else -1
+        while n > 0:
+            found = within(point, owner, points, rows, axes, radius)
+            if len(found) >= k or not len(axes) or radius >= max_distance:
+                break
+            radius = min(1.5 * radius, max(max_distance, radius))
+        found = found if n > 0 else []
+        limit = None if math.isinf(max_distance) else Fraction(max_distance) ** 2
+        result.append(sorted(x for x in found if limit is None or x[0] <= limit)[:k])
+    return result
+
+
+ORACLE = ("queries", "box", "periodic", "max_distance")
+
+
+def check(points, k, **how):
+    """Assert that all four quantities are those of the definition; return them."""
+    oracle = {"max_distance": math.inf, **how}
+    expected = remembered(expected_rows, points, k, *(oracle.get(key) for key in ORACLE))
+    arrays = hs.nearest(points, k, quantities="jdDS", **how)
+    j, d, D, S = arrays
+    ndim = np.asarray(points).shape[1]
+    assert j.shape == d.shape == (len(expected), k)
+    assert D.shape == S.shape == (len(expected), k, ndim)
+    assert d.dtype == D.dtype == np.float64 and S.dtype == np.int32
+    for i, row in enumerate(expected):
+        m = len(row)
+        assert list(zip(j[i, :m].tolist(), map(tuple, S[i, :m].tolist()))) == [r[1:] for r in row]
+        for e, (square, *_) in enumerate(row):
+            ulp = Fraction(float(np.spacing(d[i, e])))
+            assert max(Fraction(d[i, e]) - ulp, 0) ** 2 <= square
+            assert square <= (Fraction(d[i, e]) + ulp) ** 2
+        assert (np.diff(d[i, :m]) >= 0).all() and (d[i, :m] <= oracle["max_distance"]).all()
+        assert (j[i, m:] == -1).all() and (d[i, m:] == np.inf).all()
+        assert np.isnan(D[i, m:]).all() and (S[i, m:] == 0).all()
+        check_vectors(points, i, j[i, :m], D[i, :m], S[i, :m], d[i, :m], how)
+    return arrays
+
+
+def check_vectors(points, i, j, D, S, d, how):
+    asking = how.get("queries")
+    points = rational(points)
+    origin = points[i] if asking is None else rational(asking)[i]
+    rows = rational(full_box(how.get("box"), how.get("periodic"), len(origin))[0])
+    for e, other in enumerate(j.tolist()):
+        for c in range(len(origin)):
+            true = points[other][c] - origin[c]
+            true += sum(int(S[e, r]) * rows[r][c] for r in range(len(rows)))
+            assert abs(Fraction(D[e, c]) - true) <= Fraction(float(np.spacing(d[e])))
+
+
+# ---- against rational arithmetic -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3, 4, 5])
+def test_random_points_in_open_space(ndim, rng, kernel):
+    for n, k in ((1, 1), (2, 3), (50, 12)):
+        points = rng.normal(size=(n, ndim))
+        check(points, k, kernel=kernel)
+        check(points, k, queries=rng.normal(size=(7, ndim)), kernel=kernel)
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_random_points_in_boxes(kind, ndim, rng, kernel):
+    box = random_box(rng, kind, ndim, 3.0)
+    for n, k in ((1, 4), (3, 11), (25, 6)):
+        points = rng.uniform(-9, 9, (n, ndim))
+        check(points, k, box=box, kernel=kernel)
+        check(points, k, box=box, queries=rng.uniform(-20, 20, (5, ndim)), kernel=kernel)
+        if ndim > 1:
+            flags = [True] + [False] * (ndim - 1)
+            check(points, k, box=box, periodic=flags, kernel=kernel)
+
+
+@pytest.mark.parametrize("name", ["sc", "bcc", "fcc", "diamond", "hcp"])
+def test_ties_on_crystals_are_in_order_of_number_and_shift(name, kernel):
+    points, box = lattice(name, (2, 2, 2))
+    for factor in (1.0, 0.1, 1e-200):
+        check(points * factor, 14, kernel=kernel)
+        check(points[:4] * factor, 20, box=box * factor, kernel=kernel)
+
+
+def test_ties_on_rotated_and_sheared_lattices(kernel):
+    points, box = lattice("fcc", (2, 1, 1))
+    points, box = points @ EXACT_ROTATION, box @ EXACT_ROTATION
+    check(points, 13, box=box, kernel=kernel)
+    box[1] += 3 * box[0]
+    box[2] -= 2 * box[1]
+    check(points + 40 * box[0], 13, box=box, kernel=kernel)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_more_are_wanted_than_there_are_points(n, rng, kernel):
+    points = rng.random((n, 2))
+    check(points, 40, box=[0.5, 0.75], kernel=kernel)
+    check(points, 9, kernel=kernel)
+    check(points, 30, box=[0.5, 0.75], periodic=[False, True], kernel=kernel)
+
+
+def test_many_images_of_a_tiny_anisotropic_box():
+    j, d, S = hs.nearest([[0.0, 0.0, 0.0]], 2000, box=[1.0, 1e6, 1e6], quantities="jdS")
+    assert np.array_equal(d[0], np.repeat(np.arange(1.0, 1001.0), 2))
+    assert np.array_equal(S[0, :, 0], np.stack([-d[0, ::2], d[0, ::2]], 1).ravel())
+    assert not j.any() and not S[..., 1:].any()
+
+
+def test_duplicates_come_by_number(kernel):
+    points = np.repeat([[0.1, 0.2], [0.3, 0.1], [0.1, 0.2]], 30, axis=0)
+    check(points, 35, kernel=kernel)
+    check(points, 65, queries=points[:1], box=[1.0, 1.0], kernel=kernel)
+
+
+def test_max_distance_on_a_shell(kernel):
+    points = np.array(list(itertools.product(range(3), repeat=3)), float)
+    for limit in (0.0, 1.0, math.sqrt(2.0), np.nextafter(math.sqrt(2.0), 0.0), math.sqrt(3.0), 2.0):
+        check(points, 19, max_distance=limit, kernel=kernel)
+        check(points, 30, max_distance=limit, box=[3.0, 3.0, 3.0], kernel=kernel)
+    tenths = points * 0.1
+    check(tenths, 10, max_distance=0.1, kernel=kernel)
+    check(tenths, 10, max_distance=5e-324, queries=tenths, kernel=kernel)
+
+
+def test_queries_far_outside(rng, kernel):
+    points = rng.random((60, 3))
+    far = np.array([[1e3, 0.0, 0.0], [1e8, 1e8, -1e8], [1e200, 0.0, 1.0], [-1e300, 1e300, 0.0]])
+    check(points, 5, queries=far, kernel=kernel)
+    check(points, 5, queries=far[:2], box=[1.0, 1.0, 1.0], kernel=kernel)
+    slab = {"box": [1.0, 1.0, 1.0], "periodic": [True, True, False]}
+    check(points[:3], 5, queries=[[0.3, 0.2, 6.0], [5.1, 0.2, -9.0]], **slab, kernel=kernel)
+    # The nearest is the one with the least distance in the plane among those of the top layer.
+    points[:, 2] = 0.0
+    j = hs.nearest(points, 1, queries=[[0.5, 0.5, 1e4]], quantities="j", **slab, kernel=kernel)
+    lateral = np.hypot(*(points[:, :2] - 0.5).T)
+    assert j[0, 0] == np.argmin(lateral)
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-320, 1e-300, 1e-160, 1e160, 1e300])
+def test_any_scale(scale, rng, kernel):
+    points = rng.integers(-8, 9, (40, 2)).astype(float) * scale
+    check(points, 6, kernel=kernel)
+    if scale > 1e-310:
+        check(points, 6, box=[5 * scale, 7 * scale], kernel=kernel)
+
+
+def test_a_cluster_and_an_outlier_on_different_scales(rng, kernel):
+    points = rng.random((80, 3)) * 1e-150
+    points[7] = 1e300
+    points[30:50] += 1e9
+    check(points, 4, kernel=kernel)
+
+
+def test_float32_and_strided_points(rng, kernel):
+    points = rng.random((50, 6)).astype(np.float32)[::2, ::2]
+    check(points, 5, kernel=kernel)
+    check(points, 5, queries=rng.random((4, 3)), box=[1.0, 1.5, 1.0], kernel=kernel)
+
+
+def test_the_largest_dimension(rng):
+    points = rng.random((30, 8))
+    check(points, 7)
+    check(points[:3], 1, box=np.ones(8), periodic=[True, True] + [False] * 6)
+
+
+@given(
+    st.lists(st.tuples(*[st.integers(-6, 6)] * 2), max_size=30),
+    st.integers(1, 12),
+    st.sampled_from([None, [3.0, 4.0], [[2.0, 0.0], [5.0, 3.0]], [[3.0, 1.0], [-1.0, 3.0]]]),
+    st.sampled_from([math.inf, 0.0, 1.0, 2.5, math.sqrt(8.0)]),
+    st.booleans(),
+)
+def test_small_integers(places, k, box, max_distance, asks):
+    points = np.array(places, float).reshape(-1, 2) * 0.5
+    queries = {"queries": points[::3] + 0.25} if asks else {}
+    check(points, k, box=box, max_distance=max_distance, **queries)
+
+
+# ---- larger scenes -------------------------------------------------------------------------
+
+
+def scenes_of_all_densities(rng, n):
+    two = rng.random((n, 3))
+    two[n // 2 :] += 1e9
+    outlier = rng.random((n, 3))
+    outlier[5] = 1e300
+    tiny = rng.random((n, 3)) * 2.0**-500
+    tiny[5] = 1e300
+    return {
+        "even": rng.random((n, 3)),
+        "two clusters": two,
+        "lognormal": rng.lognormal(0.0, 3.0, (n, 3)),
+        "plane": np.c_[rng.random((n, 2)), np.zeros(n)],
+        "line": np.c_[rng.random(n), np.zeros((n, 2))],
+        "outlier": outlier,
+        "tiny beside an outlier": tiny,
+    }
+
+
+def test_distances_are_those_of_a_tree(rng, kernel):
+    for name, points in scenes_of_all_densities(rng, 4000).items():
+        j, d = hs.nearest(points, 9, kernel=kernel)
+        rest = np.abs(points).max(axis=1) < 1e200
+        near = points[rest]
+        unit = 2.0**-500 if name.startswith("tiny") else 1.0  # the tree squares
+        expected = cKDTree(near / unit).query(near / unit, 10)[0][:, 1:] * unit
+        # Each coordinate is exact; the tree's distances have a few roundings.
+        np.testing.assert_allclose(d[rest], expected, rtol=1e-14, err_msg=name)
+        assert (j >= 0).all() and (j != np.arange(len(points))[:, None]).all()
+
+
+def test_distances_are_those_of_a_periodic_tree(rng, kernel):
+    points = rng.random((4000, 3))
+    d = hs.nearest(points, 9, box=np.ones(3), quantities="d", kernel=kernel)
+    expected = cKDTree(points, boxsize=1.0).query(points, 10)[0][:, 1:]
+    np.testing.assert_allclose(d, expected, rtol=1e-12)
+
+
+def test_many_neighbours(rng, kernel):
+    points = rng.random((3000, 3))
+    for k in (100, 700, 2999, 3100):
+        j, d = hs.nearest(points[:], k, queries=points[:20], kernel=kernel)
+        expected, numbers = cKDTree(points).query(points[:20], min(k, 3000))
+        np.testing.assert_allclose(d[:, :3000], expected, rtol=1e-14)
+        assert np.array_equal(j[:, :3000], numbers) and (j[:, 3000:] == -1).all()
+
+
+def test_rows_agree_with_the_pairs_within_their_distance(rng):
+    points, box = rng.random((500, 3)), random_box(rng, "triclinic")
+    j, d, S = hs.nearest(points, 10, box=box, quantities="jdS", max_distance=0.15)
+    i, other, distance, shift = hs.pairs(points, 0.15, box=box, quantities="ijdS")
+    found = {(a, b, *s): x for a, b, s, x in zip(i, other, map(tuple, shift), distance)}
+    for a, row in enumerate(j):
+        for b, s, x in zip(row, S[a], d[a]):
+            if b >= 0:
+                key = (a, b, *s) if (a, b, *s) in found else (b, a, *-s)
+                assert found[key] == x
+    counts = np.bincount(np.concatenate([i, other]), minlength=500)
+    assert np.array_equal((j >= 0).sum(axis=1), np.minimum(counts, 10))
+
+
+def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
+    points, box = rng.random((6000, 3)), random_box(rng, "rotated")
+    points[:500] = np.round(points[:500], 1)
+    one = hs.nearest(points, 12, box=box, quantities="jdDS", kernel="scalar", threads=1)
+    for name in hs.kernels():
+        for threads in (1, 2, 3):
+            other = hs.nearest(
+                points, 12, box=box, quantities="jdDS", kernel=name, threads=threads
+            )
+            assert same_arrays(one, other)
+
+
+def test_cost_follows_the_points_not_their_distances(rng):
+    # n^2 would be 1e10 distances, and minutes.
+    n = 100_000
+    same = np.ones((n, 3))
+    j, d = hs.nearest(same, 3)
+    assert np.array_equal(j[3:], np.broadcast_to([0, 1, 2], (n - 3, 3))) and not d.any()
+    for points in scenes_of_all_densities(rng, n).values():
+        assert (hs.nearest(points, 3, quantities="j") >= 0).all()
+
+
+# ---- forms and errors ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ndim", [1, 3, 8])
+def test_empty_inputs(ndim):
+    none, some = np.empty((0, ndim)), np.ones((4, ndim))
+    for box in (None, np.ones(ndim)):
+        j, d, D, S = hs.nearest(none, 3, box=box, quantities="jdDS")
+        assert j.shape == d.shape == (0, 3) and D.shape == S.shape == (0, 3, ndim)
+        j, d, D, S = hs.nearest(none, 3, queries=some, box=box, quantities="jdDS")
+        assert (j == -1).all() and (d == np.inf).all() and np.isnan(D).all() and not S.any()
+        assert hs.nearest(some, 3, queries=none, box=box, quantities="S").shape == (0, 3, ndim)
+    assert hs.nearest(none, 2**56, quantities="D").shape == (0, 2**56, ndim)
+    assert hs.nearest([], 2)[0].shape == (0, 2)
+    assert hs.nearest(some, 2, queries=[])[0].shape == (0, 2)
+
+
+def test_quantities_and_types(rng):
+    points = rng.random((30, 3))
+    j, d = hs.nearest(points, 4)
+    assert j.dtype == np.int64 and d.dtype == np.float64
+    narrow = hs.nearest(points, 4, quantities="j", index_dtype=np.int32)
+    assert narrow.dtype == np.int32 and np.array_equal(narrow, j)
+    for letters in itertools.permutations("jdDS"):
+        arrays = hs.nearest(points, 4, quantities="".join(letters), box=np.ones(3))
+        assert [a.dtype.kind + str(a.ndim) for a in arrays] == [
+            {"j": "i2", "d": "f2", "D": "f3", "S": "i3"}[x] for x in letters
+        ]
+        assert all(a.flags.c_contiguous and a.flags.writeable for a in arrays)
+    assert np.array_equal(hs.nearest(points, np.int32(4), quantities="d"), d)
+
+
+def test_a_point_and_an_identical_query():
+    assert hs.nearest([[1.0], [2.0]], 1)[0].tolist() == [[1], [0]]
+    assert hs.nearest([[1.0], [2.0]], 1, queries=[[2.0]])[0].tolist() == [[1]]
+
+
+@pytest.mark.parametrize(
+    ("error", "match", "how"),
+    [
+        (ValueError, "k must be 1 or more, got 0", {"k": 0}),
+        (ValueError, "k must be 1 or more", {"k": -3}),
+        (TypeError, "k must be a whole number", {"k": 2.0}),
+        (TypeError, "k must be a whole number", {"k": True}),
+        (TypeError, "k must be a whole number", {"k": "3"}),
+        (TypeError, "k must be a whole number", {"k": None}),
+        (MemoryError, "would not fit", {"k": 2**56}),
+        (MemoryError, "more than any memory", {"k": 2**60}),
+        (MemoryError, "more than any memory", {"k": 2**70}),
+        (ValueError, "max_distance must not be negative", {"max_distance": -1.0}),
+        (ValueError, "max_distance must not be negative or NaN", {"max_distance": math.nan}),
+        (TypeError, "max_distance must be a number", {"max_distance": [1.0, 2.0]}),
+        (TypeError, "max_distance must be a number", {"max_distance": "1"}),
+        (ValueError, "same number of columns", {"queries": [[1.0, 2.0, 3.0]]}),
+        (ValueError, r"queries must have shape \(n, d\)", {"queries": [1.0, 2.0]}),
+        (ValueError, r"queries\[1, 0\] = nan", {"queries": [[1.0, 2.0], [math.nan, 0.0]]}),
+        (TypeError, "queries must hold real numbers", {"queries": [[1j, 2.0]]}),
+        (ValueError, "j d D S", {"quantities": "ij"}),
+        (ValueError, "j d D S", {"quantities": "P"}),
+        (ValueError, "quantities must be", {"quantities": "jj"}),
+        (ValueError, "quantities must be", {"quantities": ""}),
+        (TypeError, "quantities must be a string", {"quantities": 3}),
+        (ValueError, "kernel must be one of", {"kernel": "none"}),
+        (ValueError, "threads", {"threads": 0}),
+        (ValueError, "periodic needs a box", {"periodic": True}),
+        (ValueError, "box must have shape", {"box": [1.0, 2.0, 3.0]}),
+        (ValueError, "linearly independent", {"box": [[1.0, 0.0], [2.0, 0.0]]}),
+        (ValueError, "index_dtype", {"index_dtype": np.uint64}),
+        (MemoryError, "would not fit", {"memory_limit": 10.0}),
+    ],
+)
+def test_bad_arguments(error, match, how):
+    arguments = {"k": 2, **how}
+    with pytest.raises(error, match=match):
+        hs.nearest([[0.0, 0.0], [1.0, 0.0]], **arguments)
+
+
+def test_shifts_that_do_not_fit_are_refused():
+    far = [[2.0**40, 0.0], [0.0, 0.0]]
+    assert hs.nearest(far, 1, box=[1.0, 1.0])[1].tolist() == [[0.0], [0.0]]
+    with pytest.raises(OverflowError, match=r"points\["):
+        hs.nearest(far, 1, box=[1.0, 1.0], quantities="S")
+    with pytest.raises(OverflowError, match=r"queries\[0\]"):
+        hs.nearest(far[1:], 1, queries=far[:1], box=[1.0, 1.0], quantities="S")
+
+
+def test_more_images_than_memory_are_refused():
+    with pytest.raises(MemoryError, match="images"):
+        hs.nearest([[0.0, 0.0]], 1, queries=[[0.0, 1e300]], box=[1.0, 1.0], periodic=[True, False])
+    # Memory would do, but not the time: some 1e8 images are about as near.
+    with pytest.raises(MemoryError, match="images"):
+        hs.nearest(
+            np.zeros((2, 3)), 1, queries=[[0.0, 0.0, 1e10]], box=np.ones(3),
+            periodic=[True, True, False],
+        )  # fmt: skip
+
+
+def test_inputs_are_left_alone(rng):
+    points = rng.random((40, 3)) * 3.0 - 1.0  # to be wrapped
+    queries, box = points[::2] + 5.0, np.ones(3)
+    before = [a.copy() for a in (points, queries, box)]
+    results = hs.nearest(points, 3, queries=queries, box=box, quantities="jdDS")
+    for array, copy in zip((points, queries, box), before):
+        assert array.tobytes() == copy.tobytes()
+        array.flags.writeable = False
+    again = hs.nearest(points, 3, queries=queries, box=box, quantities="jdDS")
+    for first, found in zip(results, again):
+        assert first.tobytes() == found.tobytes()
+        assert not any(np.shares_memory(found, array) for array in (points, queries, box))

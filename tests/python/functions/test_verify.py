@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The verdict on a list, whoever made it."""
+
+import numpy as np
+import pytest
+from ase import Atoms
+from ase.neighborlist import neighbor_list
+from hypothesis import given
+from scipy.spatial import cKDTree
+
+import halfshell as hs
+from halfshell._check.reference import reference_pairs
+from oracles import lattice, random_scene, rotation
+from scene_strategies import scenes
+
+
+@pytest.fixture
+def scene(rng):
+    points, cutoff, box, _ = random_scene(rng, 60, neighbours=12, spread=2)
+    return points, cutoff, box
+
+
+def listed(scene, **how):
+    points, cutoff, box = scene
+    return hs.pairs(points, cutoff, box=box, quantities="ijS", **how)
+
+
+def doubled(i, j, S):
+    return np.concatenate([i, j]), np.concatenate([j, i]), np.concatenate([S, -S])
+
+
+def rows(array):
+    return [tuple(row) for row in array.tolist()]
+
+
+def test_a_right_list_is_right(scene):
+    points, cutoff, box = scene
+    verdict = hs.verify(points, cutoff, *listed(scene), box=box)
+    assert verdict.ok and verdict
+    for part in (verdict.missed, verdict.spurious, verdict.duplicate):
+        assert part.dtype == np.int64 and part.shape == (0, 5)
+
+
+@given(scenes())
+def test_the_list_of_the_definition_is_right(scene):
+    pairs = reference_pairs(scene.points, scene.cutoff, scene.box, scene.periodic, scene.inclusive)
+    i = np.array([p[0] for p in pairs], int)
+    j = np.array([p[1] for p in pairs], int)
+    S = np.array([p[2] for p in pairs], int).reshape(-1, scene.points.shape[1])
+    how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
+    assert hs.verify(scene.points, scene.cutoff, i, j, S, **how).ok
+    assert hs.verify(scene.points, scene.cutoff, *doubled(i, j, S), full=True, **how).ok
+    if pairs:
+        verdict = hs.verify(scene.points, scene.cutoff, i[1:], j[1:], S[1:], **how)
+        assert not verdict.ok
+        assert rows(verdict.missed) == [(i[0], j[0], *S[0].tolist())]
+        assert not len(verdict.spurious) and not len(verdict.duplicate)
+
+
+def test_a_missed_pair_is_named(scene):
+    points, cutoff, box = scene
+    i, j, S = listed(scene)
+    keep = np.arange(len(i)) != 7
+    verdict = hs.verify(points, cutoff, i[keep], j[keep], S[keep], box=box)
+    assert not verdict.ok and not verdict
+    assert rows(verdict.missed) == [(i[7], j[7], *S[7].tolist())]
+    assert len(verdict.spurious) == len(verdict.duplicate) == 0
+
+
+def test_a_spurious_pair_is_named(scene):
+    points, cutoff, box = scene
+    i, j, S = listed(scene)
+    more = np.append(i, 3), np.append(j, 5), np.append(S, [[9, 0, 0]], axis=0)
+    verdict = hs.verify(points, cutoff, *more, box=box)
+    assert rows(verdict.spurious) == [(3, 5, 9, 0, 0)]
+    assert len(verdict.missed) == len(verdict.duplicate) == 0
+
+
+def test_a_pair_listed_twice_is_a_duplicate_in_either_direction(scene):
+    points, cutoff, box = scene
+    i, j, S = listed(scene)
+    for a, b, sign in ((i[4], j[4], 1), (j[4], i[4], -1)):
+        more = np.append(i, a), np.append(j, b), np.append(S, sign * S[4:5], axis=0)
+        verdict = hs.verify(points, cutoff, *more, box=box)
+        assert rows(verdict.duplicate) == [(i[4], j[4], *S[4].tolist())]
+        assert len(verdict.missed) == len(verdict.spurious) == 0
+
+
+def test_all_three_at_once(scene):
+    points, cutoff, box = scene
+    i, j, S = (x[2:] for x in listed(scene))
+    more = np.append(i, [i[5], 0]), np.append(j, [j[5], 1]), np.append(S, [S[5], [8, 8, 8]], axis=0)
+    verdict = hs.verify(points, cutoff, *more, box=box)
+    assert (len(verdict.missed), len(verdict.spurious), len(verdict.duplicate)) == (2, 1, 1)
+    assert not verdict
+    assert "missed" in str(verdict) and "spurious" in str(verdict) and "duplicate" in str(verdict)
+
+
+def test_order_and_orientation_do_not_matter(scene, rng):
+    points, cutoff, box = scene
+    i, j, S = listed(scene)
+    order = rng.permutation(len(i))
+    turn = rng.random(len(i)) < 0.5
+    a, b = np.where(turn, j, i)[order], np.where(turn, i, j)[order]
+    T = np.where(turn[:, None], -S, S)[order]
+    assert hs.verify(points, cutoff, a, b, T, box=box).ok
+
+
+def test_full_lists(scene):
+    points, cutoff, box = scene
+    i, j, S = listed(scene)
+    assert hs.verify(points, cutoff, *doubled(i, j, S), box=box, full=True).ok
+    assert len(hs.verify(points, cutoff, i, j, S, box=box, full=True).missed) == len(i)
+    half = hs.verify(points, cutoff, *doubled(i, j, S), box=box)
+    assert len(half.duplicate) == len(i)
+
+
+def test_a_point_as_its_own_neighbour_is_spurious():
+    points = [[0.0, 0.0], [1.0, 0.0]]
+    verdict = hs.verify(points, 1.0, [0, 0], [1, 0])
+    assert len(verdict.spurious) == 1
+    verdict = hs.verify(points, 1.0, [0, 0], [1, 0], [[0, 0], [0, 0]])
+    assert rows(verdict.spurious) == [(0, 0, 0, 0)]
+    verdict = hs.verify(points, 1.0, [0, 1], [1, 1], [[0, 0], [0, 0]], box=[9.0, 9.0])
+    assert rows(verdict.spurious) == [(1, 1, 0, 0)]
+
+
+def test_shifts_in_open_space_and_on_open_axes_are_spurious():
+    # Whatever their length comes to: there is no such image.
+    points = [[0.0, 0.0], [1.0, 0.0]]
+    verdict = hs.verify(points, 2.0, [0, 0], [1, 1], [[0, 0], [1, 0]])
+    assert rows(verdict.spurious) == [(0, 1, 1, 0)]
+    box = [[0.5, 0.0], [0.0, 10.0]]
+    verdict = hs.verify(
+        points, 1.0, [0, 0], [1, 1], [[0, 0], [-1, 0]], box=box, periodic=[False, True]
+    )
+    assert rows(verdict.spurious) == [(0, 1, -1, 0)]
+    assert not len(verdict.missed)
+
+
+def test_lists_without_shifts(rng):
+    points = rng.random((200, 3))
+    theirs = cKDTree(points).query_pairs(0.2, output_type="ndarray")
+    assert hs.verify(points, 0.2, theirs[:, 0], theirs[:, 1]).ok
+    assert len(hs.verify(points, 0.2, theirs[1:, 0], theirs[1:, 1]).missed) == 1
+    boxed = cKDTree(points, boxsize=1.0).query_pairs(0.2, output_type="ndarray")
+    assert hs.verify(points, 0.2, boxed[:, 0], boxed[:, 1], box=[1.0] * 3).ok
+
+
+def test_without_shifts_images_are_told_apart_by_their_number():
+    points, box = [[0.0, 0.0], [0.5, 0.0]], [1.0, 10.0]
+    assert hs.verify(points, 0.5, [0, 0], [1, 1], box=box).ok
+    assert not hs.verify(points, 0.5, [0], [1], box=box).ok
+    assert len(hs.verify(points, 0.5, [0, 0, 0], [1, 1, 1], box=box).duplicate) == 1
+
+
+def test_the_rule_at_the_cutoff_is_that_of_the_list():
+    points, box = lattice("sc", (3, 3, 3))
+    closed = hs.pairs(points, 1.0, box=box, quantities="ijS")
+    assert hs.verify(points, 1.0, *closed, box=box).ok
+    verdict = hs.verify(points, 1.0, *closed, box=box, inclusive=False)
+    assert len(verdict.spurious) == len(closed[0]) == 81
+    nothing = np.empty((0, 3), int)
+    assert hs.verify(points, 1.0, [], [], nothing, box=box, inclusive=False).ok
+
+
+def test_the_list_of_ase(rng):
+    points, cutoff, box, _ = random_scene(rng, 40, neighbours=20)
+    atoms = Atoms("H40", positions=points, cell=box, pbc=True)
+    found = neighbor_list("ijS", atoms, cutoff)
+    assert hs.verify(points, cutoff, *found, box=box, inclusive=False, full=True).ok
+    assert hs.verify(atoms, cutoff, *found, inclusive=False, full=True).ok
+
+
+def test_a_rounded_list_of_a_rotated_crystal_is_found_out(rng):
+    points, _ = lattice("sc", (6, 6, 6))
+    points = points @ rotation(rng)
+    theirs = cKDTree(points).query_pairs(1.0, output_type="ndarray")
+    ours = hs.pairs(points, 1.0, quantities="P")
+    verdict = hs.verify(points, 1.0, *theirs.T)
+    one, other = set(map(tuple, ours.tolist())), set(map(tuple, theirs.tolist()))
+    assert set(rows(verdict.missed)) == one - other
+    assert set(rows(verdict.spurious)) == other - one
+    assert not verdict.ok
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.uint64, np.uint32, np.int8])
+def test_every_integer_type_of_index(dtype, rng):
+    points = rng.random((30, 3))
+    i, j = hs.pairs(points, 0.4)
+    assert hs.verify(points, 0.4, i.astype(dtype), j.astype(dtype)).ok
+    assert hs.verify(points, 0.4, i.tolist(), j.tolist()).ok
+
+
+def test_nothing_to_verify():
+    assert hs.verify(np.empty((0, 3)), 1.0, [], []).ok
+    assert hs.verify(np.zeros((1, 3)), 1.0, [], []).ok
+    assert not hs.verify(np.zeros((2, 3)), 1.0, [], []).ok
+
+
+POINTS = np.arange(12.0).reshape(4, 3)
+BAD = [
+    ({"i": [0], "j": [4]}, ValueError, "j"),
+    ({"i": [-1], "j": [1]}, ValueError, "i"),
+    ({"i": [0, 1], "j": [1]}, ValueError, "i and j|length"),
+    ({"i": [[0]], "j": [[1]]}, ValueError, "i.*shape"),
+    ({"i": [0.5], "j": [1]}, TypeError, "i"),
+    ({"i": ["0"], "j": [1]}, TypeError, "i"),
+    ({"i": [0], "j": [1], "S": [[0, 0]]}, ValueError, "S"),
+    ({"i": [0], "j": [1], "S": [0, 0, 0]}, ValueError, "S"),
+    ({"i": [0], "j": [1], "S": [[0.5, 0, 0]]}, TypeError, "S"),
+    ({"i": [2**63], "j": [1]}, ValueError, "i"),
+    ({"i": [0], "j": [1], "cutoff": -1.0}, ValueError, "cutoff"),
+    ({"i": [0], "j": [1], "points": "x"}, TypeError, "points"),
+]
+
+
+@pytest.mark.parametrize("change, exception, fragment", BAD)
+def test_bad_lists(change, exception, fragment):
+    arguments = {"points": POINTS, "cutoff": 1.0, **change}
+    with pytest.raises(exception, match=fragment):
+        hs.verify(**arguments)
+
+
+def test_pairs_without_points():
+    with pytest.raises(ValueError, match=r"^i must be empty: there are no points$"):
+        hs.verify([], 1.0, [0], [1])
+
+
+# Tables -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("quantities", ["j", "jS", "dSj"])
+def test_a_table_of_neighbours_is_a_full_list(scene, quantities):
+    points, cutoff, box = scene
+    table = hs.neighbors(points, cutoff, box=box, quantities=quantities)
+    verdict = hs.verify(points, cutoff, table, box=box)
+    assert verdict and verdict.n_given == table.n_entries == 2 * len(listed(scene)[0])
+    mask = np.ones(table.n_entries, bool)
+    mask[[0, 5]] = False
+    verdict = hs.verify(points, cutoff, table.filter(mask), box=box)
+    left_out = np.stack(table.to_pairs(), axis=1)[~mask]
+    assert not verdict and sorted(rows(verdict.missed[:, :2])) == sorted(rows(left_out))
+
+
+@pytest.mark.parametrize("quantities", ["j", "jS"])
+def test_lists_and_tables_of_two_sets(scene, rng, quantities):
+    points, cutoff, box = scene
+    queries = points[:7].astype(np.float32)
+    table = hs.neighbors(points, cutoff, queries=queries, box=box, quantities=quantities)
+    assert hs.verify(points, cutoff, table, queries=queries, box=box)
+    found = hs.pairs_between(queries, points, cutoff, box=box, quantities="ijS")
+    assert len(found[0]) == table.n_entries > 7
+    order = rng.permutation(len(found[0]))
+    i, j, S = (column[order] for column in found)
+    assert hs.verify(points, cutoff, i, j, S, queries=queries, box=box)
+    verdict = hs.verify(points, cutoff, i[1:], j[1:], S[1:], queries=queries, box=box)
+    assert rows(verdict.missed) == [(i[0], j[0], *S[0].tolist())]
+    assert not len(verdict.spurious)
+    swapped = hs.verify(points, cutoff, j, i % 7, S, queries=points, box=box)
+    assert len(swapped.missed) and swapped.n_expected > len(i)
+
+
+def test_a_query_on_a_point_is_its_neighbour():
+    points = [[0.0], [1.0]]
+    assert hs.verify(points, 0.0, [0, 1], [0, 1], queries=points)
+    verdict = hs.verify(points, 0.0, [0, 0], [0, 1], queries=points)
+    assert rows(verdict.missed) == [(1, 1)] and rows(verdict.spurious) == [(0, 1)]
+
+
+TABLE = hs.neighbors([[0.0], [1.0], [3.0]], 2.0)
+OF_QUERIES = hs.neighbors([[0.0], [1.0], [3.0]], 2.0, queries=[[0.0], [1.0]])
+
+
+@pytest.mark.parametrize(
+    ("how", "exception", "fragment"),
+    [
+        ({"i": TABLE, "j": [0]}, TypeError, "leave j, S and full out"),
+        ({"i": TABLE, "S": [[0]]}, TypeError, "leave j, S and full out"),
+        ({"i": TABLE, "full": True}, TypeError, "leave j, S and full out"),
+        ({"i": TABLE, "points": [[0.0]]}, ValueError, "table of 3 points, got 1 points"),
+        ({"i": OF_QUERIES}, ValueError, "rows of this one are of queries"),
+        ({"i": TABLE[:2]}, ValueError, "rows of this one are of queries"),
+        ({"i": OF_QUERIES, "queries": [[0.0]]}, ValueError, "table of 2 rows, got 1 queries"),
+        ({"i": [0]}, TypeError, "j must be given"),
+        ({"i": [0], "j": [0], "queries": [[0.0]], "full": True}, ValueError, "full is about"),
+        ({"i": [1], "j": [0], "queries": [[0.0]]}, ValueError, "i must be numbers of queries"),
+        ({"i": [0], "j": [0], "queries": []}, ValueError, "there are no queries"),
+        ({"i": hs.neighbors([[0.0], [1.0], [3.0]], 2.0, quantities="d")}, AttributeError, "'j'"),
+    ],
+)
+def test_bad_tables_and_sets(how, exception, fragment):
+    with pytest.raises(exception, match=fragment):
+        hs.verify(**{"points": [[0.0], [1.0], [3.0]], "cutoff": 2.0, **how})

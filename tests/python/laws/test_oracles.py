@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The oracles agree with each other and with cases that can be worked out by hand."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from halfshell._check.reference import exact_square, exact_vector, reference_pairs, ulp_error
+from oracles import (
+    BOX_KINDS,
+    EXACT_ROTATION,
+    as_integers,
+    exact_pairs,
+    lattice,
+    random_scene,
+    within_exactly,
+)
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_two_independent_oracles_agree(kind, ndim, rng):
+    for neighbours in (0.5, 4, 30):
+        n = int(rng.integers(1, 14))
+        flags = rng.random(ndim) < 0.7
+        points, cutoff, box, flags = random_scene(
+            rng, n, ndim, kind, neighbours, spread=3, periodic=flags
+        )
+        expected = [(i, j, *S) for i, j, S in reference_pairs(points, cutoff, box, flags)]
+        found = exact_pairs(points, cutoff, box, flags)
+        assert [tuple(row) for row in found.tolist()] == expected
+
+
+def test_two_independent_oracles_agree_on_ties():
+    points, box = lattice("fcc", (2, 2, 1))
+    for inclusive in (True, False):
+        expected = [(i, j, *S) for i, j, S in reference_pairs(points, 2.0, box, None, inclusive)]
+        found = exact_pairs(points, 2.0, box, None, inclusive)
+        assert [tuple(row) for row in found.tolist()] == expected
+
+
+def test_reference_equals_blind_enumeration(rng):
+    # Nothing clever: every shift in a range that is obviously large enough.
+    shifts = np.array(list(itertools.product(range(-40, 41), repeat=2)))
+    for _ in range(20):
+        box = np.array([[2, 0], [int(rng.integers(-6, 7)), 1]])
+        points = rng.integers(-3, 4, (4, 2))
+        cutoff = float(rng.integers(0, 5))
+        expected = []
+        for i, j in itertools.combinations_with_replacement(range(4), 2):
+            D = points[j] - points[i] + shifts @ box
+            near = map(tuple, shifts[(D * D).sum(axis=1) <= cutoff**2].tolist())
+            expected += [(i, j, S) for S in near if i < j or S > (0, 0)]
+        assert reference_pairs(points, cutoff, box) == sorted(expected)
+
+
+def test_reference_counts_integer_vectors_in_a_ball():
+    for cutoff in (1, 2, 3, 5):
+        inside = sum(
+            0 < a * a + b * b + c * c <= cutoff * cutoff
+            for a, b, c in itertools.product(range(-cutoff, cutoff + 1), repeat=3)
+        )
+        assert len(reference_pairs([[7.0, -2.0, 0.5]], cutoff, box=[1, 1, 1])) == inside // 2
+
+
+def test_reference_ignores_how_the_lattice_is_written(rng):
+    points = rng.integers(-64, 64, (5, 3)) / 16
+    plain = np.diag([2.0, 3.0, 2.5])
+    change = np.array([[1, 0, 0], [900, 1, 0], [-77, 1000, 1]])  # determinant 1
+    expected = {
+        (i, j, tuple(np.array(S) @ change))
+        for i, j, S in reference_pairs(points, 3, change @ plain)
+    }
+    found = {(i, j, S) for i, j, S in reference_pairs(points, 3, plain) if i < j}
+    assert {pair for pair in expected if pair[0] < pair[1]} == found
+
+
+def test_reference_refuses_dependent_rows():
+    with pytest.raises(ValueError, match="dependent"):
+        reference_pairs([[0.0, 0.0]], 1.0, box=[[1.0, 2.0], [2.0, 4.0]])
+    assert (
+        reference_pairs([[0.0, 0.0]], 1.0, box=[[1.0, 2.0], [0, 0]], periodic=[True, False]) == []
+    )
+
+
+def test_exact_helpers():
+    points = [[0.1, 0.2], [0.3, 0.7]]
+    assert exact_vector(points, 0, 1)[0] == Fraction(0.3) - Fraction(0.1)
+    assert exact_square(points, 0, 1, (1, 0), [[0.5, 0], [0, 0]]) == (
+        (Fraction(0.3) - Fraction(0.1) + Fraction(0.5)) ** 2 + (Fraction(0.7) - Fraction(0.2)) ** 2
+    )
+    assert ulp_error(0.0, Fraction(0)) == 0
+    for value in (1.0, 3.5, 1e-300, 1e300, 5e-324):
+        assert ulp_error(value, Fraction(value) ** 2) < Fraction(1, 2**60)
+        above = math.nextafter(value, math.inf)
+        assert abs(ulp_error(above, Fraction(value) ** 2) - 1) < Fraction(1, 2**60)
+
+
+def test_integers_keep_the_exact_values(rng):
+    values = np.concatenate(
+        [rng.normal(size=20), [0.0, -0.0, 5e-324, 1e-310, 1e300, -3.0, 2.0**70]]
+    )
+    (whole,) = as_integers(values)
+    unit = Fraction(5e-324)
+    assert [Fraction(x) * unit for x in whole] == [Fraction(x) for x in values.tolist()]
+
+
+def test_integers_decide_as_the_definition(rng):
+    points = rng.integers(-8, 8, (20, 3)) / 3
+    i, j = np.triu_indices(20, 1)
+    S = rng.integers(-2, 3, (len(i), 2))
+    box = rng.normal(size=(2, 3))
+    full = np.concatenate([box, np.zeros((1, 3))])
+    for inclusive in (True, False):
+        found = within_exactly(points, 2.5, i, j, S, box, inclusive)
+        for k in range(len(i)):
+            square = exact_square(points, i[k], j[k], (*S[k].tolist(), 0), full)
+            assert found[k] == (square < 6.25 or (inclusive and square == 6.25))
+
+
+def test_exact_rotation_is_a_rotation():
+    assert (EXACT_ROTATION @ EXACT_ROTATION.T == 9 * np.eye(3)).all()

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Equality with the libraries people use today, on generic points; where a peer errs, on
+ties, the test proves by rational numbers that every difference is the peer's."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from ase import Atoms
+from ase.build import bulk
+from ase.neighborlist import neighbor_list
+from scipy.spatial import cKDTree
+
+import halfshell as hs
+from halfshell._check.reference import exact_square
+from oracles import BOX_KINDS, as_set, lattice, random_box, random_scene, rotation
+
+pytestmark = pytest.mark.slow
+
+
+def half(i, j, S):
+    """The half list of a full list (i, j, S)."""
+    full = as_set(i, j, S)
+    zero = (0,) * len(S[0]) if len(S) else ()
+    found = {(a, b, s) for a, b, s in full if a < b or (a == b and s > zero)}
+    assert 2 * len(found) == len(full)
+    return found
+
+
+def assert_differences_are_theirs(ours, theirs, points, cutoff, box=None, inclusive=True):
+    """Prove in rational arithmetic that ours is right wherever the two differ."""
+    limit = Fraction(cutoff) ** 2
+    for i, j, S in ours ^ theirs:
+        square = exact_square(points, i, j, S or None, box)
+        right = square < limit or (inclusive and square == limit)
+        assert right == ((i, j, S) in ours), (i, j, S)
+    return len(ours ^ theirs)
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3, 6])
+def test_equals_ckdtree_in_open_space(ndim, rng):
+    for n in (2, 50, 800):
+        points = rng.normal(size=(n, ndim))
+        for cutoff in (0.02, 0.3, 1.0):
+            theirs = cKDTree(points).query_pairs(cutoff, output_type="ndarray")
+            ours = as_set(*hs.pairs(points, cutoff))
+            assert_differences_are_theirs(ours, as_set(*theirs.T), points, cutoff)
+            assert hs.count_pairs(points, cutoff) == len(ours)
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_equals_ckdtree_with_boxsize(ndim, rng):
+    lengths = rng.uniform(0.7, 1.4, ndim)
+    for n in (2, 60, 700):
+        points = rng.random((n, ndim)) * lengths
+        for cutoff in (0.01, 0.1, 0.34):
+            theirs = cKDTree(points, boxsize=lengths).query_pairs(cutoff, output_type="ndarray")
+            i, j, S = hs.pairs(points, cutoff, box=lengths, quantities="ijS")
+            assert as_set(i, j) == as_set(*theirs.T)
+            D = points[j] - points[i] + S * lengths
+            assert (np.linalg.norm(D, axis=1) <= cutoff * (1 + 1e-12)).all()
+
+
+def test_equals_ckdtree_with_some_open_axes(rng):
+    points = rng.random((400, 3))
+    tree = cKDTree(points, boxsize=[1.0, 0.0, 1.0])
+    theirs = tree.query_pairs(0.2, output_type="ndarray")
+    ours = as_set(*hs.pairs(points, 0.2, box=[1.0, 0.0, 1.0], periodic=[True, False, True]))
+    assert ours == as_set(*theirs.T)
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+@pytest.mark.parametrize("flags", list(itertools.product([False, True], repeat=3)))
+def test_equals_ase(kind, flags, rng):
+    sizes = ((1, 8), (2, 20), (30, 12)) if kind == "sheared" else ((1, 30), (2, 100), (60, 12))
+    for n, neighbours in sizes:
+        points, cutoff, box, flags = random_scene(
+            rng, n, 3, kind, neighbours, spread=2, periodic=flags
+        )
+        atoms = Atoms(f"H{n}", positions=points, cell=box, pbc=flags)
+        theirs = half(*neighbor_list("ijS", atoms, cutoff))
+        ours = as_set(
+            *hs.pairs(points, cutoff, box=box, periodic=flags, quantities="ijS", inclusive=False)
+        )
+        assert ours == theirs
+
+
+def test_equals_ase_in_cells_much_smaller_than_the_cutoff(rng):
+    for kind in BOX_KINDS:
+        box = random_box(rng, kind)
+        points = rng.random((2, 3)) @ box
+        atoms = Atoms("H2", positions=points, cell=box, pbc=True)
+        theirs = half(*neighbor_list("ijS", atoms, 3.3))
+        found = hs.pairs(points, 3.3, box=box, quantities="ijS", inclusive=False)
+        assert as_set(*found) == theirs
+
+
+def test_ase_atoms_are_understood(rng):
+    atoms = bulk("Cu", cubic=True).repeat((2, 2, 1))
+    atoms.rattle(0.1, seed=1)
+    i, j, S, d, D = hs.pairs(atoms, 3.0, quantities="ijSdD", inclusive=False)
+    assert as_set(i, j, S) == half(*neighbor_list("ijS", atoms, 3.0))
+    table = dict(zip(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())), zip(d, D)))
+    for a, b, s, theirs, vector in zip(*neighbor_list("ijSdD", atoms, 3.0)):
+        if (a, b, tuple(s)) in table:
+            distance, ours = table[a, b, tuple(s)]
+            assert math.isclose(distance, theirs, rel_tol=1e-12)
+            assert np.allclose(ours, vector, rtol=0, atol=1e-12)
+
+
+def test_ase_atoms_with_mixed_and_without_periodicity():
+    atoms = bulk("Cu", cubic=True).repeat((2, 2, 2))
+    for pbc in (False, True, (True, False, True)):
+        atoms.pbc = pbc
+        found = hs.pairs(atoms, 2.7, quantities="ijS", inclusive=False)
+        assert as_set(*found) == half(*neighbor_list("ijS", atoms, 2.7))
+    molecule = Atoms("H2", positions=[[0, 0, 0], [0, 0, 0.75]])
+    assert as_set(*hs.pairs(molecule, 0.75)) == {(0, 1, ())}
+
+
+# ---- where peers err: kept as proof of why the decision is exact ---------------------------
+
+
+def test_where_ckdtree_errs_on_a_rotated_lattice_the_rationals_are_with_us(rng):
+    points, _ = lattice("sc", (7, 7, 7))
+    points = points @ rotation(rng)
+    differences = 0
+    for cutoff in (1.0, math.sqrt(2.0), math.sqrt(3.0), 2.0, math.sqrt(5.0), 3.0):
+        theirs = as_set(*cKDTree(points).query_pairs(cutoff, output_type="ndarray").T)
+        ours = as_set(*hs.pairs(points, cutoff))
+        differences += assert_differences_are_theirs(ours, theirs, points, cutoff)
+    assert differences > 0  # a whole shell lies within an ulp of each cutoff
+
+
+def test_where_ase_errs_on_a_rotated_lattice_the_rationals_are_with_us(rng):
+    points, box = lattice("fcc", (3, 3, 3))
+    turn = rotation(rng)
+    points, box = points @ turn, box @ turn
+    differences = 0
+    for cutoff in (math.sqrt(2.0), 2.0, math.sqrt(6.0)):
+        atoms = Atoms(f"H{len(points)}", positions=points, cell=box, pbc=True)
+        theirs = half(*neighbor_list("ijS", atoms, cutoff))
+        ours = as_set(*hs.pairs(points, cutoff, box=box, quantities="ijS", inclusive=False))
+        differences += assert_differences_are_theirs(
+            ours, theirs, points, cutoff, box, inclusive=False
+        )
+    assert differences > 0
+
+
+def test_where_plain_float64_errs_the_rationals_are_with_us(rng):
+    points, _ = lattice("bcc", (5, 5, 5))
+    points = points @ rotation(rng)
+    i, j = np.triu_indices(len(points), 1)
+    D = points[j] - points[i]
+    square = (D * D).sum(axis=1)
+    differences = 0
+    for cutoff in (math.sqrt(3.0), 2.0, math.sqrt(8.0), math.sqrt(11.0), 4.0):
+        near = square <= cutoff * cutoff
+        ours = as_set(*hs.pairs(points, cutoff))
+        differences += assert_differences_are_theirs(ours, as_set(i[near], j[near]), points, cutoff)
+    assert differences > 0

@@ -1,0 +1,450 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of neighbours: rows, and what they turn into."""
+
+import copy
+import itertools
+import pickle
+from functools import partial
+
+import numpy as np
+import pytest
+import scipy.sparse
+from ase.build import bulk
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+import halfshell as hs
+from full_lists import same_tables
+from oracles import as_rows, random_scene, same_arrays
+from refused_calls import assert_refused
+from scene_strategies import scenes
+
+POINTS = np.random.default_rng(47).random((30, 2)) * 4.0
+NAMES = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
+
+
+@pytest.fixture
+def table():
+    """Thirty points on a torus, each with several neighbours and no images."""
+    return hs.neighbors(POINTS, 1.0, box=[4.0, 4.0], quantities="jdDS")
+
+
+@pytest.fixture
+def tiny():
+    """Three points in a box so small that each meets many images of all."""
+    return hs.neighbors(POINTS[:3], 1.7, box=[1.0, 1.1], quantities="dSj")
+
+
+def with_queries(**how):
+    return hs.neighbors(POINTS, 1.0, queries=POINTS[:5] + 0.1, quantities="jdS", **how)
+
+
+def columns(table):
+    return [getattr(table, NAMES[letter]) for letter in table.quantities]
+
+
+# ---- rows ----------------------------------------------------------------------------------
+
+
+def test_facts(table):
+    assert table.n_rows == table.n_points == len(table) == 30
+    assert table.shape == (30, 30) and with_queries().shape == (5, 30)
+    assert table.n_entries == len(table.indices) == table.counts.sum() == table.offsets[-1]
+    assert table.counts.dtype == np.int64
+    assert repr(table) == f"NeighborTable(30 rows, {table.n_entries} entries, quantities 'jdDS')"
+
+
+def test_rows_are_views(table):
+    for k in (*range(30), -1, -30, np.int32(4), np.int64(-2)):
+        row = table[k]
+        first, end = table.offsets[k % 30 : k % 30 + 2]
+        assert len(row) == 4
+        for part, column in zip(row, columns(table)):
+            assert np.shares_memory(part, column) or len(part) == 0
+            assert not part.flags.writeable
+            assert np.array_equal(part, column[first:end])
+    bare = hs.neighbors(POINTS, 1.0)
+    assert isinstance(bare[3], np.ndarray) and bare[3].base is not None
+    assert bare[3].tolist() == sorted(bare[3].tolist())
+
+
+def test_iteration_goes_over_rows(table):
+    assert all(same_arrays(row, table[k]) for k, row in enumerate(table))
+    bare = hs.neighbors(POINTS, 1.0)
+    assert all(np.array_equal(row, bare[k]) for k, row in enumerate(bare))
+    assert len(list(table)) == 30
+
+
+@pytest.mark.parametrize("key", [30, -31, 10**30])
+def test_rows_that_are_not_there(table, key):
+    assert_refused(lambda: table[key], IndexError, "of a table of 30 rows")
+
+
+@pytest.mark.parametrize("key", [1.0, "1", None, (1, 2), [1], np.arange(2)])
+def test_rows_are_chosen_by_numbers(table, key):
+    assert_refused(lambda: table[key], TypeError, "whole number")
+
+
+@pytest.mark.parametrize("ends", [*itertools.product((None, 0, 7, -3, 30, 99), repeat=2)])
+def test_slices_are_tables(table, ends):
+    part = table[slice(*ends)]
+    numbers = range(30)[slice(*ends)]
+    assert len(part) == len(numbers) and part.n_points == 30
+    assert part.offsets[0] == 0 and part.n_entries == part.offsets[-1] == len(part.indices)
+    for k, number in enumerate(numbers):
+        assert same_arrays(part[k], table[number])
+    if part.n_entries:
+        assert np.shares_memory(part.distances, table.distances)
+    assert not part.offsets.flags.writeable and not part.indices.flags.writeable
+    again = part[1:]
+    assert len(again) == max(len(part) - 1, 0)
+
+
+def test_slices_follow_rows(table):
+    assert_refused(lambda: table[::2], ValueError, "step of 2")
+    assert_refused(lambda: table[::-1], ValueError, "step of -1")
+
+
+@pytest.mark.parametrize("letters", ["j", "d", "D", "S", "dS"])
+def test_what_was_not_asked_for_is_named(letters):
+    table = hs.neighbors(POINTS, 1.0, quantities=letters)
+    for letter, name in NAMES.items():
+        if letter in letters:
+            assert len(getattr(table, name)) == table.n_entries
+        else:
+            assert not hasattr(table, name)
+            assert_refused(
+                lambda name=name: getattr(table, name),
+                AttributeError, name, f"'{letter}' in quantities, got '{letters}'",
+            )  # fmt: skip
+
+
+def test_tables_do_not_change(table):
+    for name in ("offsets", "counts", "indices", "distances", "vectors", "shifts", "quantities"):
+        with pytest.raises(AttributeError):
+            setattr(table, name, None)
+        array = getattr(table, name)
+        assert isinstance(array, str) or not array.flags.writeable
+    with pytest.raises(AttributeError):
+        table.other = 1
+
+
+def test_copies_and_pickles(table):
+    for part in (table, table.filter(table.distances < 0.7), table[3:9], table.sort()):
+        for again in (pickle.loads(pickle.dumps(part)), copy.copy(part), copy.deepcopy(part)):
+            assert same_tables(part, again) and repr(again) == repr(part)
+            assert not any(array.flags.writeable for array in again._arrays)
+            assert again.shape == part.shape
+    assert np.array_equal(pickle.loads(pickle.dumps(table)).reverse(), table.reverse())
+
+
+def test_rows_outlive_the_table():
+    row = hs.neighbors(POINTS, 1.0)[3]
+    before = row.copy()
+    [hs.neighbors(POINTS + k, 1.0) for k in range(20)]
+    assert np.array_equal(row, before)
+
+
+# ---- filter and sort -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fixture", ["table", "tiny"])
+def test_filter(fixture, request, rng):
+    table = request.getfixturevalue(fixture)
+    for mask in (rng.random(table.n_entries) < 0.5, np.zeros(table.n_entries, bool),
+                 np.ones(table.n_entries, bool), table.distances > 0.8):  # fmt: skip
+        part = table.filter(mask)
+        assert len(part) == len(table) and part.shape == table.shape
+        for k, (first, end) in enumerate(itertools.pairwise(table.offsets.tolist())):
+            keep = mask[first:end]
+            assert same_arrays(part[k], tuple(column[keep] for column in table[k]))
+    assert same_tables(table.filter(np.ones(table.n_entries, bool)), table)
+    assert same_tables(table.filter((table.distances > 0.8).tolist()), part)
+
+
+def test_filter_refuses_other_masks(table):
+    m = table.n_entries
+    assert_refused(lambda: table.filter(np.ones(m - 1, bool)), ValueError, rf"\({m},\)")
+    assert_refused(lambda: table.filter(True), ValueError, r"mask must have shape")
+    assert_refused(lambda: table.filter(np.ones(m, int)), TypeError, "bools, got dtype int64")
+    assert_refused(lambda: table.filter(np.arange(3)), ValueError, "mask")
+    assert_refused(lambda: table.filter("mask"), TypeError, "mask")
+
+
+def test_filters_of_nothing():
+    empty = hs.neighbors(np.empty((0, 2)), 1.0, quantities="jd")
+    assert len(empty.filter([]).sort()) == 0
+    alone = hs.neighbors(np.zeros((1, 2)), 1.0, quantities="jd")
+    assert alone.filter([]).counts.tolist() == [0]
+
+
+@pytest.mark.parametrize("fixture", ["table", "tiny"])
+def test_sort_by_distance(fixture, request):
+    table = request.getfixturevalue(fixture)
+    done = table.sort(by="distance")
+    assert np.array_equal(done.offsets, table.offsets)
+    at = {letter: table.quantities.index(letter) for letter in "jdS"}
+    for k in range(len(table)):
+        keys = [
+            (d, j, tuple(S))
+            for d, j, S in zip(*(table[k][at[letter]].tolist() for letter in "djS"), strict=True)
+        ]
+        found = [
+            (d, j, tuple(S))
+            for d, j, S in zip(*(done[k][at[letter]].tolist() for letter in "djS"), strict=True)
+        ]
+        assert found == sorted(keys)
+    assert same_tables(done.sort(), done)
+
+
+def test_sort_needs_distances(table):
+    assert_refused(lambda: table.sort(by="index"), ValueError, "'distance', got 'index'")
+    assert_refused(lambda: hs.neighbors(POINTS, 1.0).sort(), AttributeError, "'d' in quantities")
+
+
+# ---- pairs ---------------------------------------------------------------------------------
+
+
+def test_to_pairs(table):
+    i = np.repeat(np.arange(30), table.counts)
+    found = table.to_pairs(quantities="SPDdji")
+    expected = (table.shifts, np.stack((i, table.indices), axis=1), table.vectors,
+                table.distances, table.indices, i)  # fmt: skip
+    assert same_arrays(found, expected)
+    assert same_arrays(table.to_pairs(), (i, table.indices))
+    assert np.shares_memory(table.to_pairs(quantities="d"), table.distances)
+    assert np.array_equal(table.to_pairs(quantities="i"), i)
+    narrow = hs.neighbors(POINTS, 1.0, index_dtype=np.int32).to_pairs(quantities="ijP")
+    assert [array.dtype for array in narrow] == [np.int32] * 3
+    assert hs.neighbors(POINTS, 1.0, quantities="d").to_pairs(quantities="i").dtype == np.int64
+
+
+def test_half_of_the_pairs(table, tiny):
+    for some, cutoff, points, box in ((table, 1.0, POINTS, [4.0, 4.0]),
+                                      (tiny, 1.7, POINTS[:3], [1.0, 1.1])):  # fmt: skip
+        letters = "ijdS"
+        expected = hs.pairs(points, cutoff, box=box, quantities=letters, sort=True)
+        assert same_arrays(some.to_pairs(quantities=letters, half=True), expected)
+        unordered = some.sort().to_pairs(quantities="ijS", half=True)
+        assert np.array_equal(as_rows(*unordered), as_rows(*expected[:2], expected[3]))
+
+
+def test_half_needs_shifts_only_for_own_images():
+    i, j = hs.neighbors(POINTS, 1.0, box=[4.0, 4.0]).to_pairs(half=True)
+    expected = hs.pairs(POINTS, 1.0, box=[4.0, 4.0], sort=True)
+    assert same_arrays((i, j), expected)
+    bare = hs.neighbors(POINTS[:3], 1.7, box=[1.0, 1.1])
+    assert_refused(lambda: bare.to_pairs(half=True), AttributeError, "'S' in quantities")
+    for part in (with_queries(), bare[:2]):
+        assert_refused(lambda part=part: part.to_pairs(half=True), ValueError, "one set of points")
+
+
+def test_to_pairs_refuses_other_letters(table):
+    for letters in ("", "x", "ii", "i j"):
+        assert_refused(
+            lambda letters=letters: table.to_pairs(quantities=letters), ValueError, "i j d D S P"
+        )
+    assert_refused(lambda: table.to_pairs(quantities=None), TypeError, "quantities")
+    bare = hs.neighbors(POINTS, 1.0, quantities="d")
+    assert_refused(lambda: bare.to_pairs(), AttributeError, "'j' in quantities")
+    assert_refused(lambda: bare.to_pairs(quantities="iS"), AttributeError, "'S' in quantities")
+    assert_refused(lambda: bare.to_pairs(quantities="P"), AttributeError, "'j' in quantities")
+
+
+# ---- graphs and matrices -------------------------------------------------------------------
+
+
+def test_edge_index(table):
+    edges = table.edge_index()
+    assert edges.shape == (2, table.n_entries) and edges.dtype == np.int64
+    assert edges.flags.writeable and edges.flags.c_contiguous
+    i, j = table.to_pairs()
+    assert np.array_equal(edges[0], j) and np.array_equal(edges[1], i)
+    # The vector points from the target to the source.
+    D = POINTS[edges[0]] - POINTS[edges[1]] + table.shifts * 4.0
+    np.testing.assert_allclose(table.vectors, D, atol=1e-14)
+    assert hs.neighbors(POINTS, 1.0, index_dtype=np.int32).edge_index().dtype == np.int32
+    assert_refused(
+        lambda: hs.neighbors(POINTS, 1.0, quantities="d").edge_index(), AttributeError, "'j'"
+    )
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_to_scipy(dtype, rng):
+    points = np.concatenate([rng.random((80, 3)), np.full((3, 3), 0.5)])  # three in one place
+    table = hs.neighbors(points, 0.4, quantities="dj", index_dtype=dtype)
+    matrix = table.to_scipy()
+    assert isinstance(matrix, scipy.sparse.csr_array)
+    assert matrix.shape == (83, 83) and matrix.nnz == table.n_entries
+    assert matrix.dtype == np.float64 and matrix.has_canonical_format
+    assert (matrix.data == 0).sum() == 6
+    assert np.array_equal(matrix.data, table.distances)
+    assert np.array_equal(matrix.indices, table.indices)
+    theirs = cKDTree(points).sparse_distance_matrix(cKDTree(points), 0.4).tocsr()
+    np.testing.assert_allclose(matrix.toarray(), theirs.toarray(), rtol=1e-14)
+    matrix.data[:] = 1.0  # a copy: the table stays as it is
+    assert table.distances.min() == 0.0
+    assert scipy.sparse.csgraph.connected_components(matrix)[0] >= 1
+
+
+def test_to_scipy_of_any_order_and_of_queries(table):
+    expected = table.to_scipy().toarray()
+    assert np.array_equal(table.sort().to_scipy().toarray(), expected)
+    few = table.filter(table.distances < 0.7).to_scipy().toarray()
+    assert np.array_equal(few, np.where(expected < 0.7, expected, 0.0))
+    assert with_queries().to_scipy().shape == (5, 30)
+    assert table[2:7].to_scipy().shape == (5, 30)
+    assert np.array_equal(table[2:7].to_scipy().toarray(), expected[2:7])
+    empty = hs.neighbors(np.empty((0, 2)), 1.0, quantities="jd").to_scipy()
+    assert empty.shape == (0, 0)
+
+
+def test_to_scipy_with_images(tiny):
+    for table in (tiny, tiny.sort()):
+        assert_refused(
+            lambda table=table: table.to_scipy(), ValueError, "row 0 .* images of point 0", "'min'"
+        )
+        matrix = table.to_scipy(duplicates="min").toarray()
+        for i, j in itertools.product(range(3), repeat=2):
+            d, _, number = tiny[i]
+            assert matrix[i, j] == d[number == j].min()
+    assert_refused(lambda: tiny.to_scipy("max"), ValueError, "'raise' or 'min', got 'max'")
+
+
+def test_to_scipy_needs_both_quantities():
+    for letters, missing in (("d", "j"), ("j", "d")):
+        table = hs.neighbors(POINTS, 1.0, quantities=letters)
+        assert_refused(lambda table=table: table.to_scipy(), AttributeError, f"'{missing}'")
+
+
+def test_to_padded(table):
+    longest = int(table.counts.max())
+    for capacity in (None, longest, longest + 5):
+        for letter, fill in (("j", -1), ("j", 30), ("d", np.inf), ("d", -1), ("D", np.nan),
+                             ("S", 0)):  # fmt: skip
+            array = table.to_padded(capacity, fill, quantity=letter)
+            column = getattr(table, NAMES[letter])
+            assert array.dtype == column.dtype and array.flags.writeable
+            assert array.shape == (30, capacity or longest, *column.shape[1:])
+            for row, (first, end) in zip(array, itertools.pairwise(table.offsets)):
+                assert np.array_equal(row[: end - first], column[first:end])
+                assert np.array_equal(
+                    row[end - first :], np.full_like(row[end - first :], fill), equal_nan=fill != 0
+                )
+    assert np.array_equal(table.to_padded(), table.to_padded(longest, -1, quantity="j"))
+    empty = hs.neighbors(np.empty((0, 2)), 1.0)
+    assert empty.to_padded().shape == (0, 0) and empty.to_padded(4).shape == (0, 4)
+    assert hs.neighbors(np.zeros((2, 2)), 0.0, inclusive=False).to_padded().shape == (2, 0)
+
+
+def test_to_padded_refuses_what_does_not_fit(table):
+    longest = int(table.counts.max())
+    row = int(table.counts.argmax())
+    with pytest.raises(hs.CapacityError, match=f"row {row} has {longest} entries") as caught:
+        table.to_padded(longest - 1)
+    assert caught.value.needed == longest
+    assert_refused(lambda: table.to_padded(-1), ValueError, "capacity")
+    assert_refused(lambda: table.to_padded(5.0), TypeError, "capacity")
+    assert_refused(lambda: table.to_padded(quantity="i"), ValueError, "j d D S, got 'i'")
+    for fill in (np.nan, 0.5, 2**63, -(2**63) - 2**12):
+        assert_refused(lambda fill=fill: table.to_padded(fill=fill), ValueError, "fill")
+    narrow = hs.neighbors(POINTS, 1.0, index_dtype=np.int32)
+    assert_refused(lambda: narrow.to_padded(fill=2**31), ValueError, "int32")
+    for fill in ("0", None, [1], 1j):
+        assert_refused(lambda fill=fill: table.to_padded(fill=fill), TypeError, "fill")
+    bare = hs.neighbors(POINTS, 1.0)
+    assert_refused(lambda: bare.to_padded(quantity="d"), AttributeError, "'d' in quantities")
+
+
+# ---- the other direction -------------------------------------------------------------------
+
+
+def assert_reverses(table, other, shifts=None, vectors=None):
+    """Entry other[e] is (j, i, -S) of entry e."""
+    i, j = table.to_pairs()
+    assert other.dtype == np.int64 and other.shape == i.shape
+    assert np.array_equal(i[other], j) and np.array_equal(j[other], i)
+    assert np.array_equal(other[other], np.arange(len(i)))
+    shifts = table.shifts if shifts is None else shifts
+    assert np.array_equal(shifts[other], -shifts)
+
+
+@given(scenes())
+def test_reverse(scene):
+    how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
+    table = hs.neighbors(scene.points, scene.cutoff, quantities="jdDS", **how)
+    assert_reverses(table, table.reverse())
+    # Without shifts it is the same.
+    bare = hs.neighbors(scene.points, scene.cutoff, index_dtype=np.int32, **how)
+    assert np.array_equal(bare.reverse(), table.reverse())
+    ordered = table.sort(by="distance")
+    assert_reverses(ordered, ordered.reverse())
+
+
+@given(scenes(), st.integers(0, 2**32))
+def test_reverse_of_filtered_tables(scene, seed):
+    how = {"box": scene.box, "periodic": scene.periodic, "inclusive": scene.inclusive}
+    table = hs.neighbors(scene.points, scene.cutoff, quantities="jdS", **how)
+    keep = np.random.default_rng(seed).random(table.n_entries) < 0.6
+    both = table.filter(keep & keep[table.reverse()])
+    assert_reverses(both, both.reverse())
+    one = table.filter(keep)
+    if np.array_equal(keep, keep[table.reverse()]):
+        assert_reverses(one, one.reverse())
+    else:
+        assert_refused(lambda: one.reverse(), ValueError, "no other direction")
+
+
+def test_reverse_of_many_points(rng):
+    # More points than 16 bits count, in a box with images and in one without.
+    points, cutoff, box, _ = random_scene(rng, 70_000, neighbours=6, kind="triclinic")
+    table = hs.neighbors(points, cutoff, box=box, quantities="jS")
+    assert_reverses(table, table.reverse())
+    slab = np.column_stack([np.linspace(0.0, 1000.0, 70_000), np.zeros(70_000)])
+    table = hs.neighbors(slab, 0.03, box=[0.0, 0.01], periodic=[False, True], quantities="jS")
+    assert (np.diff(table.indices) == 0).any()
+    assert_reverses(table, table.reverse())
+
+
+def test_reverse_of_crystals():
+    for atoms in (bulk("Si"), bulk("Cu"), bulk("Ti") * (3, 1, 1)):
+        table = hs.neighbors(atoms, 7.0, quantities="jS")
+        assert_reverses(table, table.reverse())
+        assert_reverses(table, hs.neighbors(atoms, 7.0).reverse(), table.shifts)
+
+
+def test_reverse_refuses_what_has_none(table):
+    assert_refused(lambda: with_queries().reverse(), ValueError, "one set of points")
+    assert_refused(lambda: table[:30].reverse(), ValueError, "one set of points")
+    near = hs.neighbors(POINTS, 1.0, quantities="jd")
+    few = near.filter(near.distances < 0.7)
+    assert_refused(lambda: few.reverse(), AttributeError, "'S' in quantities")
+    assert_refused(lambda: near.sort().reverse(), AttributeError, "'S' in quantities")
+    assert near.filter(np.ones(near.n_entries, bool)).reverse().shape == (near.n_entries,)
+    assert_refused(
+        lambda: hs.neighbors(POINTS, 1.0, quantities="d").reverse(), AttributeError, "'j'"
+    )
+    assert hs.neighbors(np.empty((0, 2)), 1.0).reverse().shape == (0,)
+
+
+def test_words_and_flags_may_be_anything(table):
+    class Hostile:
+        def __eq__(self, other):
+            raise RuntimeError("never asked")
+
+        __bool__ = __repr__ = __hash__ = __eq__
+
+    for odd in (Hostile(), np.zeros(3), np.zeros(0), np.zeros(3, "V2"), None, 5):
+        assert_refused(partial(table.to_scipy, odd), TypeError, "duplicates")
+        assert_refused(partial(table.sort, odd), TypeError, "by")
+        assert_refused(partial(table.to_padded, quantity=odd), TypeError, "quantity")
+        assert_refused(partial(table.to_pairs, half=odd), TypeError, "half")
+
+
+@pytest.mark.parametrize("n", [0, 7])
+def test_rows_longer_than_memory_are_refused(n):
+    table = hs.neighbors(np.arange(float(n)).reshape(n, 1), 1.0)
+    for capacity in (2**40, 2**62, 2**63, 10**400):
+        assert_refused(partial(table.to_padded, capacity), MemoryError, "capacity")
+    assert_refused(partial(table.to_padded, True), TypeError, "capacity")

@@ -1,0 +1,633 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`VerletList`: every step is that of a fresh search, whatever points and box do between them."""
+
+import copy
+import importlib.util
+import itertools
+import math
+import pickle
+import re
+import threading
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from checkout import ROOT
+from halfshell._objects.skin import MOST_CHANGES, AutoSkin
+from oracles import BOX_KINDS, random_box, same_arrays
+
+
+def check(pair_list, points, box=None, periodic=None, inclusive=True):
+    """The list has what a search finds, to the last bit; returns the number of pairs."""
+    options = {"box": box, "periodic": periodic, "inclusive": inclusive}
+    expected = hs.pairs(points, pair_list.cutoff, quantities="ijdDS", sort=True, **options)
+    assert same_arrays(pair_list.pairs(quantities="ijdDS", sort=True), expected)
+    as_listed = pair_list.pairs(quantities="ijS")
+    order = np.lexsort([*as_listed[2].T[::-1], as_listed[1], as_listed[0]])
+    assert same_arrays(
+        tuple(np.ascontiguousarray(a[order]) for a in as_listed),
+        (expected[0], expected[1], expected[4]),
+    )
+    assert pair_list.margin >= 0.0
+    assert pair_list.n_points == len(points)
+    return len(expected[0])
+
+
+def wrapped(points, box, periodic=None):
+    """Points in the box, in their own dtype."""
+    return hs.Box(box).wrap(points, periodic)[0].astype(points.dtype)
+
+
+# ---- random walks --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("ndim", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", [None, "slab", *BOX_KINDS])
+def test_random_walks(rng, kind, ndim, dtype):
+    box = None if kind is None else random_box(rng, "triclinic" if kind == "slab" else kind, ndim)
+    periodic = None
+    if kind == "slab":
+        periodic = [axis != ndim - 1 for axis in range(ndim)]
+    cutoff = 0.35
+    pair_list = hs.VerletList(cutoff, 0.1, box=box, periodic=periodic)
+    points = rng.random((60, ndim)).astype(dtype)
+    n_pairs = 0
+    for step in range(12):
+        pair_list.update(points)
+        n_pairs += check(pair_list, points, box, periodic)
+        points = points + rng.normal(0.0, 0.01, points.shape).astype(dtype)
+        if box is not None and step % 2:
+            points = wrapped(points, box, periodic)
+    assert n_pairs > 100
+    assert 1 < pair_list.n_builds < 12 == pair_list.n_updates
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_boxes_smaller_than_the_cutoff(rng, kind, ndim):
+    box = random_box(rng, kind, ndim, length=0.5)
+    points = rng.random((4, ndim))
+    pair_list = hs.VerletList(1.1, 0.2, box=box)
+    for _ in range(8):
+        pair_list.update(points)
+        assert check(pair_list, points, box) > 4
+        points = points + rng.normal(0.0, 0.02, points.shape)
+    assert pair_list.n_builds < 8
+
+
+@pytest.mark.parametrize("inclusive", [True, False])
+def test_ties_at_the_cutoff(inclusive):
+    grid = np.array(list(itertools.product(range(4), repeat=3)), float)
+    pair_list = hs.VerletList(1.0, 0.5, box=[4.0] * 3, inclusive=inclusive)
+    for step in range(4):
+        points = grid + 0.25 * step
+        assert pair_list.update(points) is (step == 0)
+        assert check(pair_list, points, [4.0] * 3, inclusive=inclusive) == 192 * inclusive
+
+
+def test_order_is_that_of_the_list_and_of_no_thread_or_kernel(rng):
+    points = rng.random((30_000, 3)) * 20.0
+    lists = [
+        hs.VerletList(1.0, 0.2, box=[20.0] * 3, kernel=kernel, threads=threads)
+        for kernel in hs.kernels()
+        for threads in (1, 2, 5)
+    ]
+    for _ in range(3):
+        found = []
+        for pair_list in lists:
+            pair_list.update(points)
+            found.append(pair_list.pairs(quantities="ijdDSP"))
+        assert all(same_arrays(found[0], other) for other in found[1:])
+        points = (points + rng.normal(0.0, 0.01, points.shape)) % 20.0
+    assert {pair_list.n_builds for pair_list in lists} == {1}
+
+
+# ---- how far points may come ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("skin", [0.0, 1e-12, 0.1, 0.3, 1.0, 123.4])
+def test_points_that_approach_head_on_are_never_missed(skin, dtype):
+    cutoff = 1.0
+    for start in (cutoff + skin, math.nextafter(cutoff + skin, math.inf)):
+        for steps in itertools.product((-1, 0, 1), repeat=2):
+            left = np.array([0.0], dtype)
+            right = np.array([start], dtype)
+            pair_list = hs.VerletList(cutoff, skin)
+            pair_list.update(np.array([left, right]))
+            to_left, to_right = left + dtype(0.5 * skin), right - dtype(0.5 * skin)
+            for side, way in zip((to_left, to_right), steps):
+                side[:] = np.nextafter(side, dtype(way * 1e6)) if way else side
+            points = np.array([to_left, to_right])
+            pair_list.update(points)
+            check(pair_list, points)
+
+
+def test_margin_shrinks_as_points_move():
+    pair_list = hs.VerletList(1.0, 0.5)
+    pair_list.update([[0.0], [2.0], [9.0]])
+    assert pair_list.margin == pytest.approx(0.5, abs=1e-15) and pair_list.margin <= 0.5
+    assert not pair_list.update([[0.1], [1.9], [9.0]])
+    assert 0.3 - 1e-12 < pair_list.margin <= 0.3
+    assert not pair_list.update([[0.2], [1.8], [9.0]])
+    assert 0.1 - 1e-12 < pair_list.margin <= 0.1 + 1e-15
+    assert pair_list.update([[0.26], [1.74], [9.0]])
+    assert pair_list.n_builds == 2
+
+
+def test_without_a_skin_it_is_built_unless_nothing_has_moved(rng):
+    box = random_box(rng, "triclinic")
+    points = rng.random((50, 3))
+    pair_list = hs.VerletList(0.4, 0.0, box=box)
+    assert pair_list.update(points)
+    assert not pair_list.update(points.copy(order="F"))
+    assert pair_list.margin == 0.0
+    check(pair_list, points, box)
+    points[7, 1] = np.nextafter(points[7, 1], 2.0)
+    assert pair_list.update(points)
+    check(pair_list, points, box)
+
+
+def test_huge_skin_is_never_used_up(rng):
+    points = rng.random((40, 3))
+    pair_list = hs.VerletList(0.3, 1e6)
+    for _ in range(5):
+        pair_list.update(points)
+        check(pair_list, points)
+        points = points + rng.normal(0.0, 1e3, points.shape)
+    assert pair_list.n_builds == 1
+
+
+@pytest.mark.parametrize("unit", [1e-300, 1e-160, 1e-20, 1e20, 1e150, 1e300])
+def test_any_unit_of_length(rng, unit):
+    box = random_box(rng, "triclinic") * unit
+    points = rng.random((40, 3)) @ box
+    pair_list = hs.VerletList(0.4 * unit, 0.2 * unit, box=box)
+    for _ in range(6):
+        pair_list.update(points)
+        assert check(pair_list, points, box) > 10
+        points = points + rng.normal(0.0, 0.01, points.shape) * unit
+    for _ in range(3):
+        points = points + rng.normal(0.0, 0.5, points.shape) * unit
+        assert pair_list.update(points)
+        check(pair_list, points, box)
+
+
+# ---- jumps and drift -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_wrapping_is_no_movement(rng, kind):
+    box = random_box(rng, kind)
+    points = rng.random((80, 3)) @ box
+    pair_list = hs.VerletList(0.3, 0.1, box=box)
+    pair_list.update(points)
+    for step in range(10):
+        jumps = rng.integers(-3, 4, points.shape) * (rng.random((len(points), 1)) < 0.2)
+        moved = points + jumps @ box
+        assert not pair_list.update(wrapped(moved, box) if step % 2 else moved)
+        check(pair_list, wrapped(moved, box) if step % 2 else moved, box)
+    assert pair_list.margin > 0.09
+
+
+@pytest.mark.parametrize("times", [1, -2, 1000, 2**20])
+def test_translation_by_whole_boxes(rng, times):
+    box = random_box(rng, "triclinic")
+    points = rng.random((80, 3)) @ box
+    pair_list = hs.VerletList(0.3, 0.1, box=box)
+    pair_list.update(points)
+    moved = points + (times * np.array([1, 0, -2])) @ box
+    assert not pair_list.update(moved)
+    check(pair_list, moved, box)
+    each = points + (rng.integers(-5, 6, points.shape) * times) @ box
+    assert not pair_list.update(each)
+    check(pair_list, each, box)
+
+
+@pytest.mark.parametrize("n", [3, 5000])
+@pytest.mark.parametrize("box", [None, [10.0, 10.0, 10.0], [[10, 0, 0], [3, 10, 0], [0, 2, 10]]])
+def test_drift_of_all_points_costs_nothing(rng, box, n):
+    points = rng.random((n, 3)) * 10.0
+    pair_list = hs.VerletList(0.5, 0.2, box=box)
+    pair_list.update(points)
+    for step in range(1, 6):
+        moved = points + step * np.array([0.7, -0.4, 1.1]) + rng.normal(0.0, 0.001, points.shape)
+        if box is not None and step % 2:
+            moved = wrapped(moved, np.asarray(box, float))
+        assert not pair_list.update(moved)
+        check(pair_list, moved, box)
+
+
+def test_points_far_from_the_box(rng):
+    box = random_box(rng, "rotated")
+    points = rng.random((60, 3)) @ box + rng.integers(-(2**20), 2**20, (60, 3)) @ box
+    pair_list = hs.VerletList(0.4, 0.2, box=box)
+    pair_list.update(points)
+    assert check(pair_list, points, box) > 10
+    points += rng.normal(0.0, 0.01, points.shape)
+    assert not pair_list.update(points)
+    check(pair_list, points, box)
+
+
+def test_shifts_beyond_int32_matter_only_where_they_are_asked_for():
+    points = np.array([[0.25, 0.5], [0.5 + 2.0**33, 0.5]])
+    pair_list = hs.VerletList(0.5, 0.1, box=[1.0, 1.0])
+    pair_list.update(points)
+    i, d = pair_list.pairs(quantities="id", sort=True)
+    expected = hs.pairs(points, 0.5, box=[1.0, 1.0], quantities="id", sort=True)
+    assert len(i) == 1 and same_arrays((i, d), expected)
+    with pytest.raises(OverflowError, match="too many box vectors away"):
+        pair_list.pairs(quantities="S")
+    assert len(pair_list.pairs(quantities="i")) == 1
+
+
+# ---- boxes that change ---------------------------------------------------------------------
+
+
+def deform(rng, how, step):
+    """F of one step."""
+    if how == "shrinking":
+        return np.eye(3) * (1.0 - 0.002 * step)
+    if how == "growing":
+        return np.eye(3) * (1.0 + 0.01 * step)
+    if how == "shearing":
+        return np.eye(3) + 0.003 * step * np.eye(3, k=1)
+    if how == "rotating":
+        c, s = math.cos(0.3 * step), math.sin(0.3 * step)
+        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.eye(3) + rng.normal(0.0, 0.002, (3, 3))
+
+
+@pytest.mark.parametrize("kind", ["orthorhombic", "triclinic", "sheared"])
+@pytest.mark.parametrize("how", ["shrinking", "growing", "shearing", "rotating", "shaking"])
+def test_deforming_boxes(rng, how, kind):
+    start = random_box(rng, kind)
+    fractions = rng.random((80, 3))
+    pair_list = hs.VerletList(0.35, 0.1)
+    for step in range(12):
+        fractions = fractions + rng.normal(0.0, 0.0005, fractions.shape)
+        box = start @ deform(rng, how, step)
+        points = fractions @ box
+        if step % 3 == 2:
+            points = wrapped(points, box)
+        pair_list.update(points, box)
+        check(pair_list, points, box)
+    assert pair_list.n_builds < 12
+    if how in ("growing", "rotating"):
+        assert pair_list.n_builds == 1
+
+
+def test_a_shrinking_box_brings_pairs_together():
+    """Points stay where they are in the box: every displacement is the box's alone."""
+    start = np.diag([4.0, 4.0])
+    points = np.array([[0.0, 0.0], [1.55, 0.0]])
+    pair_list = hs.VerletList(1.5, 0.1)
+    n_pairs = []
+    for step in range(8):
+        factor = 1.0 - 0.01 * step
+        pair_list.update(points * factor, start * factor)
+        n_pairs.append(check(pair_list, points * factor, start * factor))
+    assert n_pairs[0] == 0 and n_pairs[-1] == 1
+    assert 1 < pair_list.n_builds < 8
+
+
+def test_slabs_deform_in_their_plane_and_move_absolutely_across(rng):
+    periodic = [True, True, False]
+    start = np.array([[2.0, 0.3, 0.0], [-0.4, 1.8, 0.2], [0.0, 0.0, 0.0]])
+    points = rng.random((60, 3)) * 2.0
+    pair_list = hs.VerletList(0.5, 0.2, periodic=periodic)
+    assert pair_list.update(points, start)
+    flat = start * (1.0 - 1e-3)
+    assert not pair_list.update(points, flat)
+    check(pair_list, points, flat, periodic)
+    raised = points + np.array([0.0, 0.0, 50.0]) * (np.arange(60) % 2)[:, None]
+    assert pair_list.update(raised, flat)
+    check(pair_list, raised, flat, periodic)
+
+
+def test_another_basis_of_the_same_lattice(rng):
+    box = random_box(rng, "triclinic")
+    points = rng.random((60, 3)) @ box
+    pair_list = hs.VerletList(0.4, 0.2)
+    for flip in (np.eye(3), [[1, 1, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 0], [1, 0, 0], [0, 0, -1]]):
+        pair_list.update(points, np.array(flip) @ box)
+        check(pair_list, points, np.array(flip) @ box)
+
+
+def test_a_box_that_collapses_is_an_error_of_the_box_alone(rng):
+    points = rng.random((30, 3))
+    pair_list = hs.VerletList(0.4, 0.1, box=np.eye(3))
+    pair_list.update(points)
+    with pytest.raises(ValueError, match="linearly independent"):
+        pair_list.update(points, np.diag([1.0, 1.0, 0.0]))
+    check(pair_list, points, np.eye(3))
+    thin = np.diag([1.0, 1.0, 0.3])
+    assert pair_list.update(points, thin)
+    check(pair_list, points, thin)
+
+
+# ---- other points, bad points --------------------------------------------------------------
+
+
+def test_another_number_or_type_of_points(rng):
+    pair_list = hs.VerletList(0.3, 0.2, box=[1.0] * 3)
+    for n, narrow in ((50, False), (51, False), (51, True), (0, False), (1, False), (2, False)):
+        points = rng.random((n, 3)).astype(np.float32 if narrow else np.float64)
+        assert pair_list.update(points)
+        check(pair_list, points, [1.0] * 3)
+        assert not pair_list.update(points)
+    plane = rng.random((20, 2))
+    with pytest.raises(ValueError, match="box must have shape"):
+        pair_list.update(plane)
+    assert pair_list.n_points == 2
+    assert pair_list.update(plane, [1.0, 1.0])
+    check(pair_list, plane, [1.0, 1.0])
+
+
+def test_other_axes_repeat(rng):
+    points = rng.random((40, 2))
+    pair_list = hs.VerletList(0.3, 0.1, box=[1.0, 1.0])
+    assert pair_list.update(points)
+    assert pair_list.update(points, periodic=[True, False])
+    check(pair_list, points, [1.0, 1.0], [True, False])
+    assert not pair_list.update(points)
+    assert pair_list.update(points, periodic=True)
+    check(pair_list, points, [1.0, 1.0])
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_bad_points_leave_the_list_as_it_was(rng, bad):
+    points = rng.random((40, 3))
+    pair_list = hs.VerletList(0.3, 0.2, box=[1.0] * 3)
+    pair_list.update(points)
+    for broken in (points.copy(), rng.random((41, 3))):
+        broken[17, 2] = bad
+        with pytest.raises(ValueError, match=r"points\[17, 2\]"):
+            pair_list.update(broken)
+        check(pair_list, points, [1.0] * 3)
+    with pytest.raises(ValueError, match="box must be finite"):
+        pair_list.update(points, [1.0, bad, 1.0])
+    check(pair_list, points, [1.0] * 3)
+    assert (pair_list.n_builds, pair_list.n_updates) == (1, 1)
+
+
+def test_results_that_do_not_fit_leave_the_list_as_it_was(rng):
+    points = rng.random((2000, 3))
+    pair_list = hs.VerletList(0.05, 0.02, memory_limit=2_000_000)
+    pair_list.update(points)
+    with pytest.raises(MemoryError):
+        pair_list.update(points * 0.05)
+    check(pair_list, points)
+
+
+def test_points_are_copied_and_inputs_unchanged(rng):
+    points = rng.random((50, 3))
+    box = np.eye(3)
+    before = points.copy()
+    pair_list = hs.VerletList(0.3, 0.1, box=box)
+    pair_list.update(points)
+    points[:] = 0.0
+    box *= 2.0
+    check(pair_list, before, np.eye(3))
+    points[:] = before
+    points.flags.writeable = False
+    pair_list.update(points, np.eye(3))
+    check(pair_list, points, np.eye(3))
+
+
+def test_any_kind_of_points(rng):
+    points = rng.random((40, 3))
+    turned = np.asfortranarray(points), points[::-1].copy()[::-1]
+    for given in (points.tolist(), points.astype(">f8"), *turned):
+        pair_list = hs.VerletList(0.3, 0.1, box=hs.Box(np.eye(3)))
+        pair_list.update(given)
+        check(pair_list, points, np.eye(3))
+
+
+def test_objects_that_bring_their_box():
+    ase = pytest.importorskip("ase")
+    atoms = ase.Atoms("Ar4", positions=np.eye(4, 3), cell=[3.0, 3.0, 3.0], pbc=[True, True, False])
+    pair_list = hs.VerletList(1.6, 0.2)
+    pair_list.update(atoms)
+    assert len(pair_list.pairs(quantities="i")) == len(hs.pairs(atoms, 1.6, quantities="i")) > 3
+
+
+# ---- the interface -------------------------------------------------------------------------
+
+
+def test_before_the_first_update():
+    pair_list = hs.VerletList(1.0)
+    for ask in (pair_list.pairs, lambda: pair_list.margin):
+        with pytest.raises(RuntimeError, match="call update first"):
+            ask()
+    assert (pair_list.n_points, pair_list.n_builds, pair_list.n_updates) == (0, 0, 0)
+    with pytest.raises(ValueError):
+        pair_list.update([[math.nan]])
+    with pytest.raises(RuntimeError, match="call update first"):
+        pair_list.pairs()
+
+
+@pytest.mark.parametrize(
+    ("error", "arguments"),
+    [
+        (ValueError, (-1.0,)),
+        (ValueError, (math.nan,)),
+        (ValueError, (math.inf,)),
+        (TypeError, ("far",)),
+        (TypeError, ([1.0, 2.0],)),
+        (ValueError, (1.0, -0.1)),
+        (ValueError, (1.0, math.nan)),
+        (ValueError, (1.0, math.inf)),
+        (ValueError, (1.0, "large")),
+        (TypeError, (1.0, None)),
+        (TypeError, (1.0, [0.1])),
+        (TypeError, (1.0, 1j)),
+    ],
+)
+def test_bad_lengths(error, arguments):
+    with pytest.raises(error, match="skin" if len(arguments) > 1 else "cutoff"):
+        hs.VerletList(*arguments)
+
+
+def test_cutoff_and_skin_that_overflow_together():
+    with pytest.raises(ValueError, match="finite"):
+        hs.VerletList(1.5e308, 1.5e308).update([[0.0]])
+
+
+def test_bad_options(rng):
+    pair_list = hs.VerletList(0.3, 0.1)
+    pair_list.update(rng.random((10, 3)))
+    with pytest.raises(ValueError, match="quantities"):
+        pair_list.pairs(quantities="ix")
+    with pytest.raises(ValueError, match="index_dtype"):
+        pair_list.pairs(quantities="i", index_dtype=np.int16)
+    with pytest.raises(ValueError, match="kernel"):
+        hs.VerletList(0.3, kernel="none").update([[0.0]])
+    with pytest.raises(TypeError, match="inclusive"):
+        hs.VerletList(0.3, inclusive="yes")
+
+
+@pytest.mark.parametrize("quantities", ["i", "j", "d", "D", "S", "P", "Sdi", "PDj"])
+@pytest.mark.parametrize("sort", [True, False])
+@pytest.mark.parametrize("index_dtype", [np.int32, np.int64])
+def test_quantities_and_types(rng, quantities, sort, index_dtype):
+    points = rng.random((200, 3))
+    pair_list = hs.VerletList(0.3, 0.1, box=[1.0] * 3)
+    pair_list.update(points)
+    how = {"sort": sort, "index_dtype": index_dtype}
+    whole = dict(zip("ijdDSP", pair_list.pairs(quantities="ijdDSP", **how)))
+    found = pair_list.pairs(quantities=quantities, **how)
+    expected = tuple(whole[letter] for letter in quantities)
+    assert same_arrays(found, expected if len(quantities) > 1 else expected[0])
+
+
+def test_out(rng):
+    points = rng.random((200, 3))
+    pair_list = hs.VerletList(0.3, 0.1, box=[1.0] * 3)
+    pair_list.update(points)
+    expected = pair_list.pairs(quantities="iD")
+    n = len(expected[0])
+    for sort in (False, True):
+        out = np.full(n + 5, -7), np.full((n + 9, 3), -7.0)
+        found = pair_list.pairs(quantities="iD", out=out, sort=sort)
+        assert same_arrays(found, pair_list.pairs(quantities="iD", sort=sort))
+        assert np.shares_memory(found[0], out[0]) and (out[0][n:] == -7).all()
+        with pytest.raises(hs.CapacityError) as caught:
+            pair_list.pairs(quantities="i", out=np.empty(n - 1, np.int64), sort=sort)
+        assert caught.value.needed == n
+
+
+def test_zero_cutoff():
+    points = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
+    for inclusive in (True, False):
+        pair_list = hs.VerletList(0.0, 0.5, inclusive=inclusive)
+        for moved in (points, points + [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]]):
+            pair_list.update(moved)
+            check(pair_list, moved, inclusive=inclusive)
+    assert hs.VerletList(0.0).skin == 0.0
+
+
+def test_many_dimensions(rng):
+    for ndim in (5, 6, 8):
+        points = rng.random((30, ndim))
+        pair_list = hs.VerletList(0.6, 0.2, box=np.ones(ndim))
+        for _ in range(3):
+            pair_list.update(points)
+            assert check(pair_list, points, np.ones(ndim)) > 5
+            points = points + rng.normal(0.0, 0.01, points.shape)
+
+
+def test_threads_take_turns(rng):
+    points = rng.random((400, 3))
+    pair_list = hs.VerletList(0.2, 0.1)
+    pair_list.update(points)
+    expected = pair_list.pairs(quantities="ij", sort=True)
+    wrong = []
+
+    def use():
+        for _ in range(30):
+            pair_list.update(points)
+            if not same_arrays(pair_list.pairs(quantities="ij", sort=True), expected):
+                wrong.append(1)
+
+    threads = [threading.Thread(target=use) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong and pair_list.n_updates == 121
+
+
+def test_a_call_within_a_call_is_refused():
+    pair_list = hs.VerletList(1.0, 0.1)
+
+    class Points:
+        def __array__(self, dtype=None, copy=None):
+            pair_list.update([[0.0]])
+            return np.zeros((1, 1))
+
+    with pytest.raises(TypeError, match="in the middle of another call"):
+        pair_list.update(Points())
+    assert pair_list.update([[0.0]])
+
+
+def test_lists_are_not_copied():
+    pair_list = hs.VerletList(1.0)
+    for way in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="cannot be copied"):
+            way(pair_list)
+    assert repr(pair_list).startswith("VerletList(1.0, skin=0.1")
+
+
+# ---- the skin that is chosen ---------------------------------------------------------------
+
+
+def run_auto(auto, build, use, a_step, n_steps):
+    """A list whose times and movements are known; returns the skins it had."""
+    spent, skins = math.inf, []
+    for _ in range(n_steps):
+        change = auto.wants_change(3)
+        spent += a_step
+        rebuilt = change or spent > auto.skin
+        skin = auto.next_skin() if rebuilt else auto.skin
+        volume = (auto.cutoff + skin) ** 3
+        margin = -math.inf if change else auto.skin - spent
+        spent = 0.0 if rebuilt else spent
+        auto.updated(rebuilt, build * volume, margin, 3)
+        auto.used(use * volume)
+        skins.append(auto.skin)
+    return skins
+
+
+@pytest.mark.parametrize("build", [0.5, 3.0, 50.0])
+@pytest.mark.parametrize("a_step", [0.0, 1e-5, 1e-3, 0.02, 0.2, 3.0])
+def test_automatic_skins_settle_near_the_best(build, a_step):
+    auto = AutoSkin(2.0)
+    skins = run_auto(auto, build, 1.0, a_step, 3000)
+    assert auto.is_settled
+    assert len(list(itertools.groupby(skins))) <= MOST_CHANGES + 1
+    assert len(set(skins[-1000:])) == 1
+
+    def cost(skin):
+        steps = max(1.0, skin / a_step) if a_step else math.inf
+        return (2.0 + skin) ** 3 * (build / steps + 1.0)
+
+    best = min(cost(2.0 * 2.0 ** (k / 4.0)) for k in range(-40, 1))
+    assert cost(skins[-1]) <= 1.25 * best
+
+
+def test_pairs_do_not_depend_on_the_automatic_skin(rng):
+    points = rng.random((300, 3))
+    pair_list = hs.VerletList(0.2, box=[1.0] * 3)
+    for _ in range(120):
+        pair_list.update(points)
+        check(pair_list, points, [1.0] * 3)
+        points = points + rng.normal(0.0, 0.001, points.shape)
+    assert 0.0 < pair_list.skin <= pair_list.cutoff
+    assert pair_list.n_builds < 120
+
+
+# ---- documentation -------------------------------------------------------------------------
+
+
+def test_example_of_the_documentation_runs(capsys):
+    text = (ROOT / "docs" / "verlet.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    exec(compile(code, "verlet.md", "exec"), {})
+    assert "builds in 20 steps" in capsys.readouterr().out
+
+
+def test_example_program_keeps_its_energy(capsys):
+    spec = importlib.util.spec_from_file_location("verlet", ROOT / "examples" / "verlet.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.main(50) < 0.01
+    assert "step 50" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("method", ["update", "pairs"])
+def test_methods_are_documented(method):
+    doc = getattr(hs.VerletList, method).__doc__
+    assert "Returns" in doc and "Raises" in doc and ">>>" in doc

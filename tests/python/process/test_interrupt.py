@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Ctrl-C stops a long search at once and leaves nothing behind."""
+
+import pytest
+
+from subprocesses import RESIDENT, run
+
+pytestmark = pytest.mark.slow
+
+SEARCHES = {
+    "pairs": "hs.pairs(points, 0.16, memory_limit=1e13)",
+    "sorted pairs": "hs.pairs(points, 0.16, sort=True, quantities='ijdDS', memory_limit=1e13)",
+    "neighbors": "hs.neighbors(points, 0.16, quantities='jdDS', memory_limit=1e13)",
+    "coordination": "hs.coordination(points, 0.5)",
+    "pairs of two sets": "hs.pairs_between(points[1::2], points, 0.16, memory_limit=1e13)",
+    "count of two sets": "hs.count_pairs(points[::2], 0.7, queries=points[1::2])",
+    "count": "hs.count_pairs(points, 0.5)",
+    "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
+    "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
+    "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
+    "nearest": "hs.nearest(points, 100, memory_limit=1e13)",
+    "nearest, all equally far": """hs.nearest(
+        np.concatenate([points > 0.5] * 5), 1_000_000, queries=points[:9] * 0 + 0.5
+    )""",
+    "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
+    "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
+    "wrap": "hs.Box([[1, 0, 0], [0.4, 1, 0], [0.3, 0.2, 1]]).wrap(np.concatenate([points] * 16))",
+    "count of exact ties": "hs.count_pairs(grid, 40.0, box=[60.0] * 3)",
+}
+
+
+@pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES)
+def test_an_interrupt_stops_the_search(search):
+    # The signal is raised by a second thread, which also shows that the lock is released. What a
+    # search still does is told by processor time, of all its threads: it is that of no other
+    # program.
+    result = run(
+        RESIDENT
+        + f"""
+import gc, json, signal, threading, time
+import numpy as np
+import halfshell as hs
+
+rng = np.random.default_rng(1)
+points = rng.random((400_000, 3))
+grid = np.stack(np.meshgrid(*[np.arange(60.0)] * 3), axis=-1).reshape(-1, 3)
+small = points[:500]
+expected = hs.count_pairs(small, 0.2)
+hs.count_pairs(points, 0.001)
+gc.collect()
+before = resident()
+sent = []
+
+def interrupt():
+    sent.extend([time.process_time(), time.perf_counter()])
+    signal.raise_signal(signal.SIGINT)
+
+threading.Timer(0.4, interrupt).start()
+try:
+    {search}
+    outcome = "finished"
+except KeyboardInterrupt:
+    outcome = "interrupted"
+begun, begun_by_clock = sent or [0.0, 0.0]
+delay, by_clock = time.process_time() - begun, time.perf_counter() - begun_by_clock
+hs.clear_cache()
+gc.collect()
+is_right = hs.count_pairs(small, 0.2) == expected
+print(json.dumps([outcome, delay, by_clock, resident() - before, is_right]))
+"""
+    )
+    outcome, delay, by_clock, grown, right = result
+    assert outcome == "interrupted"
+    assert delay < 1.0
+    assert by_clock < 30.0  # nothing sleeps
+    assert grown < 30_000_000
+    assert right
+
+
+def test_a_handler_that_does_not_raise_lets_the_search_finish():
+    calls, count = run(
+        """
+import json, signal, threading
+import numpy as np
+import halfshell as hs
+seen = []
+signal.signal(signal.SIGINT, lambda *_: seen.append(1))
+points = np.random.default_rng(1).random((30_000, 3))
+threading.Timer(0.1, signal.raise_signal, [signal.SIGINT]).start()
+count = 0
+while not seen:
+    count = hs.count_pairs(points, 2.0)
+print(json.dumps([len(seen), hs.count_pairs(points, 2.0)]))
+"""
+    )
+    assert calls == 1 and count == 30_000 * 29_999 // 2
+
+
+@pytest.mark.parametrize("size", [1.5e8, 5e8])
+def test_an_interrupt_is_heard_while_a_large_neighbourhood_is_gathered(size):
+    outcome, late = run(
+        RESIDENT
+        + f"""
+import json, signal, threading, time
+import numpy as np
+import halfshell as hs
+
+points = np.random.default_rng(0).random((9, 8))
+sent = []
+
+def interrupt():
+    while resident() < {size}:
+        time.sleep(0.005)
+    sent.append(time.process_time())
+    signal.raise_signal(signal.SIGINT)
+
+threading.Thread(target=interrupt, daemon=True).start()
+try:
+    hs.neighbors(points, 3.0, box=[1.0] * 8, memory_limit=1e13)
+    outcome = "finished"
+except KeyboardInterrupt:
+    outcome = "interrupted"
+print(json.dumps([outcome, time.process_time() - sent[0]]))
+"""
+    )
+    assert outcome == "interrupted"
+    assert late < 0.4  # of this process, however busy the machine is
+
+
+def test_an_interrupt_stops_the_sorting_of_rows():
+    # Late by processor time, which other processes do not take part in.
+    outcome, late = run(
+        """
+import json, signal, threading, time
+import numpy as np
+import halfshell as hs
+grid = np.stack(np.meshgrid(*[np.arange(32) * 0.1] * 3), axis=-1).reshape(-1, 3)
+table = hs.neighbors(grid, 0.33, quantities="jdS")
+sent = []
+
+def interrupt():
+    sent.append(time.process_time())
+    signal.raise_signal(signal.SIGINT)
+
+outcome, late = "finished", 0.0
+for wait in (0.03, 0.1, 0.2, 0.4, 0.7):
+    sent.clear()
+    timer = threading.Timer(wait, interrupt)
+    timer.start()
+    try:
+        while True:
+            table.sort()
+    except KeyboardInterrupt:
+        outcome = "interrupted"
+    late = max(late, time.process_time() - sent[0])
+    timer.join()
+print(json.dumps([outcome, late, table.n_entries]))
+"""
+    )[:2]
+    assert outcome == "interrupted"
+    assert late < 0.25

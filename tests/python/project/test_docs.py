@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the documentation shows runs, and signatures agree with the stubs."""
+
+import ast
+import doctest
+import importlib
+import inspect
+import pkgutil
+import re
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from checkout import ROOT
+
+MODULES = ["halfshell", *(m.name for m in pkgutil.walk_packages(hs.__path__, "halfshell."))]
+
+
+@pytest.mark.parametrize("name", [m for m in MODULES if m != "halfshell.__main__"])
+def test_examples_in_docstrings_run(name):
+    module = importlib.import_module(name)
+    failures, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert failures == 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name for name in dir(hs.CellList) if callable(getattr(hs.CellList, name)) and name[0] != "_"],
+)
+def test_methods_of_a_cell_list_are_documented(name):
+    method = getattr(hs.CellList, name)
+    doc = inspect.getdoc(method)
+    head = doc.split("Returns\n")[0]
+    for argument in set(inspect.signature(method).parameters) - {"self"}:
+        assert re.search(rf"\b{argument}\b", head), argument
+    assert ">>>" in doc
+
+
+@pytest.mark.parametrize("name", [name for name in hs.__all__ if name != "Verdict"])
+def test_public_functions_have_examples(name):
+    doc = inspect.getdoc(getattr(hs, name))
+    assert ">>>" in doc
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "nearest",
+        "neighbors", "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
+    ],
+)
+def test_every_argument_is_documented(name):
+    function = getattr(hs, name)
+    head = inspect.getdoc(function).split("Returns\n")[0]
+    for argument in inspect.signature(function).parameters:
+        assert re.search(rf"\b{argument}\b", head), argument
+
+
+def test_readme_notebook_example_runs(capsys):
+    text = (ROOT / "README.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "README.md", "exec"), names)
+    assert len(names["i"]) == len(names["S"]) > 200_000
+    assert names["i"].dtype == np.int64
+    assert "algorithm" in capsys.readouterr().out
+
+
+def test_example_of_tables_runs():
+    text = (ROOT / "docs/neighbors.md").read_text()
+    tables, graphs, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(tables), "neighbors.md", "exec"), names)
+    assert len(names["table"]) == 1000 and len(names["first"]) == 100
+    exec(compile(ast.parse(graphs), "neighbors.md", "exec"), names)
+    assert names["edge_index"].shape == (2, len(names["again"])) and names["distances"] is None
+    exec(compile(ast.parse(cells), "neighbors.md", "exec"), names)
+    assert len(names["near"]) == 10 and len(names["each"]) == 3
+    assert names["within"][-1] == hs.count_pairs(names["points"], 1.0, box=[10.0] * 3)
+
+
+def test_examples_of_streaming_run():
+    text = (ROOT / "docs/streaming.md").read_text()
+    blocks, calls, compiled = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(blocks), "streaming.md", "exec"), names)
+    d = hs.pairs(names["points"], 0.1, box=[1.0] * 3, quantities="d")
+    assert np.isclose(names["total"], d.sum(), rtol=1e-12)
+    exec(compile(ast.parse(calls), "streaming.md", "exec"), names)
+    assert names["visited"] == hs.count_pairs(names["points"], 0.05)
+    pytest.importorskip("numba")
+    exec(compile(ast.parse(compiled), "streaming.md", "exec"), names)
+    s = 1e-6 / d**6
+    assert np.isclose(names["total"][0], (s * s - s).sum(), rtol=1e-9)
+
+
+def test_example_of_histograms_runs():
+    text = (ROOT / "docs/histograms.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "histograms.md", "exec"), names)
+    assert names["counts"].sum() == names["within"][-1] == names["result"].counts.sum()
+    assert names["near"].sum() == names["within"][1] and names["far"].shape == (2, 2, 50)
+
+
+def test_examples_of_nearest_run():
+    text = (ROOT / "docs/nearest.md").read_text()
+    searches, masks, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(searches), "nearest.md", "exec"), names)
+    assert names["j"].shape == (1, 4) and names["S"].shape == (1, 4, 3)
+    exec(compile(ast.parse(masks), "nearest.md", "exec"), names)
+    i, j, d, points = (names[name] for name in ("i", "j", "d", "points"))
+    assert len(i) == len(j) == names["masked"].count() > 0 and d.max() <= 0.03
+    assert not hs.verify(points, 0.03, i, j, queries=points, box=1.0).spurious.size
+    exec(compile(ast.parse(cells), "nearest.md", "exec"), names)
+    assert names["j"].shape == (10, 3) and (np.diff(names["d"]) >= 0.0).all()
+
+
+def test_readme_commands_create_what_they_need():
+    text = (ROOT / "README.md").read_text()
+    commands = re.findall(r"```bash\n(.*?)\n```", text)
+    assert len(commands) == 2
+    for command in commands:
+        assert command.startswith("python3 -m venv .venv && ")
+
+
+def test_every_file_that_the_readme_names_exists():
+    for name in ("README.md", "CONTRIBUTING.md"):
+        for target in re.findall(r"\]\(([\w./-]+)\)", (ROOT / name).read_text()):
+            assert (ROOT / target).exists(), target
+
+
+def test_stub_and_module_name_the_same_functions():
+    core = importlib.import_module("halfshell._core")
+    stub = ast.parse((ROOT / "python/halfshell/_core.pyi").read_text())
+    named = {node.name for node in stub.body if isinstance(node, ast.FunctionDef)}
+    assert named == {name for name in dir(core) if not name.startswith("_")}

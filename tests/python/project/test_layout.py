@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The structure that csrc/README.md promises: the order of its folders, every file on the map."""
+
+import re
+from collections import defaultdict
+
+import pytest
+
+from checkout import CSRC, ROOT
+
+FILES = sorted(CSRC.rglob("*.[ch]"))
+
+# A folder of the core includes itself and folders to its left. Folders that share a place are
+# consumers of a search, which never include each other.
+ORDER = [
+    {"base"}, {"memory"}, {"exact"}, {"kernels"}, {"threads"}, {"box"}, {"scene"}, {"cells"},
+    {"search"}, {"collect"}, {"rows", "histogram", "nearest", "verlet"}, {"api"},
+]  # fmt: skip
+PLACE = {folder: place for place, folders in enumerate(ORDER) for folder in folders}
+
+
+def layer(path):
+    """The folder of the core that a file is in, or "kernels", "binding", "public"."""
+    parts = path.relative_to(CSRC).parts
+    return "public" if len(parts) == 1 else parts[1] if parts[0] == "core" else parts[0]
+
+
+def quoted_includes(path):
+    for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE):
+        yield (path.parent / name).resolve()
+
+
+def may_include(path, target):
+    here, there = layer(path), layer(target)
+    if there == "public":
+        return here == "binding" or target.name == "halfshell.h"
+    if here == "public" or "binding" in (here, there):
+        return here == there == "binding"
+    return here == there or PLACE[there] < PLACE[here]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_includes_follow_the_layers(path):
+    for target in quoted_includes(path):
+        assert target.exists(), f"{path.name} includes {target.name}"
+        assert may_include(path, target), f"{path.name} includes {target.relative_to(CSRC)}"
+
+
+def test_every_folder_of_the_core_has_a_place():
+    assert {path.name for path in (CSRC / "core").iterdir()} == PLACE.keys() - {"kernels"}
+
+
+def test_file_names_are_unique():
+    names = [path.name for path in FILES]
+    assert sorted(set(names)) == sorted(names)
+
+
+def test_no_two_modules_include_each_other():
+    """A module is name.h and name.c; what it includes, and what that includes, never leads back."""
+    uses = defaultdict(set)
+    for path in FILES:
+        uses[path.stem] |= {target.stem for target in quoted_includes(path)} - {path.stem}
+    done, open_now = set(), []
+
+    def visit(module):
+        assert module not in open_now, " -> ".join([*open_now, module])
+        if module not in done:
+            open_now.append(module)
+            for used in sorted(uses.get(module, ())):
+                visit(used)
+            done.add(open_now.pop())
+
+    for module in sorted(uses):
+        visit(module)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_only_the_binding_knows_python(path):
+    if layer(path) != "binding":
+        assert not re.search(r"^#include <(Python|numpy)", path.read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_every_file_is_on_the_map(path):
+    text = (CSRC / "README.md").read_text()
+    assert re.search(rf"`{path.stem}`|\b{re.escape(path.name)}\b", text)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_files_stay_readable(path):
+    lines = path.read_text().splitlines()
+    assert lines[0] == "/* SPDX-License-Identifier: BSD-3-Clause */"
+    # The public interface is one file, which is mostly words.
+    assert len(lines) <= (700 if path.name == "halfshell.h" else 400)
+    assert max(map(len, lines)) <= 100
+
+
+def test_every_source_names_its_license():
+    folders = ("csrc", "python", "tests", "benchmarks", "examples")
+    kinds = (".c", ".h", ".py", ".pyi", ".pyx")
+    sources = [p for f in folders for p in (ROOT / f).rglob("*") if p.suffix in kinds]
+    assert sources
+    for path in sources:
+        if "build" not in path.parts:
+            assert "SPDX-License-Identifier" in path.read_text()[:200], path

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The folders of the Python package: what each may import, and that all of them are installed."""
+
+import ast
+import tomllib
+from graphlib import TopologicalSorter
+
+import pytest
+
+from checkout import ROOT
+
+PACKAGE = ROOT / "python" / "halfshell"
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+#: A folder of private modules -> the folders that it may import from; "": modules beside them.
+ALLOWED = {
+    "_convert": {""},
+    "_objects": {"", "_convert", "_functions"},
+    "_functions": {"", "_convert", "_objects", "_report"},  # of the report its signature only
+    "_check": {"", "_convert", "_functions", "_objects"},
+    "_peers": {""},
+    "_report": {"", "_peers", "scenes"},
+    "_cli": {"", "_convert", "_functions", "_check", "_peers", "_report", "scenes"},
+    "scenes": {""},
+}
+
+
+def name_of(path):
+    """``halfshell._objects.box`` for the file of that module."""
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(path): path for path in FILES}
+
+
+def imports(path):
+    """Modules of the package that a file imports anywhere, but for the package itself."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            parts = [f"{node.module}.{alias.name}" for alias in node.names]
+            found = [part if part in MODULES else node.module for part in parts]
+        else:
+            continue
+        yield from (name for name in found if name in MODULES and name != "halfshell")
+
+
+def folder_of(name):
+    parts = name.split(".")
+    is_package = MODULES[name].name == "__init__.py"
+    return parts[1] if len(parts) > 2 or (is_package and len(parts) == 2) else ""
+
+
+@pytest.mark.parametrize("name", [name for name in MODULES if folder_of(name)])
+def test_imports_follow_the_order_of_folders(name):
+    folder = folder_of(name)
+    for other in imports(MODULES[name]):
+        assert folder_of(other) in ALLOWED[folder] | {folder}, f"{name} imports {other}"
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    private = {name: path for name, path in MODULES.items() if name != "halfshell"}
+    graph = {name: set(imports(path)) - {name} for name, path in private.items()}
+    assert len(list(TopologicalSorter(graph).static_order())) == len(private)
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_files_stay_readable(path):
+    assert len(path.read_text().splitlines()) <= 400
+
+
+def test_importing_a_private_folder_runs_nothing():
+    private = [p for p in FILES if p.name == "__init__.py" and p.parent.name.startswith("_")]
+    assert private
+    for path in private:
+        if path.parent.name != "_peers":  # which has the names that benchmarks import
+            body = ast.parse(path.read_text()).body
+            assert len(body) == 1 and isinstance(body[0], ast.Expr), path
+
+
+def test_every_folder_is_installed():
+    with (ROOT / "pyproject.toml").open("rb") as stream:
+        listed = tomllib.load(stream)["tool"]["setuptools"]["packages"]
+    folders = {name for name, path in MODULES.items() if path.name == "__init__.py"}
+    assert set(listed) == folders | {"halfshell.include"}

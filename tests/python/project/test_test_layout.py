@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The folders of the tests and benchmarks: one for each subject, helpers in one place, names that
+are unique."""
+
+import ast
+import re
+
+import pytest
+
+from checkout import BENCHMARKS, PYTHON_TESTS, ROOT, SUPPORT, TESTS
+
+#: A folder of tests/python -> what its tests are about.
+FOLDERS = {
+    "functions": "one public function",
+    "objects": "one public class",
+    "arguments": "what goes in, and what is refused",
+    "laws": "scenes on which the answer is known, or must not change",
+    "process": "memory, threads, signals, the environment",
+    "scenes": "the scenes and structures of the package",
+    "binding": "the boundary to C",
+    "report": "`halfshell report`",
+    "cli": "the command line",
+    "benchmarks": "the scripts in benchmarks/",
+    "project": "layout, documentation, types, packaging",
+}
+FILES = sorted(PYTHON_TESTS.rglob("*.py"))
+THEMES = [path for path in FILES if path.name.startswith("test_")]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "csrc/README.md"]
+PAGES += [*sorted((ROOT / "docs").rglob("*.md")), *(ROOT / ".ci").iterdir(), TESTS / "c/Makefile"]
+
+
+def imported(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+def test_every_folder_has_a_subject_that_the_guide_names():
+    folders = {path.name for path in PYTHON_TESTS.iterdir() if path.is_dir()}
+    assert folders - {"__pycache__"} == FOLDERS.keys() | {"support"}
+    guide = (ROOT / "CONTRIBUTING.md").read_text()
+    for folder, subject in FOLDERS.items():
+        assert f"`{folder}` ({subject})" in guide
+
+
+def test_tests_and_helpers_are_in_their_folders():
+    for path in FILES:
+        if path.name != "conftest.py":
+            is_test = path.name.startswith("test_")
+            assert path.parent.parent == PYTHON_TESTS
+            assert path.parent.name in FOLDERS if is_test else path.parent == SUPPORT, path
+
+
+def test_file_names_are_unique():
+    """Modules of tests have no package, so that any folder can be run alone."""
+    names = [path.stem for path in FILES]
+    assert sorted(set(names)) == sorted(names)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_no_test_imports_another(path):
+    """What two of them need is in support/."""
+    assert not {path.stem for path in THEMES}.intersection(imported(path))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_files_of_tests_that_a_page_names_exist(page):
+    for name in re.findall(r"\b(?:tests|benchmarks)/[\w/]*\w\.\w+\b", page.read_text()):
+        assert (ROOT / name).exists(), name
+
+
+def test_benchmarks_are_commands_and_folders_that_their_guide_names():
+    guide = (BENCHMARKS / "README.md").read_text()
+    folders = {path.name for path in BENCHMARKS.iterdir() if path.is_dir()} - {"__pycache__"}
+    assert folders == {"scenes", "libraries", "measure", "pages", "results"}
+    for folder in folders:
+        assert f"| `{folder}/` |" in guide
+    for command in BENCHMARKS.glob("*.py"):
+        assert f"`{command.name}`" in guide
+    for folder in ("libraries", "measure", "pages"):
+        for path in (BENCHMARKS / folder).glob("[!_]*.py"):
+            assert f"`{path.stem}`" in guide

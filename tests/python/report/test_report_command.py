@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``halfshell report``: what it prints and writes, and what it says to wrong arguments."""
+
+import re
+import sys
+
+import pytest
+
+import halfshell as hs
+from halfshell import cli, scenes
+from halfshell._cli import report
+from halfshell._peers import LIBRARIES
+from halfshell._report.measure import run
+from halfshell._report.measure.peers import PeerProcess
+from halfshell._report.page.rows import read_csv
+from report_helpers import fake, parse, row
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def command(capsys, tmp_path, monkeypatch):
+    """Run the command line in an empty folder; return its status and what it printed."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        status = cli.main(["report", *arguments])
+        out, err = capsys.readouterr()
+        return status, out, err
+
+    return call
+
+
+def test_the_command_writes_the_report(command, tmp_path):
+    status, out, err = command(
+        "--quick", "--size", "small", "--scenes", "near-ties,head-on", "--peers", "cKDTree",
+        "-o", "there/it is",
+    )  # fmt: skip
+    assert (status, err) == (0, "")
+    assert "every one was right" in re.sub(r"\s+", " ", out)
+    folder = tmp_path / "there" / "it is"
+    assert sorted(path.name for path in folder.iterdir()) == ["report.csv", "report.html"]
+    parse((folder / "report.html").read_text(encoding="utf-8"))
+    with (folder / "report.csv").open(newline="", encoding="utf-8") as stream:
+        facts, rows = read_csv(stream)
+    assert facts["halfshell"] == hs.__version__
+    assert {row.scene for row in rows} == {"near-ties", "head-on"}
+    assert {"exact", "cKDTree", "verlet"} <= {row.method for row in rows}
+
+
+def test_libraries_that_are_missing_are_told_of_when_they_were_asked_for(command, monkeypatch):
+    missing = fake("pass", module="no_such_module")
+    start = PeerProcess.__init__
+    monkeypatch.setattr(PeerProcess, "__init__", lambda self, name, *rest: start(
+        self, name, *rest, command=missing))  # fmt: skip
+    options = ("--scenes", "uniform", "--methods", "exact", "--size", "small")
+    assert "not installed" in command(*options, "--peers", "vesin")[1]
+    assert "vesin" not in command(*options)[1]
+
+
+def test_a_wrong_exact_list_is_an_exit_status(command, monkeypatch):
+    monkeypatch.setattr(run, "run", lambda plan, progress: [row("exact", missed=1)])
+    assert command("--scenes", "uniform")[0] == 1
+    monkeypatch.setattr(run, "run", lambda plan, progress: [row("exact"), row("single", missed=1)])
+    assert command("--scenes", "uniform")[0] == 0
+
+
+def test_names_are_listed(command):
+    status, out, _ = command("--list")
+    assert status == 0
+    assert all(name in out for name in (*scenes.names(), *LIBRARIES))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--scenes", "no-such-scene"],
+        ["--scenes", ","],
+        ["--methods", "exact,guess"],
+        ["--peers", "nobody"],
+        ["--size", "huge"],
+        ["--patience", "0"],
+        ["--patience", "soon"],
+        ["--quik"],
+        ["file.xyz"],
+        ["--scenes"],
+        ["--scenes", "uniform", "-o", "taken"],
+    ],
+)
+def test_wrong_arguments_are_one_line_and_exit_status_2(command, tmp_path, arguments):
+    (tmp_path / "taken").write_text("a file")
+    status, out, err = command(*arguments)
+    assert (status, out) == (2, "")
+    assert err.startswith("halfshell: error: ") and err.count("\n") == 1
+
+
+@pytest.mark.parametrize("package", ["scipy", "matplotlib", "rich"])
+def test_a_missing_extra_is_named(command, monkeypatch, package):
+    name = {"scipy": "scipy.spatial", "matplotlib": "matplotlib.figure", "rich": "rich.console"}
+    monkeypatch.setitem(sys.modules, name[package], None)
+    status, _, err = command("--scenes", "uniform")
+    assert status == 2
+    assert f"report needs {package}: pip install {package}\n" in err
+
+
+def test_all_missing_extras_are_named_at_once(command, monkeypatch):
+    for name in ("scipy.spatial", "rich.console"):
+        monkeypatch.setitem(sys.modules, name, None)
+    status, _, err = command("--scenes", "uniform")
+    assert status == 2
+    assert "report needs scipy and rich: pip install scipy rich\n" in err
+
+
+def test_quick_is_a_choice_of_scenes_that_there_are():
+    assert set(report.QUICK) <= set(scenes.names())
+    assert {"head-on", "stiff-chain"} <= set(report.QUICK)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the report says: words, tables, figures, and the page that holds them all."""
+
+import base64
+import io
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+import halfshell as hs
+from checkout import ROOT
+from halfshell._peers import LIBRARIES
+from halfshell._report.measure.facts import machine_facts
+from halfshell._report.page import figures, html, table, words
+from halfshell._report.page.rows import read_csv
+from report_helpers import bare, parse, row
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Two scenes, one of which moves, by every method of ours and SciPy's tree."""
+    return hs.report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
+
+
+def test_words_say_what_the_rows_say():
+    said = words.findings([
+        row("exact", d_max_ulp=0.0), row("double", missed=3, seconds_least=0.5, d_max_ulp=1.0),
+        row("other", "peer", spurious=1, version="2"), bare("gone", "not installed"),
+    ])  # fmt: skip
+    text = "\n".join(said)
+    assert "Precision 'exact' gave 1 list with 1,000 pairs in all, and every one was right." in text
+    assert "1 of the lists is wrong, by 3 pairs. Worst on s: 3 missed of 1,000 pairs." in text
+    assert "2.00 times as long as 'double'" in text
+    assert "off by 1 unit in the last place" in text
+    assert "gone: not installed; no list to judge." in text
+
+
+def test_words_on_a_scene_tell_right_from_wrong():
+    said = words.scene_words([
+        row("exact"), row("single", missed=1, spurious=2),
+        bare("other", "crashed", note="ended by SIGABRT"), bare("more", "not offered", note="2-D"),
+    ])  # fmt: skip
+    assert said == (
+        "Right: exact. Wrong: single (1 missed, 2 spurious). "
+        "No answer: other (crashed: ended by SIGABRT). Not offered: more (2-D)."
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, ""), (0, "0"), (7, "7"), (12345, "12,345"), (0.5, "0.5"), (1e10, "1.0e+10"),
+     (math.inf, "inf"), (3e-17, "3e-17"), (99.9, "100"), (9.96, "10"), (580.4, "580")],
+)  # fmt: skip
+def test_numbers_are_short(value, text):
+    assert words.number(value) == text
+
+
+def test_durations_have_units():
+    assert [words.duration(x) for x in (2.0, 3e-3, 4e-6, None)] == ["2 s", "3 ms", "4 µs", ""]
+
+
+def test_tables_have_a_line_a_method(rows):
+    from rich.console import Console
+
+    stream = io.StringIO()
+    console = Console(file=stream, width=80)
+    console.print(table.summary_table(rows))
+    for name in ("near-ties", "head-on"):
+        console.print(table.scene_table([row for row in rows if row.scene == name]))
+    console.print(table.scene_table([bare("other", "crashed", note="by SIGABRT")]))
+    text = stream.getvalue()
+    assert max(map(len, text.splitlines())) <= 80
+    assert re.search(r"exact +2 +0 +0 +0 +0 +0 +0", text)
+    assert re.search(r"single +<= .* spurious", text)
+    assert "other: crashed: by SIGABRT" in text
+    assert "…" not in text
+
+
+def test_the_page_is_well_formed_and_needs_nothing_else(rows):
+    page = html.page(machine_facts(), rows)
+    tree = parse(page)
+    assert "http" not in re.sub(r"base64,[^\"]*", "", page)
+    for element in tree.iter():
+        assert element.tag not in ("script", "link", "iframe", "object")
+        for name, value in element.attrib.items():
+            if name in ("src", "href"):
+                assert value.startswith("data:image/svg+xml;base64,")
+    images = [element.get("src") for element in tree.iter("img")]
+    assert len(images) >= 5
+    for image in images:
+        svg = ElementTree.fromstring(base64.b64decode(image.partition(",")[2]))
+        assert svg.tag == "{http://www.w3.org/2000/svg}svg"
+    text = " ".join(tree.itertext())
+    assert "every one was right" in text and "near-ties" in text
+    assert len(page) < 500_000
+
+
+def test_what_a_library_says_cannot_break_the_page(rows):
+    note = '<script>alert("&")</script> \x1b[31m'
+    page = html.page(machine_facts(), [*rows, bare("vesin", "failed", note=note)])
+    parse(page)
+    assert "<script>" not in page
+
+
+def test_zero_and_infinity_have_a_place_in_the_figures(rows):
+    odd = [row("exact", d_max_ulp=0.0, force_error=0.0),
+           row("single", missed=5, d_max_ulp=math.inf, force_error=math.inf)]  # fmt: skip
+    svg = figures.to_svg(figures.scene_figure(odd)).decode()
+    assert ">0<" in svg and ">∞<" in svg
+    assert figures.scene_figure([bare("vesin", "crashed")]) is None
+    assert figures.cost_figure([row("exact")]) is None
+    assert figures.drift_figure([row("exact")]) is None
+
+
+def test_figures_are_the_same_bytes_each_time(rows):
+    for make in (figures.map_figure, figures.cost_figure, figures.drift_figure):
+        assert figures.to_svg(make(rows)) == figures.to_svg(make(rows))
+
+
+def test_every_method_has_a_mark():
+    assert set(figures.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
+
+
+# Geometry ----------------------------------------------------------------------------------
+
+
+def outside(figure):
+    """How far what is drawn reaches beyond the picture, in inches."""
+    agg = pytest.importorskip("matplotlib.backends.backend_agg")
+    with figures._rules():
+        canvas = agg.FigureCanvasAgg(figure)
+        canvas.draw()
+        drawn, page = figure.get_tightbbox(canvas.get_renderer()), figure.bbox_inches
+    return max(-drawn.x0, -drawn.y0, drawn.x1 - page.x1, drawn.y1 - page.y1)
+
+
+@pytest.mark.parametrize("n", range(1, len(figures.LOOKS) + 1))
+def test_the_key_is_whole_for_any_methods(n):
+    ours = {"exact", "double", "single", "float32"}
+    for names in (list(figures.LOOKS)[:n], list(figures.LOOKS)[-n:]):
+        shown = [row(name, "halfshell" if name in ours else "peer") for name in names]
+        figure = figures.key_figure(shown)
+        (legend,) = figure.legends
+        assert len(legend.get_texts()) == n
+        extent = legend.get_window_extent()
+        assert extent.x0 >= 0.02 * figure.bbox.width and extent.x1 <= 0.98 * figure.bbox.width
+        assert extent.y0 >= 0.0 and extent.y1 <= figure.bbox.height
+        assert figure.bbox.width == pytest.approx(7.6 * figure.dpi)
+
+
+@pytest.mark.slow
+def test_no_figure_of_the_committed_report_is_cut():
+    with (ROOT / "docs" / "report" / "report.csv").open(newline="", encoding="utf-8") as stream:
+        rows = read_csv(stream)[1]
+    made = [figures.key_figure(rows), figures.map_figure(rows), figures.cost_figure(rows),
+            figures.drift_figure(rows)]  # fmt: skip
+    for name in list(dict.fromkeys(one.scene for one in rows))[::8]:
+        made.append(figures.scene_figure([one for one in rows if one.scene == name]))
+    assert all(outside(figure) < 1e-6 for figure in made if figure is not None)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Other libraries in the report: they may be missing, raise, hang or abort, and nothing happens."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell._peers import LIBRARIES, Library, Question, wrapped
+from halfshell._report.measure.peers import PeerProcess
+from report_helpers import fake, question
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_library_answers_from_its_own_process():
+    command = fake("print('noise'); return lambda: (np.array([0]), np.array([1]))")
+    with PeerProcess("ase", 60.0, command=command) as peer:
+        for _ in range(2):
+            reply = peer.ask(question())
+            assert reply["status"] == "ok"
+            assert reply["answer"]["i"].tolist() == [0]
+            assert reply["timings"]["ij"].least > 0.0
+        assert peer.version == np.__version__
+        refused = peer.ask(question(points=np.zeros((2, 2))))
+        assert (refused["status"], refused["note"]) == ("not offered", "2 dimensions")
+
+
+def test_a_library_that_raises_has_failed():
+    with PeerProcess("ase", 60.0, command=fake("raise ValueError('no  such\\nthing')")) as peer:
+        assert peer.ask(question()) == {"status": "failed", "note": "ValueError: no such thing"}
+
+
+def test_a_library_that_ends_the_process_has_crashed_and_is_started_again():
+    with PeerProcess("ase", 60.0, command=fake("os.abort()")) as peer:
+        for _ in range(2):
+            reply = peer.ask(question())
+            assert reply["status"] == "crashed"
+            assert "SIGABRT" in reply["note"]
+    with PeerProcess("ase", 60.0, command=fake("os._exit(3)")) as peer:
+        assert "status 3" in peer.ask(question())["note"]
+
+
+def test_a_library_that_hangs_is_ended():
+    with PeerProcess("ase", 0.5, command=fake("time.sleep(60)")) as peer:
+        assert peer.ask(question())["status"] == "timed out"
+        assert peer.ask(question())["status"] == "timed out"
+
+
+def test_a_library_that_took_its_time_is_left_out_of_the_rest():
+    command = fake("time.sleep(0.2); return lambda: (np.array([0]), np.array([1]))")
+    with PeerProcess("ase", 60.0, budget=0.1, command=command) as peer:
+        assert peer.ask(question())["status"] == "ok"
+        assert peer.ask(question())["status"] == "left out"
+
+
+def test_a_list_of_all_and_nothing_is_no_answer():
+    command = fake("return lambda: (np.zeros(10**7, int), np.ones(10**7, int))")
+    with PeerProcess("ase", 60.0, command=command) as peer:
+        reply = peer.ask(question())
+        assert reply["status"] == "failed" and "10,000,000 rows" in reply["note"]
+
+
+def test_a_library_that_is_missing_is_said_to_be():
+    with PeerProcess("ase", 60.0, command=fake("pass", module="no_such_module")) as peer:
+        assert peer.ask(question())["status"] == "not installed"
+        assert peer.version is None
+
+
+def test_rows_of_missing_libraries_say_so(monkeypatch):
+    missing = fake("pass", module="no_such_module")
+    start = PeerProcess.__init__
+    monkeypatch.setattr(PeerProcess, "__init__", lambda self, name, *rest: start(
+        self, name, *rest, command=missing))  # fmt: skip
+    rows = hs.report(["uniform"], methods=["exact"], peers=["vesin"], size="small")
+    (row,) = [row for row in rows if row.kind == "peer"]
+    assert (row.method, row.status, row.note) == ("vesin", "not installed", "pip install vesin")
+    assert row.wrong is None and row.seconds is None
+
+
+def test_points_are_folded_for_a_library_that_demands_it(rng):
+    points = rng.uniform(-3.0, 3.0, (60, 2)) * [1.0, 2.0]
+    points[0], points[1] = (1.0, -1e-30), (2.0, 4.0)
+    asked = Question(points, 0.2, np.diag([1.0, 2.0]), (True, False))
+    folded, outside = wrapped(asked)
+    assert outside
+    assert ((folded.points[:, 0] >= 0.0) & (folded.points[:, 0] < 1.0)).all()
+    assert (folded.points[:, 1] == points[:, 1]).all()
+    assert not wrapped(folded)[1]
+    tree = LIBRARIES["cKDTree"]
+    i, _ = tree.indices(tree.prepare(folded)())
+    assert len(i) == hs.count_pairs(points, 0.2, box=[1.0, 2.0], periodic=[True, False])
+
+
+def test_what_a_question_asks_for():
+    rows = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0]])
+    slab = Question(np.zeros((1, 3)), 0.5, rows, (True, True, False))
+    assert slab.has_images and slab.orthorhombic
+    assert not replace(slab, cutoff=0.4).has_images
+    tilted = replace(slab, rows=rows + np.array([[0.0] * 3, [0.9, 0.0, 0.0], [0.0] * 3]))
+    assert not tilted.orthorhombic
+    assert LIBRARIES["cKDTree"].refuses(tilted) == "triclinic box"
+    assert LIBRARIES["MDAnalysis"].refuses(slab) == "some axes periodic, some open"
+    assert LIBRARIES["freud"].refuses(replace(slab, cutoff=0.1, quantities="ijS")) == "quantities S"
+    line = Question(np.zeros((1, 1)), 0.5)
+    assert LIBRARIES["freud"].refuses(line) == "1 dimension"
+    assert LIBRARIES["vesin"].refuses(line) is None
+
+
+@pytest.mark.parametrize("name", LIBRARIES)
+def test_installed_libraries_are_right_where_nothing_is_hard(name):
+    if LIBRARIES[name].version() is None:
+        pytest.skip(f"{name} is not installed")
+    rows = hs.report(["uniform", "offset-1e3"], methods=[], peers=[name], size="small")
+    assert {row.status for row in rows} <= {"ok", "not offered"}
+    done = [row for row in rows if row.status == "ok"]
+    assert done
+    for row in done:
+        assert row.wrong == 0
+        assert row.d_max_relative is None or row.d_max_relative < 1e-3
+
+
+def test_no_adapter_shadows_another():
+    assert list(LIBRARIES) == [library.name for library in LIBRARIES.values()]
+    assert all(isinstance(library, Library) for library in LIBRARIES.values())

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The truth of the report against full rational brute force, where every trick could fail."""
+
+import math
+
+import numpy as np
+import pytest
+
+from halfshell._check.reference import reference_pairs
+from halfshell._report.truth.integers import (
+    as_integers,
+    common_unit,
+    nearest_float,
+    nearest_root,
+)
+from halfshell._report.truth.lattice import short_basis
+from halfshell._report.truth.pairs import exact_vectors, true_pairs
+from oracles import BOX_KINDS, lattice, random_scene, rotation
+
+pytestmark = pytest.mark.slow
+
+
+def assert_true(points, cutoff, box=None, periodic=None):
+    """Both rules give what rational arithmetic over all points gives; returns the truth."""
+    truth = true_pairs(points, cutoff, box, periodic)
+    for inclusive in (True, False):
+        found = truth.by_rule(inclusive)
+        rows = sorted(zip(found.i.tolist(), found.j.tolist(), map(tuple, found.S.tolist())))
+        assert rows == reference_pairs(points, cutoff, box, periodic, inclusive)
+    return truth
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3, 4, 6, 8])
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_random_scenes_in_boxes_of_every_kind(ndim, kind, rng):
+    for _ in range(3):
+        flags = rng.random(ndim) < 0.7
+        n = 20 if ndim < 4 else 5
+        assert_true(*random_scene(rng, n, ndim, kind, 4, spread=3, periodic=flags))
+
+
+@pytest.mark.parametrize("ndim", [1, 2, 3, 8])
+def test_open_space(ndim, rng):
+    points = rng.normal(size=(40, ndim))
+    assert assert_true(points, 1.0).pairs.S.any() == 0
+    assert_true(points.astype(np.float32), 0.7)
+
+
+def test_cutoffs_larger_than_the_box(rng):
+    assert len(assert_true(rng.random((3, 2)), 2.7, np.eye(2)).pairs) > 50
+    assert_true(np.zeros((1, 3)), 2.0, [1.0, 1.0, 1.0])
+    assert_true(rng.random((2, 3)), 1.5, np.eye(3) + np.tril(rng.random((3, 3)), -1), [1, 0, 1])
+
+
+@pytest.mark.parametrize("name", ["sc", "fcc", "hcp"])
+def test_ties_on_lattices_straight_and_rotated(name, rng):
+    points, box = lattice(name, (3, 2, 2))
+    shells = {"sc": 2.0, "fcc": 2.0, "hcp": 18.0}
+    truth = assert_true(points, math.sqrt(shells[name]), box)
+    if name == "fcc":
+        assert assert_true(points, 2.0, box).tie.any()
+    turn = rotation(rng)
+    turned = assert_true(points @ turn, math.sqrt(shells[name]), box @ turn)
+    assert turned.n_by_integers > 0 and truth.n_by_integers > 0
+
+
+def test_ties_at_any_scale(rng):
+    points, box = lattice("sc", (3, 3, 2))
+    for scale in (2.0**-1074, 5e-324, 1e-310, 1e-150, 1e150, 2.0**1020):
+        scaled = points * scale
+        assert assert_true(scaled, 1.0 * scale, box * scale).tie.any()
+        assert assert_true(scaled, 1.0 * scale).tie.any()
+
+
+def test_mixed_scales():
+    points = np.array([[1e300, 0.0], [1e300, 1e-300], [-1e300, 0.0], [5e-324, 0.0], [0.0, 0.0]])
+    for cutoff in (0.0, 5e-324, 1e-300, 1.0, 1e300, 1.7e308):
+        assert_true(points, cutoff)
+    assert_true(np.array([[1e300, 0.25], [1e290, 0.5], [0.1, 0.125]]), 1.0, [3.0, 1.0])
+    assert_true(np.array([[1e300, 0.25], [1e300, 0.5]]), 0.25, [0.0, 1.0], [False, True])
+    assert_true(np.array([[0.0], [1e-200], [1.0]]), 1e-200, [1.0])
+
+
+def test_logarithmically_spread_points_do_not_become_quadratic(rng):
+    sign = rng.choice([-1.0, 1.0], (3000, 1))
+    points = sign * 10.0 ** rng.uniform(-150, 150, (3000, 1))
+    truth = true_pairs(points, 1e-3)
+    assert truth.n_by_integers < len(points) ** 2 // 100
+    assert_true(points[:60], 1e-3)
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e15, -(2.0**53)])
+def test_far_from_the_origin_and_many_boxes_away(offset, rng):
+    points = rng.random((25, 3)) * 3.0
+    assert_true(points + offset, 1.0)
+    assert_true(points + offset, 1.0, [3.0, 2.0, 3.0])
+    assert_true(points + offset, 1.0, [3.0, 2.0, 0.0], [True, True, False])
+    box = np.array([[3.0, 0.0, 0.0], [0.1, 2.0, 0.0], [0.5, -0.7, 3.0]])
+    assert_true(points + offset, 1.0, box)
+    assert_true(points + offset, 1.0, box, [True, False, True])
+    assert_true(points + rng.integers(-3, 4, (25, 3)) * offset, 1.0, box)
+
+
+def test_boxes_sheared_by_millions_of_widths(rng):
+    box = np.array([[1.0, 0.0, 0.0], [1e6, 1.0, 0.0], [-3e6, 7e5, 1.1]])
+    assert_true(rng.random((6, 3)), 0.6, box)
+    assert_true(rng.random((6, 3)) @ box, 0.6, box)
+    assert_true(rng.random((6, 2)), 0.6, [[1.0, 2.0**40], [0.0, 1.0]])
+
+
+def test_flat_and_needle_boxes(rng):
+    box = np.array([[1.0, 0.0, 0.0], [-0.5, 0.8660254, 0.0], [-0.5, -0.8660254, 1e-3]])
+    assert_true(rng.random((2, 3)), 0.02, box)
+    assert_true(rng.random((5, 3)) * [1e8, 1.0, 1.0], 1.0, [1e8, 1.0, 1e-1 + 1.0])
+
+
+def test_slabs_at_an_angle(rng):
+    box = np.array([[1.0, 0.2, 0.3], [0.0, 0.0, 0.0], [-0.4, 0.9, 1.2]])
+    assert_true(rng.normal(size=(20, 3)) * 3.0, 0.8, box, [True, False, True])
+    assert_true(rng.normal(size=(20, 3)) + 1e9, 0.8, box, [True, False, False])
+
+
+def test_coincident_points_and_cutoff_zero(rng):
+    points = np.repeat(rng.random((6, 3)), 3, axis=0)
+    assert assert_true(points, 0.0).tie.all()
+    assert assert_true(points, 0.0, [1.0] * 3).tie.all()
+    assert_true(points, 0.4, [1.0] * 3)
+    moved = points + rng.integers(-2, 3, points.shape)  # rounds: no longer the same points
+    assert_true(moved, 0.0, [1.0] * 3)
+    assert_true(np.zeros((4, 2)), 0.0)
+
+
+def test_near_ties_of_an_ulp():
+    for steps in (-2, -1, 0, 1, 2):
+        x = 0.3 + steps * math.ulp(0.3)
+        assert_true(np.array([[0.0], [x], [0.1 + 0.2]]), 0.3, [1.0])
+        assert_true(np.array([[0.1], [0.1 + x]]), 0.3)
+
+
+def test_edges_of_the_box_exactly():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [-1.0, 0.0], [0.5, 2.0]])
+    assert_true(points, 0.5, [1.0, 1.0])
+    assert_true(points, 1.0, [1.0, 1.0], [True, False])
+
+
+def test_no_points_and_one():
+    assert len(true_pairs(np.empty((0, 3)), 1.0, [1.0] * 3).pairs) == 0
+    assert len(true_pairs(np.zeros((1, 3)), 1.0).pairs) == 0
+
+
+def test_dependent_rows_are_refused():
+    with pytest.raises(ValueError, match="linearly dependent"):
+        true_pairs(np.zeros((1, 2)), 1.0, [[1.0, 2.0], [2.0, 4.0]])
+
+
+def test_a_million_ties_do_not_take_long():
+    steps = np.arange(24.0)
+    points = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3) * 4.05
+    truth = true_pairs(points, 4.05 * 2, [4.05 * 24] * 3)
+    counts = np.bincount(np.concatenate([truth.pairs.i, truth.pairs.j]))
+    assert truth.n_by_integers >= 3 * 24**3
+    assert counts.min() >= 26 and counts.max() <= 32  # (2, 0, 0) are ties but for rounding
+
+
+def test_exact_vectors_are_those_of_the_pairs(rng):
+    points, cutoff, box, flags = random_scene(rng, 12, 3, "sheared", 6, spread=2)
+    truth = true_pairs(points, cutoff, box, flags)
+    exact = exact_vectors(truth.scene, truth.pairs)
+    for row, i, j, S in zip(exact, truth.pairs.i, truth.pairs.j, truth.pairs.S):
+        vector = points[j] - points[i] + S @ box
+        rounded = [nearest_float(x, truth.scene.unit) for x in row]
+        assert np.allclose(rounded, vector, rtol=0.0, atol=1e-13)
+
+
+def test_integers_are_the_floats(rng):
+    values = np.concatenate([rng.normal(size=50), [0.0, 5e-324, -1.7e308, 1e-310, 2.0**60]])
+    unit = common_unit(values)
+    back = [nearest_float(whole, unit) for whole in as_integers(values, unit)]
+    assert back == values.tolist()
+
+
+def test_roots_are_rounded_once(rng):
+    for square in [*rng.integers(1, 2**62, 200).tolist(), 3, 10**40, 2**400 + 1]:
+        assert nearest_root(square * square, -3) == square / 8
+        root = nearest_root(square, 0)
+        below, above = math.nextafter(root, 0.0), math.nextafter(root, math.inf)
+        # root is nearest if the middles to its neighbours lie on both sides of the true root
+        assert (_int_sum(below, root)) ** 2 <= 4 * square * 4**60 <= (_int_sum(root, above)) ** 2
+
+
+def _int_sum(a, b):
+    (p, q), (r, s) = a.as_integer_ratio(), b.as_integer_ratio()
+    return (p * s + r * q) * 2**60 // (q * s)
+
+
+@pytest.mark.parametrize("ndim", [2, 3, 5])
+def test_short_bases_span_the_same_lattice(ndim, rng):
+    rows = rng.integers(-(10**9), 10**9, (ndim, ndim)).tolist()
+    basis, steps = short_basis(rows)
+    assert (np.array(steps, object) @ np.array(rows, object)).tolist() == basis
+    assert abs(round(np.linalg.det(np.array(steps, float)))) == 1 or ndim > 3
+    longest = max(np.linalg.norm(row) for row in np.array(basis, float))
+    assert longest <= 2.0**ndim * abs(np.linalg.det(np.array(rows, float))) ** (1 / ndim) * 10

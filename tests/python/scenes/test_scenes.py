@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scenes of `halfshell.scenes`: exact answers, the same bits everywhere, said what for."""
+
+import dataclasses
+import importlib.util
+import inspect
+import re
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from checkout import TESTS
+from halfshell import scenes
+from oracles import check
+
+SOURCE = TESTS / "scene_files.py"
+SPEC = importlib.util.spec_from_file_location("scene_files", SOURCE)
+scene_files = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(scene_files)
+
+KEPT = scene_files.read()
+NAMES = scenes.names()
+every_scene = pytest.mark.parametrize("name", NAMES)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@every_scene
+def test_pairs_are_those_of_rational_arithmetic(name, kernel, threads):
+    scene = scenes.load(name, "small")
+    before = scene_files.digest(scene)
+    found = check(**scene.arguments, kernel=kernel, threads=threads)
+    assert len(found) == hs.count_pairs(**scene.arguments, kernel=kernel, threads=threads)
+    assert scene_files.digest(scene) == before, "the search changed its input"
+
+
+@every_scene
+def test_a_quick_scene_is_counted_as_it_is_listed(name):
+    scene = scenes.load(name, "quick")
+    pairs = hs.count_pairs(**scene.arguments)
+    assert pairs == len(hs.pairs(**scene.arguments, quantities="i"))
+    assert {"n": scene.n_points, "pairs": pairs}.items() <= KEPT[name]["quick"].items()
+
+
+@every_scene
+def test_memory_follows_points_and_pairs(name):
+    scene = scenes.load(name, "quick")
+    measured = hs.explain(**scene.arguments, measure=True).measured
+    # Two columns of int64, grown by steps, and what a grid and a neighbourhood take.
+    result = 16 * measured["pairs"]
+    assert measured["bytes_peak"] <= 2 * result + 500 * scene.n_points + (2 << 20)
+
+
+@pytest.mark.parametrize("size", scenes.SIZES)
+@every_scene
+def test_the_bits_are_those_that_are_written_down(name, size):
+    scene = scenes.load(name, size)
+    assert scene.n_points == KEPT[name][size]["n"]
+    assert scene_files.digest(scene) == KEPT[name][size]["digest"]
+
+
+def test_every_scene_is_written_down():
+    assert tuple(KEPT) == NAMES
+
+
+def test_the_page_has_the_table_of_the_docstrings():
+    text = scene_files.PAGE.read_text()
+    assert scene_files.page(text) == text, "python tests/scene_files.py --write"
+
+
+def test_the_code_of_the_page_runs(capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", scene_files.PAGE.read_text(), re.DOTALL)
+    exec(compile(code, "scenes.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(NAMES)
+
+
+def test_each_size_is_about_as_large_as_promised():
+    for name in NAMES:
+        small, quick, full = (KEPT[name][size]["n"] for size in scenes.SIZES)
+        assert 1 <= small <= 300
+        assert small < quick <= 10_000
+        assert quick < full <= 1_000_000
+        assert KEPT[name]["full"]["pairs"] <= 20_000_000
+
+
+@every_scene
+def test_scenes_say_what_they_are_and_what_they_stress(name):
+    scene = scenes.load(name, "small")
+    assert scene.name == name
+    assert 10 <= len(scene.title) <= 80
+    assert "\n" not in scene.title
+    assert len(scene.stresses) > 40
+    assert scene.stresses == inspect.cleandoc(scene.stresses)
+
+
+def test_titles_and_names_tell_scenes_apart():
+    titles = [scenes.load(name, "small").title for name in NAMES]
+    assert len(set(titles)) == len(titles)
+    assert all(name == name.lower() and " " not in name for name in NAMES)
+
+
+@every_scene
+def test_fields_have_the_promised_types(name):
+    scene = scenes.load(name, "small")
+    n, ndim = scene.points.shape
+    assert (scene.n_points, scene.ndim) == (n, ndim)
+    assert scene.points.dtype in (np.float64, np.float32)
+    assert scene.points.flags.c_contiguous
+    assert np.isfinite(scene.points).all()
+    assert type(scene.cutoff) is float
+    assert type(scene.inclusive) is bool
+    assert len(scene.periodic) == ndim
+    assert all(type(flag) is bool for flag in scene.periodic)
+    if scene.box is None:
+        assert not any(scene.periodic)
+    else:
+        assert scene.box.dtype == np.float64
+        assert scene.box.shape in ((ndim,), (ndim, ndim))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scene.cutoff = 1.0
+
+
+def test_scenes_are_made_anew():
+    one, other = (scenes.load("uniform", "small") for _ in range(2))
+    one.points[:] = 0.0
+    assert other.points.any()
+
+
+def test_full_is_the_size_unless_one_is_named():
+    assert scenes.load("uniform").n_points == KEPT["uniform"]["full"]["n"]
+
+
+@pytest.mark.parametrize(
+    ("name", "nearest"),
+    [("fcc-shel", "fcc-shell"), ("Plummer", "plummer"), ("offset-1e5", "offset-1e15"), ("", "")],
+)
+def test_an_unknown_name_is_told_the_nearest_ones(name, nearest):
+    with pytest.raises(ValueError, match=f"no scene '{name}'; the nearest are .*{nearest}"):
+        scenes.load(name)
+
+
+@pytest.mark.parametrize("size", ["", "Full", "medium"])
+def test_an_unknown_size_is_told_the_three(size):
+    with pytest.raises(ValueError, match="one of small, quick, full"):
+        scenes.load("uniform", size)
+
+
+@pytest.mark.parametrize(("name", "size"), [(None, "full"), (b"uniform", "full"), ("uniform", 3)])
+def test_names_and_sizes_are_strings(name, size):
+    with pytest.raises(TypeError, match="must be a string"):
+        scenes.load(name, size)
+
+
+def test_two_scenes_of_one_name_are_refused():
+    add = importlib.import_module("halfshell.scenes._catalogue").add
+    with pytest.raises(ValueError, match="two scenes 'uniform'"):
+        add({"uniform": ("again",)})(lambda size: None)
+
+
+def test_examples_of_the_scenes_run():
+    doctest = importlib.import_module("doctest")
+    for part in ("_scene", "_catalogue"):
+        module = importlib.import_module(f"halfshell.scenes.{part}")
+        failures, count = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+        assert (failures, count > 2) == (0, True)

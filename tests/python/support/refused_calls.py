@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calls that must be refused: at once, and in words that say what is wrong."""
+
+import os
+import re
+import time
+
+import numpy as np
+import pytest
+
+NAN, INF = float("nan"), float("inf")
+# Seconds of processor time, however busy the machine is; more under sanitizers.
+LIMIT = 0.5 * float(os.environ.get("HALFSHELL_SLOWDOWN", "1"))
+
+
+def with_value(row, column, value, shape=(5, 3), dtype=float):
+    array = np.zeros(shape, dtype)
+    array[row, column] = value
+    return array
+
+
+def assert_refused(call, exceptions, *fragments):
+    """The call raises one of `exceptions`, at once, and the message has all the fragments."""
+    start = time.process_time()
+    with pytest.raises(exceptions) as caught:
+        call()
+    elapsed = time.process_time() - start
+    assert caught.type not in (RuntimeError, np.linalg.LinAlgError, SystemError)
+    message = str(caught.value)
+    for fragment in fragments:
+        assert re.search(fragment, message), f"{fragment!r} is not in: {message}"
+    assert elapsed < LIMIT, f"refused after {elapsed:.2f} s"
