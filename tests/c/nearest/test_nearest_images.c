@@ -159,6 +159,25 @@ more_images_than_can_be_counted_are_refused(void)
     near_unit_close(&unit);
 }
 
+/* Each image may be 0.3 of a period off, so that there are more of them, which are further off. */
+static void
+images_that_drift_make_more_images(void)
+{
+    const double    x[1] = {0.0};
+    const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    const hs_points points = points_in(x, 1, 1);
+    hs_near_images  images;
+    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    const hs_near_group group = near_unit_group(&unit, 100.0);
+    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK && images.high[0] == 100);
+    unit.search.scene.lattice.aligned = false;
+    unit.near.drift[0][0] = 0.3;
+    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.high[0] >= 100 + 0.3 * 130 && images.high[0] <= 100 + 0.3 * 145);
+    CHECK(images.low[0] == -images.high[0]);
+    near_unit_close(&unit);
+}
+
 /* Only where the open axes are at right angles to what repeats does the way to the points along
  * them leave less for the rest. */
 static void
@@ -193,5 +212,6 @@ test_nearest_images(void)
     RUN(images_in_reach_are_met_once);
     RUN(there_may_be_no_image_in_reach);
     RUN(more_images_than_can_be_counted_are_refused);
+    RUN(images_that_drift_make_more_images);
     RUN(layers_are_upright);
 }
