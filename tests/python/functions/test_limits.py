@@ -4,14 +4,13 @@
 import inspect
 import re
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
+from checkout import ROOT
 
 import halfshell as hs
 
-ROOT = Path(__file__).resolve().parents[2]
 POINTS = np.array([[0.0, 0.0], [3.0, 4.0]])  # at distance 5
 CELLS = hs.CellList(POINTS, 7.0)
 BALL = hs.CellList(POINTS, 5.0)
