@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 import pytest
-from checkout import ROOT
 
 import halfshell as hs
+from checkout import ROOT
 
 POINTS = np.array([[0.0, 0.0], [3.0, 4.0]])  # at distance 5
 CELLS = hs.CellList(POINTS, 7.0)
