@@ -27,9 +27,8 @@ hs_points_of(PyObject *object, const char *name, hs_points *points)
     }
     const npy_intp d = PyArray_DIM(array, 1);
     if (d < 1 || d > HS_MAX_DIM) {
-        PyErr_Format(PyExc_ValueError,
-                     "%s must have shape (n, d) with 1 <= d <= %d, got d = %zd", name, HS_MAX_DIM,
-                     (Py_ssize_t)d);
+        PyErr_Format(PyExc_ValueError, "%s must have shape (n, d) with 1 <= d <= %d, got d = %zd",
+                     name, HS_MAX_DIM, (Py_ssize_t)d);
         return false;
     }
     *points = (hs_points){.data = PyArray_DATA(array),
@@ -79,8 +78,8 @@ hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *giv
 }
 
 /* The bit of a letter of HS_LETTERS is its HS_WANT_ bit. */
-_Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 &&
-                   HS_WANT_VECTOR == 8 && HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32,
+_Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 && HS_WANT_VECTOR == 8 &&
+                   HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32,
                "hs_quantities_of counts on this");
 
 /* Names the letters that are known. */

@@ -32,8 +32,8 @@ raise_at(const char *format, const hs_failure *failure)
 {
     PyObject *number = PyFloat_FromDouble(failure->value);
     if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, format, (long long)failure->row,
-                     (long long)failure->column, number);
+        PyErr_Format(PyExc_ValueError, format, (long long)failure->row, (long long)failure->column,
+                     number);
         Py_DECREF(number);
     }
     return NULL;
@@ -212,9 +212,9 @@ raise_capacity(const hs_failure *failure)
 {
     const long long needed = (long long)failure->expected_pairs;
     PyObject       *module = PyImport_ImportModule("halfshell._errors");
-    PyObject *type = module != NULL ? PyObject_GetAttrString(module, "CapacityError") : NULL;
-    PyObject *message = PyUnicode_FromFormat(
-        "out is too small: there are %lld pairs, and every array must have room for them", needed);
+    PyObject       *type = module != NULL ? PyObject_GetAttrString(module, "CapacityError") : NULL;
+    PyObject       *message = PyUnicode_FromFormat(
+              "out is too small: there are %lld pairs, and every array must have room for all", needed);
     if (type != NULL && message != NULL) {
         PyObject *error = PyObject_CallFunction(type, "OL", message, needed);
         if (error != NULL) {
@@ -350,7 +350,6 @@ hs_raise(hs_status status, const hs_failure *failure, const hs_options *options)
     if (number < sizeof RAISE / sizeof RAISE[0] && RAISE[number] != NULL) {
         return RAISE[number](failure);
     }
-    PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status,
-                 hs_status_text(status));
+    PyErr_Format(PyExc_SystemError, "unmapped status %d: %s", (int)status, hs_status_text(status));
     return NULL;
 }

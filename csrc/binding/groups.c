@@ -23,8 +23,7 @@ typedef struct hierarchy {
 } hierarchy;
 
 static const hierarchy VERSIONS[] = {
-    {"cgroup2", "/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file ",
-     "active_file "},
+    {"cgroup2", "/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file ", "active_file "},
     {"cgroup", "/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes",
      "total_inactive_file ", "total_active_file "},
 };

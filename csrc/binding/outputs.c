@@ -19,7 +19,7 @@ typedef struct array_form {
 static array_form
 form_of(char letter, int ndim, int index_bytes)
 {
-    const int index_type = index_bytes == 8 ? NPY_INT64 : NPY_INT32;
+    const int    index_type = index_bytes == 8 ? NPY_INT64 : NPY_INT32;
     const size_t index = (size_t)index_bytes, d = (size_t)ndim;
     switch (letter) {
     case 'i': return (array_form){HS_WANT_I, index_type, 0, index};
@@ -203,8 +203,8 @@ hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair
     *arrays = (hs_pair_arrays){.capacity = INT64_MAX, .index_bytes = index_bytes};
     for (Py_ssize_t k = 0; k < n; k++) {
         const array_form form = form_of(letters[k], ndim, index_bytes);
-        PyObject  *item = item_of(out, k, n);
-        const npy_intp capacity = item == NULL ? -1 : check_array(item, letters[k], form);
+        PyObject        *item = item_of(out, k, n);
+        const npy_intp   capacity = item == NULL ? -1 : check_array(item, letters[k], form);
         if (capacity < 0) {
             return false;
         }
@@ -255,8 +255,8 @@ hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char 
     for (Py_ssize_t k = 0; k < n; k++) {
         if (range_of((PyArrayObject *)item_of(out, k, n), &out_first, &out_end) &&
             out_first < end && first < out_end) {
-            PyErr_Format(PyExc_ValueError, "out for '%c' must not share memory with %s",
-                         letters[k], name);
+            PyErr_Format(PyExc_ValueError, "out for '%c' must not share memory with %s", letters[k],
+                         name);
             return false;
         }
     }

@@ -180,9 +180,8 @@ hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
 PyObject *
 hs_py_plain_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    static const plain_form form = {.name = "plain_count",
-                                    .function = hs_py_count_pairs,
-                                    .n_arguments = HS_CALL_ARGUMENTS};
+    static const plain_form form = {
+        .name = "plain_count", .function = hs_py_count_pairs, .n_arguments = HS_CALL_ARGUMENTS};
     return call_plain(&form, module, arguments, n_arguments);
 }
 

@@ -21,8 +21,7 @@
  */
 PyObject *hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 PyObject *hs_py_plain_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
-PyObject *hs_py_plain_between(PyObject *module, PyObject *const *arguments,
-                              Py_ssize_t n_arguments);
+PyObject *hs_py_plain_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 PyObject *hs_py_plain_count_between(PyObject *module, PyObject *const *arguments,
                                     Py_ssize_t n_arguments);
 PyObject *hs_py_plain_neighbors(PyObject *module, PyObject *const *arguments,

@@ -6,9 +6,9 @@
 #include "errors.h"
 #include "py_result.h"
 
-#define FIRST_CAPACITY 1024             /* systems; doubled as needed */
+#define FIRST_CAPACITY 1024               /* systems; doubled as needed */
 #define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */
-#define MOST_COUNTS (INT64_C(1) << 48) /* no memory holds them; NumPy cannot even say so */
+#define MOST_COUNTS    (INT64_C(1) << 48) /* no memory holds them; NumPy cannot even say so */
 
 /*
  * The systems as the core takes them. Where all share box and cutoff, those without points are left
@@ -34,7 +34,7 @@ static bool
 grow(batch *given)
 {
     const int64_t capacity = given->capacity > 0 ? 2 * given->capacity : FIRST_CAPACITY;
-    int64_t *first = PyMem_Realloc(given->first, (size_t)(capacity + 1) * sizeof *first);
+    int64_t      *first = PyMem_Realloc(given->first, (size_t)(capacity + 1) * sizeof *first);
     given->first = first != NULL ? first : given->first;
     int64_t *number = PyMem_Realloc(given->number, (size_t)capacity * sizeof *number);
     given->number = number != NULL ? number : given->number;
@@ -168,10 +168,9 @@ take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
         }
     }
     const int64_t n_systems = n_boxes < n_cutoffs ? n_boxes : n_cutoffs;
-    const bool    found =
-        n_systems < MOST_NUMBER
-               ? find_all(PyArray_DATA(numbers), call->points.n, n_systems, given)
-               : find_occupied(PyArray_DATA(numbers), call->points.n, given);
+    const bool    found = n_systems < MOST_NUMBER
+                              ? find_all(PyArray_DATA(numbers), call->points.n, n_systems, given)
+                              : find_occupied(PyArray_DATA(numbers), call->points.n, given);
     systems->first = given->first;
     if (!found) {
         free_batch(given);
@@ -192,7 +191,7 @@ raise_failure(hs_status status, hs_failure *failure, const hs_py_call *call, con
 PyObject *
 hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_result  result;
     hs_failure failure;
     hs_pairs  *pairs = NULL;
@@ -207,8 +206,7 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         !hs_result_is_apart(&result, arguments[2], "box") ||
         !hs_result_is_apart(&result, more[4], "batch") ||
         !hs_result_is_apart(&result, more[5], "cutoff") ||
-        !hs_result_is_apart(&result, more[6], "box") ||
-        !take_batch(more + 4, &call, &given)) {
+        !hs_result_is_apart(&result, more[6], "box") || !take_batch(more + 4, &call, &given)) {
         return NULL;
     }
     hs_py_call_release(&call);
@@ -225,7 +223,7 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
 PyObject *
 hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     batch      given;
     (void)module;

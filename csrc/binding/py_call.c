@@ -10,7 +10,7 @@
 
 #include <math.h>
 
-#define MOST_THREADS 1024 /* an explicit wish, but not any */
+#define MOST_THREADS    1024 /* an explicit wish, but not any */
 #define THREADS_MUST_BE "threads must be a whole number from 1 to 1024 or None"
 
 /* Points below which a search is expected to be over before another thread could take the GIL: it

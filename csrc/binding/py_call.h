@@ -11,8 +11,8 @@
  * alive. */
 typedef struct hs_py_call {
     hs_points       points;
-    const hs_cells *cells;    /* borrowed: points and box are theirs; or NULL */
-    hs_points       queries;  /* when has_queries */
+    const hs_cells *cells;   /* borrowed: points and box are theirs; or NULL */
+    hs_points       queries; /* when has_queries */
     bool            has_queries;
     hs_box          box;
     bool            has_box;

@@ -18,7 +18,7 @@ free_cells(PyObject *capsule)
 PyObject *
 hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     hs_cells  *cells = NULL;
     (void)module;
@@ -103,11 +103,11 @@ hs_py_cells_layout(PyObject *module, PyObject *capsule)
     hs_cells_points(cells, &points);
     const int64_t n_starts = layout.n_cells + 1;
     return Py_BuildValue("{s:N,s:N,s:N,s:N,s:N,s:N}", /* takes the references */
-                         "shape", hs_tuple_of_integers(layout.shape, layout.ndim),
-                         "cell_sizes", hs_tuple_of_reals(layout.cell_size, layout.ndim),
-                         "cell_start", view_of(capsule, NPY_INT32, layout.start, n_starts, 0),
-                         "order", view_of(capsule, NPY_INT32, layout.order, layout.n_points, 0),
-                         "cell_ids", indices_of(cells, &layout), "points",
+                         "shape", hs_tuple_of_integers(layout.shape, layout.ndim), "cell_sizes",
+                         hs_tuple_of_reals(layout.cell_size, layout.ndim), "cell_start",
+                         view_of(capsule, NPY_INT32, layout.start, n_starts, 0), "order",
+                         view_of(capsule, NPY_INT32, layout.order, layout.n_points, 0), "cell_ids",
+                         indices_of(cells, &layout), "points",
                          view_of(capsule, NPY_DOUBLE, points.data, points.n, points.ndim));
 }
 
@@ -132,11 +132,11 @@ hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
     if (found == NULL) {
         return NULL;
     }
-    hs_status status;
-    Py_BEGIN_ALLOW_THREADS
-    status = hs_cells_find(cells, &points, PyArray_DATA((PyArrayObject *)found), &failure);
-    Py_END_ALLOW_THREADS
-    if (status != HS_OK) {
+    hs_status              status;
+    Py_BEGIN_ALLOW_THREADS status =
+        hs_cells_find(cells, &points, PyArray_DATA((PyArrayObject *)found), &failure);
+    Py_END_ALLOW_THREADS if (status != HS_OK)
+    {
         Py_DECREF(found);
         return hs_raise(status, &failure, NULL);
     }
@@ -146,7 +146,7 @@ hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
 PyObject *
 hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     hs_pairs  *ranges = NULL;
     (void)module;

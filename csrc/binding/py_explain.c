@@ -97,7 +97,7 @@ take_more(PyObject *const *more, hs_py_call *call, bool *measures)
 PyObject *
 hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call     call;
+    hs_py_call  call;
     hs_failure  failure;
     hs_plan     plan;
     hs_counters counters = {0};

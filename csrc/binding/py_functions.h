@@ -17,11 +17,9 @@ PyObject *hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssi
 PyObject *hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* py_neighbors.c. The arguments of py_call.h, then quantities, sort (which changes nothing),
  * index_bytes, out; queries. */
-PyObject *hs_py_pairs_between(PyObject *module, PyObject *const *arguments,
-                              Py_ssize_t n_arguments);
+PyObject *hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* The arguments of py_call.h, queries. */
-PyObject *hs_py_count_between(PyObject *module, PyObject *const *arguments,
-                              Py_ssize_t n_arguments);
+PyObject *hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* Those of py_call.h, then quantities of j d D S, index_bytes; queries or None -> offsets and
  * arrays, read-only. */
 PyObject *hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
@@ -46,8 +44,7 @@ PyObject *hs_py_stream_type(PyObject *module);
 
 /* py_visit.c. The arguments of py_call.h, then what to call (a callable, or the address of a
  * hs_pair_fn), the address of its data, and whether threads may call it -> pairs visited. */
-PyObject *hs_py_for_each_pair(PyObject *module, PyObject *const *arguments,
-                              Py_ssize_t n_arguments);
+PyObject *hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
 /* py_batch.c. The arguments of py_call.h (where each system has a box of its own, any one of that
  * shape), quantities, sort, index_bytes, out; batch, cutoffs or None, boxes or None. */
@@ -85,12 +82,10 @@ PyObject *hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_
 /* py_verlet.c. A new list. */
 PyObject *hs_py_verlet_new(PyObject *module, PyObject *ignored);
 /* A list, the arguments of py_call.h, skin, rebuild -> whether it was built. */
-PyObject *hs_py_verlet_update(PyObject *module, PyObject *const *arguments,
-                              Py_ssize_t n_arguments);
+PyObject *hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* A list, the arguments of py_call.h with points of shape (0, d), quantities, sort, index_bytes,
  * out. */
-PyObject *hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments,
-                             Py_ssize_t n_arguments);
+PyObject *hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 /* A list -> dict of its state. */
 PyObject *hs_py_verlet_look(PyObject *module, PyObject *list);
 

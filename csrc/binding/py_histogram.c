@@ -79,7 +79,7 @@ PyObject *
 hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_py_call          call;
+    hs_py_call       call;
     hs_failure       failure;
     hs_histogram     wanted;
     (void)module;

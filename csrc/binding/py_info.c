@@ -61,8 +61,7 @@ PyObject *
 hs_py_build_info(PyObject *module, PyObject *ignored)
 {
     PyObject *dict = PyDict_New();
-    if (dict != NULL &&
-        hs_dict_put(dict, "core", version()) &&
+    if (dict != NULL && hs_dict_put(dict, "core", version()) &&
         hs_dict_put(dict, "compiler", PyUnicode_FromString(COMPILER)) &&
 #ifdef NDEBUG
         hs_dict_put(dict, "assertions", PyBool_FromLong(0)) &&

@@ -37,7 +37,7 @@ raise_memory(const hs_failure *failure)
 PyObject *
 hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call     call;
+    hs_py_call  call;
     hs_failure  failure;
     hs_pairs   *rows = NULL;
     const char *letters;

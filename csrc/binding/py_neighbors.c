@@ -23,8 +23,8 @@ expect_queries(PyObject *queries)
 static hs_pairs *
 find_rows(hs_py_call *call)
 {
-    hs_failure failure;
-    hs_pairs  *rows = NULL;
+    hs_failure     failure;
+    hs_pairs      *rows = NULL;
     const hs_among among = hs_py_call_among(call);
     hs_py_call_release(call);
     const hs_status status = hs_neighbors_find(&among, &call->options, &rows, &failure);
@@ -39,13 +39,12 @@ PyObject *
 hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_py_call          call;
+    hs_py_call       call;
     hs_result        result;
     (void)module;
     if (!hs_expect_arguments("pairs_between", n_arguments, HS_CALL_ARGUMENTS + 5) ||
-        !expect_queries(more[4]) ||
-        !hs_py_call_init_sets(&call, arguments, more[4]) || !hs_result_init(&result, more, &call) ||
-        !hs_result_is_apart(&result, more[4], "queries") ||
+        !expect_queries(more[4]) || !hs_py_call_init_sets(&call, arguments, more[4]) ||
+        !hs_result_init(&result, more, &call) || !hs_result_is_apart(&result, more[4], "queries") ||
         !hs_result_is_apart(&result, arguments[0], "points") ||
         !hs_result_is_apart(&result, arguments[2], "box")) {
         return NULL;
@@ -59,7 +58,7 @@ hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
 PyObject *
 hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     int64_t    count = 0;
     (void)module;
@@ -72,15 +71,14 @@ hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_py_call_release(&call);
     const hs_status status = hs_pairs_count(&among, &call.options, &count, &failure);
     hs_py_call_acquire(&call);
-    return status == HS_OK ? PyLong_FromLongLong(count)
-                           : hs_raise(status, &failure, &call.options);
+    return status == HS_OK ? PyLong_FromLongLong(count) : hs_raise(status, &failure, &call.options);
 }
 
 PyObject *
 hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_py_call          call;
+    hs_py_call       call;
     const char      *letters;
     (void)module;
     if (!hs_expect_arguments("neighbors", n_arguments, HS_CALL_ARGUMENTS + 3) ||
@@ -93,9 +91,9 @@ hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
         return NULL;
     }
     hs_pairs *rows = find_rows(&call);
-    PyObject *table = rows != NULL ? hs_table_of(rows, letters, call.points.ndim,
-                                                 call.options.index_bytes)
-                                   : NULL;
+    PyObject *table = rows != NULL
+                          ? hs_table_of(rows, letters, call.points.ndim, call.options.index_bytes)
+                          : NULL;
     hs_pairs_free(rows);
     return table;
 }
@@ -103,7 +101,7 @@ hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
 PyObject *
 hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     (void)module;
     if (!hs_expect_arguments("coordination", n_arguments, HS_CALL_ARGUMENTS + 1) ||
@@ -117,8 +115,8 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
     }
     const hs_among among = hs_py_call_among(&call);
     hs_py_call_release(&call);
-    const hs_status status = hs_neighbors_count(
-        &among, &call.options, PyArray_DATA((PyArrayObject *)counts), &failure);
+    const hs_status status =
+        hs_neighbors_count(&among, &call.options, PyArray_DATA((PyArrayObject *)counts), &failure);
     hs_py_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(counts);

@@ -9,7 +9,7 @@
 PyObject *
 hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_result  result;
     hs_failure failure;
     hs_pairs  *pairs = NULL;
@@ -38,7 +38,7 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
 PyObject *
 hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     int64_t    count = 0;
     (void)module;

@@ -42,7 +42,7 @@ list_of(PyObject *const *arguments, Py_ssize_t n_arguments, int n, const char *n
 PyObject *
 hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     bool       rebuilt = false;
     (void)module;
@@ -69,7 +69,7 @@ hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
 PyObject *
 hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_result  result;
     hs_failure failure;
     hs_pairs  *pairs = NULL;
@@ -112,7 +112,7 @@ hs_py_verlet_look(PyObject *module, PyObject *capsule)
     const hs_verlet_state state = hs_verlet_look(list);
     return Py_BuildValue("{s:O,s:i,s:L,s:L,s:d,s:d,s:d,s:d}", "has_list",
                          state.has_list ? Py_True : Py_False, "ndim", state.ndim, "n_points",
-                         (long long)state.n_points, "n_listed", (long long)state.n_listed,
-                         "cutoff", state.cutoff, "radius", state.radius, "margin", state.margin,
-                         "tried", state.tried);
+                         (long long)state.n_points, "n_listed", (long long)state.n_listed, "cutoff",
+                         state.cutoff, "radius", state.radius, "margin", state.margin, "tried",
+                         state.tried);
 }

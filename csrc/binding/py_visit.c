@@ -10,7 +10,7 @@
 typedef struct callable {
     PyObject *function; /* borrowed */
     int       ndim;
-    bool      stops;    /* it wants to, or has failed; guarded by the lock of the function */
+    bool      stops; /* it wants to, or has failed; guarded by the lock of the function */
     PyObject *type, *value, *traceback; /* owned; of the first failure */
 } callable;
 
@@ -66,12 +66,11 @@ call_with(const callable *to_call, const hs_pair_arrays *pairs, int64_t e)
                                  tuple_of_shift(pairs->shift + e * ndim, ndim),
                                  hs_tuple_of_reals(pairs->vector + e * ndim, ndim),
                                  PyFloat_FromDouble(d * d)};
-    bool complete = true;
+    bool         complete = true;
     for (int k = 0; k < 5; k++) {
         complete = complete && arguments[k] != NULL;
     }
-    PyObject *result =
-        complete ? PyObject_Vectorcall(to_call->function, arguments, 5, NULL) : NULL;
+    PyObject *result = complete ? PyObject_Vectorcall(to_call->function, arguments, 5, NULL) : NULL;
     for (int k = 0; k < 5; k++) {
         Py_XDECREF(arguments[k]);
     }
@@ -119,7 +118,7 @@ take_function(PyObject *const *arguments, callable *to_call, hs_visit *visit)
 PyObject *
 hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call    call;
+    hs_py_call call;
     hs_failure failure;
     callable   to_call = {0};
     hs_visit   visit = {0};

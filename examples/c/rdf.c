@@ -60,7 +60,7 @@ count_pairs(const settings *job, const double *points, int64_t n, double *edges,
                             .real = HS_FLOAT64,
                             .row_stride = NDIM * sizeof(double),
                             .column_stride = sizeof(double)};
-    hs_box box = {.ndim = NDIM};
+    hs_box          box = {.ndim = NDIM};
     for (int k = 0; k < NDIM; k++) {
         box.periodic[k] = true;
         box.rows[k][k] = (double)job->cells;
@@ -74,7 +74,7 @@ count_pairs(const settings *job, const double *points, int64_t n, double *edges,
                                     .last_inclusive = true,
                                     .n_types = 1,
                                     .counts = counts};
-    hs_options options = hs_options_default();
+    hs_options         options = hs_options_default();
     options.threads = -2; /* two, where that pays */
     const hs_among among = {.points = &view, .box = &box};
     return hs_pairs_histogram(&among, &options, &histogram, failure);

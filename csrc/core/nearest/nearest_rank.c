@@ -64,8 +64,8 @@ hs_near_pair(const hs_near *near, const hs_near_block *block, int32_t si, int32_
     }
     HS_ASSERT(bins->turns.known && asking->turns.known);
     for (int r = 0; r < m; r++) {
-        turned[r] = shift[r] + hs_turns_get(&asking->turns, r, si) -
-                    hs_turns_get(&bins->turns, r, sj);
+        turned[r] =
+            shift[r] + hs_turns_get(&asking->turns, r, si) - hs_turns_get(&bins->turns, r, sj);
     }
     if (!hs_lattice_shift(&near->search->scene.lattice, turned, as_given)) {
         return false;

@@ -194,10 +194,10 @@ no_failure_leaks(void)
     const hs_points     points = points_of(scene);
     const int64_t       before = hs_test_live_blocks();
     for (int trial = 0; trial < 6; trial++) {
-        hs_options options = options_of(scene);
-        hs_pairs  *pairs;
-        hs_plan    plan;
-        int64_t    count;
+        hs_options   options = options_of(scene);
+        hs_pairs    *pairs;
+        hs_plan      plan;
+        int64_t      count;
         const double kept = shared.x[7], kept_row = shared.box.rows[1][1];
         if (trial < 3)
             options.cutoff = bad[trial];

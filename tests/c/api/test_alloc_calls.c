@@ -72,7 +72,7 @@ every_function_fails_cleanly(void)
             /* Cells of such numbers keep no bounds for queries that come later. */
             if (function->run == call_cells_candidates && kinds[k].exponent > 0)
                 s.c.queries = NULL;
-            const int  n_failed = fail_each(&kinds[k], function);
+            const int n_failed = fail_each(&kinds[k], function);
             if (kinds[k].grows && function->run == call_stream) { /* two blocks in all */
                 s.c.max_pairs = 2000;
                 CHECK(fail_each(&kinds[k], function) > 0);

@@ -91,8 +91,8 @@ wrapped_is_the_point_moved(const hs_box *box, const double *x, const double *wra
         double largest = fmax(fabs(x[k]), fabs(wrapped[k]));
         for (int l = 0; l < box->ndim; l++) {
             if (box->periodic[l]) {
-                sum = big_sum(sum, big_product(big_from_int(shift[l]),
-                                               big_from_double(box->rows[l][k])));
+                sum = big_sum(
+                    sum, big_product(big_from_int(shift[l]), big_from_double(box->rows[l][k])));
                 largest = fmax(largest, fabs((double)shift[l] * box->rows[l][k]));
             } else if (shift[l] != 0) {
                 return false;
@@ -179,8 +179,8 @@ find_status(const hs_options *options, hs_failure *failure)
 {
     const hs_points points = points_of(&shared.scene);
     hs_pairs       *pairs = (hs_pairs *)failure;
-    const hs_status status = hs_pairs_find(AMONG(&points, shared.scene.box), options, &pairs,
-                                           failure);
+    const hs_status status =
+        hs_pairs_find(AMONG(&points, shared.scene.box), options, &pairs, failure);
     CHECK((pairs == NULL) == (status != HS_OK));
     hs_pairs_free(pairs);
     return status;
@@ -329,9 +329,9 @@ plans_describe_the_search(void)
 static void
 the_largest_boxes_are_measured_and_wrapped_into(void)
 {
-    hs_box          box = {.ndim = 2, .periodic = {true, true}};
-    double          x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4];
-    int64_t         shift[4];
+    hs_box  box = {.ndim = 2, .periodic = {true, true}};
+    double  x[4] = {0x1.8p1023, 0x1p1021, -0x1p1022, -0x1.cp1023}, heights[2], wrapped[4];
+    int64_t shift[4];
     for (int exponent = 0; exponent > -80; exponent--) {
         double scaled[4];
         for (int e = 0; e < 4; e++) {

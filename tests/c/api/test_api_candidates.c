@@ -44,9 +44,9 @@ build(const brute_scene *scene, hs_layout *layout)
 static void
 check_indices(const hs_cells *cells, const brute_scene *scene, const hs_layout *layout)
 {
-    const int d = scene->ndim;
-    int64_t  *indices = array_of(layout->n_cells * d, sizeof *indices);
-    int64_t  *cell = array_of(scene->n, sizeof *cell), wrong = 0;
+    const int       d = scene->ndim;
+    int64_t        *indices = array_of(layout->n_cells * d, sizeof *indices);
+    int64_t        *cell = array_of(scene->n, sizeof *cell), wrong = 0;
     const hs_points points = points_of(scene);
     hs_cells_indices(cells, indices);
     CHECK(hs_cells_find(cells, &points, cell, NULL) == HS_OK);
@@ -176,7 +176,7 @@ ranges_that_are_refused(void)
     const double    far[6] = {1e9, 0.0, 0.0, 0.0, -1e300, 0.0};
     const hs_points points = points_of(&s.scene), query = {far, 2, 3, HS_FLOAT64, 24, 8};
     hs_options      options = options_of(&s.scene);
-    int64_t             polls = INT32_MAX;
+    int64_t         polls = INT32_MAX;
     CHECK(hs_cells_candidates(cells, &query, &options, &ranges, &failure) == HS_ERR_FAR);
     CHECK(failure.row == 1 && failure.column == 1 && failure.value == -1e300);
     CHECK(failure.in_queries && failure.system == -1 && ranges == NULL);
@@ -218,10 +218,9 @@ failures_leave_nothing_behind(void)
         while (!ended && nth < 200) {
             hs_pairs *ranges = NULL;
             hs_test_fail_allocation(++nth);
-            const hs_status status =
-                call == 2 ? hs_cells_find(cells, &points, cell, NULL)
-                          : hs_cells_candidates(cells, call ? &points : NULL, &options, &ranges,
-                                                NULL);
+            const hs_status status = call == 2 ? hs_cells_find(cells, &points, cell, NULL)
+                                               : hs_cells_candidates(cells, call ? &points : NULL,
+                                                                     &options, &ranges, NULL);
             ended = hs_test_failure_is_due();
             hs_test_fail_allocation(0);
             CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));
@@ -314,10 +313,10 @@ scales_that_do_not_serve(void)
             CHECK(same_array(kept, fresh, HS_WANT_VECTOR, 16));
             for (int i = 0; i < 20; i++) {
                 for (int j = 0; j < 20; j++) {
-                    brute_rows     none = {.m = 0};
-                    const int64_t  still[HS_MAX_DIM] = {0};
-                    brute_scene    at = {.ndim = 2, .cutoff = options.cutoff};
-                    const double  *p = (from != NULL ? y : x) + 2 * i;
+                    brute_rows    none = {.m = 0};
+                    const int64_t still[HS_MAX_DIM] = {0};
+                    brute_scene   at = {.ndim = 2, .cutoff = options.cutoff};
+                    const double *p = (from != NULL ? y : x) + 2 * i;
                     expected += (from != NULL || i != j) &&
                                 brute_sign(&at, &none, p, x + 2 * j, still) <= 0;
                 }

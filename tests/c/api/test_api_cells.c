@@ -80,16 +80,16 @@ any_cutoff_and_any_queries(void)
         const int n = random_below(&random, ndim <= 3 ? 50 : 10);
         hs_cells *cells = NULL;
         make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, trial % 13 ? 0 : 200, &s);
-        make_scene(&random, SCENE_OPEN, ndim, n, trial % 3 ? 4.0 : 4000.0,
-                   trial % 13 ? 0 : 200, &other);
+        make_scene(&random, SCENE_OPEN, ndim, n, trial % 3 ? 4.0 : 4000.0, trial % 13 ? 0 : 200,
+                   &other);
         const hs_points points = points_of(&s.scene), queries = points_of(&other.scene);
         hs_options      options = options_of(&s.scene);
         options.precision = trial % 9 == 0 ? HS_DOUBLE : HS_EXACT;
         options.cell_size = wanted_width(trial, s.scene.cutoff);
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
         options.cell_size = 0.0;
-        const double cutoffs[] = {s.scene.cutoff, 0.5 * s.scene.cutoff, 0.01 * s.scene.cutoff,
-                                  0.0, 1.25 * s.scene.cutoff};
+        const double cutoffs[] = {s.scene.cutoff, 0.5 * s.scene.cutoff, 0.01 * s.scene.cutoff, 0.0,
+                                  1.25 * s.scene.cutoff};
         options.want = WANT_ALL;
         options.threads = 1 + trial % 2;
         for (int c = 0; c < 5; c++) {
@@ -165,7 +165,7 @@ the_layout_is_visible_and_holds_all_neighbours(void)
         hs_layout layout;
         make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0, 0, &s);
         make_scene(&random, SCENE_OPEN, ndim, 20, 4.0, 0, &other);
-        const hs_points points = points_of(&s.scene), queries = points_of(&other.scene);
+        const hs_points  points = points_of(&s.scene), queries = points_of(&other.scene);
         const hs_points *asking = trial % 2 ? &queries : NULL;
         hs_options       options = options_of(&s.scene);
         options.cutoff *= 0.5;

@@ -22,7 +22,7 @@ typedef struct trial {
     int32_t       types[SCENE_POINTS];
     double        weights[SCENE_POINTS]; /* small integers */
     int           n_types;
-    int64_t       split;   /* points before it ask those from it on; -1: one set */
+    int64_t       split; /* points before it ask those from it on; -1: one set */
     int64_t       expected[N_TYPES * N_TYPES * MOST_EDGES], found[N_TYPES * N_TYPES * MOST_EDGES];
     double        expected_sums[N_TYPES * N_TYPES * MOST_EDGES];
     double        sums[N_TYPES * N_TYPES * MOST_EDGES];
@@ -151,8 +151,7 @@ find_in_cells(trial *t, const hs_points *points, const hs_points *queries,
                            : HS_ERR_MEMORY;
     if (status != HS_OK) { /* a box of so many images that no cells are made for them */
         CHECK(status == HS_ERR_MEMORY);
-        return hs_pairs_histogram(QUERIED(points, queries, t->s->scene.box), options, wanted,
-                                  NULL);
+        return hs_pairs_histogram(QUERIED(points, queries, t->s->scene.box), options, wanted, NULL);
     }
     status = hs_pairs_histogram(QUERIED_CELLS(cells, queries), options, wanted, NULL);
     hs_cells_free(cells);
@@ -325,9 +324,13 @@ threads_and_kernels_agree(void)
         const hs_points points = points_of(&scene);
         hs_options      options = options_of(&scene);
         hs_counters     counters;
-        hs_histogram    wanted = {.n_edges = BINS + 1, .edges = edges, .last_inclusive = true,
-                                  .n_types = 3, .of_points = {types, weights},
-                                  .counts = counts, .sums = sums};
+        hs_histogram    wanted = {.n_edges = BINS + 1,
+                                  .edges = edges,
+                                  .last_inclusive = true,
+                                  .n_types = 3,
+                                  .of_points = {types, weights},
+                                  .counts = counts,
+                                  .sums = sums};
         int64_t         count, all = 0;
         options.kernel = run < 2 * n_names ? names[run / 2] : NULL;
         options.threads = run < 2 * n_names ? 1 + run % 2 : 2 + run % 2 * 3;
@@ -353,16 +356,16 @@ threads_and_kernels_agree(void)
 static void
 bad_arguments_are_named(void)
 {
-    double       x[4] = {0.0, 0.25, 0.5, 0.75}, edges[3] = {0.0, 0.5, 1.0};
-    int32_t      types[4] = {0, 1, 2, 1};
-    double       weights[4] = {1.0, NAN, 1.0, 1.0};
-    int64_t      counts[12];
-    double       sums[12];
-    brute_scene  scene = {.ndim = 1, .n = 4, .x = x, .inclusive = true, .cutoff = 1.0};
-    hs_points    points = points_of(&scene);
-    hs_options   options = options_of(&scene);
-    hs_failure   failure;
-    hs_histogram wanted = {.n_edges = 3, .edges = edges, .n_types = 2, .counts = counts};
+    double              x[4] = {0.0, 0.25, 0.5, 0.75}, edges[3] = {0.0, 0.5, 1.0};
+    int32_t             types[4] = {0, 1, 2, 1};
+    double              weights[4] = {1.0, NAN, 1.0, 1.0};
+    int64_t             counts[12];
+    double              sums[12];
+    brute_scene         scene = {.ndim = 1, .n = 4, .x = x, .inclusive = true, .cutoff = 1.0};
+    hs_points           points = points_of(&scene);
+    hs_options          options = options_of(&scene);
+    hs_failure          failure;
+    hs_histogram        wanted = {.n_edges = 3, .edges = edges, .n_types = 2, .counts = counts};
     static const double bad[][2] = {{1, NAN}, {2, INFINITY}, {0, -1.0}, {1, 2.0}};
     CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, &failure) == HS_ERR_TYPES);
     wanted.of_points.types = types;

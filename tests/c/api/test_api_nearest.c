@@ -94,8 +94,8 @@ order_is_that_of_real_numbers(void)
 static void
 order_at_the_ends_of_the_range(void)
 {
-    const double ends[] = {0.0, 5e-324, -5e-324, 1e-310, 0x1p-400, 0x1p-399, 1.0, 0x1p400,
-                           0x1p401, DBL_MAX, -DBL_MAX};
+    const double ends[] = {0.0, 5e-324,  -5e-324, 1e-310,  0x1p-400, 0x1p-399,
+                           1.0, 0x1p400, 0x1p401, DBL_MAX, -DBL_MAX};
     enum { ENDS = sizeof ends / sizeof ends[0] };
     hs_stages stages = {0};
     int       wrong = 0;
@@ -126,7 +126,10 @@ rows_are_the_neighbours_in_order(void)
         const int n = random_below(&random, ndim <= 3 ? 50 : ndim <= 5 ? 10 : 5);
         kernel_to_check = names[random_below(&random, n_names)];
         make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 7 ? 4.0 : 400.0,
-                   trial % 11 ? 0 : trial % 2 ? -400 : 300, &s);
+                   trial % 11  ? 0
+                   : trial % 2 ? -400
+                               : 300,
+                   &s);
         s.scene.cutoff *= ndim > 5 ? 0.5 : 1.0;
         found += compare_rows(&s.scene, trial % 3 ? -1 : random_below(&random, n + 1),
                               1 + random_below(&random, 40), 1 + trial % 2);
@@ -151,8 +154,8 @@ whichever_allocation_fails_nothing_is_left(void)
         const int64_t before = hs_test_live_blocks();
         hs_pairs     *rows = NULL;
         hs_test_fail_allocation(++nth);
-        const hs_status status = hs_nearest_find(AMONG(&points, s.scene.box), 100, &options, &rows,
-                                                 NULL);
+        const hs_status status =
+            hs_nearest_find(AMONG(&points, s.scene.box), 100, &options, &rows, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);
@@ -222,8 +225,8 @@ find_ties(int64_t k, int64_t polls, hs_counters *counters, int64_t *wrong)
     options.poll = stop_after;
     options.poll_context = &polls;
     options.counters = counters;
-    const hs_status status = hs_nearest_find(QUERIED(&points, &query, NULL), k, &options, &rows,
-                                             NULL);
+    const hs_status status =
+        hs_nearest_find(QUERIED(&points, &query, NULL), k, &options, &rows, NULL);
     *wrong = status != HS_OK && rows != NULL;
     for (int64_t e = 0; status == HS_OK && e < k; e++)
         *wrong += ((const int64_t *)hs_pairs_array(rows, HS_WANT_J))[e] != e;

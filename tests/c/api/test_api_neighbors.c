@@ -44,8 +44,8 @@ static entry
 entry_of(const found_pairs *found, int64_t e, bool reversed)
 {
     entry of = {.i = reversed ? found->j[e] : found->i[e],
-                   .j = reversed ? found->i[e] : found->j[e],
-                   .distance = found->distance[e]};
+                .j = reversed ? found->i[e] : found->j[e],
+                .distance = found->distance[e]};
     for (int k = 0; k < dimensions; k++) {
         const int32_t shift = found->shift[e * dimensions + k];
         const double  along = found->vector[e * dimensions + k];
@@ -139,8 +139,7 @@ bare_rows_agree(const sets_of_scene *sets, const brute_scene *scene, hs_options 
     options.want = HS_WANT_J;
     options.index_bytes = 4;
     bool same = hs_neighbors_find(QUERIED(&sets->points, sets->asking, scene->box), &options, &rows,
-                                  NULL) ==
-                    HS_OK &&
+                                  NULL) == HS_OK &&
                 hs_pairs_length(rows) == expected->n &&
                 hs_neighbors_count(QUERIED(&sets->points, sets->asking, scene->box), &options,
                                    counts, NULL) == HS_OK;
@@ -152,8 +151,7 @@ bare_rows_agree(const sets_of_scene *sets, const brute_scene *scene, hs_options 
         same = counts[i] == offsets[i + 1] - offsets[i];
     if (same && sets->asking != NULL)
         same = hs_pairs_count(QUERIED(&sets->points, sets->asking, scene->box), &options, &total,
-                              NULL) ==
-                   HS_OK &&
+                              NULL) == HS_OK &&
                total == expected->n;
     hs_pairs_free(rows);
     free(counts);
@@ -179,9 +177,8 @@ compare_rows(const brute_scene *scene, int64_t split, int threads)
     CHECK(hs_neighbors_find(QUERIED(&sets.points, sets.asking, scene->box), &options, &rows,
                             NULL) == HS_OK);
     take_all(rows, &found);
-    const bool same =
-        same_rows(&expected, rows, split < 0 ? scene->n : split, &found) &&
-        bare_rows_agree(&sets, scene, options, &expected);
+    const bool same = same_rows(&expected, rows, split < 0 ? scene->n : split, &found) &&
+                      bare_rows_agree(&sets, scene, options, &expected);
     CHECK(same);
     if (!same)
         fprintf(stderr, "  d = %d, n = %d, split %d, cutoff %a: %d entries, %d expected\n",
@@ -256,13 +253,13 @@ enum { MANY = 24000, ASKING = 9000 };
 static hs_status
 find_many(int index_bytes, int threads, bool asks, double limit, hs_pairs **rows)
 {
-    static double  x[3 * MANY];
-    harness_random random = {88};
-    hs_box         box = {.ndim = 3, .periodic = {true, false, true}};
-    const hs_points points = {.data = x, .n = MANY, .ndim = 3, .real = HS_FLOAT64,
-                              .row_stride = 24, .column_stride = 8};
-    hs_points      queries = points;
-    hs_options     options = hs_options_default();
+    static double   x[3 * MANY];
+    harness_random  random = {88};
+    hs_box          box = {.ndim = 3, .periodic = {true, false, true}};
+    const hs_points points = {
+        .data = x, .n = MANY, .ndim = 3, .real = HS_FLOAT64, .row_stride = 24, .column_stride = 8};
+    hs_points  queries = points;
+    hs_options options = hs_options_default();
     for (int e = 0; e < 3 * MANY; e++)
         x[e] = random_unit(&random);
     for (int k = 0; k < 3; k++)

@@ -32,7 +32,7 @@ compare_scene(const brute_scene *scene, double budget, int64_t stride)
 static void
 big_integers_confirm_the_plain_numbers(void)
 {
-    harness_random random = {77};
+    harness_random      random = {77};
     static random_scene s;
     for (int trial = 0; trial < 60; trial++) {
         brute_rows r;

@@ -77,8 +77,13 @@ large_results_are_left_and_taken_up(void)
     const int            n = IS_SLOW ? 1500 : 3000;
     double              *x = random_points(n, 2, 1.0);
     for (int c = 0; c < 3; c++) {
-        const brute_scene scene = {.ndim = 2, .n = n, .x = x, .inclusive = true,
-                                   .cutoff = c == 0 ? 2.0 : c == 1 ? 0.3 : 0.1};
+        const brute_scene scene = {.ndim = 2,
+                                   .n = n,
+                                   .x = x,
+                                   .inclusive = true,
+                                   .cutoff = c == 0   ? 2.0
+                                             : c == 1 ? 0.3
+                                                      : 0.1};
         for (int s = 0; s < 4; s++) {
             compare_stream(&scene, sizes[s], 1 + (s + c) % 4);
         }

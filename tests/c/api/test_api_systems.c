@@ -46,8 +46,8 @@ make_batch(uint64_t seed, batch *made)
 static hs_points
 points_of(const batch *made, int64_t first, int64_t end)
 {
-    return (hs_points){made->x + 3 * first, end - first, 3, HS_FLOAT64, 3 * sizeof(double),
-                       sizeof(double)};
+    return (hs_points){made->x + 3 * first, end - first,        3,
+                       HS_FLOAT64,          3 * sizeof(double), sizeof(double)};
 }
 
 /* Compares with single calls; returns the number of pairs, -1 when something differs. */
@@ -149,7 +149,7 @@ static void
 polls_are_counted(void)
 {
     enum { N = 6, POINTS = 1500 };
-    static double x[N * POINTS];
+    static double  x[N * POINTS];
     harness_random random = {11};
     int64_t        first[N + 1], most = 0;
     for (int e = 0; e < N * POINTS; e++)
@@ -251,8 +251,8 @@ bad_arguments_are_refused(void)
     hs_pairs    *pairs = NULL;
     int64_t      counts[N_SYSTEMS];
     make_batch(4, &made);
-    hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    hs_systems systems = {N_SYSTEMS, made.first, NULL, NULL, NULL};
+    hs_points           points = points_of(&made, 0, made.first[N_SYSTEMS]);
+    hs_systems          systems = {N_SYSTEMS, made.first, NULL, NULL, NULL};
     static const double bad[] = {NAN, INFINITY, -1.0};
     for (int b = 0; b < 3; b++) {
         options.cutoff = bad[b];
@@ -296,12 +296,12 @@ static void
 results_go_to_the_callers_arrays(void)
 {
     enum { ROOM = 20000 };
-    static batch    made;
-    static int64_t  i[ROOM], j[ROOM];
-    hs_pair_arrays  out = {.capacity = ROOM, .index_bytes = 8, .i = i, .j = j};
-    hs_options      options = hs_options_default();
-    hs_failure      failure;
-    int             n_asked = 0;
+    static batch   made;
+    static int64_t i[ROOM], j[ROOM];
+    hs_pair_arrays out = {.capacity = ROOM, .index_bytes = 8, .i = i, .j = j};
+    hs_options     options = hs_options_default();
+    hs_failure     failure;
+    int            n_asked = 0;
     make_batch(6, &made);
     made.first[1] = made.first[2] = 0; /* the first systems are empty */
     const hs_points points = points_of(&made, 0, made.first[N_SYSTEMS]);
@@ -354,10 +354,9 @@ empty_systems_cost_nothing(void)
 static void
 far_points_are_named_among_all(void)
 {
-    double           x[8] = {0.0, 0.0, 0.5, 0.5, 0.0, 3.9, 0.0, -3.9};
-    const int64_t    first[] = {0, 2, 4};
-    hs_box           box = {
-        .ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
+    double        x[8] = {0.0, 0.0, 0.5, 0.5, 0.0, 3.9, 0.0, -3.9};
+    const int64_t first[] = {0, 2, 4};
+    hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
     const hs_points  points = {x, 4, 2, HS_FLOAT64, 16, 8};
     const hs_systems systems = {2, first, &box, NULL, NULL};
     hs_options       options = hs_options_default();
@@ -370,8 +369,7 @@ far_points_are_named_among_all(void)
     options.want = HS_WANT_SHIFT;
     for (int sorted = 0; sorted < 2; sorted++) {
         options.sorted = sorted;
-        CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) ==
-              HS_ERR_SHIFT_RANGE);
+        CHECK(hs_systems_find(&points, &systems, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
         CHECK(pairs == NULL && (failure.row == 2 || failure.row == 3));
     }
     options.sorted = false;

@@ -19,9 +19,9 @@ same_pairs(const hs_pairs *one, const hs_pairs *other, int ndim)
 {
     static const unsigned bits[] = {HS_WANT_I, HS_WANT_J, HS_WANT_DISTANCE, HS_WANT_VECTOR,
                                     HS_WANT_SHIFT};
-    const size_t  sizes[] = {8, 8, 8, 8 * (size_t)ndim, 4 * (size_t)ndim};
-    const int64_t n = hs_pairs_length(one);
-    bool          same = n == hs_pairs_length(other);
+    const size_t          sizes[] = {8, 8, 8, 8 * (size_t)ndim, 4 * (size_t)ndim};
+    const int64_t         n = hs_pairs_length(one);
+    bool                  same = n == hs_pairs_length(other);
     for (int k = 0; k < 5 && same; k++) {
         same = memcmp(hs_pairs_array(one, bits[k]), hs_pairs_array(other, bits[k]),
                       (size_t)n * sizes[k]) == 0;
@@ -76,15 +76,18 @@ every_step_is_that_of_a_search(void)
     int64_t        n_pairs = 0, n_kept = 0;
     for (int trial = 0; trial < 240; trial++) {
         make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, 1 + random_below(&random, 60), 4.0,
-                   trial % 7 == 6 ? 300 : trial % 7 == 5 ? -300 : 0, &shared);
+                   trial % 7 == 6   ? 300
+                   : trial % 7 == 5 ? -300
+                                    : 0,
+                   &shared);
         hs_verlet       *list = hs_verlet_new();
         const hs_points  points = points_of(&shared.scene);
         const hs_options options = options_of(&shared.scene);
         const double     skin = 0.3 * shared.scene.cutoff;
         for (int step = 0; step < 6; step++) {
             bool rebuilt;
-            CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, skin, false,
-                                   &rebuilt, NULL) == HS_OK);
+            CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, skin, false, &rebuilt,
+                                   NULL) == HS_OK);
             CHECK(rebuilt || step > 0);
             const hs_verlet_state state = hs_verlet_look(list);
             CHECK(state.margin >= 0.0 && state.margin <= state.radius - state.cutoff);
@@ -103,8 +106,12 @@ every_step_is_that_of_a_search(void)
 static void
 head_on_pairs_are_never_missed(void)
 {
-    const hs_options options = {.cutoff = 1.0, .want = HS_WANT_I, .index_bytes = 8, .threads = 1,
-                                .inclusive = true, .memory_limit = INFINITY};
+    const hs_options options = {.cutoff = 1.0,
+                                .want = HS_WANT_I,
+                                .index_bytes = 8,
+                                .threads = 1,
+                                .inclusive = true,
+                                .memory_limit = INFINITY};
     int64_t          n_found = 0, n_kept = 0;
     for (int skin = 1; skin < 40; skin++) {
         for (int beside = -4; beside <= 4; beside++) { /* ulps, to more than any rounding */
@@ -225,14 +232,14 @@ static void
 finding_can_be_interrupted(void)
 {
     enum { N = 3000 };
-    static double    x[3 * N];
-    harness_random   random = {5};
-    hs_options       options = hs_options_default();
-    const hs_points  points = {x, N, 3, HS_FLOAT64, 24, 8};
-    int              polls = 0;
-    bool             rebuilt;
-    hs_pairs        *pairs = NULL;
-    hs_verlet       *list = hs_verlet_new();
+    static double   x[3 * N];
+    harness_random  random = {5};
+    hs_options      options = hs_options_default();
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    int             polls = 0;
+    bool            rebuilt;
+    hs_pairs       *pairs = NULL;
+    hs_verlet      *list = hs_verlet_new();
     for (int e = 0; e < 3 * N; e++)
         x[e] = random_unit(&random);
     options.cutoff = 2.0;
@@ -348,8 +355,7 @@ images_are_numbered_as_they_come(void)
         CHECK(number >= 0 && number <= n);
         n += number == n;
         CHECK(images.n == n && memcmp(images.of + 3 * number, shifts[e], sizeof shifts[e]) == 0);
-        CHECK(hs_images_number(&images, shifts[e / 2]) ==
-              hs_images_number(&images, shifts[e / 2]));
+        CHECK(hs_images_number(&images, shifts[e / 2]) == hs_images_number(&images, shifts[e / 2]));
     }
     CHECK(n > 1000);
     hs_images_free(&images);

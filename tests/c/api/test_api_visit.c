@@ -61,8 +61,8 @@ compare_visit(const brute_scene *scene, int threads, bool many)
     hs_options      options = options_of(scene);
     seen            s = {.ndim = scene->ndim};
     hs_visit visit = {.pair = many ? NULL : see_pair, .pairs = many ? see_pairs : NULL, .user = &s};
-    hs_pairs       *whole = NULL;
-    int64_t         n = -1;
+    hs_pairs *whole = NULL;
+    int64_t   n = -1;
     options.want = WANT_ALL;
     options.threads = threads;
     CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &whole, NULL) == HS_OK);
@@ -106,7 +106,7 @@ random_points(int64_t n, int ndim)
 
 /* One place for each point, written by whoever sees it as the lower number: no two threads do. */
 typedef struct tally {
-    int64_t *of; /* all sums are of j, so that order does not matter */
+    int64_t *of;         /* all sums are of j, so that order does not matter */
     int      stop_point; /* ends the search, or -1 */
 } tally;
 
@@ -166,10 +166,10 @@ typedef struct inner_search {
 static int
 search_again(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)
 {
-    inner_search     *inner = user;
-    const hs_points   points = points_of(inner->scene);
-    const hs_options  options = options_of(inner->scene);
-    hs_pairs         *pairs = NULL;
+    inner_search    *inner = user;
+    const hs_points  points = points_of(inner->scene);
+    const hs_options options = options_of(inner->scene);
+    hs_pairs        *pairs = NULL;
     (void)S;
     (void)D;
     (void)d2;

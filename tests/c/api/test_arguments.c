@@ -45,8 +45,8 @@ status_of_all(const hs_points *points, const hs_points *queries, const hs_box *b
     hs_plan            plan;
     const hs_histogram histogram = {.n_edges = 2, .edges = edges, .n_types = 1, .counts = counts};
     const hs_visit     visit = {.pair = ignore_pair};
-    const hs_status    status = hs_neighbors_find(QUERIED(points, queries, box), options, &pairs,
-                                                  NULL);
+    const hs_status    status =
+        hs_neighbors_find(QUERIED(points, queries, box), options, &pairs, NULL);
     hs_pairs_free(pairs);
     CHECK(hs_neighbors_count(QUERIED(points, queries, box), options, counts, NULL) == status);
     CHECK(hs_pairs_histogram(QUERIED(points, queries, box), options, &histogram, NULL) == status);
@@ -125,10 +125,10 @@ boxes_of_another_dimension_are_refused(void)
 static void
 bad_options_are_refused(void)
 {
-    const hs_points points = good_points();
-    hs_pairs       *pairs;
-    int64_t         i[1];
-    hs_pair_arrays  out = {.capacity = 1, .index_bytes = 8, .i = i};
+    const hs_points  points = good_points();
+    hs_pairs        *pairs;
+    int64_t          i[1];
+    hs_pair_arrays   out = {.capacity = 1, .index_bytes = 8, .i = i};
     const hs_options good = good_options();
     hs_options       bad[] = {good, good, good, good, good, good, good, good};
     bad[0].index_bytes = 2;
@@ -215,8 +215,14 @@ each_array_that_is_wanted_must_be_there(void)
         double         distance[1], vector[3];
         hs_options     options = good_options();
         hs_pairs      *pairs = NULL;
-        hs_pair_arrays out = {.capacity = 1, .index_bytes = 8, .i = i, .j = j, .both = both,
-                              .distance = distance, .vector = vector, .shift = shift};
+        hs_pair_arrays out = {.capacity = 1,
+                              .index_bytes = 8,
+                              .i = i,
+                              .j = j,
+                              .both = both,
+                              .distance = distance,
+                              .vector = vector,
+                              .shift = shift};
         options.out = &out;
         options.want = bit;
         CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);

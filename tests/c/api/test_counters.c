@@ -49,7 +49,7 @@ points_have_as_many_coordinates_as_axes(void)
     }
     const hs_counters plane = counters_of(scene_of(SCENE_OPEN, 2), HS_WANT_I, false);
     const hs_counters space = counters_of(scene_of(SCENE_OPEN, 3), HS_WANT_I, false);
-    const int64_t     block = 300 + HS_GROUP_POINTS; /* all points are in reach */
+    const int64_t     block = 300 + HS_GROUP_POINTS;              /* all points are in reach */
     const int64_t     room = (block + HS_PADDING + 15) / 16 * 16; /* whole cache lines of floats */
     const int64_t     batch = HS_BATCH + HS_BATCH_PADDING;
     /* float32 candidates; for decisions float64 ones, and both points of each pair of a batch */

@@ -52,16 +52,20 @@ a_kept_tree_gives_the_same_rows(void)
         const int n = random_below(&random, ndim <= 3 ? 60 : 12);
         hs_cells *cells = NULL;
         make_scene(&random, trial % SCENE_KINDS, ndim, n, 4.0,
-                   trial % 11 ? 0 : trial % 2 ? -400 : 300, &s);
-        make_scene(&random, SCENE_OPEN, ndim, random_below(&random, 20), 4.0,
-                   trial % 5 ? 0 : 30, &other);
-        const hs_points points = points_of(&s.scene), queries = points_of(&other.scene);
+                   trial % 11  ? 0
+                   : trial % 2 ? -400
+                               : 300,
+                   &s);
+        make_scene(&random, SCENE_OPEN, ndim, random_below(&random, 20), 4.0, trial % 5 ? 0 : 30,
+                   &other);
+        const hs_points  points = points_of(&s.scene), queries = points_of(&other.scene);
         const hs_options options = options_of(&s.scene);
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
         for (int call = 0; call < 4; call++) {
-            const double limit = call == 0   ? s.scene.cutoff
-                                 : call == 3 ? 0x1p-900
-                                             : random_below(&random, 2) ? 0.0 : 3.0;
+            const double     limit = call == 0                  ? s.scene.cutoff
+                                     : call == 3                ? 0x1p-900
+                                     : random_below(&random, 2) ? 0.0
+                                                                : 3.0;
             const hs_points *asking = (call + trial) % 2 ? &queries : NULL;
             const bool       right =
                 compare(cells, &s.scene, asking, 1 + random_below(&random, 40), limit);
@@ -89,8 +93,8 @@ failures_leave_nothing_behind(void)
         hs_pairs *rows = NULL;
         CHECK(hs_cells_build(&points, s.scene.box, &options, &cells, NULL) == HS_OK);
         hs_test_fail_allocation(nth + 1);
-        const hs_status status = hs_nearest_find(QUERIED_CELLS(cells, &points), 5, &options, &rows,
-                                                 NULL);
+        const hs_status status =
+            hs_nearest_find(QUERIED_CELLS(cells, &points), 5, &options, &rows, NULL);
         ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);

@@ -57,8 +57,8 @@ limits_are_heeded_before_anything_is_reserved(void)
     options.memory_limit = 1e6;
     options.cutoff = INFINITY;
     options.want = HS_WANT_J | HS_WANT_DISTANCE;
-    const hs_status status = hs_nearest_find(AMONG(&points, NULL), INT64_C(1) << 41, &options,
-                                             &rows, &failure);
+    const hs_status status =
+        hs_nearest_find(AMONG(&points, NULL), INT64_C(1) << 41, &options, &rows, &failure);
     CHECK(status == HS_ERR_MEMORY && failure.limit_bytes == 1e6);
     CHECK(failure.expected_pairs == 0x1p42 && failure.expected_bytes == 0x1p46);
     hs_account_init(&account, &options);

@@ -78,11 +78,11 @@ entering_sets_and_leaving_restores(void)
             feraiseexcept(FE_DIVBYZERO);
             const hs_fpenv saved = hs_fpenv_enter();
             const bool     inside = rounds_to_nearest_without_flushing();
-            const bool     nested_inside = (hs_fpenv_leave(hs_fpenv_enter()),
-                                        rounds_to_nearest_without_flushing());
+            const bool     nested_inside =
+                (hs_fpenv_leave(hs_fpenv_enter()), rounds_to_nearest_without_flushing());
             hs_fpenv_leave(saved);
-            const int mode_after = fegetround();
-            const int flags_after = fetestexcept(FE_ALL_EXCEPT);
+            const int  mode_after = fegetround();
+            const int  flags_after = fetestexcept(FE_ALL_EXCEPT);
             const bool flush_after = is_flushing();
             set_flushing(false);
             fesetround(FE_TONEAREST);
@@ -226,21 +226,21 @@ make_trapped_scene(trapped_scene *s)
 static int64_t
 search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
 {
-    const double edges[] = {0.0, 0x1p-1070, 0x1p-1056};
-    int64_t      count = -1, bins[3] = {0}, rows[N_TRAPPED];
-    hs_pairs    *pairs = NULL;
-    hs_status    status = HS_OK;
-    hs_layout    layout;
-    hs_plan      plan;
-    bool         rebuilt;
-    const hs_histogram histogram = {.n_edges = 3, .edges = edges, .last_inclusive = true,
-                                    .n_types = 1, .counts = bins};
+    const double       edges[] = {0.0, 0x1p-1070, 0x1p-1056};
+    int64_t            count = -1, bins[3] = {0}, rows[N_TRAPPED];
+    hs_pairs          *pairs = NULL;
+    hs_status          status = HS_OK;
+    hs_layout          layout;
+    hs_plan            plan;
+    bool               rebuilt;
+    const hs_histogram histogram = {
+        .n_edges = 3, .edges = edges, .last_inclusive = true, .n_types = 1, .counts = bins};
     switch (family) {
     case 0: status = hs_pairs_find(AMONG(&s->points, &s->box), &s->options, &pairs, NULL); break;
     case 1: status = hs_pairs_count(AMONG(&s->points, &s->box), &s->options, &count, NULL); break;
     case 2:
-        status = hs_neighbors_find(QUERIED(&s->points, &s->points, &s->box), &s->options, &pairs,
-                                   NULL);
+        status =
+            hs_neighbors_find(QUERIED(&s->points, &s->points, &s->box), &s->options, &pairs, NULL);
         break;
     case 3: status = hs_neighbors_count(AMONG(&s->points, &s->box), &s->options, rows, NULL); break;
     case 4:
@@ -251,13 +251,18 @@ search_by(int family, const trapped_scene *s, hs_cells *cells, hs_verlet *list)
         status = hs_nearest_find(AMONG(&s->points, &s->box), 3, &s->options, &pairs, NULL);
         break;
     case 6: status = hs_pairs_find(IN_CELLS(cells), &s->options, &pairs, NULL); break;
-    case 7: status = hs_neighbors_find(QUERIED_CELLS(cells, &s->points), &s->options, &pairs,
-                                       NULL); break;
-    case 8: status = hs_nearest_find(QUERIED_CELLS(cells, &s->points), 2, &s->options, &pairs,
-                                     NULL); break;
+    case 7:
+        status = hs_neighbors_find(QUERIED_CELLS(cells, &s->points), &s->options, &pairs, NULL);
+        break;
+    case 8:
+        status = hs_nearest_find(QUERIED_CELLS(cells, &s->points), 2, &s->options, &pairs, NULL);
+        break;
     case 9: status = hs_cells_find(cells, &s->points, rows, NULL); break;
     case 10: status = hs_cells_candidates(cells, NULL, &s->options, &pairs, NULL); break;
-    case 11: hs_cells_layout(cells, &layout); count = layout.n_cells; break;
+    case 11:
+        hs_cells_layout(cells, &layout);
+        count = layout.n_cells;
+        break;
     case 12:
         status = hs_verlet_update(list, &s->points, &s->box, &s->options, 0x1p-1060, true, &rebuilt,
                                   NULL);

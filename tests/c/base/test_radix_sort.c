@@ -16,18 +16,12 @@ random_key(harness_random *random, int kind)
 {
     const int64_t any = (int64_t)(random_bits(random) >> 1);
     switch (kind) {
-    case 0:
-        return any;
-    case 1:
-        return any % 100;
-    case 2: /* clusters far apart */
-        return any % 50 + (any >> 61) * (INT64_C(1) << 50);
-    case 3: /* every magnitude */
-        return any >> (any % 63);
-    case 4:
-        return 7;
-    default: /* bits far from each other */
-        return any & INT64_C(0x4000000100000001);
+    case 0: return any;
+    case 1: return any % 100;
+    case 2: /* clusters far apart */ return any % 50 + (any >> 61) * (INT64_C(1) << 50);
+    case 3: /* every magnitude */ return any >> (any % 63);
+    case 4: return 7;
+    default: /* bits far from each other */ return any & INT64_C(0x4000000100000001);
     }
 }
 
@@ -51,8 +45,8 @@ keys_ascend_and_equal_ones_keep_their_order(void)
             if (e < first || e >= end)
                 right = right && ids[e] == e;
             else if (e > first)
-                right = right && (keys[e - 1] < keys[e] ||
-                                  (keys[e - 1] == keys[e] && ids[e - 1] < ids[e]));
+                right = right &&
+                        (keys[e - 1] < keys[e] || (keys[e - 1] == keys[e] && ids[e - 1] < ids[e]));
         }
         CHECK(right);
     }

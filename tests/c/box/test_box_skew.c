@@ -17,8 +17,7 @@ enum { N = 12 };
 static hs_box
 skewed(double times, double tilt)
 {
-    return (hs_box){
-        .ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {times + tilt, 1.0}}};
+    return (hs_box){.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {times + tilt, 1.0}}};
 }
 
 static void
@@ -54,8 +53,8 @@ check_pairs(const brute_scene *scene, const hs_box *upright, double times, bool 
     hs_failure      failure;
     int64_t         count = -1, expected_count = -2;
     CHECK(hs_pairs_count(AMONG(&points, upright), &options, &expected_count, NULL) == HS_OK);
-    const hs_status counted = hs_pairs_count(AMONG(&points, scene->box), &options, &count,
-                                             &failure);
+    const hs_status counted =
+        hs_pairs_count(AMONG(&points, scene->box), &options, &count, &failure);
     CHECK(counted == HS_OK ? count == expected_count : is_refusal(counted));
     options.sorted = sorted;
     options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR;
@@ -107,8 +106,7 @@ check_rows(const brute_scene *scene, const hs_box *upright)
         CHECK(status == HS_OK || is_refusal(status));
         if (status == HS_OK) {
             CHECK(hs_nearest_find(QUERIED(&points, asking, upright), 70, &options, &expected,
-                                  NULL) ==
-                  HS_OK);
+                                  NULL) == HS_OK);
             CHECK(same_array(rows, expected, HS_WANT_J, 8));
             hs_pairs_free(expected);
         }
@@ -204,8 +202,8 @@ shifts_beyond_float64(void)
             hs_pairs  *skew = NULL, *expected = NULL;
             options.want = HS_WANT_J | HS_WANT_DISTANCE;
             for (int of = 0; of < 2; of++) {
-                const hs_box *in = of ? &box : &upright;
-                hs_pairs    **rows = of ? &skew : &expected;
+                const hs_box   *in = of ? &box : &upright;
+                hs_pairs      **rows = of ? &skew : &expected;
                 const hs_status status =
                     full ? hs_neighbors_find(AMONG(&points, in), &options, rows, NULL)
                          : hs_nearest_find(AMONG(&points, in), 25, &options, rows, NULL);
@@ -264,8 +262,11 @@ nearly_flat_boxes(void)
         brute_list  expected;
         for (int l = 0; l < 3; l++) {
             for (int k = 0; k < 3; k++)
-                box.rows[l][k] = l == k ? ldexp(1.0, l == 0 ? 0 : l == 1 ? -e : -f)
-                                        : k < l || trial % 2 ? random_unit(&random) : 0.0;
+                box.rows[l][k] = l == k               ? ldexp(1.0, l == 0   ? 0
+                                                                   : l == 1 ? -e
+                                                                            : -f)
+                                 : k < l || trial % 2 ? random_unit(&random)
+                                                      : 0.0;
         }
         for (int k = 0; k < 3 * 6; k++)
             x[k] = random_unit(&random);

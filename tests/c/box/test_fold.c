@@ -54,8 +54,7 @@ along_an_axis(void)
     for (int trial = 0; trial < 700; trial++) {
         const double length = ldexp(1.0 + random_unit(&random), random_below(&random, 60) - 30);
         const double reach = reaches[trial % 7];
-        hs_lattice   lattice = {.ndim = 1, .n_periodic = 1, .aligned = true,
-                                .period = {length}};
+        hs_lattice   lattice = {.ndim = 1, .n_periodic = 1, .aligned = true, .period = {length}};
         hs_folded    found = hs_folded_none();
         double       largest = 0.0;
         bool         right = true;
@@ -158,7 +157,7 @@ in_any_box(void)
         }
         const bool     few = hs_fold_turns(&lattice, largest) <= HS_FOLD_TURNS;
         const hs_turns turns = turns_here(trial % 2 && few);
-        const bool said = few && trial % 3; /* or else looked at, to the same bits */
+        const bool     said = few && trial % 3; /* or else looked at, to the same bits */
         hs_fold_points(&lattice, said, r, 0, 100, x, &turns, &found);
         hs_fold_points(&lattice, said, r, 100, POINTS, x, &turns, &found);
         CHECK(found.failed == -1);

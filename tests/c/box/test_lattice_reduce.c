@@ -85,8 +85,8 @@ fill_cell(double b, double c, double alpha, double beta, double gamma, matrix a)
 {
     const double degree = 3.14159265358979323846 / 180.0;
     double       x = c * cos(beta * degree);
-    double       y = c * (cos(alpha * degree) - cos(beta * degree) * cos(gamma * degree)) /
-               sin(gamma * degree);
+    double       y =
+        c * (cos(alpha * degree) - cos(beta * degree) * cos(gamma * degree)) / sin(gamma * degree);
     memset(a, 0, sizeof(matrix));
     a[0][0] = 1.0;
     a[1][0] = b * cos(gamma * degree);

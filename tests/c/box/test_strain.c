@@ -79,7 +79,7 @@ no_bound_beyond_the_numbers(void)
 {
     CHECK(has_bound(1.0, 0.0, 0.5, 1.0, 1.5));
     CHECK(has_bound(1.0, 0.0, 0x1p20, 1.0, 1.0));
-    CHECK(!has_bound(1.0, 0.0, 0x1p60, 1.0, 1.0)); /* no inverse in float64 */
+    CHECK(!has_bound(1.0, 0.0, 0x1p60, 1.0, 1.0));       /* no inverse in float64 */
     CHECK(!has_bound(1.0, 0.0, 0x1p600, 0x1p-600, 1.0)); /* of no height */
     CHECK(!has_bound(0x1p-1074, 0.0, 0.0, 0x1p-1074, 0.0));
     CHECK(!has_bound(0x1p-1000, 0.0, 0.0, 0x1p-1000, 0x1p500));

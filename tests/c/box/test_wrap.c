@@ -36,13 +36,9 @@ far_coordinate(harness_random *random, double length, double boxes)
     const double whole = floor(boxes * random_unit(random));
     double       x = whole * length;
     switch (random_bits(random) % 4) {
-    case 0:
-        break;
-    case 1:
-        x += 0.5 * length;
-        break;
-    default:
-        x += length * random_unit(random);
+    case 0: break;
+    case 1: x += 0.5 * length; break;
+    default: x += length * random_unit(random);
     }
     for (int step = (int)(random_bits(random) % 5) - 2; step != 0; step += step < 0 ? 1 : -1)
         x = nextafter(x, step < 0 ? -INFINITY : INFINITY);
@@ -89,18 +85,30 @@ static void
 axis_handles_faces_and_extremes(void)
 {
     /* Three times the last but one is more than DBL_MAX, which is 2.6 times it. */
-    static const double lengths[] = {1.0, 3.0, 0.1, 0x1p-900, 0x1.fffffffffffffp+900, 7e22,
-                                     DBL_MAX / 2.6, 0x1.23p-1060};
+    static const double lengths[] = {
+        1.0, 3.0, 0.1, 0x1p-900, 0x1.fffffffffffffp+900, 7e22, DBL_MAX / 2.6, 0x1.23p-1060};
     for (size_t l = 0; l < sizeof lengths / sizeof lengths[0]; l++) {
         const double length = lengths[l], half = 0.5 * length;
-        const double at[] = {0.0,           -0.0,          half,           -half,
-                             length,        -length,       1.5 * length,   -1.5 * length,
-                             nextafter(half, INFINITY),    nextafter(-half, -INFINITY),
-                             nextafter(length, 0.0),       nextafter(1.5 * length, INFINITY),
-                             DBL_MAX,       -DBL_MAX,      0x1p-1074,      -0x1p-1074,
-                             7.0 * half,    1234567.8 * half};
+        const double at[] = {0.0,
+                             -0.0,
+                             half,
+                             -half,
+                             length,
+                             -length,
+                             1.5 * length,
+                             -1.5 * length,
+                             nextafter(half, INFINITY),
+                             nextafter(-half, -INFINITY),
+                             nextafter(length, 0.0),
+                             nextafter(1.5 * length, INFINITY),
+                             DBL_MAX,
+                             -DBL_MAX,
+                             0x1p-1074,
+                             -0x1p-1074,
+                             7.0 * half,
+                             1234567.8 * half};
         for (size_t e = 0; e < sizeof at / sizeof at[0]; e++) {
-            int64_t      turns;
+            int64_t turns;
             if (isinf(at[e]))
                 continue;
             const double inside = hs_wrap_axis(at[e], length, &turns);
@@ -148,10 +156,9 @@ point_is_within_its_error_bound(void)
         CHECK(hs_wrap_point(&lattice, s.x, inside, turns, &magnitude));
         const double terms = 2 * lattice.n_periodic + 2;
         for (int k = 0; k < s.scene.ndim; k++) {
-            const double bound =
-                0x1p-53 * fabs(inside[k]) + terms * terms * 0x1p-104 * magnitude;
-            big off = big_difference(true_inside(&lattice, s.x, turns, k),
-                                     big_from_double(inside[k]));
+            const double bound = 0x1p-53 * fabs(inside[k]) + terms * terms * 0x1p-104 * magnitude;
+            big          off =
+                big_difference(true_inside(&lattice, s.x, turns, k), big_from_double(inside[k]));
             big most = big_from_double(bound);
             CHECK(big_compare_magnitude(&off, &most) <= 0);
         }

@@ -28,7 +28,10 @@ open_scene(int ndim, int64_t n, double cutoff, const hs_box *box, sorted *s)
     s->x = malloc((size_t)(n * ndim) * sizeof *s->x);
     for (int64_t e = 0; e < n * ndim; e++)
         s->x[e] = 2.0 * random_unit(&random) - 1.0;
-    const hs_points points = {.data = s->x, .n = n, .ndim = ndim, .real = HS_FLOAT64,
+    const hs_points points = {.data = s->x,
+                              .n = n,
+                              .ndim = ndim,
+                              .real = HS_FLOAT64,
                               .row_stride = ndim * (ptrdiff_t)sizeof(double),
                               .column_stride = sizeof(double)};
     s->options = hs_options_default();
@@ -59,9 +62,8 @@ compare_order(double cutoff, int threads, int nth, const int32_t *expected, int 
     hs_team *team = hs_team_create(threads);
     open_scene(2, FEW, cutoff, NULL, &s);
     hs_test_fail_allocation(nth);
-    const hs_status status =
-        hs_bins_build(&s.account, team, &s.options, &s.scene, &s.grid, &bins);
-    const bool disturbed = nth > 0 && !hs_test_failure_is_due();
+    const hs_status status = hs_bins_build(&s.account, team, &s.options, &s.scene, &s.grid, &bins);
+    const bool      disturbed = nth > 0 && !hs_test_failure_is_due();
     hs_test_fail_allocation(0);
     CHECK(status == HS_OK || (disturbed && status == HS_ERR_MEMORY));
     *n_refused += status != HS_OK;

@@ -28,14 +28,13 @@ prepare(searched *s)
     const hs_options options = options_of(&shared.scene);
     hs_failure       failure;
     hs_account_init(&s->account, &options);
-    hs_status status = hs_scene_init(&s->account, NULL, &points, shared.scene.box, &options,
-                                     &s->scene, &failure);
+    hs_status status =
+        hs_scene_init(&s->account, NULL, &points, shared.scene.box, &options, &s->scene, &failure);
     if (status != HS_OK)
         return status;
     status = hs_grid_init(&s->scene, &s->grid, &failure);
     if (status == HS_OK)
-        status = hs_stencil_build(&s->account, &options, &s->scene, &s->grid, false,
-                                      &s->stencil);
+        status = hs_stencil_build(&s->account, &options, &s->scene, &s->grid, false, &s->stencil);
     if (status != HS_OK)
         hs_scene_free(&s->account, &s->scene);
     return status;
@@ -117,7 +116,7 @@ random_place(harness_random *random, const searched *s, double *x)
 static void
 random_neighbour(harness_random *random, const searched *s, const double *x, double *y)
 {
-    double vector[HS_MAX_DIM], square = 0.0;
+    double    vector[HS_MAX_DIM], square = 0.0;
     const int along = random_below(random, 2 * s->grid.ndim);
     for (int k = 0; k < s->grid.ndim; k++) {
         vector[k] = along < s->grid.ndim ? (double)(k == along) : 2.0 * random_unit(random) - 1.0;
@@ -239,7 +238,7 @@ reach_never_passes_its_integers(void)
     static const double cutoffs[] = {0x1p30,         0x1.fffffffp+30, 0x1.fffffffep+30,
                                      0x1p31 - 0.5,   0x1p31,          0x1p32,
                                      0x1p31 - 0.001, 0x1p31 - 1.5,    0x1p31 - 2.5};
-    hs_box        box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    hs_box              box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
     for (int trial = 0; trial < 9; trial++) {
         searched s;
         shared.x[0] = 0.25;

@@ -179,8 +179,8 @@ rows_are_as_long_as_the_circle_is_wide(void)
     CHECK(whole.n_rows == 19 && half.n_rows == 10);
     for (int64_t r = 0; r < whole.n_rows; r++) {
         const hs_stencil_row *row = &whole.rows[r];
-        const double gap = cell * fmax(abs(row->offset[1]) - 1.0, 0.0);
-        const double most = floor(sqrt(1.0 - gap * gap) / cell + 1.0 + 2e-5);
+        const double          gap = cell * fmax(abs(row->offset[1]) - 1.0, 0.0);
+        const double          most = floor(sqrt(1.0 - gap * gap) / cell + 1.0 + 2e-5);
         CHECK(row->offset[1] == r - 9 && row->first == -row->last);
         CHECK(row->last == fmin(most, (double)grid.reach[0]));
         const hs_stencil_row *forward = &half.rows[r < 9 ? 0 : r - 9];
@@ -203,7 +203,7 @@ flat_frames_prune_nothing(void)
     const hs_options options = hs_options_default();
     CHECK(!scene.lattice.aligned && grid.n_cells == 1);
     CHECK(hs_stencil_build(&account, &options, &scene, &grid, true, &pruned) == HS_OK);
-    hs_lattice *lattice = &scene.lattice;
+    hs_lattice  *lattice = &scene.lattice;
     const double normal[2][2] = {{1.0, -1e4}, {0.0, 1e4}}, direction[2][2] = {{1.0}, {1.0, 1e-4}};
     for (int k = 0; k < 2; k++) {
         memcpy(lattice->normal[k], normal[k], sizeof normal[k]);

@@ -58,7 +58,7 @@ indices_of_a_pair_are_within_reach(void)
         hs_scene scene;
         hs_grid  dense, grid;
         random_axis(&random, &scene, &dense);
-        const int k = scene.ndim - 1;
+        const int    k = scene.ndim - 1;
         const double width = random_width(&random);
         hs_sparse_grid(&scene, &dense, width, &grid);
         for (int point = 0; point < 100; point++) {
@@ -95,7 +95,7 @@ cells_hold_few_numbers_however_far_out(void)
         hs_scene scene;
         hs_grid  dense, grid;
         random_axis(&random, &scene, &dense);
-        const int k = scene.ndim - 1;
+        const int    k = scene.ndim - 1;
         const double width = random_width(&random);
         hs_sparse_grid(&scene, &dense, width, &grid);
         const double t = random_coordinate(&random, &scene, &grid, k);
@@ -116,8 +116,8 @@ sparse_pays_where_points_crowd(void)
     static const bool pays[SPARSE_MANY_KINDS] = {false, true, true, true, true, false, true, false};
     harness_random    random = {141};
     for (int kind = 0; kind < SPARSE_MANY_KINDS; kind++) {
-        const brute_scene scene = {.ndim = 3, .n = SPARSE_MANY, .x = many, .cutoff = 1.0,
-                                   .inclusive = true};
+        const brute_scene scene = {
+            .ndim = 3, .n = SPARSE_MANY, .x = many, .cutoff = 1.0, .inclusive = true};
         const hs_options options = options_of(&scene);
         const hs_points  points = points_of(&scene);
         hs_account       account;

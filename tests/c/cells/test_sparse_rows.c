@@ -290,10 +290,10 @@ candidates_follow_points_and_pairs(void)
 {
     harness_random random = {1618};
     for (int kind = 0; kind < SPARSE_MANY_KINDS; kind++) {
-        const brute_scene scene = {.ndim = 3, .n = SPARSE_MANY, .x = many, .cutoff = 1.0,
-                                   .inclusive = true};
-        sparse_scene      s;
-        int64_t           pairs = 0;
+        const brute_scene scene = {
+            .ndim = 3, .n = SPARSE_MANY, .x = many, .cutoff = 1.0, .inclusive = true};
+        sparse_scene s;
+        int64_t      pairs = 0;
         many_points(&random, kind, many);
         CHECK(sparse_open(&scene, 1.0, &s) == HS_OK);
         const int64_t candidates = sparse_walk(&s, count_within, &pairs);
@@ -342,8 +342,12 @@ an_interrupt_leaves_nothing(void)
     enum { POINTS = 3 << 17 };
     double      *x = malloc(POINTS * sizeof *x);
     int          polls = 0;
-    hs_points    points = {.data = x, .n = POINTS, .ndim = 1, .real = HS_FLOAT64,
-                           .row_stride = sizeof *x, .column_stride = sizeof *x};
+    hs_points    points = {.data = x,
+                           .n = POINTS,
+                           .ndim = 1,
+                           .real = HS_FLOAT64,
+                           .row_stride = sizeof *x,
+                           .column_stride = sizeof *x};
     hs_options   options = hs_options_default();
     sparse_scene s;
     hs_failure   failure;

@@ -112,7 +112,9 @@ narrow_cells_are_widened(void)
         brute_scene scene = {.ndim = ndim, .n = N, .x = x, .inclusive = true};
         scene.n = trial % 3 == 2 ? 2 : N;
         scene.box = trial % 3 ? &box : NULL;
-        scene.cutoff = trial % 3 == 2 ? (ndim <= 2 ? 90.0 : ndim == 3 ? 20.0 : 2.1)
+        scene.cutoff = trial % 3 == 2 ? (ndim <= 2   ? 90.0
+                                         : ndim == 3 ? 20.0
+                                                     : 2.1)
                                       : 0.4 + 0.1 * (trial / 8 % 4);
         scene.cutoff = trial % 3 == 1 && ndim > 4 ? 0.45 : scene.cutoff;
         for (int k = 0; k < ndim; k++) {

@@ -73,8 +73,8 @@ each_page_is_written_to_once(void)
     const size_t         before = hs_test_touch_parts(PART);
     for (int threads = 1; threads <= 6; threads++) {
         for (int s = 0; s < 6; s++) {
-            asked     counts = {.most = 1000};
-            int64_t   of_j, of_vector;
+            asked         counts = {.most = 1000};
+            int64_t       of_j, of_vector;
             const int64_t parts = (sizes[s] * 24 + PART - 1) / PART;
             CHECK(touch(threads, sizes[s], &counts, &of_j, &of_vector) == HS_OK);
             CHECK(of_j == pages_of(sizes[s] * 8) && of_vector == pages_of(sizes[s] * 24));

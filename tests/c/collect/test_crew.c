@@ -23,11 +23,11 @@ typedef enum crowd {
     CROWD_OPEN,
     CROWD_PERIODIC,
     CROWD_TRICLINIC,
-    CROWD_SPARSE,     /* clusters a long way apart: cells that are not stored unless occupied */
-    CROWD_IMAGES,     /* a cutoff of several periods */
-    CROWD_ONE_SPOT,   /* all points in one place: no range but the first has pairs to speak of */
-    CROWD_UNEVEN,     /* nearly all pairs in one corner */
-    CROWD_EMPTY,      /* pairs there are none */
+    CROWD_SPARSE,   /* clusters a long way apart: cells that are not stored unless occupied */
+    CROWD_IMAGES,   /* a cutoff of several periods */
+    CROWD_ONE_SPOT, /* all points in one place: no range but the first has pairs to speak of */
+    CROWD_UNEVEN,   /* nearly all pairs in one corner */
+    CROWD_EMPTY,    /* pairs there are none */
     CROWDS
 } crowd;
 
@@ -38,8 +38,8 @@ static brute_scene scene;
 static void
 set_crowd(int n, double cutoff, const hs_box *box)
 {
-    scene = (brute_scene){.ndim = 3, .n = n, .x = places, .box = box, .cutoff = cutoff,
-                          .inclusive = true};
+    scene = (brute_scene){
+        .ndim = 3, .n = n, .x = places, .box = box, .cutoff = cutoff, .inclusive = true};
 }
 
 /* Two clusters, 1e9 apart. */
@@ -60,10 +60,11 @@ make_crowd(crowd kind)
         const double u = random_unit(&random);
         places[e] = kind == CROWD_ONE_SPOT ? 0.25 : kind == CROWD_UNEVEN ? u * u * u : u;
     }
-    walls = (hs_box){.ndim = 3, .periodic = {true, true, true},
-                     .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
-    set_crowd(n, 0.1, kind == CROWD_PERIODIC || kind == CROWD_TRICLINIC || kind == CROWD_IMAGES
-                          ? &walls : NULL);
+    walls = (hs_box){
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    set_crowd(n, 0.1,
+              kind == CROWD_PERIODIC || kind == CROWD_TRICLINIC || kind == CROWD_IMAGES ? &walls
+                                                                                        : NULL);
     if (kind == CROWD_TRICLINIC) {
         walls.rows[1][0] = 0.3;
         walls.rows[2][0] = -0.4;
@@ -228,9 +229,9 @@ an_interrupt_ends_all_threads(void)
         options.threads = 1 + trial % MOST_THREADS;
         options.sorted = trial % 3 == 1;
         options.poll_context = &left;
-        const hs_status status =
-            trial % 3 == 2 ? hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL)
-                           : hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL);
+        const hs_status status = trial % 3 == 2
+                                     ? hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL)
+                                     : hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL);
         CHECK(status == (left <= 0 ? HS_ERR_INTERRUPTED : HS_OK) && left >= 0);
         CHECK((pairs != NULL) == (status == HS_OK && trial % 3 != 2));
         CHECK((count == -1) == (status != HS_OK || trial % 3 != 2));

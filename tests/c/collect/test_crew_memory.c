@@ -41,7 +41,7 @@ the_last_pairs_need_their_room(void)
     search_unit_open(NULL, 2.0, false, HS_WANT_I | HS_WANT_J, &unit);
     CHECK(record(high, &n_all) == HS_OK && n_all >= ENOUGH && n_all < N * (N - 1) / 2);
     while (high - low > 1.0) {
-        const double middle = floor(0.5 * (low + high));
+        const double    middle = floor(0.5 * (low + high));
         const hs_status status = record(middle, &n_pairs);
         CHECK(status == HS_OK || status == HS_ERR_MEMORY);
         CHECK(status != HS_OK || n_pairs == n_all);

@@ -170,9 +170,9 @@ much_that_is_held_back_waits(void)
 }
 
 /* Range 1 is begun before range 0 fails, and goes on until it hears of that. */
-static hs_mutex mutex;
-static bool            later_is_begun;
-static hs_status       later_status;
+static hs_mutex  mutex;
+static bool      later_is_begun;
+static hs_status later_status;
 
 static bool
 has_begun(bool begin)

@@ -193,7 +193,7 @@ empty_results_have_arrays(void)
 static void
 sorted_pairs_ascend_strictly(void)
 {
-    harness_random     random = {99};
+    harness_random      random = {99};
     static random_scene s;
     for (int trial = 0; trial < 60; trial++) {
         found_pairs found;
@@ -336,16 +336,15 @@ memory_limit_refuses_or_is_kept(void)
 static void
 a_slab_with_too_many_images_is_refused_at_once(void)
 {
-    double      x[6] = {0.0, 0.0, 0.0, 0.5, 0.25, 7.0};
-    hs_box      box = {.ndim = 3,
-                       .periodic = {true, false, true},
-                       .rows = {{1.0}, {0.0}, {0.5, 0.0, 1.0}}};
-    brute_scene scene = {.ndim = 3, .n = 2, .x = x, .box = &box, .cutoff = 1e5};
-    hs_options  options = options_of(&scene);
-    limit_state state = {.bytes = 1e9};
-    hs_failure  failure;
-    hs_pairs   *pairs = NULL;
-    hs_plan     plan;
+    double x[6] = {0.0, 0.0, 0.0, 0.5, 0.25, 7.0};
+    hs_box box = {
+        .ndim = 3, .periodic = {true, false, true}, .rows = {{1.0}, {0.0}, {0.5, 0.0, 1.0}}};
+    brute_scene     scene = {.ndim = 3, .n = 2, .x = x, .box = &box, .cutoff = 1e5};
+    hs_options      options = options_of(&scene);
+    limit_state     state = {.bytes = 1e9};
+    hs_failure      failure;
+    hs_pairs       *pairs = NULL;
+    hs_plan         plan;
     const hs_points points = points_of(&scene);
     options.find_limit = find_limit; /* 2 * pi * 1e10 pairs */
     options.find_context = &state;
@@ -361,13 +360,13 @@ a_slab_with_too_many_images_is_refused_at_once(void)
 static void
 a_result_too_large_is_refused_before_it_is_found(void)
 {
-    double      x[2] = {0.0, 0.0};
-    hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
-    brute_scene scene = {.ndim = 2, .n = 1, .x = x, .box = &box, .cutoff = 1e5};
-    hs_options  options = options_of(&scene);
-    limit_state state = {.bytes = 1e9};
-    hs_failure  failure;
-    hs_pairs   *pairs = (hs_pairs *)&state;
+    double          x[2] = {0.0, 0.0};
+    hs_box          box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    brute_scene     scene = {.ndim = 2, .n = 1, .x = x, .box = &box, .cutoff = 1e5};
+    hs_options      options = options_of(&scene);
+    limit_state     state = {.bytes = 1e9};
+    hs_failure      failure;
+    hs_pairs       *pairs = (hs_pairs *)&state;
     const hs_points points = points_of(&scene);
     options.find_limit = find_limit; /* 1.6e10 pairs */
     options.find_context = &state;

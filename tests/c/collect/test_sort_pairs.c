@@ -15,8 +15,7 @@ static void
 fill_pairs(harness_random *random, int64_t n, int most_j, bool has_shift, hs_output *found)
 {
     const unsigned columns = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
-    hs_output_init(&unit.call.account, 2, has_shift ? columns | HS_WANT_SHIFT : columns, 4,
-                   found);
+    hs_output_init(&unit.call.account, 2, has_shift ? columns | HS_WANT_SHIFT : columns, 4, found);
     CHECK(hs_output_reserve(found, n, 0.0) == HS_OK);
     int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
     int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
@@ -38,9 +37,9 @@ is_in_order(const hs_output *sorted, const int32_t *shift, int64_t p)
     const int64_t *i = hs_output_column(sorted, HS_WANT_I);
     const int64_t *j = hs_output_column(sorted, HS_WANT_J);
     const int64_t  keys[4] = {i[p], j[p], shift != NULL ? shift[2 * p] : 0,
-                              shift != NULL ? shift[2 * p + 1] : 0};
+                             shift != NULL ? shift[2 * p + 1] : 0};
     const int64_t  next[4] = {i[p + 1], j[p + 1], shift != NULL ? shift[2 * p + 2] : 0,
-                              shift != NULL ? shift[2 * p + 3] : 0};
+                             shift != NULL ? shift[2 * p + 3] : 0};
     int            k = 0;
     while (k < 4 && keys[k] == next[k])
         k++;

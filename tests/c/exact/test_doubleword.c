@@ -16,14 +16,9 @@ random_significand(harness_random *random)
 {
     double x = 1.0 + random_unit(random);
     switch (random_bits(random) % 4) {
-    case 0:
-        x = 1.0 + ldexp((double)(random_bits(random) % 16), -52);
-        break;
-    case 1:
-        x = 2.0 - ldexp((double)(1 + random_bits(random) % 16), -52);
-        break;
-    default:
-        break;
+    case 0: x = 1.0 + ldexp((double)(random_bits(random) % 16), -52); break;
+    case 1: x = 2.0 - ldexp((double)(1 + random_bits(random) % 16), -52); break;
+    default: break;
     }
     return random_bits(random) & 1 ? x : -x;
 }
@@ -90,8 +85,8 @@ sums_keep_their_relative_error_under_cancellation(void)
         if (trial % 4 == 0)
             y = hs_two_sum(-x.hi * (1.0 + (double)(trial % 7) * 0x1p-52), y.lo);
         const hs_dw  sum = hs_dw_add(x, y);
-        const double error = relative_error(
-            sum, big_sum(big_from_double_word(x), big_from_double_word(y)), 1);
+        const double error =
+            relative_error(sum, big_sum(big_from_double_word(x), big_from_double_word(y)), 1);
         worst = error > worst ? error : worst;
         CHECK(is_double_word(sum));
     }
@@ -159,7 +154,7 @@ difference_bound_holds_where_it_is_sharpest(void)
     };
     double worst = 0.0;
     for (size_t i = 0; i < sizeof found / sizeof found[0]; i++) {
-        hs_metric metric = {.ndim = 1, .n_rows = 1, .rows = {{found[i].row}}};
+        hs_metric    metric = {.ndim = 1, .n_rows = 1, .rows = {{found[i].row}}};
         const double used =
             difference_error_used(&metric, &found[i].p, &found[i].q, &found[i].shift);
         worst = used > worst ? used : worst;
@@ -207,8 +202,8 @@ stage_errors_are_within_their_bounds(void)
         const hs_dw square = hs_double_word_square(&difference, metric.ndim);
         const big   unit = big_from_bits(1, 1074, 1);
         const big   error = big_difference(
-            big_product(big_from_double_word(square), unit),
-            big_square(metric.ndim, metric.n_rows, (const double(*)[8])metric.rows, p, q, shift));
+              big_product(big_from_double_word(square), unit),
+              big_square(metric.ndim, metric.n_rows, (const double(*)[8])metric.rows, p, q, shift));
         CHECK(fabs(big_to_double(&error, -2148)) <=
               hs_double_word_error(square.hi, difference.error, metric.ndim));
     }
@@ -227,9 +222,9 @@ square_roots_are_rounded_once(void)
         const big    exact = big_product(big_from_double_word(x), big_from_bits(1, 1074, 1));
         const double ulp = nextafter(root, HUGE_VAL) - root;
         const double below = root - nextafter(root, 0.0);
-        const big    low = big_difference(big_from_double(root),
-                                          big_from_double(below * (0.5 + 0x1p-40)));
-        const big    high = big_sum(big_from_double(root), big_from_double(ulp * (0.5 + 0x1p-40)));
+        const big    low =
+            big_difference(big_from_double(root), big_from_double(below * (0.5 + 0x1p-40)));
+        const big high = big_sum(big_from_double(root), big_from_double(ulp * (0.5 + 0x1p-40)));
         CHECK(big_compare(big_product(low, low), exact) <= 0);
         CHECK(big_compare(big_product(high, high), exact) >= 0);
     }

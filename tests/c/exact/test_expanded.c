@@ -34,8 +34,7 @@ add_product(const tiny_system *system, bool fused, double sum, double a, double 
 }
 
 static double
-tiny_chain(const tiny_system *system, const manner *way, int ndim, const double *y,
-           const double *q)
+tiny_chain(const tiny_system *system, const manner *way, int ndim, const double *y, const double *q)
 {
     double s = 0.0;
     for (int k = 0; k < ndim; k++) {
@@ -78,10 +77,9 @@ every_pair_of_a_tiny_system_is_judged_right(void)
     int              wrong = 0;
     for (int digits = 3; digits <= 5; digits++) {
         for (int variant = 0; variant < 32; variant++) {
-            const tiny_system system =
-                make_system(digits, lowest[variant / 8], variant & 1, false);
-            const manner way = {false, variant & 2, variant & 4};
-            const int    n = list_numbers(&system, 6, numbers);
+            const tiny_system system = make_system(digits, lowest[variant / 8], variant & 1, false);
+            const manner      way = {false, variant & 2, variant & 4};
+            const int         n = list_numbers(&system, 6, numbers);
             for (int i = 0; i < n; i++) {
                 for (int j = 0; j < n; j++) {
                     const double y = numbers[i], q = numbers[j], minus = -q;
@@ -103,11 +101,11 @@ samples_of_tiny_systems_are_judged_right(void)
     int            wrong = 0;
     for (int trial = 0; trial < 96; trial++) {
         const int         ndim = 2 + trial % 3;
-        const tiny_system system = make_system(3 + trial / 3 % 6, trial % 4 * 4 - 10, trial & 1,
-                                               false);
-        const manner      way = {trial & 4, trial & 8, trial & 16};
-        const int         n = list_numbers(&system, system.digits < 6 ? 5 : 2, numbers);
-        const bool        near = trial & 32; /* close together */
+        const tiny_system system =
+            make_system(3 + trial / 3 % 6, trial % 4 * 4 - 10, trial & 1, false);
+        const manner way = {trial & 4, trial & 8, trial & 16};
+        const int    n = list_numbers(&system, system.digits < 6 ? 5 : 2, numbers);
+        const bool   near = trial & 32; /* close together */
         for (int i = 0; i < 4000; i++) {
             double y[4], q[4];
             for (int k = 0; k < ndim; k++) {
@@ -195,7 +193,7 @@ is_unsure(const pair *p, int fused, int side, bool *is_wrong)
     const double        cutoff = sqrt(p->square) * (1.0 + side * 0x1p-46);
     const hs_expanded   bounds = hs_expanded_of(p->ndim, cutoff, p->extent, 0.0);
     const hs_thresholds t = hs_expanded_thresholds(bounds, p->q, p->ndim);
-    const bool          is_in = p->s[fused] < t.in, is_out = p->s[fused] > t.out;
+    const bool is_in = p->s[fused]<t.in, is_out = p->s[fused]> t.out;
     *is_wrong = side > 0 ? is_out : is_in;
     return !is_in && !is_out;
 }
@@ -254,8 +252,7 @@ band_used(pair *p, int fused)
     compute_pair(p);
     hs_expanded_bounds(p->ndim, sqrt(p->square), p->extent, 0.0, u, 0x1p-126, &in, &out);
     const double moved = p->exact[fused] + p->norm - p->square;
-    return moved > 0.0 ? moved / (out - p->square)
-                       : isinf(in) ? 0.0 : moved / (in - p->square);
+    return moved > 0.0 ? moved / (out - p->square) : isinf(in) ? 0.0 : moved / (in - p->square);
 }
 
 static double

@@ -59,9 +59,8 @@ every_pair_of_a_tiny_system_is_judged_right(void)
     int              wrong = 0;
     for (int digits = 3; digits <= 5; digits++) {
         for (int variant = 0; variant < 8; variant++) {
-            const tiny_system system =
-                make_system(digits, lowest[variant / 2], variant & 1, false);
-            const int n = list_numbers(&system, 6, numbers);
+            const tiny_system system = make_system(digits, lowest[variant / 2], variant & 1, false);
+            const int         n = list_numbers(&system, 6, numbers);
             for (int i = 0; i < n; i++) {
                 for (int j = 0; j < n; j++) {
                     const double y = numbers[i], q = numbers[j], minus = -q;
@@ -83,9 +82,9 @@ samples_of_tiny_systems_are_judged_right(void)
     int            wrong = 0;
     for (int trial = 0; trial < 24; trial++) {
         const int         ndim = 2 + trial % 3;
-        const tiny_system system = make_system(3 + trial / 3 % 6, trial % 4 * 4 - 10, trial & 1,
-                                               trial / 2 % 2);
-        const int         n = list_numbers(&system, system.digits < 6 ? 5 : 2, numbers);
+        const tiny_system system =
+            make_system(3 + trial / 3 % 6, trial % 4 * 4 - 10, trial & 1, trial / 2 % 2);
+        const int n = list_numbers(&system, system.digits < 6 ? 5 : 2, numbers);
         for (int i = 0; i < 8000; i++) {
             double y[4], q[4];
             for (int k = 0; k < ndim; k++) {

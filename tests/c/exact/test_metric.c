@@ -21,8 +21,8 @@ static int
 true_sign(const scene *s)
 {
     const big cutoff = big_from_double(s->cutoff);
-    const big square = big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q,
-                                  s->shift);
+    const big square =
+        big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q, s->shift);
     return big_compare(square, big_product(cutoff, cutoff));
 }
 
@@ -45,9 +45,9 @@ decides_like(const scene *s, int sign, hs_stages *stages)
 static double
 cutoff_near(const scene *s, int steps)
 {
-    const big square = big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q,
-                                  s->shift);
-    int       exponent = 0;
+    const big square =
+        big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q, s->shift);
+    int exponent = 0;
     if (square.sign != 0)
         exponent = -2148 + 32 * square.n;
     double cutoff = ldexp(sqrt(big_to_double(&square, -2148 - exponent)), exponent / 2);
@@ -71,20 +71,13 @@ random_number(harness_random *random, int kind)
     static const double extremes[] = {0.0, 0x1p-1074, DBL_MIN, DBL_MAX, 1.0, 0x1p1023, 0x1p-1022};
     const double        unit = 2.0 * random_unit(random) - 1.0;
     switch (kind) {
-    case 0:
-        return 3.0 * unit;
-    case 1:
-        return (double)(random_bits(random) % 17) * 0.25 - 2.0;
-    case 2:
-        return ldexp(unit, (int)(random_bits(random) % 2098) - 1074);
-    case 3:
-        return random_sign(random) * extremes[random_bits(random) % 7];
-    case 4:
-        return random_sign(random) * ldexp((double)(random_bits(random) % 40), -1074);
-    case 5:
-        return ldexp(unit, (int)(random_bits(random) % 120) - 60);
-    default:
-        return ((double)(random_bits(random) % 17) - 8.0) * 0.1;
+    case 0: return 3.0 * unit;
+    case 1: return (double)(random_bits(random) % 17) * 0.25 - 2.0;
+    case 2: return ldexp(unit, (int)(random_bits(random) % 2098) - 1074);
+    case 3: return random_sign(random) * extremes[random_bits(random) % 7];
+    case 4: return random_sign(random) * ldexp((double)(random_bits(random) % 40), -1074);
+    case 5: return ldexp(unit, (int)(random_bits(random) % 120) - 60);
+    default: return ((double)(random_bits(random) % 17) - 8.0) * 0.1;
     }
 }
 
@@ -94,16 +87,11 @@ random_shift(harness_random *random)
     static const int64_t extremes[] = {INT64_MIN, INT64_MAX, -(INT64_C(1) << 53),
                                        (INT64_C(1) << 53) + 1};
     switch (random_bits(random) % 5) {
-    case 0:
-        return 0;
-    case 1:
-        return (int64_t)(random_bits(random) % 5) - 2;
-    case 2:
-        return (int64_t)(random_bits(random) >> 11) - (INT64_C(1) << 52);
-    case 3:
-        return extremes[random_bits(random) % 4];
-    default:
-        return (int64_t)(random_bits(random) % 2001) - 1000;
+    case 0: return 0;
+    case 1: return (int64_t)(random_bits(random) % 5) - 2;
+    case 2: return (int64_t)(random_bits(random) >> 11) - (INT64_C(1) << 52);
+    case 3: return extremes[random_bits(random) % 4];
+    default: return (int64_t)(random_bits(random) % 2001) - 1000;
     }
 }
 
@@ -185,7 +173,7 @@ largest_integers_fit(void)
 static void
 ties_hold_in_every_binade(void)
 {
-    static const double quadruples[][4] = {{1, 2, 2, 3}, {2, 3, 6, 7}, {1, 4, 8, 9},
+    static const double quadruples[][4] = {{1, 2, 2, 3},  {2, 3, 6, 7}, {1, 4, 8, 9},
                                            {2, 6, 9, 11}, {0, 3, 4, 5}, {0, 0, 1, 1}};
     hs_stages           stages = {0, 0, 0};
     for (int exponent = -1074; exponent <= 1020; exponent++) {
@@ -238,8 +226,8 @@ float64_error(const scene *s)
     for (int k = 0; k < s->ndim; k++)
         square += (s->q[k] - s->p[k]) * (s->q[k] - s->p[k]);
     const big exact = big_square(s->ndim, 0, NULL, s->p, s->q, NULL);
-    const big error = big_difference(
-        big_product(big_from_double(square), big_from_bits(1, 1074, 1)), exact);
+    const big error =
+        big_difference(big_product(big_from_double(square), big_from_bits(1, 1074, 1)), exact);
     return big_to_double(&error, -2148) / big_to_double(&exact, -2148) * 0x1p53;
 }
 
@@ -350,7 +338,7 @@ ties_are_broken_by_a_hair(void)
         const double *leg = legs[trial % 4], unit = ldexp(1.0, trial % 7 * 40 - 120);
         const int     below_one = (int)(random_bits(&random) % 140);
         const double  off = trial % 3 ? ldexp(random_sign(&random), -below_one) : 0.0;
-        scene s = {.ndim = 3 + trial / 4 % 3, .n_rows = trial / 12 % 2};
+        scene         s = {.ndim = 3 + trial / 4 % 3, .n_rows = trial / 12 % 2};
         for (int k = 0; k < s.ndim; k++) {
             const int below = 50 + (int)(random_bits(&random) % 30) * (trial % 5 ? 1 : 30);
             s.q[k] = k < 2 ? leg[k] : random_sign(&random) * ldexp(1.0, -below);

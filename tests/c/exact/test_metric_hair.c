@@ -67,7 +67,7 @@ sums_a_little_below_the_cutoff(void)
     int          wrong = 0;
     for (int trial = 0; trial < 72; trial++) {
         static const double rows[8][8];
-        const double p[5] = {0.0};
+        const double        p[5] = {0.0};
         const double q[5] = {1.0, 0x1p-26, -0x1p-26, fourths[trial / 2 % 6], fifths[trial / 12]};
         const big    r = big_from_double(cutoff);
         const int    sign =
@@ -106,10 +106,10 @@ the_first_stage_that_can_tell_which_is_nearer_does(void)
     const double p[2] = {0.0, 0.0}, rows[1][8] = {{0.0}};
     const double odd = 1.0 + 0x1p-52; /* with a hair beside it more than two words hold */
     const struct {
-        double         q[2];
-        const double  *to;
-        int            sign;
-        int64_t        stages[3];
+        double        q[2];
+        const double *to;
+        int           sign;
+        int64_t       stages[3];
     } cases[] = {
         {{1.0, 0.5}, (const double[2]){1.0, 0.25}, 1, {1, 0, 0}},
         {{1.0, 0x1p-30}, (const double[2]){1.0, 0.0}, 1, {0, 1, 0}},

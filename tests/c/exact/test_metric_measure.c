@@ -41,8 +41,8 @@ root_below(big square)
 static void
 check_measured(const scene *s, double cutoff, bool inclusive)
 {
-    const big    square = big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q,
-                                     s->shift);
+    const big square =
+        big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q, s->shift);
     const big    limit = big_product(big_from_double(cutoff), big_from_double(cutoff));
     const int    sign = big_compare(square, limit);
     const double ulp = ulp_of(root_below(square));
@@ -76,8 +76,8 @@ check_measured(const scene *s, double cutoff, bool inclusive)
 static void
 check_cutoffs(const scene *s)
 {
-    const double root = root_below(big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows,
-                                              s->p, s->q, s->shift));
+    const double root = root_below(
+        big_square(s->ndim, s->n_rows, (const double(*)[8])s->rows, s->p, s->q, s->shift));
     for (int strict = 0; strict < 2; strict++) {
         check_measured(s, root, !strict);
         check_measured(s, root < DBL_MAX ? nextafter(root, DBL_MAX) : root, !strict);

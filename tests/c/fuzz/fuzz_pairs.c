@@ -10,7 +10,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-#define MOST_TESTS 1500.0 /* images that the brute force looks at */
+#define MOST_TESTS 1500.0    /* images that the brute force looks at */
 #define PLAN_LIMIT (1 << 20) /* bytes; keeps plans of hopeless scenes short */
 
 typedef struct input {
@@ -48,8 +48,7 @@ take_number(input *in, int kind)
     uint32_t            bits32;
     uint64_t            bits;
     switch (kind) {
-    default:
-        return (double)(int8_t)take(in, 1) * pitches[kind & 3];
+    default: return (double)(int8_t)take(in, 1) * pitches[kind & 3];
     case 4:
         value = (double)(int8_t)take(in, 1) * 0.1;
         return steps_from(value, (int)take(in, 1) % 5 - 2);
@@ -244,10 +243,10 @@ kernel_for(size_t size)
 int
 LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    input           in = {data, data + size};
+    input in = {data, data + size};
     kernel_to_check = kernel_for(size);
-    fuzz_scene      f;
-    brute_list      expected;
+    fuzz_scene f;
+    brute_list expected;
     take_scene(&in, &f);
     const hs_status valid = status_of(&f);
     if (valid != HS_OK || !is_searchable(&f) || !brute_find(&f.scene, MOST_TESTS, &expected)) {

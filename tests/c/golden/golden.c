@@ -18,7 +18,7 @@ enum { MOST_POINTS = 4000, MOST_KERNELS = 16 };
 typedef struct golden_scene {
     const char *name;
     int         ndim, n;
-    double      size;     /* points lie in [0, size) on each axis */
+    double      size; /* points lie in [0, size) on each axis */
     double      cutoff;
     double      pitch;    /* 0: random points; else whole multiples of this */
     double      edge;     /* of the box; 0: open space */
@@ -31,32 +31,87 @@ typedef struct golden_scene {
 static const golden_scene scenes[] = {
     {.name = "open", .ndim = 3, .n = 3000, .size = 1.0, .cutoff = 0.11},
     {.name = "open, two points", .ndim = 3, .n = 2, .size = 1.0, .cutoff = 2.0},
-    {.name = "open, clustered far away", .ndim = 3, .n = 900, .size = 1.0, .cutoff = 0.2,
+    {.name = "open, clustered far away",
+     .ndim = 3,
+     .n = 900,
+     .size = 1.0,
+     .cutoff = 0.2,
      .offset = 0x1p40},
-    {.name = "periodic", .ndim = 3, .n = 4000, .size = 1.0, .cutoff = 0.1, .edge = 1.0,
+    {.name = "periodic",
+     .ndim = 3,
+     .n = 4000,
+     .size = 1.0,
+     .cutoff = 0.1,
+     .edge = 1.0,
      .periodic = 7},
     {.name = "slab", .ndim = 3, .n = 2000, .size = 1.0, .cutoff = 0.13, .edge = 1.0, .periodic = 3},
-    {.name = "triclinic, points outside", .ndim = 3, .n = 1500, .size = 3.0, .cutoff = 0.13,
-     .edge = 1.0, .tilt = 0.375, .periodic = 7},
-    {.name = "sheared", .ndim = 3, .n = 300, .size = 1.0, .cutoff = 0.3, .edge = 1.0, .tilt = 7.25,
+    {.name = "triclinic, points outside",
+     .ndim = 3,
+     .n = 1500,
+     .size = 3.0,
+     .cutoff = 0.13,
+     .edge = 1.0,
+     .tilt = 0.375,
+     .periodic = 7},
+    {.name = "sheared",
+     .ndim = 3,
+     .n = 300,
+     .size = 1.0,
+     .cutoff = 0.3,
+     .edge = 1.0,
+     .tilt = 7.25,
      .periodic = 7},
     /* Thousands of candidates for each point: more than are held at a time. */
-    {.name = "images", .ndim = 3, .n = 12, .size = 1.0, .cutoff = 3.75, .edge = 1.0, .tilt = 0.25,
+    {.name = "images",
+     .ndim = 3,
+     .n = 12,
+     .size = 1.0,
+     .cutoff = 3.75,
+     .edge = 1.0,
+     .tilt = 0.25,
      .periodic = 7},
     {.name = "1-D", .ndim = 1, .n = 500, .size = 1.0, .cutoff = 0.03, .edge = 1.0, .periodic = 1},
     {.name = "2-D", .ndim = 2, .n = 3000, .size = 1.0, .cutoff = 0.05, .edge = 1.0, .periodic = 3},
-    {.name = "5-D", .ndim = 5, .n = 400, .size = 1.0, .cutoff = 0.5, .edge = 1.0, .tilt = 0.125,
+    {.name = "5-D",
+     .ndim = 5,
+     .n = 400,
+     .size = 1.0,
+     .cutoff = 0.5,
+     .edge = 1.0,
+     .tilt = 0.125,
      .periodic = 31},
     {.name = "8-D, open", .ndim = 8, .n = 200, .size = 1.0, .cutoff = 0.9},
     /* Distances of 3 are (3, 0, 0) and (2, 2, 1): many pairs exactly at the cutoff. */
-    {.name = "crystal, cutoff on a shell", .ndim = 3, .n = 1000, .size = 10.0, .cutoff = 3.0,
-     .pitch = 1.0, .edge = 10.0, .periodic = 7},
+    {.name = "crystal, cutoff on a shell",
+     .ndim = 3,
+     .n = 1000,
+     .size = 10.0,
+     .cutoff = 3.0,
+     .pitch = 1.0,
+     .edge = 10.0,
+     .periodic = 7},
     /* 0.1 is no binary number: what is near the cutoff needs the last stages. */
-    {.name = "crystal of 0.1, nearly ties", .ndim = 3, .n = 1000, .size = 10.0, .cutoff = 0.3,
+    {.name = "crystal of 0.1, nearly ties",
+     .ndim = 3,
+     .n = 1000,
+     .size = 10.0,
+     .cutoff = 0.3,
      .pitch = 0.1},
-    {.name = "float32", .ndim = 3, .n = 2000, .size = 1.0, .cutoff = 0.1, .edge = 1.0,
-     .tilt = 0.25, .periodic = 7, .narrow = true},
-    {.name = "crystal, float32", .ndim = 3, .n = 1000, .size = 10.0, .cutoff = 0.3, .pitch = 0.1,
+    {.name = "float32",
+     .ndim = 3,
+     .n = 2000,
+     .size = 1.0,
+     .cutoff = 0.1,
+     .edge = 1.0,
+     .tilt = 0.25,
+     .periodic = 7,
+     .narrow = true},
+    {.name = "crystal, float32",
+     .ndim = 3,
+     .n = 1000,
+     .size = 10.0,
+     .cutoff = 0.3,
+     .pitch = 0.1,
      .narrow = true},
 };
 
@@ -111,11 +166,11 @@ hash_search(const hs_points *points, const hs_box *box, const hs_options *option
 {
     static const unsigned wants[] = {HS_WANT_I,      HS_WANT_J,     HS_WANT_DISTANCE,
                                      HS_WANT_VECTOR, HS_WANT_SHIFT, HS_WANT_BOTH};
-    const size_t index = (size_t)options->index_bytes, d = (size_t)points->ndim;
-    const size_t widths[] = {index, index, sizeof(double), d * sizeof(double), d * sizeof(int32_t),
-                             2 * index};
-    uint64_t     hash = FNV_START;
-    hs_pairs    *pairs;
+    const size_t          index = (size_t)options->index_bytes, d = (size_t)points->ndim;
+    const size_t          widths[] = {
+                 index, index, sizeof(double), d * sizeof(double), d * sizeof(int32_t), 2 * index};
+    uint64_t        hash = FNV_START;
+    hs_pairs       *pairs;
     const hs_status status = hs_pairs_find(AMONG(points, box), options, &pairs, NULL);
     if (status != HS_OK) {
         fprintf(stderr, "golden: %s\n", hs_status_text(status));
@@ -214,8 +269,8 @@ check_scene(const golden_scene *scene, double *x, float *narrow)
                                          kernel, k + 1, &n_pairs);
         first = k == 0 ? hash : first;
         if (hash != first) {
-            fprintf(stderr, "golden: %s: kernel %s, %d threads differ from %s alone\n",
-                    scene->name, kernel, k + 1, kernels[0]);
+            fprintf(stderr, "golden: %s: kernel %s, %d threads differ from %s alone\n", scene->name,
+                    kernel, k + 1, kernels[0]);
             failures++;
         }
     }

@@ -51,7 +51,7 @@ count_edges(const hs_edges *edges, double extent, float square, int32_t *sure, i
 static float
 some_square(harness_random *random, const hs_edges *edges, double extent)
 {
-    const int64_t k = (int64_t)(random_unit(random) * (double)edges->n);
+    const int64_t       k = (int64_t)(random_unit(random) * (double)edges->n);
     const hs_thresholds last =
         hs_thresholds_of(3, upper[edges->n - 1], extent, edges->filter_error);
     float square = (float)(at[k] * at[k] * (1.0 + (random_unit(random) - 0.5) * 0x1p-20));
@@ -91,8 +91,8 @@ check_edges(harness_random *random, const hs_edges *edges, double extent)
         if (table.cells != NULL) {
             CHECK(low == sure && high == perhaps);
             /* Of one band alone each square is known to be below it, in it or above. */
-            const int32_t cell = (int32_t)(hs_bits_of_float(squares[s]) >> table.shift) -
-                                 table.first;
+            const int32_t cell =
+                (int32_t)(hs_bits_of_float(squares[s]) >> table.shift) - table.first;
             CHECK(low < high || table.cells[cell < 0 ? 0 : cell].n_bands > 1);
         } else {
             CHECK(low == 0 && high == edges->n);

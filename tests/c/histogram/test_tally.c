@@ -29,8 +29,8 @@ make_line(harness_random *random, int bits, line *made)
 {
     int n = 0;
     for (int i = 0; i < POINTS; i++) {
-        const int exponent =
-            bits > 0 ? (int)(random_bits(random) % (unsigned)(2 * bits)) - bits : 0;
+        const int exponent = bits > 0 ? (int)(random_bits(random) % (unsigned)(2 * bits)) - bits
+                                      : 0;
         made->x[i] = ldexp(1.0, i);
         made->types[i] = (int32_t)(random_bits(random) % TYPES);
         made->weights[i] = ldexp(random_unit(random) - 0.5, exponent);
@@ -81,13 +81,13 @@ line_is_right(const line *made, int split)
     for (int a = 0; a < n_types; a++) {
         for (int b = 0; b < n_types; b++) {
             for (int k = 0; k < PAIRS; k++) {
-                const int  i = made->pair_of[k] / POINTS, j = made->pair_of[k] % POINTS;
-                const int  at = (a * n_types + b) * PAIRS + k;
-                const int  s = n_types > 1 ? made->types[i] : 0;
-                const int  t = n_types > 1 ? made->types[j] : 0;
-                const bool meant = (s == a && t == b) || (split == 0 && s == b && t == a);
-                const bool asked = split == 0 || (i < split && j >= split);
-                const bool weighted = made->wanted.of_points.weights != NULL;
+                const int    i = made->pair_of[k] / POINTS, j = made->pair_of[k] % POINTS;
+                const int    at = (a * n_types + b) * PAIRS + k;
+                const int    s = n_types > 1 ? made->types[i] : 0;
+                const int    t = n_types > 1 ? made->types[j] : 0;
+                const bool   meant = (s == a && t == b) || (split == 0 && s == b && t == a);
+                const bool   asked = split == 0 || (i < split && j >= split);
+                const bool   weighted = made->wanted.of_points.weights != NULL;
                 const double product = weighted ? made->weights[i] * made->weights[j] : 1.0;
                 right = right &&
                         (made->wanted.counts == NULL || made->counts[at] == (meant && asked));
@@ -182,10 +182,10 @@ static void
 lattice_pairs_are_all_at_an_edge(void)
 {
     enum { N = 100, EDGES = 700 };
-    static double  x[N], edges[EDGES];
-    static int64_t counts[EDGES];
-    hs_options     options = hs_options_default();
-    hs_counters    counters;
+    static double   x[N], edges[EDGES];
+    static int64_t  counts[EDGES];
+    hs_options      options = hs_options_default();
+    hs_counters     counters;
     const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8};
     options.counters = &counters;
     for (int i = 0; i < N; i++) {
@@ -197,8 +197,12 @@ lattice_pairs_are_all_at_an_edge(void)
             edges[k] = few ? k : k / 7 + 1e-9 * (k % 7);
         }
         for (int inclusive = 0; inclusive < 2; inclusive++) {
-            hs_histogram wanted = {.n_edges = n_edges, .edges = edges, .inclusive = inclusive,
-                                   .last_inclusive = inclusive, .n_types = 1, .counts = counts};
+            hs_histogram wanted = {.n_edges = n_edges,
+                                   .edges = edges,
+                                   .inclusive = inclusive,
+                                   .last_inclusive = inclusive,
+                                   .n_types = 1,
+                                   .counts = counts};
             options.threads = 1 + inclusive;
             CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
             CHECK(counters.ambiguous > 4000);
@@ -218,18 +222,22 @@ static void
 pairs_of_two_spots_are_all_at_the_edge(void)
 {
     enum { HERE = 100, THERE = 1100, N = HERE + THERE };
-    static double    x[N];
-    const double     edges[2] = {0.5, 1.0};
-    int64_t          counts[2];
-    hs_options       options = hs_options_default();
-    const hs_points  points = {x, N, 1, HS_FLOAT64, 8, 8};
-    const int64_t    close = HERE * (HERE - 1) / 2 + THERE * (THERE - 1) / 2;
+    static double   x[N];
+    const double    edges[2] = {0.5, 1.0};
+    int64_t         counts[2];
+    hs_options      options = hs_options_default();
+    const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8};
+    const int64_t   close = HERE * (HERE - 1) / 2 + THERE * (THERE - 1) / 2;
     for (int i = 0; i < N; i++) {
         x[i] = i < HERE ? 0.0 : 1.0;
     }
     for (int inclusive = 0; inclusive < 2; inclusive++) {
-        const hs_histogram wanted = {.n_edges = 2, .edges = edges, .inclusive = inclusive,
-                                     .last_inclusive = inclusive, .n_types = 1, .counts = counts};
+        const hs_histogram wanted = {.n_edges = 2,
+                                     .edges = edges,
+                                     .inclusive = inclusive,
+                                     .last_inclusive = inclusive,
+                                     .n_types = 1,
+                                     .counts = counts};
         CHECK(hs_pairs_histogram(AMONG(&points, NULL), &options, &wanted, NULL) == HS_OK);
         CHECK(counts[0] == close && counts[1] == (inclusive ? HERE * THERE : 0));
     }

@@ -141,11 +141,11 @@ static void
 the_last_bit_breaks_ties(void)
 {
     const double   weight = ldexp(1.0, 53) - 1.0;
-    const uint32_t digits[][3] = {{0, 0x400, 0x80000000}, {1, 0x400, 0x80000000}, {0x800, 0, 1},
-                                  {0x801, 0, 1}};
-    const double   kept[] = {0x1p63, 0x1p63 + 0x1p11, 0x1p32, 0x1p32 + 0x1p-20};
-    hs_weights     of = weights_of(&weight, 1);
-    hs_sums        sums;
+    const uint32_t digits[][3] = {
+        {0, 0x400, 0x80000000}, {1, 0x400, 0x80000000}, {0x800, 0, 1}, {0x801, 0, 1}};
+    const double kept[] = {0x1p63, 0x1p63 + 0x1p11, 0x1p32, 0x1p32 + 0x1p-20};
+    hs_weights   of = weights_of(&weight, 1);
+    hs_sums      sums;
     CHECK(hs_sums_init(NULL, 1, &of, &of, &sums) == HS_OK && sums.n_limbs >= 4);
     /* Room for the largest product 2^62 times, and its sign. */
     CHECK(32 * sums.n_limbs >= 2 * of.bits + 2 * of.most_place + 63);

@@ -138,8 +138,8 @@ check_scene(const scene *s, int *n_open, int *n_left)
     const int   n_kernels = hs_kernel_names(names, MOST_KERNELS);
     for (int inclusive = 0; inclusive < 2; inclusive++) {
         hs_metric metric;
-        hs_metric_init(&metric, s->ndim, s->n_rows, (const double(*)[HS_MAX_DIM])s->rows,
-                       s->cutoff, inclusive);
+        hs_metric_init(&metric, s->ndim, s->n_rows, (const double(*)[HS_MAX_DIM])s->rows, s->cutoff,
+                       inclusive);
         for (int k = 0; k < n_kernels; k++) {
             const hs_kernel *kernel = hs_kernel_select(names[k]);
             check_judged(kernel, &metric, s, n_open);
@@ -151,25 +151,18 @@ check_scene(const scene *s, int *n_open, int *n_left)
 static double
 random_number(harness_random *random, kind of)
 {
-    static const double extremes[] = {0.0, 0x1p-1074, DBL_MIN, DBL_MAX, 1.0, 0x1p1023, 0x1p-400,
-                                      0x1.fffp-401, 0x1p400, 0x1.1p400, 0x1p-512};
+    static const double extremes[] = {0.0,      0x1p-1074,    DBL_MIN, DBL_MAX,   1.0,     0x1p1023,
+                                      0x1p-400, 0x1.fffp-401, 0x1p400, 0x1.1p400, 0x1p-512};
     const double        unit = 2.0 * random_unit(random) - 1.0;
     const double        sign = random_bits(random) & 1 ? 1.0 : -1.0;
     switch (of) {
-    case DYADIC:
-        return sign * 0.25 * (double)(random_bits(random) % 9);
-    case DECIMAL:
-        return ((double)(random_bits(random) % 17) - 8.0) * 0.1;
-    case MEDIUM:
-        return ldexp(unit, (int)(random_bits(random) % 120) - 60);
-    case EVERY_EXPONENT:
-        return ldexp(unit, (int)(random_bits(random) % 2098) - 1074);
-    case EXTREME:
-        return sign * extremes[random_bits(random) % 11];
-    case SUBNORMAL:
-        return sign * ldexp((double)(random_bits(random) % 40), -1074);
-    default:
-        return 3.0 * unit;
+    case DYADIC: return sign * 0.25 * (double)(random_bits(random) % 9);
+    case DECIMAL: return ((double)(random_bits(random) % 17) - 8.0) * 0.1;
+    case MEDIUM: return ldexp(unit, (int)(random_bits(random) % 120) - 60);
+    case EVERY_EXPONENT: return ldexp(unit, (int)(random_bits(random) % 2098) - 1074);
+    case EXTREME: return sign * extremes[random_bits(random) % 11];
+    case SUBNORMAL: return sign * ldexp((double)(random_bits(random) % 40), -1074);
+    default: return 3.0 * unit;
     }
 }
 
@@ -178,16 +171,12 @@ static double
 random_turns(harness_random *random)
 {
     switch (random_bits(random) % 8) {
-    case 0:
-        return ldexp(random_bits(random) & 1 ? 1.0 : -1.0, 53);
-    case 1:
-        return (double)(int64_t)(random_bits(random) >> 11) - 0x1p52;
+    case 0: return ldexp(random_bits(random) & 1 ? 1.0 : -1.0, 53);
+    case 1: return (double)(int64_t)(random_bits(random) >> 11) - 0x1p52;
     case 2:
     case 3:
-    case 4:
-        return (double)(random_bits(random) % 5) - 2.0;
-    default:
-        return 0.0;
+    case 4: return (double)(random_bits(random) % 5) - 2.0;
+    default: return 0.0;
     }
 }
 
@@ -195,8 +184,9 @@ random_turns(harness_random *random)
 static void
 fill_scene(harness_random *random, scene *s, kind of, int rows)
 {
-    s->n_rows = rows == 2 && random_bits(random) & 1 ? 0 : 1 + (int)(random_bits(random) %
-                                                                     (unsigned)s->ndim);
+    s->n_rows = rows == 2 && random_bits(random) & 1
+                    ? 0
+                    : 1 + (int)(random_bits(random) % (unsigned)s->ndim);
     s->shifted = rows != 2;
     for (int l = 0; l < s->n_rows; l++) {
         for (int k = 0; k < s->ndim; k++) {

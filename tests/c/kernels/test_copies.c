@@ -147,11 +147,11 @@ gathering_copies_every_run(void)
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         for (int trial = 0; trial < 400; trial++) {
             static const int32_t most[] = {1, 3, 15, 16, 17, 70, N_POINTS};
-            const int     ndim = 1 + trial % HS_MAX_DIM;
-            const int32_t n_points = 1 + (int32_t)(random_bits(&random) % N_POINTS);
-            const int32_t n_runs = make_runs(&random, ndim, n_points, most[trial % 7], runs);
-            hs_gather     g = place_gather(&random, ndim, n_points, runs[n_runs].at, trial & 1,
-                                           trial & 2);
+            const int            ndim = 1 + trial % HS_MAX_DIM;
+            const int32_t        n_points = 1 + (int32_t)(random_bits(&random) % N_POINTS);
+            const int32_t        n_runs = make_runs(&random, ndim, n_points, most[trial % 7], runs);
+            hs_gather            g =
+                place_gather(&random, ndim, n_points, runs[n_runs].at, trial & 1, trial & 2);
             const uint32_t before = trial % 5 ? 0 : bits_of((float)(trial + 1));
             g.largest = before;
             kernel->gather(&g, runs, n_runs);
@@ -196,9 +196,9 @@ check_emit(const hs_kernel *kernel, const hs_hits *hits, int bytes, int which, b
 {
     const hs_emit_fn emit = bytes == 8 ? kernel->emit_int64 : kernel->emit_int32;
     const int32_t    n = hits->n > 0 ? hits->end[hits->n - 1] : 0;
-    void *i = guarded_place(i_pages, n + HS_PADDING, (size_t)bytes, at_end);
-    void *j = guarded_place(j_pages, n + HS_PADDING, (size_t)bytes, at_end);
-    bool  same = true;
+    void            *i = guarded_place(i_pages, n + HS_PADDING, (size_t)bytes, at_end);
+    void            *j = guarded_place(j_pages, n + HS_PADDING, (size_t)bytes, at_end);
+    bool             same = true;
     emit(hits, which & 1 ? i : NULL, which & 2 ? j : NULL);
     for (int32_t t = 0, h = 0; t < hits->n; t++) {
         for (; h < hits->end[t]; h++) {

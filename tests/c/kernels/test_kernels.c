@@ -38,13 +38,17 @@ every_kernel_lists_what_the_plain_loop_lists(void)
 static void
 scans_stop_before_hits_might_not_fit(void)
 {
-    static const int32_t sizes[] = {1, 127, 1000, MOST_HITS / 3 + 1, /* one too many */
-                                    HS_BLOCK_CANDIDATES - 1, HS_BLOCK_CANDIDATES};
-    static const float   limits[][2] = {{100.0f, 100.0f}, {-1.0f, 100.0f}, {2.0f, 3.0f},
-                                        {-1.0f, 0.0f}};
-    harness_random       random = {577215};
-    const hs_kernel     *kernel;
-    int                  most = 0, least = 1000;
+    static const int32_t sizes[] = {1,
+                                    127,
+                                    1000,
+                                    MOST_HITS / 3 + 1, /* one too many */
+                                    HS_BLOCK_CANDIDATES - 1,
+                                    HS_BLOCK_CANDIDATES};
+    static const float   limits[][2] = {
+          {100.0f, 100.0f}, {-1.0f, 100.0f}, {2.0f, 3.0f}, {-1.0f, 0.0f}};
+    harness_random   random = {577215};
+    const hs_kernel *kernel;
+    int              most = 0, least = 1000;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         for (int trial = 0; trial < 24; trial++) {
             const int32_t n = sizes[trial % 6], n_points = n == 1 ? 1 : HS_GROUP_POINTS - trial % 3;
@@ -68,10 +72,10 @@ static void
 infinity_and_nan_are_listed_as_unsure(void)
 {
     static const float odd[] = {NAN, INFINITY, -INFINITY, 0x1p-149f, -0.0f};
-    static const float limits[][2] = {{-1.0f, INFINITY}, {INFINITY, 4.0f}, {1.0f, 4.0f},
-                                      {-1.0f, -1.0f},    {-1.0f, 0.0f}};
-    harness_random     random = {314159};
-    const hs_kernel   *kernel;
+    static const float limits[][2] = {
+        {-1.0f, INFINITY}, {INFINITY, 4.0f}, {1.0f, 4.0f}, {-1.0f, -1.0f}, {-1.0f, 0.0f}};
+    harness_random   random = {314159};
+    const hs_kernel *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         for (int trial = 0; trial < 1000; trial++) {
             const int32_t n = (int32_t)(random_bits(&random) % (SHORT_BLOCK + 1));
@@ -148,8 +152,8 @@ kernels_differ_between_the_thresholds_only(void)
             scene.expanded = hs_expanded_of(ndim, sqrt(square), 8.0, 0.0);
             expect(&scene, expanded, true, 0);
             scalar = expected;
-            hs_scan       scan = place_scan(&scene, trial & 4);
-            hs_scan_fn    list = expanded ? kernel->list : kernel->list_direct;
+            hs_scan    scan = place_scan(&scene, trial & 4);
+            hs_scan_fn list = expanded ? kernel->list : kernel->list_direct;
             CHECK(list(&scan, 0) == 1);
             /* without the unsure ones, the lists are the same */
             bool    same = scan.n_hits - scan.n_unsure == scalar.n_hits - scalar.n_unsure;

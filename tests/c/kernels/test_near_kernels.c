@@ -94,8 +94,8 @@ relating_rounds_each_step(void)
                                .extent = 1.0 + random_unit(&random)};
             g.extent = ldexp(g.extent, below(&random, 40) - 20);
             for (int k = 0; k < g.ndim; k++) {
-                double *x = guarded_place(double_pages[k], n_points + HS_PADDING, sizeof *x,
-                                          trial & 1);
+                double *x =
+                    guarded_place(double_pages[k], n_points + HS_PADDING, sizeof *x, trial & 1);
                 for (int32_t si = 0; si < n_points + HS_PADDING; si++) {
                     x[si] = si < n_points ? 2.0 * random_unit(&random) - 1.0 : 1e300;
                 }
@@ -136,8 +136,8 @@ keys_ascend(void)
                 const int32_t number = keys[e] & (HS_ORDER_MOST - 1);
                 int32_t       bits;
                 memcpy(&bits, &s[number], sizeof bits);
-                same = same && number < n && (bits | (HS_ORDER_MOST - 1)) ==
-                                                 (keys[e] | (HS_ORDER_MOST - 1));
+                same = same && number < n &&
+                       (bits | (HS_ORDER_MOST - 1)) == (keys[e] | (HS_ORDER_MOST - 1));
                 same = same && (e == 0 || keys[e - 1] < keys[e]) && keys[e] < HS_ORDER_LAST;
             }
             CHECK(same);
@@ -157,7 +157,8 @@ check_boxes(const hs_boxes *b, int32_t n_hits)
         double s = 0.0;
         for (int k = 0; k < b->ndim; k++) {
             const double gap = fmax(fmax((double)b->low[k][c] - (double)b->to[k],
-                                         (double)b->from[k] - (double)b->high[k][c]), 0.0);
+                                         (double)b->from[k] - (double)b->high[k][c]),
+                                    0.0);
             s += gap * gap;
         }
         if (s <= (double)b->out) {

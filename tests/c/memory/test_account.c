@@ -83,8 +83,8 @@ arena_is_filled_to_its_end(void)
     for (int64_t bytes = 0; bytes < 130; bytes += 13, n = 0) {
         hs_account account = new_account();
         for (; n < (int)(sizeof kept / sizeof *kept); n++) {
-            kept[n] = (kept_block){hs_alloc(&account, HS_FOR_CELLS, bytes, 1), bytes,
-                                   (unsigned char)n};
+            kept[n] =
+                (kept_block){hs_alloc(&account, HS_FOR_CELLS, bytes, 1), bytes, (unsigned char)n};
             memset(kept[n].data, kept[n].mark, (size_t)bytes);
         }
         while (n-- > 0) {

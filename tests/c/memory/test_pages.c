@@ -14,7 +14,7 @@ void test_pages(void);
 #include <sys/mman.h>
 #include <sys/wait.h>
 
-#define MB ((size_t)1 << 20)
+#define MB       ((size_t)1 << 20)
 #define TOO_MUCH ((size_t)1 << 61)
 
 static void
@@ -82,9 +82,9 @@ static void
 what_cannot_be_had_is_refused(void)
 {
     static const size_t sizes[] = {TOO_MUCH, PTRDIFF_MAX / 2 + MB, PTRDIFF_MAX, SIZE_MAX - MB};
-    void  *mapping;
-    size_t length;
-    char  *block = hs_pages_reserve(3 * MB, &mapping, &length);
+    void               *mapping;
+    size_t              length;
+    char               *block = hs_pages_reserve(3 * MB, &mapping, &length);
     fill(block, 3 * MB);
     for (int s = 0; s < 4; s++) {
         void  *other;
@@ -109,8 +109,8 @@ growing_blocks_move(void)
         size_t length;
         char  *block = hs_pages_reserve(8 * MB, &mapping, &length);
         fill(block, 8 * MB);
-        char *behind = mmap((char *)mapping + length, HS_PAGES_STEP, PROT_NONE,
-                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0);
+        char        *behind = mmap((char *)mapping + length, HS_PAGES_STEP, PROT_NONE,
+                                   MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0);
         const rlim_t before = limit_addresses(little ? 9 * MB : SIZE_MAX / 4);
         char        *grown = hs_pages_grow(16 * MB, &mapping, &length);
         set_address_limit(before);

@@ -195,8 +195,8 @@ the_best_fit_is_taken(void)
 {
     static const size_t sizes[] = {32, 8, 12, 5}, wanted[] = {6, 40, 4, 7};
     static const size_t found[] = {8, 32, 5, 12};
-    char     *results[4];
-    hs_region regions[4] = {{0}};
+    char               *results[4];
+    hs_region           regions[4] = {{0}};
     reset_pool();
     for (int k = 0; k < 4; k++)
         results[k] = make_result(sizes[k] * MB, 1);

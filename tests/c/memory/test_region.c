@@ -287,7 +287,7 @@ the_tail_is_given_back(void)
     CHECK(hs_region_reserve(&region, 100 * MB));
     hs_region_expect(&region, 40 * MB);
     fill(&region, 40 * MB);
-    void *data = hs_region_detach(&region, 5 * MB + 8);
+    void        *data = hs_region_detach(&region, 5 * MB + 8);
     const size_t recycled = hs_pool_held(); /* huge pages from 6 MB on */
     CHECK(recycled == 34 * MB);
     CHECK(resident() - start < (int64_t)(40 * MB) + NOISE);
@@ -309,7 +309,7 @@ the_tail_is_given_back(void)
 static int
 with_little_room(size_t room, int (*work)(void))
 {
-    int         status = -1;
+    int status = -1;
     fflush(NULL);
     const pid_t child = fork();
     if (child == 0) {
@@ -333,7 +333,7 @@ grow_to_the_limit(void)
     if (region.data != NULL || !hs_region_reserve(&region, 21 * MB) ||
         !hs_region_reserve(&other, 60 * MB))
         return 2;
-    hs_region_release(&other); /* the pool must let go of this below */
+    hs_region_release(&other);     /* the pool must let go of this below */
     if (region.capacity > 22 * MB) /* nothing is hoarded */
         return 3;
     fill(&region, 21 * MB);

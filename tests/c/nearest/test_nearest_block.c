@@ -73,8 +73,9 @@ places_are_right(const hs_near_group *group)
         double norm = 0.0;
         for (int k = 0; k < bins->ndim; k++) {
             const double centre = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
-            const double y = (bins->x[k][block.number[c]] +
-                              hs_near_image_of(&block, c)->moved[k] - centre) * block.unit;
+            const double y =
+                (bins->x[k][block.number[c]] + hs_near_image_of(&block, c)->moved[k] - centre) *
+                block.unit;
             right = right && fabs(fmax(fmin(y, block.extent), -block.extent) -
                                   (double)block.y[k][c]) <= 1e-5;
             norm += (double)block.y[k][c] * (double)block.y[k][c];

@@ -69,11 +69,11 @@ images_in_reach_are_met_once(void)
     harness_random random = {2718};
     int64_t        n_near = 0, n_met = 0;
     for (int trial = 0; trial < 60; trial++) {
-        const int     d = 1 + trial % 3;
-        double        x[3 * N];
-        hs_box        box = {.ndim = d};
+        const int      d = 1 + trial % 3;
+        double         x[3 * N];
+        hs_box         box = {.ndim = d};
         hs_near_images images;
-        double        moved[HS_MAX_DIM];
+        double         moved[HS_MAX_DIM];
         for (int l = 0; l < d; l++) {
             box.periodic[l] = l == trial / 3 % d || trial % 4 < 2;
             for (int k = 0; k < d; k++)

@@ -27,7 +27,7 @@ borrows(hs_near_kept *kept, double limit)
 {
     const hs_points points = points_on_line(line, 4);
     const hs_sets   sets = {
-        .points = &points, .is_full = true, .is_plain = true, .is_wide = true, .trees = kept};
+          .points = &points, .is_full = true, .is_plain = true, .is_wide = true, .trees = kept};
     hs_options options = hs_options_default();
     hs_failure failure;
     options.cutoff = limit;
@@ -113,7 +113,7 @@ rows_end_at_the_largest_distance(void)
 static void
 check_radii(const double *x)
 {
-    const hs_points points = points_on_line(x, 2);
+    const hs_points  points = points_on_line(x, 2);
     const hs_options options = hs_options_default();
     static const int exponents[] = {-1000, -300, 0, 300, 600, 601, 602, 900};
     for (int e = 0; e < 8; e++) {
@@ -157,8 +157,7 @@ images_without_end_are_refused(void)
         hs_near_group_set(&unit.near, 0, 1, &group);
         group.radius = 0.5;
         group.away = e ? 0x1p60 : 0.0;
-        CHECK(hs_near_bound(&unit.near, &options, &bounder, &group) ==
-              (e ? HS_ERR_MEMORY : HS_OK));
+        CHECK(hs_near_bound(&unit.near, &options, &bounder, &group) == (e ? HS_ERR_MEMORY : HS_OK));
         CHECK(e || (group.radius >= 1.0 && group.radius < 1.001));
         hs_near_bounder_free(&unit.near, &bounder);
         near_unit_close(&unit);

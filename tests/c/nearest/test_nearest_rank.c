@@ -24,8 +24,7 @@ open_scene(const double *x, int64_t n, int d, const hs_box *box, int64_t k, doub
     near_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
     CHECK(hs_near_block_init(&unit.near, &block) == HS_OK);
     group = near_unit_group(&unit, radius);
-    CHECK(hs_near_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
-          HS_OK);
+    CHECK(hs_near_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) == HS_OK);
     options = hs_options_default();
     ranker = (hs_near_ranker){.near = &unit.near, .block = &block, .pace = {.options = &options}};
     for (int32_t h = 0; h < block.n && h < 2 * N; h++)
@@ -197,7 +196,8 @@ only_the_point_itself_is_left_out(void)
         CHECK(!image->is_home && abs(image->shift[0]) == 1 + e / 2);
     }
     CHECK(hs_near_image_of(&block, ranker.keys[0].place)->shift[0] *
-              unit.search.scene.lattice.U[0][0] < 0); /* the smaller S first */
+              unit.search.scene.lattice.U[0][0] <
+          0); /* the smaller S first */
     close_scene();
 }
 

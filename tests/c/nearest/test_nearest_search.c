@@ -15,11 +15,11 @@ static void
 spots_are_searched_in_parts(void)
 {
     enum { N = 12000, SPOTS = 3 };
-    double          *x = array_of(2 * N, sizeof *x);
-    const hs_points  points = {x, N, 2, HS_FLOAT64, 16, 8};
-    hs_options       options = hs_options_default();
-    hs_pairs        *rows = NULL;
-    int64_t          wrong = 0;
+    double         *x = array_of(2 * N, sizeof *x);
+    const hs_points points = {x, N, 2, HS_FLOAT64, 16, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *rows = NULL;
+    int64_t         wrong = 0;
     for (int i = 0; i < N; i++) {
         x[2 * i] = i % SPOTS;
         x[2 * i + 1] = 0.5;
@@ -156,12 +156,12 @@ clusters_that_rounding_blurs(void)
     static double  x[2 * N];
     harness_random random = {13};
     for (int trial = 0; trial < 120; trial++) {
-        const int   exponent = 20 + 10 * (trial % 3), fine = exponent - 53 + trial / 3 % 16;
+        const int    exponent = 20 + 10 * (trial % 3), fine = exponent - 53 + trial / 3 % 16;
         const double side = ldexp(1.0, exponent), step = ldexp(1.0, fine);
-        hs_box      box = {.ndim = 2,
-                           .periodic = {true, true},
-                           .rows = {{side, 0.0}, {0.375 * side, 0.875 * side}}};
-        brute_scene scene = {.ndim = 2, .n = N, .x = x, .box = &box, .cutoff = 40.0 * step};
+        hs_box       box = {.ndim = 2,
+                            .periodic = {true, true},
+                            .rows = {{side, 0.0}, {0.375 * side, 0.875 * side}}};
+        brute_scene  scene = {.ndim = 2, .n = N, .x = x, .box = &box, .cutoff = 40.0 * step};
         for (int i = 0; i < N; i++) {
             for (int k = 0; k < 2; k++) {
                 x[2 * i + k] = 0.3 * side * (i % 3) + step * 20.0 * random_unit(&random);
@@ -198,7 +198,7 @@ many_points_on_a_lattice(void)
         const int steps[] = {-SIDE * SIDE, -SIDE, -1, 1, SIDE, SIDE * SIDE};
         int       n = 0;
         for (int s = 0; s < 6; s++) {
-            const int k = s < 3 ? 2 - s : s - 3;
+            const int    k = s < 3 ? 2 - s : s - 3;
             const double to = x[3 * i + k] + (s < 3 ? -1.0 : 1.0);
             if (to >= 0.0 && to < SIDE) {
                 wrong += j[K * i + n] != i + steps[s] || d[K * i + n] != 1.0;

@@ -79,10 +79,9 @@ many_points_can_be_stopped(void)
 static void
 many_images_can_be_stopped(void)
 {
-    double          x[6] = {0.125, 0.25, 0.375, 0.0, 0.0, 0.0};
-    hs_box          box = {.ndim = 3,
-                           .periodic = {true, true, true},
-                           .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    double x[6] = {0.125, 0.25, 0.375, 0.0, 0.0, 0.0};
+    hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
     brute_scene     scene = {.ndim = 3, .n = 1, .x = x, .box = &box, .cutoff = INFINITY};
     const hs_points query = {x + 3, 1, 3, HS_FLOAT64, 24, 8};
     hs_pairs       *rows = NULL;

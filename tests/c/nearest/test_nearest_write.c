@@ -190,8 +190,8 @@ find_far(double away, unsigned want, double *distance, int32_t *shift, hs_failur
     hs_pairs       *rows = NULL;
     options.cutoff = INFINITY;
     options.want = want | HS_WANT_DISTANCE;
-    const hs_status status = hs_nearest_find(QUERIED(&point, &query, &box), 1, &options, &rows,
-                                             failure);
+    const hs_status status =
+        hs_nearest_find(QUERIED(&point, &query, &box), 1, &options, &rows, failure);
     if (status == HS_OK) {
         *distance = ((const double *)hs_pairs_array(rows, HS_WANT_DISTANCE))[0];
         *shift = want != 0 ? ((const int32_t *)hs_pairs_array(rows, HS_WANT_SHIFT))[0] : 0;

@@ -57,8 +57,8 @@ check_nodes(int32_t leaf_points, int *deepest)
         const double *bounds = hs_tree_bounds(tree, node->left, d);
         for (int k = 0; k < d; k++) {
             for (int side = 0; side < 2; side++)
-                bounded = bounded && is_range(&left[side], k, bounds[4 * k + side],
-                                              bounds[4 * k + 2 + side]);
+                bounded = bounded &&
+                          is_range(&left[side], k, bounds[4 * k + side], bounds[4 * k + 2 + side]);
         }
     }
     for (int k = 0; k < d; k++)

@@ -39,16 +39,15 @@ rows_are_consistent(const hs_pairs *rows, int index_bytes)
 static void
 every_shape_of_columns_has_the_same_rows(void)
 {
-    static const unsigned wants[] = {HS_WANT_I | HS_WANT_J | HS_WANT_BOTH,
-                                     WANT_ALL | HS_WANT_BOTH};
+    static const unsigned wants[] = {HS_WANT_I | HS_WANT_J | HS_WANT_BOTH, WANT_ALL | HS_WANT_BOTH};
     harness_random        random = {606};
     int64_t               n_entries = 0;
     for (int trial = 0; trial < 200; trial++) {
         make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, random_below(&random, 80), 4.0, 0,
                    &shared);
         const hs_points points = points_of(&shared.scene);
-        const hs_points queries = {points.data, points.n / 2, points.ndim, HS_FLOAT64,
-                                   points.row_stride, points.column_stride};
+        const hs_points queries = {points.data, points.n / 2,      points.ndim,
+                                   HS_FLOAT64,  points.row_stride, points.column_stride};
         hs_options      options = options_of(&shared.scene);
         for (int shape = 0; shape < 8; shape++) {
             const hs_points *asking = shape & 4 ? &queries : NULL;
@@ -59,16 +58,14 @@ every_shape_of_columns_has_the_same_rows(void)
             options.threads = 1 + trial % 2;
             options.out = NULL;
             CHECK(hs_neighbors_find(QUERIED(&points, asking, shared.scene.box), &options, &rows,
-                                    NULL) ==
-                  HS_OK);
+                                    NULL) == HS_OK);
             const int64_t n = hs_pairs_length(rows);
             CHECK(hs_pairs_rows(rows) == (asking != NULL ? queries.n : points.n));
             CHECK(rows_are_consistent(rows, options.index_bytes));
             make_arrays(options.want, points.ndim, options.index_bytes, n, &c);
             options.out = &c.arrays;
             CHECK(hs_neighbors_find(QUERIED(&points, asking, shared.scene.box), &options, &full,
-                                    NULL) ==
-                  HS_OK);
+                                    NULL) == HS_OK);
             CHECK(same_as_result(&c, rows, n) && untouched_from(&c, n));
             hs_array_free(hs_pairs_take_offsets(rows));
             CHECK(hs_pairs_rows(rows) == 0 && hs_pairs_offsets(rows) == NULL);
@@ -108,9 +105,8 @@ crowds_are_counted_when_they_cannot_be_kept(void)
 static void
 shifts_that_do_not_fit_name_a_point(void)
 {
-    double          x[4] = {0.0, 3.9, 0.0, -3.9};
-    hs_box          box = {
-        .ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
+    double x[4] = {0.0, 3.9, 0.0, -3.9};
+    hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
     const hs_points points = {x, 2, 2, HS_FLOAT64, 16, 8};
     hs_options      options = hs_options_default();
     options.cutoff = 1.0;
@@ -180,7 +176,7 @@ long_rows_are_the_same_by_one_walk(void)
 static void
 nothing_is_nearer_than_nothing(void)
 {
-    const double x[] = {0.5, 0.5, 0.75};
+    const double    x[] = {0.5, 0.5, 0.75};
     const hs_points points = {x, 3, 1, HS_FLOAT64, 8, 8};
     hs_options      options = hs_options_default();
     hs_pairs       *rows = NULL;

@@ -44,7 +44,7 @@ random_number(harness_random *random, const double *others, int n_others, int un
         }
         return isfinite(x) ? x : DBL_MAX;
     }
-    const int exponent = unit + scales[random_below(random, 11)] + random_below(random, 8);
+    const int    exponent = unit + scales[random_below(random, 11)] + random_below(random, 8);
     const double x = ldexp(1.0 + random_unit(random), exponent < 1023 ? exponent : 1023);
     return sign * (isfinite(x) ? x : 0.0);
 }
@@ -80,10 +80,10 @@ condense_random(harness_random *random, column_case *test)
     options.want = random_below(random, 2) ? HS_WANT_SHIFT : HS_WANT_I;
     hs_account_init(&account, &options);
     CHECK(hs_cloud_load(&account, NULL, &points, &options, &cloud, &failure) == HS_OK);
-    const hs_status status =
-        hs_condense(&account, &options, test->periodic ? &box : NULL, test->unit,
-                    test->n % 2 ? HS_FAR_EXPONENT : HS_FAR_BOUNDED_EXPONENT, &cloud, NULL,
-                    &test->condensed, &failure);
+    const hs_status status = hs_condense(&account, &options, test->periodic ? &box : NULL,
+                                         test->unit,
+                                         test->n % 2 ? HS_FAR_EXPONENT : HS_FAR_BOUNDED_EXPONENT,
+                                         &cloud, NULL, &test->condensed, &failure);
     memcpy(test->after, cloud.x[0], (size_t)test->n * sizeof(double));
     for (int i = 0; i < test->n && status == HS_OK; i++) {
         CHECK(test->after[i] >= cloud.lower[0] && test->after[i] <= cloud.upper[0]);
@@ -116,9 +116,9 @@ is_kept(const column_case *test, big before, big after)
     const big far = big_product(big_from_double(ldexp(2.0, test->unit)), one);
     before = big_product(before, one);
     after = big_product(after, unit);
-    return big_compare(before, after) == 0 || (big_compare_magnitude(&before, &far) >= 0 &&
-                                               big_compare_magnitude(&after, &far) >= 0 &&
-                                               before.sign == after.sign);
+    return big_compare(before, after) == 0 ||
+           (big_compare_magnitude(&before, &far) >= 0 && big_compare_magnitude(&after, &far) >= 0 &&
+            before.sign == after.sign);
 }
 
 static void

@@ -48,8 +48,8 @@ make_far_scene(harness_random *random, int trial, far_scene *s)
     if (trial % 5 == 0 && ndim > 1 && s->box.periodic[0] && s->box.periodic[1]) {
         s->box.rows[1][0] = 0.25 * s->box.rows[0][0]; /* skewed */
     }
-    s->points = (hs_points){s->x, N_FAR, ndim, HS_FLOAT64, ndim * (ptrdiff_t)sizeof(double),
-                            sizeof(double)};
+    s->points = (hs_points){
+        s->x, N_FAR, ndim, HS_FLOAT64, ndim * (ptrdiff_t)sizeof(double), sizeof(double)};
 }
 
 /* A long period, a short one, and numbers that no scale between these holds. */
@@ -65,24 +65,24 @@ make_subnormal_scene(harness_random *random, int trial, far_scene *s)
     s->box = (hs_box){.ndim = ndim};
     for (int k = 0; k < ndim; k++) {
         const double length = (k + trial) % 2 == 0 ? unit : long_one;
-        const double places[] = {0.0,          0x1p-1074,      -0x1p-1030,   0x1p-1000,
-                                 0.5 * length, -0.5 * length,  3.0 * length, -5.5 * length};
+        const double places[] = {0.0,          0x1p-1074,     -0x1p-1030,   0x1p-1000,
+                                 0.5 * length, -0.5 * length, 3.0 * length, -5.5 * length};
         s->box.periodic[k] = random_below(random, 5) > 0;
         s->box.rows[k][k] = length;
         for (int i = 0; i < N_FAR; i++) {
             s->x[i * ndim + k] = places[random_below(random, 8)];
         }
     }
-    s->points = (hs_points){s->x, N_FAR, ndim, HS_FLOAT64, ndim * (ptrdiff_t)sizeof(double),
-                            sizeof(double)};
+    s->points = (hs_points){
+        s->x, N_FAR, ndim, HS_FLOAT64, ndim * (ptrdiff_t)sizeof(double), sizeof(double)};
 }
 
 /* What scenes may be refused for. */
 static bool
 is_refusal(hs_status status)
 {
-    return status == HS_ERR_SHIFT_RANGE || status == HS_ERR_BOX_SKEWED ||
-           status == HS_ERR_MEMORY || status == HS_ERR_ROUNDING;
+    return status == HS_ERR_SHIFT_RANGE || status == HS_ERR_BOX_SKEWED || status == HS_ERR_MEMORY ||
+           status == HS_ERR_ROUNDING;
 }
 
 static void
@@ -97,8 +97,8 @@ check_rows(const far_scene *s, hs_options options, int64_t half)
         sum += counts[i];
     CHECK(status == HS_OK ? sum == 2 * half : is_refusal(status));
     const double       edges[] = {0.0, s->cutoff};
-    const hs_histogram histogram = {.edges = edges, .n_edges = 2, .last_inclusive = true,
-                                    .n_types = 1, .counts = bins};
+    const hs_histogram histogram = {
+        .edges = edges, .n_edges = 2, .last_inclusive = true, .n_types = 1, .counts = bins};
     status = hs_pairs_histogram(AMONG(&s->points, &s->box), &options, &histogram, NULL);
     CHECK(status == HS_OK ? bins[0] + bins[1] == half : is_refusal(status));
 }

@@ -76,9 +76,8 @@ points_far_above_a_slab_keep_their_neighbours(void)
 {
     static const double heights[] = {0x1p60, 0x1p90, 0x1p100, 0x1p300, 0x1p900};
     static const double distances[] = {0.25};
-    const hs_box        box = {.ndim = 3,
-                               .periodic = {true, true, false},
-                               .rows = {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}}};
+    const hs_box        box = {
+               .ndim = 3, .periodic = {true, true, false}, .rows = {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}}};
     for (int h = 0; h < 5; h++) {
         const double    z = heights[h];
         const double    x[] = {0.125, 0.5, z, 1.375, 0.5, z, 0.125, 0.5, 0.0, 0.625, 0.5, -z};
@@ -94,12 +93,11 @@ points_wrap_from_where_scaling_overflows(void)
     static const int exponents[] = {-40, -300, -520, -600, -1000};
     for (int e = 0; e < 5; e++) {
         for (int ndim = 1; ndim <= 2; ndim++) {
-            const double    unit = ldexp(1.0, exponents[e]), far = ldexp(1.0, 600);
-            const double    x[] = {far, 0.0, 0.25 * unit, 0.0, -far, 0.5 * unit};
-            const double    d[] = {0.25 * unit};
-            const hs_box    box = {.ndim = 2,
-                                   .periodic = {true, ndim == 2},
-                                   .rows = {{unit, 0.0}, {0.0, unit}}};
+            const double unit = ldexp(1.0, exponents[e]), far = ldexp(1.0, 600);
+            const double x[] = {far, 0.0, 0.25 * unit, 0.0, -far, 0.5 * unit};
+            const double d[] = {0.25 * unit};
+            const hs_box box = {
+                .ndim = 2, .periodic = {true, ndim == 2}, .rows = {{unit, 0.0}, {0.0, unit}}};
             const hs_points points = {x, 3, 2, HS_FLOAT64, 16, 8};
             check_pairs(&points, &box, 0.3 * unit, 1, d, false);
             check_nearest(&points, &box, unit);

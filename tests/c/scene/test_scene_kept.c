@@ -26,14 +26,13 @@ keep(const double *x, int64_t n, const hs_box *box)
 {
     const hs_points points = points_in(x, n, box->ndim);
     const hs_sets   sets = {
-        .points = &points, .is_kept = true, .is_full = true, .is_plain = true, .is_wide = true};
+          .points = &points, .is_kept = true, .is_full = true, .is_plain = true, .is_wide = true};
     hs_options options = hs_options_default();
     hs_failure failure;
     options.cutoff = 1.0;
     options.want = HS_WANT_SHIFT;
     hs_account_init(&account, &options);
-    CHECK(hs_scene_init_sets(&account, NULL, &sets, box, &options, &kept, NULL, &failure) ==
-          HS_OK);
+    CHECK(hs_scene_init_sets(&account, NULL, &sets, box, &options, &kept, NULL, &failure) == HS_OK);
 }
 
 static hs_status
@@ -229,9 +228,8 @@ the_formula_of_double_errs_with_the_box_vectors(void)
 {
     const double x[4] = {0.25, 0.5, 0.75, 0.5};
     for (int skew = 0; skew <= 4000; skew += 2000) {
-        const hs_box    box = {.ndim = 2,
-                               .periodic = {true, true},
-                               .rows = {{1.0, 0.0}, {skew + 0.25, 1.0}}};
+        const hs_box box = {
+            .ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {skew + 0.25, 1.0}}};
         const hs_points points = points_in(x, 2, 2);
         hs_options      options = hs_options_default();
         hs_scene        scene;

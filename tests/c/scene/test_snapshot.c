@@ -36,8 +36,8 @@ any_layout_is_copied(void)
         ptrdiff_t row, column; /* in entries */
         int64_t   first;
         int       ndim;
-    } layouts[] = {{D, 1, 0, D}, {2 * D, 1, 0, D}, {1, N, 0, D}, {-D, 1, (N - 1) * D, D},
-                   {0, 1, 5, D}, {2 * D, 2, 0, D}, {1, 7, 0, 1}, {2, 7, 0, 1},
+    } layouts[] = {{D, 1, 0, D},     {2 * D, 1, 0, D}, {1, N, 0, D}, {-D, 1, (N - 1) * D, D},
+                   {0, 1, 5, D},     {2 * D, 2, 0, D}, {1, 7, 0, 1}, {2, 7, 0, 1},
                    {D, -1, D - 1, D}};
     hs_frame frame = {0};
     for (int l = 0; l < 18; l++) {
@@ -70,11 +70,11 @@ static void
 the_first_that_is_not_finite_is_named(void)
 {
     enum { N = 50 };
-    float          f[2 * N];
-    double         x[2 * N];
-    const double   bad[] = {NAN, INFINITY, -INFINITY};
-    hs_frame       frame = {0};
-    hs_failure     failure;
+    float        f[2 * N];
+    double       x[2 * N];
+    const double bad[] = {NAN, INFINITY, -INFINITY};
+    hs_frame     frame = {0};
+    hs_failure   failure;
     for (int at = 0; at < 2 * N; at++) {
         for (int e = 0; e < 2 * N; e++) {
             f[e] = (float)e;
@@ -137,9 +137,9 @@ frames_match_or_do_not(void)
         const hs_points *points;
         const hs_box    *box;
         bool             matches;
-    } cases[] = {{&one, &box, true},     {&one, &longer, true},   {&one, &wide, true},
-                 {&fewer, &box, false},  {&flat, NULL, false},    {&narrow, &box, false},
-                 {&one, &both, false},   {&one, &other, false},   {&one, NULL, false}};
+    } cases[] = {{&one, &box, true},    {&one, &longer, true}, {&one, &wide, true},
+                 {&fewer, &box, false}, {&flat, NULL, false},  {&narrow, &box, false},
+                 {&one, &both, false},  {&one, &other, false}, {&one, NULL, false}};
     hs_frame   base = {0}, frame = {0};
     hs_failure failure = HS_NO_FAILURE;
     CHECK(hs_frame_take(&one, &box, &options, &base, &failure) == HS_OK);

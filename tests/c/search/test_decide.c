@@ -117,8 +117,8 @@ pairs_do_not_depend_on_the_filter(void)
             }
             n_unsure += done.n_ambiguous;
             n_certain += done.n_candidates - done.n_ambiguous;
-            const int64_t decided = done.stages.by_float64 + done.stages.by_double_word +
-                                    done.stages.by_integers;
+            const int64_t decided =
+                done.stages.by_float64 + done.stages.by_double_word + done.stages.by_integers;
             CHECK(decided == done.n_ambiguous);
             CHECK(errors[e] < 1.0 || done.n_ambiguous > all.n);
         }

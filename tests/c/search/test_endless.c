@@ -30,8 +30,8 @@ too_many_images_are_refused(void)
             options.cell_size = trial / 4 * 0.1;
             options.want = HS_WANT_I | HS_WANT_J;
             options.memory_limit = 1e9;
-            const hs_status status = hs_pairs_find(AMONG(&points, &box), &options, &pairs,
-                                                   &failure);
+            const hs_status status =
+                hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure);
             CHECK(status == HS_ERR_MEMORY);
             CHECK(pairs == NULL && failure.row == -1);
         }

@@ -68,13 +68,13 @@ static void
 samples_end_early_in_a_crowd(void)
 {
     enum { N = 100000 };
-    static double    x[3 * N];
-    harness_random   random = {4};
-    const hs_points  points = {x, N, 3, HS_FLOAT64, 24, 8};
-    hs_options       options = hs_options_default();
-    hs_pairs        *pairs = NULL;
-    hs_failure       failure;
-    const double     all = 0.5 * N * (N - 1.0);
+    static double   x[3 * N];
+    harness_random  random = {4};
+    const hs_points points = {x, N, 3, HS_FLOAT64, 24, 8};
+    hs_options      options = hs_options_default();
+    hs_pairs       *pairs = NULL;
+    hs_failure      failure;
+    const double    all = 0.5 * N * (N - 1.0);
     scatter(&random, 1.0, N, x);
     options.cutoff = 2.0;
     options.memory_limit = 1e8;
@@ -87,14 +87,14 @@ samples_end_early_in_a_crowd(void)
 static void
 endless_pairs_are_not_counted(void)
 {
-    double       x[9] = {0.0};
-    hs_box       box = {.ndim = 3, .periodic = {true, true, true}};
-    brute_scene  scene = {.ndim = 3, .n = 3, .x = x, .box = &box, .cutoff = 1.0};
-    hs_options   options = options_of(&scene);
-    hs_points    points = points_of(&scene);
-    hs_failure   failure;
-    hs_pairs    *pairs;
-    int64_t      count = -5;
+    double      x[9] = {0.0};
+    hs_box      box = {.ndim = 3, .periodic = {true, true, true}};
+    brute_scene scene = {.ndim = 3, .n = 3, .x = x, .box = &box, .cutoff = 1.0};
+    hs_options  options = options_of(&scene);
+    hs_points   points = points_of(&scene);
+    hs_failure  failure;
+    hs_pairs   *pairs;
+    int64_t     count = -5;
     for (int k = 0; k < 3; k++) {
         box.rows[k][k] = 1e-7;
     }

@@ -31,9 +31,9 @@ search(bool sorted, int threads, refusal *once, int64_t *found)
 {
     static double       x[N];
     static const double at = 0.5;
-    const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8}, query = {&at, 1, 1, HS_FLOAT64, 8, 8};
-    hs_options      options = hs_options_default();
-    hs_pairs       *rows = NULL;
+    const hs_points     points = {x, N, 1, HS_FLOAT64, 8, 8}, query = {&at, 1, 1, HS_FLOAT64, 8, 8};
+    hs_options          options = hs_options_default();
+    hs_pairs           *rows = NULL;
     for (int p = 0; p < N; p++)
         x[p] = (p * 77 % SPOTS) / (double)SPOTS;
     options.cutoff = 0.75;

@@ -44,8 +44,8 @@ fill(harness_random *random, int32_t n, int32_t runs, int64_t numbers, int32_t w
     for (int32_t r = 0; r <= runs; r++) {
         block->runs[r].at = (int32_t)((int64_t)n * r / runs);
         for (int b = 0; r < runs && b < D; b++)
-            block->runs[r].image[b] = (int32_t)(random_bits(random) % (2 * (unsigned)widest + 1)) -
-                                      widest;
+            block->runs[r].image[b] =
+                (int32_t)(random_bits(random) % (2 * (unsigned)widest + 1)) - widest;
     }
     for (int32_t c = 0; c < n; c++) {
         block->id[c] = (int32_t)(random_bits(random) % (uint64_t)numbers);
@@ -100,15 +100,15 @@ blocks_are_sorted_by_number_and_shift(void)
     CHECK(hs_block_init(&account, D, HS_BLOCK_LISTS_PLACES, MOST, RUNS, &block) == HS_OK);
     CHECK(hs_order_init(&account, &block, &order) == HS_OK);
     for (int trial = 0; trial < 1600; trial++) {
-        const int32_t n = trial % 4 == 3   ? MOST / 3 * (1 + trial % 3)
-                          : trial % 4 == 2 ? 400
-                                           : trial % 300;
-        const int     bits = 1 + trial % 31;
-        const hs_box  box = {.ndim = D,
-                             .periodic = {true, true},
-                             .rows = {{1.0, 0.0}, {multiples[trial / 7 % 4], 1.0}}};
+        const int32_t      n = trial % 4 == 3   ? MOST / 3 * (1 + trial % 3)
+                               : trial % 4 == 2 ? 400
+                                                : trial % 300;
+        const int          bits = 1 + trial % 31;
+        const hs_box       box = {.ndim = D,
+                                  .periodic = {true, true},
+                                  .rows = {{1.0, 0.0}, {multiples[trial / 7 % 4], 1.0}}};
         const hs_block_use use = trial % 2 ? HS_BLOCK_LISTS_PLACES : HS_BLOCK_LISTS_IDS;
-        hs_lattice lattice;
+        hs_lattice         lattice;
         hs_lattice_init(&box, D, (hs_scale){.exponent = 0, .first = 1.0, .second = 1.0}, &lattice);
         fill(&random, n, 1 + trial % RUNS, INT64_C(1) << bits, 1 << trial % 11, &block);
         by_shifts = use == HS_BLOCK_LISTS_PLACES;

@@ -94,8 +94,7 @@ cells_that_cannot_be_narrowed_are_refused(void)
                 memcpy(built.search.scene.lattice.normal[k], normals[k], sizeof normals[k]);
         }
         hs_call_begin(&options, &call);
-        CHECK(hs_search_reuse(&sets, &call, &search, &failure) ==
-              (bad ? HS_ERR_MEMORY : HS_OK));
+        CHECK(hs_search_reuse(&sets, &call, &search, &failure) == (bad ? HS_ERR_MEMORY : HS_OK));
         if (!bad)
             hs_search_close(&search);
         hs_call_dismiss(&call);

@@ -68,10 +68,10 @@ ranges_come_in_any_order(void)
 {
     static found all, some;
     for (int trial = 0; trial < 6; trial++) {
-        const int     d = 1 + trial % 3, n = 600;
-        hs_box        box = {.ndim = d, .periodic = {trial % 2, true, true}};
-        hs_walker     walker;
-        const double  cutoff = 0.3;
+        const int    d = 1 + trial % 3, n = 600;
+        hs_box       box = {.ndim = d, .periodic = {trial % 2, true, true}};
+        hs_walker    walker;
+        const double cutoff = 0.3;
         for (int k = 0; k < d; k++)
             box.rows[k][k] = k == 0 || d == 1 ? 4.0 : 1.0;
         search_unit_points(900 + (uint64_t)trial, n, d, 1.0, &unit);
@@ -105,10 +105,10 @@ ranges_come_in_any_order(void)
 static void
 single_points_find_the_same(void)
 {
-    static found  all, own;
-    const hs_box  box = {.ndim = 2, .periodic = {true, true}, .rows = {{2.0}, {0.0, 2.0}}};
-    const int     n = 500;
-    hs_walker     walker;
+    static found all, own;
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{2.0}, {0.0, 2.0}}};
+    const int    n = 500;
+    hs_walker    walker;
     search_unit_points(4711, n, 2, 2.0, &unit);
     search_unit_open(&box, 0.25, true, HS_WANT_I, &unit);
     open_walker(&walker, &all);

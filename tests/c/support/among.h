@@ -5,9 +5,9 @@
 
 #include "../../../csrc/halfshell.h"
 
-#define AMONG(p, b) (&(hs_among){.points = (p), .box = (b)})
-#define QUERIED(p, q, b) (&(hs_among){.points = (p), .queries = (q), .box = (b)})
-#define IN_CELLS(c) (&(hs_among){.cells = (c)})
+#define AMONG(p, b)         (&(hs_among){.points = (p), .box = (b)})
+#define QUERIED(p, q, b)    (&(hs_among){.points = (p), .queries = (q), .box = (b)})
+#define IN_CELLS(c)         (&(hs_among){.cells = (c)})
 #define QUERIED_CELLS(c, q) (&(hs_among){.cells = (c), .queries = (q)})
 
 #endif

@@ -15,7 +15,7 @@ typedef double matrix[HS_MAX_DIM][HS_MAX_DIM];
 /* C11 does not add this qualifier by itself. */
 static inline const double (*as_const(matrix a))[HS_MAX_DIM]
 {
-    return (const double (*)[HS_MAX_DIM])a;
+    return (const double(*)[HS_MAX_DIM])a;
 }
 
 /* Whether entry c of row k is as close to that of U A as it is said to be. Exact. */
@@ -25,8 +25,8 @@ is_within_error(const hs_reduction *r, matrix a, int k, int c)
     big difference = big_negated(big_from_double(r->rows[k][c]));
     for (int l = 0; l < r->n_rows; l++) {
         if (r->U[k][l] != 0 && a[l][c] != 0.0) {
-            difference = big_sum(difference, big_product(big_from_int(r->U[k][l]),
-                                                         big_from_double(a[l][c])));
+            difference = big_sum(difference,
+                                 big_product(big_from_int(r->U[k][l]), big_from_double(a[l][c])));
         }
     }
     big error = big_from_double(r->error[k]);

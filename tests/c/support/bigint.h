@@ -169,8 +169,8 @@ big_component(int n_rows, const double rows[][8], const double *p, const double 
 {
     big component = big_difference(big_from_double(q[k]), big_from_double(p[k]));
     for (int l = 0; l < n_rows && shift != NULL; l++)
-        component = big_sum(component,
-                            big_product(big_from_int(shift[l]), big_from_double(rows[l][k])));
+        component =
+            big_sum(component, big_product(big_from_int(shift[l]), big_from_double(rows[l][k])));
     return component;
 }
 

@@ -18,13 +18,13 @@ enum { CALL_ROOM = 1024 }; /* entries of counts, and of what histograms write */
 /* Which arguments a function looks at. */
 enum {
     USES_POINTS = 1 << 0,
-    USES_QUERIES = 1 << 1,     /* when they are not NULL */
-    NEEDS_QUERIES = 1 << 2,    /* which may not be NULL */
-    USES_BOX = 1 << 3,         /* when it is not NULL */
-    NEEDS_BOX = 1 << 4,        /* which may not be NULL */
-    USES_OPTIONS = 1 << 5,     /* at least threads and the limit of memory */
+    USES_QUERIES = 1 << 1,  /* when they are not NULL */
+    NEEDS_QUERIES = 1 << 2, /* which may not be NULL */
+    USES_BOX = 1 << 3,      /* when it is not NULL */
+    NEEDS_BOX = 1 << 4,     /* which may not be NULL */
+    USES_OPTIONS = 1 << 5,  /* at least threads and the limit of memory */
     USES_CUTOFF = 1 << 6,
-    NEEDS_FINITE = 1 << 7,     /* cutoffs */
+    NEEDS_FINITE = 1 << 7, /* cutoffs */
     USES_CELL_SIZE = 1 << 8,
     USES_PRECISION = 1 << 9,
     USES_WANT = 1 << 10,
@@ -64,11 +64,11 @@ typedef struct call {
     hs_stream          *stream;
     int64_t             k, max_pairs;
     double              skin;
-    bool                has_result; /* false: NULL in place of where the answer goes */
-    int                 retries;    /* so often a stream that lacked memory is asked again */
+    bool                has_result;        /* false: NULL in place of where the answer goes */
+    int                 retries;           /* so often a stream that lacked memory is asked again */
     int                 ndim, index_bytes; /* of results, whatever the arguments are spoilt to */
     int64_t             n_points;
-    uint64_t            answer;     /* of the last call that succeeded */
+    uint64_t            answer; /* of the last call that succeeded */
 } call;
 
 typedef struct call_kind {
@@ -186,41 +186,36 @@ call_among(const call *c, const hs_points *queries)
 static inline hs_status
 call_find(call *c, hs_failure *failure)
 {
-    const hs_among among = call_among(c, NULL);
+    const hs_among  among = call_among(c, NULL);
     hs_pairs       *pairs = CALL_NOTHING;
-    const hs_status status =
-        hs_pairs_find(&among, c->options, RESULT(pairs), failure);
+    const hs_status status = hs_pairs_find(&among, c->options, RESULT(pairs), failure);
     return call_take_pairs(c, status, pairs);
 }
 
 static inline hs_status
 call_count(call *c, hs_failure *failure)
 {
-    const hs_among among = call_among(c, c->queries);
+    const hs_among  among = call_among(c, c->queries);
     int64_t         count = -7;
-    const hs_status status =
-        hs_pairs_count(&among, c->options, RESULT(count), failure);
+    const hs_status status = hs_pairs_count(&among, c->options, RESULT(count), failure);
     return call_take_count(c, status, count);
 }
 
 static inline hs_status
 call_neighbors(call *c, hs_failure *failure)
 {
-    const hs_among among = call_among(c, c->queries);
+    const hs_among  among = call_among(c, c->queries);
     hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status =
-        hs_neighbors_find(&among, c->options, RESULT(rows),
-                          failure);
+    const hs_status status = hs_neighbors_find(&among, c->options, RESULT(rows), failure);
     return call_take_pairs(c, status, rows);
 }
 
 static inline hs_status
 call_neighbors_count(call *c, hs_failure *failure)
 {
-    const hs_among among = call_among(c, c->queries);
+    const hs_among  among = call_among(c, c->queries);
     int64_t         counts[CALL_ROOM];
-    const hs_status status = hs_neighbors_count(&among, c->options,
-                                                RESULT(counts[0]), failure);
+    const hs_status status = hs_neighbors_count(&among, c->options, RESULT(counts[0]), failure);
     return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
 }
 
@@ -242,17 +237,15 @@ static inline hs_status
 call_histogram(call *c, hs_failure *failure)
 {
     const hs_among among = call_among(c, c->queries);
-    return call_take_histogram(c, hs_pairs_histogram(&among,
-                                                     c->options, c->histogram, failure));
+    return call_take_histogram(c, hs_pairs_histogram(&among, c->options, c->histogram, failure));
 }
 
 static inline hs_status
 call_nearest(call *c, hs_failure *failure)
 {
-    const hs_among among = call_among(c, c->queries);
+    const hs_among  among = call_among(c, c->queries);
     hs_pairs       *rows = CALL_NOTHING;
-    const hs_status status = hs_nearest_find(&among, c->k,
-                                             c->options, RESULT(rows), failure);
+    const hs_status status = hs_nearest_find(&among, c->k, c->options, RESULT(rows), failure);
     return call_take_pairs(c, status, rows);
 }
 
@@ -302,10 +295,10 @@ call_take_stream(call *c, hs_status status, hs_stream *stream, hs_failure *failu
 static inline hs_status
 call_stream(call *c, hs_failure *failure)
 {
-    const hs_among among = call_among(c, NULL);
+    const hs_among  among = call_among(c, NULL);
     hs_stream      *stream = CALL_NOTHING;
-    const hs_status status = hs_stream_open(&among, c->options, c->max_pairs,
-                                            RESULT(stream), failure);
+    const hs_status status =
+        hs_stream_open(&among, c->options, c->max_pairs, RESULT(stream), failure);
     return call_take_stream(c, status, stream, failure);
 }
 
@@ -328,10 +321,10 @@ static inline hs_status
 call_visit(call *c, hs_failure *failure)
 {
     const hs_among among = call_among(c, NULL);
-    int64_t n_visited = -7;
+    int64_t        n_visited = -7;
     call_visited = 0;
-    const hs_status status = hs_pairs_visit(&among, c->options, c->visit,
-                                            RESULT(n_visited), failure);
+    const hs_status status =
+        hs_pairs_visit(&among, c->options, c->visit, RESULT(n_visited), failure);
     return call_take_visits(c, status, n_visited);
 }
 
@@ -357,11 +350,10 @@ static inline hs_status
 call_plan(call *c, hs_failure *failure)
 {
     const hs_among among = call_among(c, NULL);
-    hs_plan plan, untouched;
+    hs_plan        plan, untouched;
     memset(&plan, 0x5a, sizeof plan);
     memcpy(&untouched, &plan, sizeof plan);
-    const hs_status status = hs_plan_make(&among, c->options, RESULT(plan),
-                                          failure);
+    const hs_status status = hs_plan_make(&among, c->options, RESULT(plan), failure);
     CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
     c->answer = status == HS_OK ? call_hash(9, plan.shape, sizeof plan.shape) : c->answer;
     return status;

@@ -35,22 +35,22 @@ extern int         harness_tests;    /* tests run so far */
 extern const char *harness_filter;   /* run only tests whose name contains this, or NULL */
 extern bool        harness_times;    /* whether to print what each test took */
 
-#define CHECK(condition)                                                                  \
-    do {                                                                                  \
-        if (!(condition)) {                                                               \
+#define CHECK(condition)                                                                         \
+    do {                                                                                         \
+        if (!(condition)) {                                                                      \
             fprintf(stderr, "%s:%d: %s: CHECK(%s)\n", __FILE__, __LINE__, __func__, #condition); \
-            harness_failures++;                                                           \
-        }                                                                                 \
+            harness_failures++;                                                                  \
+        }                                                                                        \
     } while (0)
 
-#define RUN(test)                                                        \
-    do {                                                                 \
-        if (harness_filter == NULL || strstr(#test, harness_filter)) {   \
-            const clock_t begun_ = clock();                              \
-            harness_tests++;                                             \
-            test();                                                      \
-            harness_took(#test, begun_);                                 \
-        }                                                                \
+#define RUN(test)                                                      \
+    do {                                                               \
+        if (harness_filter == NULL || strstr(#test, harness_filter)) { \
+            const clock_t begun_ = clock();                            \
+            harness_tests++;                                           \
+            test();                                                    \
+            harness_took(#test, begun_);                               \
+        }                                                              \
     } while (0)
 
 /* Seconds of processor time, of all threads: other programs do not change them much. */

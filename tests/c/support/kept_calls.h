@@ -11,8 +11,7 @@ static inline hs_status
 call_cells_build(call *c, hs_failure *failure)
 {
     hs_cells       *cells = CALL_NOTHING;
-    const hs_status status =
-        hs_cells_build(c->points, c->box, c->options, RESULT(cells), failure);
+    const hs_status status = hs_cells_build(c->points, c->box, c->options, RESULT(cells), failure);
     if (!c->has_result) {
         CHECK(status != HS_OK && cells == CALL_NOTHING);
         return status;
@@ -132,14 +131,13 @@ static const call_kind call_kinds[] = {
      USES_CELLS | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL | USES_COUNTERS |
          USES_HISTOGRAM},
     {"nearest_find in cells", call_nearest,
-     USES_CELLS | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) |
-         USES_INDEX_BYTES | USES_K},
+     USES_CELLS | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) | USES_INDEX_BYTES |
+         USES_K},
     {"stream_open in cells", call_stream,
      USES_CELLS | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES | USES_MAX_PAIRS},
     {"pairs_visit in cells", call_visit, USES_CELLS | OF_SEARCH | USES_VISIT},
     {"cells_find", call_cells_find, USES_CELLS | USES_QUERIES | NEEDS_QUERIES | USES_RESULT},
-    {"cells_candidates", call_cells_candidates,
-     USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
+    {"cells_candidates", call_cells_candidates, USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
     {"systems_find", call_systems_find, OF_SCENE | USES_SYSTEMS | OF_SEARCH | OF_ARRAYS},
     {"systems_count", call_systems_count, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
     {"verlet_update", call_verlet_update, OF_VERLET | USES_SKIN},

@@ -23,10 +23,10 @@ same_columns(const hs_pairs *one, const hs_pairs *other, unsigned want, int ndim
 static inline const char *
 unsorted_difference(const hs_verlet *list, hs_options options, int ndim, int64_t n)
 {
-    const char    *difference = NULL;
-    hs_pairs      *found = NULL, *into = NULL;
-    caller_arrays  c;
-    const size_t   bytes = (size_t)options.index_bytes;
+    const char   *difference = NULL;
+    hs_pairs     *found = NULL, *into = NULL;
+    caller_arrays c;
+    const size_t  bytes = (size_t)options.index_bytes;
     options.sorted = false;
     options.want = WANT_ALL | HS_WANT_BOTH;
     make_arrays(options.want, ndim, options.index_bytes, n, &c);
@@ -86,8 +86,7 @@ list_difference(const hs_verlet *list, const hs_points *points, const hs_box *bo
         difference = sorted_list_difference(list, points, box, &options, &n);
     }
     *n_pairs += n;
-    return difference != NULL ? difference
-                              : unsorted_difference(list, options, points->ndim, n);
+    return difference != NULL ? difference : unsorted_difference(list, options, points->ndim, n);
 }
 
 #endif

@@ -63,8 +63,7 @@ sort_row(const found_pairs *all, int64_t begin, int64_t end, int64_t i, neighbou
 }
 
 static inline bool
-row_is_right(const neighbour *sorted, int64_t n, const found_pairs *found, int64_t first,
-             int64_t k)
+row_is_right(const neighbour *sorted, int64_t n, const found_pairs *found, int64_t first, int64_t k)
 {
     const int d = of_rows->ndim;
     for (int64_t e = 0; e < k; e++) {

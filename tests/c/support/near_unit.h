@@ -21,13 +21,10 @@ static inline void
 near_unit_open(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
                unsigned want, double limit, near_unit *unit)
 {
-    const hs_sets sets = {.points = points,
-                          .queries = queries,
-                          .is_full = true,
-                          .is_plain = true,
-                          .is_wide = true};
-    hs_options    options = hs_options_default();
-    hs_failure    failure;
+    const hs_sets sets = {
+        .points = points, .queries = queries, .is_full = true, .is_plain = true, .is_wide = true};
+    hs_options options = hs_options_default();
+    hs_failure failure;
     options.cutoff = limit;
     options.want = want;
     options.threads = 1;

@@ -10,7 +10,7 @@ enum { MARKED = 1024, N_QUANTITIES = 6 }; /* bytes behind each array that must s
 
 /* In the order of their HS_WANT_ bits. */
 typedef struct caller_arrays {
-    hs_pair_arrays arrays; /* what goes into options.out */
+    hs_pair_arrays arrays;              /* what goes into options.out */
     char          *start[N_QUANTITIES]; /* owned */
     size_t         width[N_QUANTITIES]; /* bytes of a pair; 0 where not wanted */
     int64_t        room;                /* pairs that there really is room for */

@@ -6,8 +6,7 @@
 #include "brute_force.h"
 #include "among.h"
 
-#define WANT_ALL \
-    (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
+#define WANT_ALL (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
 
 /* What a search returned: arrays taken from it, NULL where not wanted. */
 typedef struct found_pairs {
@@ -109,13 +108,13 @@ measures_are_right(const brute_scene *scene, const brute_rows *r, const brute_pa
         (!scene->inclusive && distance == scene->cutoff) ||
         big_compare(big_product(low, low), square) > 0)
         return false;
-    big ulp = big_from_double(above <= DBL_MAX ? above - distance : distance - below);
+    big       ulp = big_from_double(above <= DBL_MAX ? above - distance : distance - below);
     const big high = big_sum(big_from_double(distance), ulp);
     if (big_compare(square, big_product(high, high)) > 0)
         return false;
     for (int k = 0; k < scene->ndim; k++) {
-        big off = big_difference(big_from_double(vector[k]),
-                                 big_component(r->m, rows, p, q, shift, k));
+        big off =
+            big_difference(big_from_double(vector[k]), big_component(r->m, rows, p, q, shift, k));
         if (big_compare_magnitude(&off, &ulp) > 0)
             return false;
     }
@@ -222,8 +221,8 @@ into_difference(const brute_scene *scene, const brute_list *expected)
         hs_failure     failure;
         options.out = &out;
         options.sorted = trial & 2;
-        const hs_status status = hs_pairs_find(AMONG(&points, scene->box), &options, &pairs,
-                                               &failure);
+        const hs_status status =
+            hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, &failure);
         if (status != (trial & 1 ? HS_ERR_CAPACITY : HS_OK))
             difference = hs_status_text(status);
         else if (trial & 1 && failure.expected_pairs != (double)expected->n)

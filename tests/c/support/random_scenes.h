@@ -35,14 +35,10 @@ static inline double
 random_entry(harness_random *random, int numbers, double size)
 {
     switch (numbers) {
-    case 1:
-        return 0.25 * floor(4.0 * size * random_unit(random));
-    case 2:
-        return 0.1 * floor(10.0 * size * random_unit(random));
-    case 3:
-        return (float)(size * random_unit(random) * 0.999);
-    default:
-        return size * random_unit(random);
+    case 1: return 0.25 * floor(4.0 * size * random_unit(random));
+    case 2: return 0.1 * floor(10.0 * size * random_unit(random));
+    case 3: return (float)(size * random_unit(random) * 0.999);
+    default: return size * random_unit(random);
     }
 }
 

@@ -59,10 +59,16 @@ place_floats(guarded pages, const float *from, int32_t n, bool at_end, const flo
 static inline hs_scan
 place_scan(const numbers *s, bool at_end)
 {
-    hs_scan scan = {.ndim = s->ndim, .n = s->n, .n_points = s->n_points,
-                    .most_hits = s->most_hits, .most_unsure = s->most_unsure,
-                    .triangular = s->triangular, .direct = s->direct, .expanded = s->expanded,
-                    .n_unsure = -1, .n_hits = -1};
+    hs_scan scan = {.ndim = s->ndim,
+                    .n = s->n,
+                    .n_points = s->n_points,
+                    .most_hits = s->most_hits,
+                    .most_unsure = s->most_unsure,
+                    .triangular = s->triangular,
+                    .direct = s->direct,
+                    .expanded = s->expanded,
+                    .n_unsure = -1,
+                    .n_hits = -1};
     for (int k = 0; k < s->ndim; k++) {
         float *q = guarded_place(q_pages[k], s->n_points, sizeof(float), at_end);
         memcpy(q, s->q[k], (size_t)s->n_points * sizeof(float));

@@ -31,22 +31,16 @@ place_coordinate(harness_random *random, place_kind kind, int i, int k, double x
 {
     static const double far[] = {1e10, -1e30, 1e300, -1e300};
     switch (kind) {
-    case PLACE_CLUSTERS:
-        return 0.2 * x + 1000.0 * ((i % 5 * (k + 3)) % 5);
-    case PLACE_TWO_NEAR:
-        return x + (i & 1 ? 1e9 : 0.0);
-    case PLACE_TWO_FAR:
-        return x + (i & 1 ? 1e18 : 0.0);
+    case PLACE_CLUSTERS: return 0.2 * x + 1000.0 * ((i % 5 * (k + 3)) % 5);
+    case PLACE_TWO_NEAR: return x + (i & 1 ? 1e9 : 0.0);
+    case PLACE_TWO_FAR: return x + (i & 1 ? 1e18 : 0.0);
     case PLACE_OUTLIERS:
         return i % 10 == 3 && random_below(random, 2) ? far[random_below(random, 4)] : x;
     case PLACE_EXPONENTIAL:
         return pow(10.0, -3.0 + 303.0 * random_unit(random)) * (random_below(random, 2) ? 1 : -1);
-    case PLACE_COINCIDENT:
-        return i % 7 * (k + 1) * 0.25;
-    case PLACE_LINE:
-        return k == i % 2 ? x : 0.5;
-    default:
-        return x;
+    case PLACE_COINCIDENT: return i % 7 * (k + 1) * 0.25;
+    case PLACE_LINE: return k == i % 2 ? x : 0.5;
+    default: return x;
     }
 }
 

@@ -41,15 +41,15 @@ sparse_open(const brute_scene *brute, double width, sparse_scene *s)
     status = hs_grid_init(&s->scene, &s->dense, &failure);
     if (status == HS_OK) {
         hs_sparse_grid(&s->scene, &s->dense, width, &s->grid);
-        status = hs_stencil_build(&s->account, &s->options, &s->scene, &s->grid, false,
-                                  &s->stencil);
+        status =
+            hs_stencil_build(&s->account, &s->options, &s->scene, &s->grid, false, &s->stencil);
     }
     if (status != HS_OK) {
         hs_scene_free(&s->account, &s->scene);
         return status;
     }
-    status = hs_sparse_build(&s->account, NULL, &s->options, &s->scene, &s->grid, &s->sparse,
-                             &s->bins);
+    status =
+        hs_sparse_build(&s->account, NULL, &s->options, &s->scene, &s->grid, &s->sparse, &s->bins);
     if (status != HS_OK)
         hs_stencil_free(&s->account, &s->stencil);
     return status;

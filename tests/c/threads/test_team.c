@@ -118,8 +118,13 @@ count_poll(void *context, double fraction)
 static void
 passes_cover_all_points_and_poll(void)
 {
-    static const int64_t sizes[] = {0, 1, HS_SLAB_POINTS, HS_POLL_POINTS - 1, HS_POLL_POINTS,
-                                    HS_POLL_POINTS + 1, 5 * HS_POLL_POINTS + 12345};
+    static const int64_t sizes[] = {0,
+                                    1,
+                                    HS_SLAB_POINTS,
+                                    HS_POLL_POINTS - 1,
+                                    HS_POLL_POINTS,
+                                    HS_POLL_POINTS + 1,
+                                    5 * HS_POLL_POINTS + 12345};
     for (int s = 0; s < 7; s++) {
         for (int n_strips = 0; n_strips <= 5; n_strips++) {
             const int64_t n = sizes[s];
@@ -127,9 +132,8 @@ passes_cover_all_points_and_poll(void)
             hs_options    options = {.poll = count_poll, .poll_context = &polls};
             pass_record   record = {.failing = -1};
             hs_status     status =
-                n_strips == 0
-                        ? hs_walk_slabs(NULL, &options, n, record_slab, &record)
-                        : hs_walk_strips(NULL, &options, n, n_strips, record_slab, &record);
+                n_strips == 0 ? hs_walk_slabs(NULL, &options, n, record_slab, &record)
+                                  : hs_walk_strips(NULL, &options, n, n_strips, record_slab, &record);
             CHECK(status == HS_OK && record.seen == n);
             CHECK(-1 - polls == n / HS_POLL_POINTS);
             polls = 2; /* the second stops */
@@ -171,8 +175,8 @@ check_same(const sorted_scene *a, const sorted_scene *b)
     CHECK(a->grid.n_cells == b->grid.n_cells && a->grid.n_cells > 1000);
     CHECK(memcmp(a->scene.x_largest, b->scene.x_largest, sizeof a->scene.x_largest) == 0);
     CHECK(memcmp(a->bins.order, b->bins.order, n * sizeof(int32_t)) == 0);
-    CHECK(memcmp(a->bins.start, b->bins.start,
-                 (size_t)(a->grid.n_cells + 1) * sizeof(int32_t)) == 0);
+    CHECK(memcmp(a->bins.start, b->bins.start, (size_t)(a->grid.n_cells + 1) * sizeof(int32_t)) ==
+          0);
     CHECK(a->bins.keeps_originals == b->bins.keeps_originals);
     CHECK(a->bins.turns.known == b->bins.turns.known);
     for (int k = 0; k < a->bins.ndim; k++) {
@@ -194,10 +198,11 @@ sorting_does_not_depend_on_the_team(void)
     for (int64_t e = 0; e < 3 * MANY; e++) {
         x[e] = 100.0 * random_unit(&random);
     }
-    const hs_points points = {.data = x, .n = MANY, .ndim = 3, .real = HS_FLOAT64,
-                              .row_stride = 24, .column_stride = 8};
+    const hs_points points = {
+        .data = x, .n = MANY, .ndim = 3, .real = HS_FLOAT64, .row_stride = 24, .column_stride = 8};
     for (int trial = 0; trial < 4; trial++) {
-        hs_box box = {.ndim = 3, .periodic = {true, true, true},
+        hs_box box = {.ndim = 3,
+                      .periodic = {true, true, true},
                       .rows = {{100.0}, {0.0, 97.0}, {0.0, 0.0, 61.0}}};
         box.rows[2][0] = trial % 2 ? 31.0 : 0.0;
         hs_options options = hs_options_default();

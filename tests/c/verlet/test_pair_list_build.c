@@ -159,7 +159,8 @@ limits_leave_the_list_as_it_was(void)
             n_refused++;
         }
     }
-    CHECK(status == HS_OK && n_refused > TRIALS(100) && n_late > TRIALS(10) && has_pairs_of(list, &many));
+    CHECK(status == HS_OK && n_refused > TRIALS(100) && n_late > TRIALS(10) &&
+          has_pairs_of(list, &many));
     hs_verlet_free(list);
 }
 
@@ -183,7 +184,7 @@ shifts_that_do_not_fit_name_a_point(void)
         box.rows[1][0] = 8.0;
         CHECK(update(list, &scene, 0.25, &rebuilt, NULL) == HS_OK && has_pairs_of(list, &scene));
         box.rows[1][0] = 0x1p23; /* 2^20 of the first */
-        x[3] = 0x1p48; /* 2^45 of the second: 2^65 */
+        x[3] = 0x1p48;           /* 2^45 of the second: 2^65 */
         CHECK(update(list, &scene, 0.25, &rebuilt, &failure) == HS_ERR_SHIFT_RANGE);
         CHECK(failure.row == 1);
         hs_verlet_free(list);

@@ -68,8 +68,8 @@ every_type_and_dimension_gives_the_pairs_of_a_search(void)
         for (int step = 0; step < STEPS; step++) {
             const hs_points points = typed_points(&shared.scene, is_narrow ? narrow : NULL);
             bool            rebuilt;
-            CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, skin, false,
-                                   &rebuilt, NULL) == HS_OK);
+            CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, skin, false, &rebuilt,
+                                   NULL) == HS_OK);
             CHECK(list_difference(list, &points, shared.scene.box, options, &n_pairs) == NULL);
             n_kept += !rebuilt;
             move(&random, &shared, 0.05 * options.cutoff, step == 1 || trial % 4 == 0);
@@ -108,15 +108,15 @@ digits_that_scaling_would_lose_are_kept(void)
 static void
 jump_by(int64_t periods, double tilt, double height, const char *kernel, hs_status shift_status)
 {
-    double       x[6] = {0.25, 0.25, 0.25, 0.5, 0.75, 0.5};
-    hs_box       box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {tilt, height}}};
-    hs_points    points = {x, 3, 2, HS_FLOAT64, 16, 8};
-    hs_options   options = hs_options_default();
-    hs_verlet   *list = hs_verlet_new();
-    hs_pairs    *pairs = NULL;
-    hs_failure   failure;
-    bool         rebuilt;
-    int64_t      n_pairs = 0;
+    double     x[6] = {0.25, 0.25, 0.25, 0.5, 0.75, 0.5};
+    hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0, 0.0}, {tilt, height}}};
+    hs_points  points = {x, 3, 2, HS_FLOAT64, 16, 8};
+    hs_options options = hs_options_default();
+    hs_verlet *list = hs_verlet_new();
+    hs_pairs  *pairs = NULL;
+    hs_failure failure;
+    bool       rebuilt;
+    int64_t    n_pairs = 0;
     options.cutoff = 0.25;
     options.kernel = kernel;
     CHECK(hs_verlet_update(list, &points, &box, &options, 0.5 * height, false, &rebuilt, NULL) ==
@@ -175,10 +175,10 @@ static void
 box_vectors_may_be_any_sum_of_shorter_ones(void)
 {
     enum { N = 400 };
-    static const int    tilts[] = {0, 24, 48, 54, 60}; /* the largest: so many bits */
-    static double       x[4 * N];
-    harness_random      random = {52};
-    int64_t             n_pairs = 0;
+    static const int tilts[] = {0, 24, 48, 54, 60}; /* the largest: so many bits */
+    static double    x[4 * N];
+    harness_random   random = {52};
+    int64_t          n_pairs = 0;
     for (int trial = 0; trial < 15; trial++) {
         const int  d = 2 + trial / 5;
         hs_box     box = {.ndim = d};
@@ -239,8 +239,8 @@ what_does_not_fit_is_told(void)
     hs_status       status = HS_ERR_MEMORY;
     int             n_told = 0;
     double          limit;
-    CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.2, false, &rebuilt,
-                           NULL) == HS_OK);
+    CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.2, false, &rebuilt, NULL) ==
+          HS_OK);
     CHECK(hs_pairs_count(AMONG(&points, shared.scene.box), &options, &count, NULL) == HS_OK);
     CHECK(count > 5000);
     make_arrays(options.want, 3, 8, 100, &c);

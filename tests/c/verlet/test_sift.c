@@ -48,7 +48,7 @@ every_pair_is_told_where_it_is(void)
                                      .y = y,
                                      .offset = offset,
                                      .limit = {.in = 20.0f, .out = 30.0f}};
-        const int32_t n_hits = hs_sift(&pairs, hits, unsure, &n_unsure);
+        const int32_t       n_hits = hs_sift(&pairs, hits, unsure, &n_unsure);
         for (int32_t e = 0; e < n; e++) {
             float square = 0.0f;
             for (int k = 0; k < stride; k++) {

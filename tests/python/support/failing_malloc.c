@@ -23,9 +23,9 @@ static atomic_long n_live;
 static char   early[4096];
 static size_t early_used;
 
-#define NEXT(type, name, ...)                             \
-    static type (*next)(__VA_ARGS__);                     \
-    if (next == NULL) {                                   \
+#define NEXT(type, name, ...)                                \
+    static type (*next)(__VA_ARGS__);                        \
+    if (next == NULL) {                                      \
         next = (type(*)(__VA_ARGS__))dlsym(RTLD_NEXT, name); \
     }
 

@@ -18,7 +18,7 @@ static FILE *
 open_there(const char *name, const char *path, const char *mode)
 {
     FILE *(*next)(const char *, const char *);
-    char  there[8192];
+    char there[8192];
     *(void **)&next = dlsym(RTLD_NEXT, name);
     snprintf(there, sizeof there, "%s%s", getenv("ELSEWHERE"), path);
     return next(is_elsewhere(path) ? there : path, mode);
