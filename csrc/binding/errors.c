@@ -214,7 +214,7 @@ raise_capacity(const hs_failure *failure)
     PyObject       *module = PyImport_ImportModule("halfshell._errors");
     PyObject       *type = module != NULL ? PyObject_GetAttrString(module, "CapacityError") : NULL;
     PyObject       *message = PyUnicode_FromFormat(
-              "out is too small: there are %lld pairs, and every array must have room for all", needed);
+              "out is too small: there are %lld pairs, each array needs room for all", needed);
     if (type != NULL && message != NULL) {
         PyObject *error = PyObject_CallFunction(type, "OL", message, needed);
         if (error != NULL) {

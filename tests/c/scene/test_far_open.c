@@ -77,7 +77,7 @@ points_far_above_a_slab_keep_their_neighbours(void)
     static const double heights[] = {0x1p60, 0x1p90, 0x1p100, 0x1p300, 0x1p900};
     static const double distances[] = {0.25};
     const hs_box        box = {
-               .ndim = 3, .periodic = {true, true, false}, .rows = {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}}};
+               .ndim = 3, .periodic = {true, true}, .rows = {{1.0, 0.0, 0.0}, {0.25, 1.0, 0.0}}};
     for (int h = 0; h < 5; h++) {
         const double    z = heights[h];
         const double    x[] = {0.125, 0.5, z, 1.375, 0.5, z, 0.125, 0.5, 0.0, 0.625, 0.5, -z};

@@ -131,9 +131,12 @@ passes_cover_all_points_and_poll(void)
             int64_t       polls = -1; /* counts down: never 0 */
             hs_options    options = {.poll = count_poll, .poll_context = &polls};
             pass_record   record = {.failing = -1};
-            hs_status     status =
-                n_strips == 0 ? hs_walk_slabs(NULL, &options, n, record_slab, &record)
-                                  : hs_walk_strips(NULL, &options, n, n_strips, record_slab, &record);
+            hs_status     status;
+            if (n_strips == 0) {
+                status = hs_walk_slabs(NULL, &options, n, record_slab, &record);
+            } else {
+                status = hs_walk_strips(NULL, &options, n, n_strips, record_slab, &record);
+            }
             CHECK(status == HS_OK && record.seen == n);
             CHECK(-1 - polls == n / HS_POLL_POINTS);
             polls = 2; /* the second stops */
