@@ -94,7 +94,7 @@ subtract_rows(const hs_lattice *lattice, const double *r, const int64_t *given_t
             subtract_product((double)tail, entry, &sum, &low, &absolute);
         }
         inside[k] = sum + low;
-        *magnitude = fmax(*magnitude, absolute);
+        *magnitude = hs_larger(absolute, *magnitude);
     }
 }
 
@@ -116,7 +116,7 @@ hs_wrap_point(const hs_lattice *lattice, const double *r, double *inside, int64_
 {
     for (int k = 0; k < lattice->ndim; k++) {
         inside[k] = r[k];
-        *magnitude = fmax(*magnitude, fabs(r[k]));
+        *magnitude = hs_larger(fabs(r[k]), *magnitude);
     }
     for (int row = 0; row < lattice->n_periodic; row++) {
         turns[row] = 0;

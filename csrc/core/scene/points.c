@@ -128,8 +128,8 @@ join_ranges(const loading *load, int n_slabs)
         cloud->upper[k] = -INFINITY;
         for (int entry = 0; entry < n_slabs * LANES; entry++) {
             const range *found = &load->found[entry / LANES][k];
-            cloud->lower[k] = fmin(cloud->lower[k], found->lower[entry % LANES]);
-            cloud->upper[k] = fmax(cloud->upper[k], found->upper[entry % LANES]);
+            cloud->lower[k] = hs_smaller(found->lower[entry % LANES], cloud->lower[k]);
+            cloud->upper[k] = hs_larger(found->upper[entry % LANES], cloud->upper[k]);
             poison += found->poison[entry % LANES];
         }
         if (cloud->n > 0) {

@@ -56,31 +56,19 @@ new_arrays(hs_account *account, int n, int64_t length, size_t size, void **array
     return true;
 }
 
-/* n arrays of `length` doubles for batches, zero at first: batch kernels read a little beyond the
- * last pair, where any finite number will do. */
-static bool
-new_batches(hs_account *account, int n, double **arrays)
-{
-    const int64_t length = HS_BATCH + HS_BATCH_PADDING;
-    const bool    done = new_arrays(account, n, length, sizeof(double), (void **)arrays);
-    for (int k = 0; done && k < n; k++) {
-        memset(arrays[k], 0, (size_t)length * sizeof(double));
-    }
-    return done;
-}
-
 static bool
 allocate(hs_account *account, hs_trace *trace)
 {
     const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
     const int     m_given = trace->needs_given && !trace->is_narrow ? m : 0;
     const int     m_narrow = trace->needs_given && trace->is_narrow ? m : 0;
-    const int64_t block = trace->block->capacity;
+    const int64_t block = trace->block->capacity, batch = HS_BATCH + HS_BATCH_PADDING;
     const size_t  wide = sizeof(int64_t), narrow = sizeof(int32_t);
     return new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->place) &&
            new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->si) &&
-           new_batches(account, d, trace->p) && new_batches(account, d, trace->q) &&
-           new_batches(account, m, trace->times) &&
+           new_arrays(account, d, batch, sizeof(double), (void **)trace->p) &&
+           new_arrays(account, d, batch, sizeof(double), (void **)trace->q) &&
+           new_arrays(account, m, batch, sizeof(double), (void **)trace->times) &&
            new_arrays(account, m, HS_BATCH, wide, (void **)trace->image) &&
            new_arrays(account, m_given, HS_BATCH, wide, (void **)trace->given) &&
            new_arrays(account, m_narrow, HS_BATCH, narrow, (void **)trace->shift) &&
@@ -107,7 +95,8 @@ hs_trace_init(hs_search *search, const hs_block *block, bool needs_given, hs_tra
 void
 hs_trace_free(hs_account *account, hs_trace *trace)
 {
-    for (int k = HS_MAX_DIM - 1; k >= 0; k--) {
+    const int ndim = trace->search != NULL ? trace->search->scene.ndim : 0;
+    for (int k = ndim - 1; k >= 0; k--) {
         hs_free(account, trace->of.few[k]);
         hs_free(account, trace->of.turned[k]);
         hs_free(account, trace->of.image[k]);
@@ -352,16 +341,24 @@ hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
     return HS_OK;
 }
 
+/* Batch kernels read a little beyond the last of n entries, where any finite numbers will do. */
+static const double *
+end_with_zeros(double *entries, int32_t n)
+{
+    memset(entries + n, 0, HS_BATCH_PADDING * sizeof *entries);
+    return entries;
+}
+
 hs_batch
 hs_trace_batch(const hs_trace *trace)
 {
     hs_batch batch = {.n = trace->n};
     for (int k = 0; k < trace->search->scene.ndim; k++) {
-        batch.p[k] = trace->p[k];
-        batch.q[k] = trace->q[k];
+        batch.p[k] = end_with_zeros(trace->p[k], trace->n);
+        batch.q[k] = end_with_zeros(trace->q[k], trace->n);
     }
     for (int r = 0; trace->is_shifted && r < trace->search->scene.lattice.n_periodic; r++) {
-        batch.shift[r] = trace->times[r];
+        batch.shift[r] = end_with_zeros(trace->times[r], trace->n);
     }
     return batch;
 }
