@@ -21,7 +21,7 @@ typedef struct hs_measured {
     bool    is_wide;    /* some shift is too large for the batch kernels */
     double  p[HS_MAX_DIM][HS_IN_BATCH], q[HS_MAX_DIM][HS_IN_BATCH]; /* measured between these */
     double  times[HS_MAX_DIM][HS_IN_BATCH];                         /* the metric's shifts */
-    int64_t shift[HS_MAX_DIM][HS_IN_BATCH];                         /* the same numbers */
+    int64_t shift[HS_MAX_DIM][HS_IN_BATCH];                         /* these numbers as integers */
     double  distance[HS_IN_BATCH], vector[HS_MAX_DIM][HS_IN_BATCH];
 } hs_measured;
 
@@ -40,7 +40,7 @@ hs_measured_shift(hs_measured *pairs, int32_t e, int r, int64_t shift)
 void hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors,
                       hs_measured *pairs);
 
-/* The same for arrays from elsewhere. shift: one array for each row of the metric, or NULL when no
+/* Measures pairs in the arrays of `batch`. shift: one array for each row of the metric, or NULL when no
  * pair is shifted. is_wide: batch->shift does not hold these numbers. vector: NULL, or one array
  * for each axis. */
 void hs_measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *batch,
@@ -53,7 +53,7 @@ hs_scale hs_measures_unscale(const hs_scene *scene);
 void hs_restore_distances(double *distance, int32_t n, hs_scale unscale);
 void hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive);
 
-/* n rows of ndim numbers: the vectors in the caller's unit, times sign[e], which is 1 or -1. */
+/* Writes n vectors, one behind another: in the caller's unit, times sign[e], which is 1 or -1. */
 void hs_restore_vectors(double *HS_RESTRICT to, double *const *vector, const double *sign,
                         int32_t n, int ndim, hs_scale unscale);
 
