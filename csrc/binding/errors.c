@@ -5,15 +5,22 @@
 #include "environment.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 
-/* PyErr_Format knows no floating-point numbers; repr does, and shortest. */
+/* Raises the text of `format`, which the number follows: PyErr_Format knows no floating-point
+ * numbers; repr does, and shortest. */
 static PyObject *
-raise_with_number(PyObject *type, const char *format, double value)
+raise_number(PyObject *type, double value, const char *format, ...)
 {
+    char      text[256];
     PyObject *number = PyFloat_FromDouble(value);
+    va_list   arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
     if (number != NULL) {
-        PyErr_Format(type, format, number);
+        PyErr_Format(type, "%s%R", text, number);
         Py_DECREF(number);
     }
     return NULL;
@@ -26,64 +33,35 @@ set_of(const hs_failure *failure)
     return failure->in_queries ? "queries" : "points";
 }
 
-/* As PyErr_Format with a place or none, and a number. */
-static PyObject *
-raise_at(const char *format, const hs_failure *failure)
-{
-    PyObject *number = PyFloat_FromDouble(failure->value);
-    if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, format, (long long)failure->row, (long long)failure->column,
-                     number);
-        Py_DECREF(number);
-    }
-    return NULL;
-}
-
 static PyObject *
 raise_not_finite(const hs_failure *failure)
 {
-    return raise_at(failure->in_queries ? "queries must be finite, got queries[%lld, %lld] = %R"
-                                        : "points must be finite, got points[%lld, %lld] = %R",
-                    failure);
-}
-
-static PyObject *
-raise_of_row(const char *format, long long row, double value)
-{
-    PyObject *number = PyFloat_FromDouble(value);
-    if (number != NULL) {
-        PyErr_Format(PyExc_ValueError, format, row, number);
-        Py_DECREF(number);
-    }
-    return NULL;
+    const char *set = set_of(failure);
+    return raise_number(PyExc_ValueError, failure->value,
+                        "%s must be finite, got %s[%lld, %lld] = ", set, set,
+                        (long long)failure->row, (long long)failure->column);
 }
 
 static PyObject *
 raise_box(const hs_failure *failure)
 {
-    PyObject *number = PyFloat_FromDouble(failure->value);
-    if (failure->system < 0) {
-        Py_XDECREF(number);
-        return raise_at("box must be finite, got box[%lld, %lld] = %R", failure);
-    }
-    if (number != NULL) { /* of one system out of many */
-        PyErr_Format(PyExc_ValueError, "box must be finite, got box[%lld, %lld, %lld] = %R",
-                     (long long)failure->system, (long long)failure->row,
-                     (long long)failure->column, number);
-        Py_DECREF(number);
-    }
-    return NULL;
+    const long long system = failure->system, row = failure->row, column = failure->column;
+    return system < 0 ? raise_number(PyExc_ValueError, failure->value,
+                                     "box must be finite, got box[%lld, %lld] = ", row, column)
+                      : raise_number(PyExc_ValueError, failure->value,
+                                     "box must be finite, got box[%lld, %lld, %lld] = ", system,
+                                     row, column);
 }
 
 static PyObject *
 raise_cutoff(const hs_failure *failure)
 {
-    return failure->system >= 0
-               ? raise_of_row("cutoff must be finite and not negative, got cutoff[%lld] = %R",
-                              (long long)failure->system, failure->value)
-               : raise_with_number(PyExc_ValueError,
-                                   "cutoff must be finite and not negative, got %R",
-                                   failure->value);
+    return failure->system < 0
+               ? raise_number(PyExc_ValueError, failure->value,
+                              "cutoff must be finite and not negative, got ")
+               : raise_number(PyExc_ValueError, failure->value,
+                              "cutoff must be finite and not negative, got cutoff[%lld] = ",
+                              (long long)failure->system);
 }
 
 /* "box", or which one of many. */
@@ -231,34 +209,33 @@ raise_capacity(const hs_failure *failure)
 static PyObject *
 raise_too_many(const hs_failure *failure)
 {
-    return raise_with_number(PyExc_OverflowError,
-                             "fewer than 2**31 points and systems and 2**62 pairs can be "
-                             "searched, got %R",
-                             failure->value);
+    return raise_number(
+        PyExc_OverflowError, failure->value,
+        "fewer than 2**31 points and systems and 2**62 pairs can be searched, got ");
 }
 
 static PyObject *
 raise_edges(const hs_failure *failure)
 {
-    return raise_of_row("edges must be finite, not negative and ascending, got edges[%lld] = %R",
-                        (long long)failure->row, failure->value);
+    return raise_number(PyExc_ValueError, failure->value,
+                        "edges must be finite, not negative and ascending, got edges[%lld] = ",
+                        (long long)failure->row);
 }
 
 static PyObject *
 raise_types(const hs_failure *failure)
 {
-    return raise_of_row(failure->in_queries ? "types must be from 0 on, got query_types[%lld] = %R"
-                                            : "types must be from 0 on, got types[%lld] = %R",
-                        (long long)failure->row, failure->value);
+    return raise_number(PyExc_ValueError, failure->value,
+                        "types must be from 0 on, got %stypes[%lld] = ",
+                        failure->in_queries ? "query_" : "", (long long)failure->row);
 }
 
 static PyObject *
 raise_weights(const hs_failure *failure)
 {
-    return raise_of_row(failure->in_queries
-                            ? "query_weights must be finite, got query_weights[%lld] = %R"
-                            : "weights must be finite, got weights[%lld] = %R",
-                        (long long)failure->row, failure->value);
+    const char *name = failure->in_queries ? "query_weights" : "weights";
+    return raise_number(PyExc_ValueError, failure->value,
+                        "%s must be finite, got %s[%lld] = ", name, name, (long long)failure->row);
 }
 
 static PyObject *
