@@ -52,12 +52,14 @@ near_unit_close(near_unit *unit)
     hs_account_close(&unit->call.account);
 }
 
-/* All who ask as one group, with this radius. */
+/* All asking points as one group, with this radius. A block holds the coordinates of the first of
+ * them only, as many as groups have. */
 static inline hs_near_group
 near_unit_group(const near_unit *unit, double radius)
 {
     hs_near_group group;
     hs_near_group_set(&unit->near, 0, (int32_t)hs_search_asking(&unit->search)->n, &group);
+    group.last = group.last < HS_GROUP_POINTS ? group.last : HS_GROUP_POINTS;
     group.radius = radius;
     return group;
 }

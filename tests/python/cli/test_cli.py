@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import types
+from functools import partial
 
 import numpy as np
 import pytest
@@ -762,7 +763,12 @@ def test_ctrl_c_is_one_line_and_status_130(tmp_path):
     os.mkfifo(pipe)
     run = [sys.executable, "-m", "halfshell", "pairs", str(pipe)]
     with subprocess.Popen(
-        run, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        run,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        # A shell that runs the tests in the background has them ignore it, and their children.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     ) as process:
         with open(pipe, "wb"):  # returns once the command waits for our bytes
             for attempt in range(12):  # an interpreter may swallow one, in a clean-up of its own
