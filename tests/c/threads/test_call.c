@@ -64,6 +64,14 @@ what_was_done_adds_up(void)
     hs_account_close(&call.account);
 }
 
+/* Whether sums are rounded up now. */
+static bool
+rounds_up(void)
+{
+    volatile double one = 1.0, little = 0x1p-80;
+    return one + little > 1.0;
+}
+
 static void
 the_callers_environment_comes_back(void)
 {
@@ -75,15 +83,15 @@ the_callers_environment_comes_back(void)
     options.counters = &counters;
     CHECK(fesetround(FE_UPWARD) == 0);
     CHECK(hs_call_enter(&options, &failure, &call) == &failure);
-    CHECK(fegetround() == FE_TONEAREST);
+    CHECK(!rounds_up());
     CHECK(failure.row == -1 && failure.column == -1 && failure.system == -1);
     CHECK(failure.value == 0.0 && !failure.in_queries);
     hs_call_leave(&call, 3);
-    CHECK(fegetround() == FE_UPWARD && counters.pairs == 3);
+    CHECK(rounds_up() && counters.pairs == 3);
     /* A caller who does not want to know. */
     CHECK(hs_call_enter(&options, NULL, &call) == &call.ignored && call.ignored.row == -1);
     hs_call_leave(&call, 4);
-    CHECK(fegetround() == FE_UPWARD && counters.pairs == 4);
+    CHECK(rounds_up() && counters.pairs == 4);
     CHECK(fesetround(FE_TONEAREST) == 0);
 #endif
 }
