@@ -173,7 +173,8 @@ typedef struct hs_pair_arrays {
     int32_t *shift;       /* m * ndim */
 } hs_pair_arrays;
 
-/* Called at most once per call, when the result may be large: bytes that may still be used. */
+/* Called where the result may be large, seldom more than once in a call: bytes that may still be
+ * used. */
 typedef double (*hs_limit_fn)(void *context);
 
 /* With this many points the work takes a millisecond, while a thread costs some ten microseconds to
@@ -212,7 +213,9 @@ typedef struct hs_cells hs_cells;
 /*
  * What a search looks among: points in a box, or cells, which have both. All borrowed: points must
  * not move during the call (a concurrent write may change the answer, it cannot corrupt memory:
- * each number is read once).
+ * each number is read once). With cells, counters tell what the call took, not what the cells hold;
+ * the first hs_nearest_find builds a tree of the points, which stays with the cells and is not
+ * counted as memory of the call.
  */
 typedef struct hs_among {
     const hs_points *points;
@@ -284,7 +287,7 @@ typedef struct hs_histogram {
  * k - 1, if there is one. sums: of the products of their two weights, exact until they are rounded
  * once.
  *
- * queries NULL: each pair of points once (half list); a and b are its two types, and [a][b] is
+ * Without queries: each pair of points once (half list); a and b are its two types, and [a][b] is
  * [b][a]. Otherwise each query with each point: a is the type of the query, b that of the point.
  *
  * options->cutoff, inclusive and precision are ignored, as are want and sorted. Outputs are
@@ -309,7 +312,7 @@ hs_status hs_pairs_histogram(const hs_among *among, const hs_options *options,
 hs_status hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options,
                           hs_pairs **rows, hs_failure *failure);
 
-/* Rows of a result of hs_neighbors_find, hs_cells_neighbors or hs_cells_candidates, and where each
+/* Rows of a result of hs_neighbors_find or hs_cells_candidates, and where each
  * begins: rows + 1 numbers, the last one the length of all; borrowed. 0 and NULL when taken, or of
  * another search. */
 int64_t        hs_pairs_rows(const hs_pairs *pairs);
@@ -407,10 +410,6 @@ void hs_cells_free(hs_cells *cells);
 void          hs_cells_points(const hs_cells *cells, hs_points *points);
 const hs_box *hs_cells_box(const hs_cells *cells);
 
-/* hs_among.cells: counters tell what the call took, not what the cells hold. The first
- * hs_nearest_find builds a tree of the points, which stays with the cells and is not counted as
- * memory of the call. */
-
 /*
  * The layout of cells: points order[start[c]] to order[start[c + 1] - 1] are in cell c, ascending.
  * Cell ids run along the first axis fastest; in dense layouts that is all there is to them, in
@@ -448,7 +447,7 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * queries that they cannot. Open space and boxes along the coordinate axes take queries up to some
  * 2^850 cutoffs away, skewed boxes those within four times the distance of the points or 1024 box
  * vectors. failure.row, column and value tell which one; row is -1 for cells that are
- * one cell with everything.
+ * one cell with everything. Of the options out, sorted and want are ignored; counters.pairs is 0.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);
@@ -526,7 +525,8 @@ hs_verlet_state hs_verlet_look(const hs_verlet *list);
 /* NULL-safe. */
 void hs_verlet_free(hs_verlet *list);
 
-/* What a search of this scene would do, without doing it. */
+/* What a search of this scene would do: cells are made, by threads if these pay, and not searched.
+ * No queries. */
 typedef struct hs_plan {
     int         ndim;
     int         n_periodic;

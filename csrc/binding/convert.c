@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* convert.c: see convert.h. */
+/* convert.c: Python objects to views, without copying what is right already. */
 #include "convert.h"
 
 #include "foreign.h"

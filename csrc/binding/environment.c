@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* environment.c: see environment.h. */
+/* environment.c: the variables are read once, when the module is imported. */
 #include "environment.h"
 
 #include "convert.h"

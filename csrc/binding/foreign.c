@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* foreign.c: see foreign.h. */
+/* foreign.c: arrays of other libraries, by the protocols that they share. */
 #include "foreign.h"
 
 #include <math.h>

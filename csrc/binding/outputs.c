@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* outputs.c: see outputs.h. */
+/* outputs.c: one table of letters, from which arrays are checked and made. */
 #include "outputs.h"
 
 #include <string.h>

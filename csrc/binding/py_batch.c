@@ -68,7 +68,7 @@ refuse_number(int64_t i, int64_t number, int64_t before, int64_t n_systems)
     return false;
 }
 
-/* Systems that have points. Each number is read once: somebody may write to them meanwhile. */
+/* Systems that have points. Each number is read once: another thread may write meanwhile. */
 static bool
 find_occupied(const int64_t *numbers, int64_t n_points, batch *given)
 {

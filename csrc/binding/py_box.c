@@ -69,10 +69,11 @@ wrap_in_parts(const hs_box *box, const hs_points *points, double *wrapped, int64
         hs_status status;
         part.n = points->n - first < POINTS_PER_CALL ? points->n - first : POINTS_PER_CALL;
         part.data = (const char *)points->data + first * points->row_stride;
-        Py_BEGIN_ALLOW_THREADS status = hs_box_wrap(box, &part, wrapped + first * points->ndim,
-                                                    shifts + first * points->ndim, &failure);
-        Py_END_ALLOW_THREADS if (status != HS_OK)
-        {
+        Py_BEGIN_ALLOW_THREADS
+        status = hs_box_wrap(box, &part, wrapped + first * points->ndim,
+                             shifts + first * points->ndim, &failure);
+        Py_END_ALLOW_THREADS
+        if (status != HS_OK) {
             failure.row += failure.row >= 0 && is_of_point(status) ? first : 0;
             hs_raise(status, &failure, NULL);
             return false;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_call.c: see py_call.h. */
+/* py_call.c: numbers first, views last: numbers may run code of their own. */
 #include "py_call.h"
 
 #include "available.h"

@@ -132,11 +132,11 @@ hs_py_cells_find(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
     if (found == NULL) {
         return NULL;
     }
-    hs_status              status;
-    Py_BEGIN_ALLOW_THREADS status =
-        hs_cells_find(cells, &points, PyArray_DATA((PyArrayObject *)found), &failure);
-    Py_END_ALLOW_THREADS if (status != HS_OK)
-    {
+    hs_status status;
+    Py_BEGIN_ALLOW_THREADS
+    status = hs_cells_find(cells, &points, PyArray_DATA((PyArrayObject *)found), &failure);
+    Py_END_ALLOW_THREADS
+    if (status != HS_OK) {
         Py_DECREF(found);
         return hs_raise(status, &failure, NULL);
     }

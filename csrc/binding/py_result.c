@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_result.c: see py_result.h. */
+/* py_result.c: arrays take over the memory of a result. */
 #include "py_result.h"
 
 #include "convert.h"

@@ -13,13 +13,14 @@
 
 /* Owns the stream, and references to the cells that it borrows from and to the progress hook. */
 typedef struct pair_stream {
-    PyObject_HEAD hs_stream *stream;     /* NULL: over */
-    PyObject                *cells;      /* or NULL; as long as there is a stream */
-    hs_py_call               call;       /* points: their number only */
-    PyObject                *progress;   /* or NULL */
-    char                     letters[8]; /* of the quantities */
-    int64_t                  max_pairs;
-    bool                     is_running; /* somebody is in a call of the core */
+    PyObject_HEAD
+    hs_stream *stream;     /* NULL: over */
+    PyObject  *cells;      /* or NULL; as long as there is a stream */
+    hs_py_call call;       /* points: their number only */
+    PyObject  *progress;   /* or NULL */
+    char       letters[8]; /* of the quantities */
+    int64_t    max_pairs;
+    bool       is_running; /* a thread is in a call of the core */
 } pair_stream;
 
 /* Marks it as running; false with an exception set when it is already: a hook that asks for the

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* threads.h: how many threads a search may use when nobody says. */
+/* threads.h: how many threads a search may use when the caller does not say. */
 #ifndef HS_THREADS_H
 #define HS_THREADS_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tuples.c: see tuples.h. */
+/* tuples.c: results of several arrays. */
 #include "tuples.h"
 
 /* Puts entry k into the tuple and gives it up; where it is NULL, *tuple is given up. */

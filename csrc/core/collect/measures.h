@@ -40,8 +40,8 @@ hs_measured_shift(hs_measured *pairs, int32_t e, int r, int64_t shift)
 void hs_measured_find(const hs_kernel *kernel, const hs_metric *metric, bool vectors,
                       hs_measured *pairs);
 
-/* Measures pairs in the arrays of `batch`. shift: one array for each row of the metric, or NULL when no
- * pair is shifted. is_wide: batch->shift does not hold these numbers. vector: NULL, or one array
+/* Measures pairs in the arrays of `batch`. shift: one array for each row of the metric, or NULL if
+ * no pair is shifted. is_wide: batch->shift does not hold these numbers. vector: NULL, or one array
  * for each axis. */
 void hs_measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs_batch *batch,
                       int64_t *const *shift, bool is_wide, double *distance, double *const *vector);

@@ -45,7 +45,7 @@ find_signs(const hs_trace *trace, const int32_t *point, const int32_t *id, doubl
 
 /* d and D of the batch to the recorder's arrays, in the unit of the metric. */
 static void
-measure(hs_recorder *recorder, const hs_trace *trace)
+measure(hs_recorder *recorder, hs_trace *trace)
 {
     const hs_search *search = trace->search;
     const hs_batch   batch = hs_trace_batch(trace);
@@ -166,7 +166,7 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
 static hs_status
 put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 {
-    const hs_trace  *trace = &scanner->trace;
+    hs_trace        *trace = &scanner->trace;
     const hs_search *search = scanner->search;
     const bool       measured = recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
     double           sign[HS_BATCH];

@@ -32,6 +32,7 @@ hs_status
 hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **result)
 {
     hs_call_leave(&pairs->call, n_pairs);
+    hs_call_detach(&pairs->call);
     if (status == HS_OK) {
         *result = pairs;
     } else {

@@ -12,7 +12,7 @@
 #include "tree.h"
 
 typedef struct hs_near {
-    hs_search     *search;      /* borrowed: scene, bins, kernel, options */
+    hs_search     *search;      /* borrowed: scene, bins, call */
     hs_tree        tree;        /* of the points; owned unless the search is borrowed */
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
     const hs_tree *asking;      /* the tree of the asking points */

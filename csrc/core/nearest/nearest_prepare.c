@@ -208,11 +208,11 @@ hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double li
                 hs_failure *failure)
 {
     hs_search    *search = near->search;
-    const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
+    const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
     if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
-    hs_call_gather(search->call, sets->points->n + n_asking);
+    hs_call_gather(search->call, sets->points->n + n_queries);
     search->is_full = true;
     hs_status status = HS_UNSERVED;
     if (sets->trees != NULL) {

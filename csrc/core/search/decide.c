@@ -90,9 +90,9 @@ judge_scaled(const hs_metric *metric, const hs_trace *trace, uint8_t *verdict, h
 void
 hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
 {
-    const hs_trace *trace = &scanner->trace;
-    const bool      by_batch = scanner->options.precision != HS_DOUBLE && !trace->is_wide;
-    uint8_t         verdict[HS_BATCH + HS_BATCH_PADDING];
+    hs_trace  *trace = &scanner->trace;
+    const bool by_batch = scanner->options.precision != HS_DOUBLE && !trace->is_wide;
+    uint8_t    verdict[HS_BATCH + HS_BATCH_PADDING];
     if (by_batch && !metric->floats_usable && !trace->is_shifted) {
         judge_scaled(metric, trace, verdict, &scanner->stages);
     } else if (by_batch) {

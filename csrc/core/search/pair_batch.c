@@ -350,7 +350,7 @@ end_with_zeros(double *entries, int32_t n)
 }
 
 hs_batch
-hs_trace_batch(const hs_trace *trace)
+hs_trace_batch(hs_trace *trace)
 {
     hs_batch batch = {.n = trace->n};
     for (int k = 0; k < trace->search->scene.ndim; k++) {

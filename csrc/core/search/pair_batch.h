@@ -74,7 +74,7 @@ int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t
 hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
 
 /* The batch as the batch kernels take it. */
-hs_batch hs_trace_batch(const hs_trace *trace);
+hs_batch hs_trace_batch(hs_trace *trace);
 
 /* Pair e as the functions of metric.h take it; returns shift, filled, or NULL for none. */
 const int64_t *hs_trace_pair(const hs_trace *trace, int32_t e, double *p, double *q,

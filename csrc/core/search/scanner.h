@@ -30,7 +30,7 @@ typedef struct hs_neighbourhood {
 /* Belongs to one thread. */
 struct hs_scanner {
     const hs_search *search;  /* borrowed, read only */
-    hs_options       options; /* the search's, with a poll only for the caller's own thread */
+    hs_options       options; /* the call's, with a poll only for the caller's own thread */
     hs_block         block;
     hs_block_use     use;
     bool             is_ordered; /* candidates are put in order before they are tested */

@@ -23,6 +23,7 @@ choose_grid(hs_search *search, hs_failure *failure)
     if (status == HS_TOO_MUCH) {
         status = hs_grid_init(&search->scene, &search->grid, failure);
     }
+    search->is_sparse = false; /* another system may have been searched before */
     if (status == HS_OK && may_be_sparse) {
         const double  width = hs_sparse_choose(&search->scene, &search->grid);
         const hs_grid dense = search->grid;

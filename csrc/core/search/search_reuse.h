@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * search_reuse.h: another search among points that are in cells already. Cells, points and their
- * scale are those of the first search; cutoff, reach, stencil, queries, account and threads are
- * its own.
+ * scale are those of the first search; cutoff, reach, stencil and queries are its own; account and
+ * threads are those of its call.
  */
 #ifndef HS_SEARCH_REUSE_H
 #define HS_SEARCH_REUSE_H

@@ -106,9 +106,12 @@ hs_call_report(const hs_call *call, int64_t n_pairs)
 void
 hs_call_restart(hs_call *call)
 {
+    const hs_account before = call->account;
     hs_account_close(&call->account);
     hs_account_init(&call->account, &call->options);
-    call->done = (hs_counters){.pairs = 0};
+    call->account.limit = before.limit;
+    call->account.find_limit = before.find_limit;
+    call->done = (hs_counters){.polls = call->done.polls};
 }
 
 void

@@ -56,10 +56,12 @@ void hs_call_note(hs_call *call, const hs_counters *done);
 /* Writes the counters, if the options want them. */
 void hs_call_report(const hs_call *call, int64_t n_pairs);
 
-/* Forgets what has been done and held: nothing may be held any more. */
+/* Forgets what has been done and held, except polls and the limit that was found. Nothing may be
+ * held any more. */
 void hs_call_restart(hs_call *call);
 
-/* Gives up what points to the caller's memory, for a call that is kept inside an object. */
+/* Gives up what points to the caller's memory, for a call that is kept inside an object; only the
+ * context of find_limit stays. */
 void hs_call_detach(hs_call *call);
 
 #endif

@@ -34,10 +34,9 @@ sift_slab(const hs_refilter *refilter, hs_sifted *slab)
         .n = slab->n,
         .limit = shifted ? refilter->shifted : refilter->plain,
     };
-    int32_t n_unsure;
-    slab->n_hits = hs_sift(&pairs, slab->hits, slab->unsure, &n_unsure);
-    if (n_unsure > 0) {
-        hs_refilter_settle(refilter, n_unsure, slab);
+    slab->n_hits = hs_sift(&pairs, slab->hits, slab->unsure, &slab->n_unsure);
+    if (slab->n_unsure > 0) {
+        hs_refilter_settle(refilter, slab->n_unsure, slab);
     }
 }
 
@@ -83,20 +82,22 @@ static hs_status
 place_hits(const hs_refilter *refilter, round_of_slabs *doing, int64_t end, int64_t *work,
            bool *writes)
 {
-    hs_output   *output = refilter->output;
-    hs_counters *walked = &refilter->call->done;
-    int64_t      n = 0;
+    hs_output  *output = refilter->output;
+    hs_counters done = {.pairs = 0};
+    int64_t     n = 0;
     for (int s = 0; s < doing->n; s++) {
         hs_sifted *slab = &doing->slabs[s];
         slab->at = output->n_pairs + n;
         n += slab->n_hits;
-        walked->candidates += slab->n;
-        walked->by_float64 += slab->stages.by_float64;
-        walked->by_double_word += slab->stages.by_double_word;
-        walked->by_integers += slab->stages.by_integers;
+        done.candidates += slab->n;
+        done.ambiguous += slab->n_unsure;
+        done.by_float64 += slab->stages.by_float64;
+        done.by_double_word += slab->stages.by_double_word;
+        done.by_integers += slab->stages.by_integers;
         *work += slab->n + INTEGER_WORK * slab->stages.by_integers +
                  (refilter->measures ? MEASURE_WORK * (int64_t)slab->n_hits : 0);
     }
+    hs_call_note(refilter->call, &done);
     *writes = true;
     if (output->fixed) {
         *writes = output->n_pairs + n <= output->capacity;

@@ -43,7 +43,7 @@ typedef struct hs_refilter {
 typedef struct hs_sifted {
     int64_t   first; /* pair of the list */
     int32_t   n;     /* pairs, all with or all without an image */
-    int32_t   n_hits;
+    int32_t   n_hits, n_unsure;
     int64_t   at; /* their place in the output */
     hs_status status;
     int64_t   failed_point;

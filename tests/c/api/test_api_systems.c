@@ -383,9 +383,42 @@ far_points_are_named_among_all(void)
     CHECK(failure.row == 3);
 }
 
+/* A crowd far from a few others takes cells that are stored sparsely, the next system does not. */
+static void
+cells_of_one_system_are_not_those_of_the_next(void)
+{
+    enum { CROWD = 1200, FEW = 300 };
+    static double    x[(CROWD + FEW) * 3];
+    const int64_t    first[] = {0, CROWD, CROWD + FEW};
+    const hs_points  points = {x, CROWD + FEW, 3, HS_FLOAT64, 24, 8};
+    const hs_systems systems = {2, first, NULL, NULL, NULL};
+    harness_random   random = {23};
+    hs_options       options = hs_options_default();
+    hs_pairs        *pairs, *alone;
+    for (int e = 0; e < 3 * (CROWD + FEW); e++)
+        x[e] = random_unit(&random) * (e < 3 * CROWD ? 4.0 : 8.0) + (e < 30 ? 1e5 : 0.0);
+    options.cutoff = 1.0;
+    options.cell_size = 1.0;
+    CHECK(hs_systems_find(&points, &systems, &options, &pairs, NULL) == HS_OK);
+    const int64_t *i = hs_pairs_array(pairs, HS_WANT_I), *j = hs_pairs_array(pairs, HS_WANT_J);
+    int64_t        at = 0, wrong = 0;
+    for (int s = 0; s < 2; s++) {
+        const hs_points own = {x + 3 * first[s], first[s + 1] - first[s], 3, HS_FLOAT64, 24, 8};
+        CHECK(hs_pairs_find(AMONG(&own, NULL), &options, &alone, NULL) == HS_OK);
+        const int64_t *own_i = hs_pairs_array(alone, HS_WANT_I);
+        const int64_t *own_j = hs_pairs_array(alone, HS_WANT_J);
+        for (int64_t e = 0; e < hs_pairs_length(alone) && at < hs_pairs_length(pairs); e++, at++)
+            wrong += i[at] != own_i[e] + first[s] || j[at] != own_j[e] + first[s];
+        hs_pairs_free(alone);
+    }
+    CHECK(wrong == 0 && at == hs_pairs_length(pairs));
+    hs_pairs_free(pairs);
+}
+
 void
 test_api_systems(void)
 {
+    RUN(cells_of_one_system_are_not_those_of_the_next);
     RUN(the_same_as_single_calls);
     RUN(failures_name_system_and_point);
     RUN(polls_are_counted);

@@ -28,8 +28,10 @@ count(PyObject *module, PyObject *arguments)
     points.real = HS_FLOAT64;
     points.row_stride = (ptrdiff_t)sizeof(double) * ndim;
     points.column_stride = (ptrdiff_t)sizeof(double);
-    Py_BEGIN_ALLOW_THREADS status = halfshell->pairs_count(&among, &options, &n_pairs, &failure);
-    Py_END_ALLOW_THREADS   PyBuffer_Release(&buffer);
+    Py_BEGIN_ALLOW_THREADS
+    status = halfshell->pairs_count(&among, &options, &n_pairs, &failure);
+    Py_END_ALLOW_THREADS
+    PyBuffer_Release(&buffer);
     if (status != HS_OK) {
         PyErr_SetString(PyExc_ValueError, halfshell->status_text(status));
         return NULL;
