@@ -50,7 +50,7 @@ int hs_version(void);
 typedef enum hs_status {
     HS_OK = 0,
     HS_ERR_MEMORY,        /* an allocation was refused, or the result passes memory_limit */
-    HS_ERR_CUTOFF,        /* the cutoff is negative, NaN or infinite */
+    HS_ERR_CUTOFF,        /* the cutoff, or with the skin, is negative, NaN or infinite */
     HS_ERR_NOT_FINITE,    /* a coordinate is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_FINITE,    /* a box entry is NaN or infinite: failure.row, failure.column */
     HS_ERR_BOX_DEPENDENT, /* the periodic box vectors are exactly linearly dependent */
@@ -264,7 +264,7 @@ hs_status hs_neighbors_count(const hs_among *among, const hs_options *options, i
 
 /* What is known of each point of a set beside its place; borrowed. */
 typedef struct hs_marks {
-    const int32_t *types;   /* n, from 0 on; NULL: all 0 */
+    const int32_t *types;   /* n, from 0 on; NULL where n_types is 1 */
     const double  *weights; /* n, finite; NULL: all 1 */
 } hs_marks;
 

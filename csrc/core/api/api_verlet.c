@@ -56,6 +56,12 @@ hs_verlet_look(const hs_verlet *list)
                              .tried = list->tried};
 }
 
+static bool
+is_length(double x)
+{
+    return x >= 0.0 && isfinite(x);
+}
+
 /* cutoff + skin, rounded up. */
 static double
 radius_of(double cutoff, double skin)
@@ -100,8 +106,13 @@ try_to_keep(hs_verlet *list, int next, const hs_options *options, double *margin
 }
 
 static hs_status
-build(hs_verlet *list, int next, const hs_options *options, double radius, hs_failure *failure)
+build(hs_verlet *list, int next, const hs_options *options, double skin, hs_failure *failure)
 {
+    const double radius = radius_of(options->cutoff, skin);
+    if (!is_length(skin) || !is_length(radius)) {
+        failure->value = radius;
+        return HS_ERR_CUTOFF;
+    }
     const hs_status status =
         hs_listing_build(&list->frames[next], options, radius, &list->listing, failure);
     if (status == HS_OK) {
@@ -119,13 +130,10 @@ static hs_status
 update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_options *options,
        double skin, bool rebuild, bool *rebuilt, hs_failure *failure)
 {
-    const double radius = radius_of(options->cutoff, skin);
-    const int    next = spare_frame(list);
-    double       margin = -INFINITY;
-    if (!(options->cutoff >= 0.0) || !isfinite(options->cutoff) || !(skin >= 0.0) ||
-        !isfinite(radius)) {
-        failure->value = options->cutoff >= 0.0 && isfinite(options->cutoff) ? radius
-                                                                             : options->cutoff;
+    const int next = spare_frame(list);
+    double    margin = -INFINITY;
+    if (!is_length(options->cutoff)) {
+        failure->value = options->cutoff;
         return HS_ERR_CUTOFF;
     }
     hs_status status = hs_check_resources(options);
@@ -146,7 +154,7 @@ update(hs_verlet *list, const hs_points *points, const hs_box *box, const hs_opt
     }
     const bool needed = status == HS_OK && !(margin >= 0.0);
     if (needed) {
-        status = build(list, next, options, radius, failure);
+        status = build(list, next, options, skin, failure);
     }
     if (status == HS_OK) {
         *rebuilt = needed;

@@ -186,13 +186,12 @@ search_range(void *context, int64_t range)
         return status;
     }
     const double done = (double)crew->systems->first[end] / (double)crew->points->n;
-    if (!crew->is_direct) {
-        return hs_commit(&worker->committer, done, true);
-    }
-    if (first == 0 && done > 0.0) { /* most batches have systems of similar size */
+    if (crew->is_direct && first == 0 && done > 0.0) {
+        /* most batches have systems of similar size */
         hs_output_expect(crew->output, (double)crew->output->n_pairs / done);
     }
-    return HS_OK;
+    /* Of nothing, where pairs are written directly: then it only says how far this has come. */
+    return hs_commit(&worker->committer, done, true);
 }
 
 void

@@ -383,6 +383,44 @@ far_points_are_named_among_all(void)
     CHECK(failure.row == 3);
 }
 
+/* An hs_poll_fn: never less than before. */
+static bool
+note_fraction(void *context, double fraction)
+{
+    double *told = context;
+    CHECK(fraction >= *told && fraction <= 1.0);
+    *told = fraction;
+    return true;
+}
+
+/* By one thread, which writes pairs where they belong, and by several. */
+static void
+progress_goes_on_over_all_systems(void)
+{
+    enum { N = 400, POINTS = 400 };
+    static double   x[N * POINTS];
+    static int64_t  first[N + 1];
+    harness_random  random = {29};
+    const hs_points points = {x, N * POINTS, 1, HS_FLOAT64, 8, 8};
+    for (int e = 0; e < N * POINTS; e++)
+        x[e] = random_unit(&random);
+    for (int s = 0; s <= N; s++)
+        first[s] = s * POINTS;
+    for (int threads = 1; threads <= 2; threads++) {
+        const hs_systems systems = {N, first, NULL, NULL, NULL};
+        hs_options       options = hs_options_default();
+        hs_pairs        *pairs;
+        double           told = 0.0;
+        options.cutoff = 0.01;
+        options.threads = threads;
+        options.poll = note_fraction;
+        options.poll_context = &told;
+        CHECK(hs_systems_find(&points, &systems, &options, &pairs, NULL) == HS_OK);
+        CHECK(told > 0.3);
+        hs_pairs_free(pairs);
+    }
+}
+
 /* A crowd far from a few others takes cells that are stored sparsely, the next system does not. */
 static void
 cells_of_one_system_are_not_those_of_the_next(void)
@@ -418,6 +456,7 @@ cells_of_one_system_are_not_those_of_the_next(void)
 void
 test_api_systems(void)
 {
+    RUN(progress_goes_on_over_all_systems);
     RUN(cells_of_one_system_are_not_those_of_the_next);
     RUN(the_same_as_single_calls);
     RUN(failures_name_system_and_point);

@@ -362,9 +362,34 @@ images_are_numbered_as_they_come(void)
     hs_images_free(&images);
 }
 
+/* A skin that no list can have matters only when one is built. */
+static void
+the_skin_is_not_looked_at_while_the_list_is_kept(void)
+{
+    static const double x[] = {0.0, 0.5, 2.0};
+    const hs_points     points = {x, 3, 1, HS_FLOAT64, 8, 8};
+    hs_options          options = hs_options_default();
+    hs_verlet          *list = hs_verlet_new();
+    hs_failure          failure;
+    bool                rebuilt;
+    options.cutoff = 1.0;
+    CHECK(hs_verlet_update(list, &points, NULL, &options, NAN, false, &rebuilt, &failure) ==
+          HS_ERR_CUTOFF);
+    CHECK(hs_verlet_update(list, &points, NULL, &options, 0.25, false, &rebuilt, &failure) ==
+          HS_OK);
+    CHECK(rebuilt);
+    CHECK(hs_verlet_update(list, &points, NULL, &options, NAN, false, &rebuilt, &failure) == HS_OK);
+    CHECK(!rebuilt);
+    CHECK(hs_verlet_update(list, &points, NULL, &options, -1.0, true, &rebuilt, &failure) ==
+          HS_ERR_CUTOFF);
+    CHECK(hs_verlet_look(list).radius == 1.25);
+    hs_verlet_free(list);
+}
+
 void
 test_api_verlet(void)
 {
+    RUN(the_skin_is_not_looked_at_while_the_list_is_kept);
     RUN(every_step_is_that_of_a_search);
     RUN(head_on_pairs_are_never_missed);
     RUN(failures_leave_the_list_as_it_was);
