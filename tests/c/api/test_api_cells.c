@@ -248,6 +248,25 @@ a_plane_has_no_third_coordinate(void)
     CHECK(flat[HS_FOR_STENCIL] < deep[HS_FOR_STENCIL]);
 }
 
+/* However many pairs calls may find later, cells take memory of their own size. */
+static void
+cells_of_a_crowd_need_no_room_for_its_pairs(void)
+{
+    static double   x[4000];
+    const hs_points points = {x, 4000, 1, HS_FLOAT64, 8, 8};
+    hs_options      options = hs_options_default();
+    hs_cells       *cells;
+    int64_t         count;
+    for (int i = 0; i < 4000; i++)
+        x[i] = i;
+    options.cutoff = 4000.0;
+    options.memory_limit = 1e6; /* 8 million pairs take 128 MB */
+    CHECK(hs_cells_build(&points, NULL, &options, &cells, NULL) == HS_OK);
+    CHECK(hs_pairs_count(IN_CELLS(cells), &options, &count, NULL) == HS_OK);
+    CHECK(count == 4000 * 3999 / 2);
+    hs_cells_free(cells);
+}
+
 static void
 points_may_change_once_they_are_in_cells(void)
 {
@@ -299,6 +318,7 @@ test_api_cells(void)
     RUN(the_layout_is_visible_and_holds_all_neighbours);
     RUN(cells_are_as_wide_as_wanted);
     RUN(a_plane_has_no_third_coordinate);
+    RUN(cells_of_a_crowd_need_no_room_for_its_pairs);
     RUN(points_may_change_once_they_are_in_cells);
     RUN(failures_leave_nothing_behind);
 }

@@ -187,6 +187,37 @@ what_does_not_move_uses_nothing(void)
     }
 }
 
+/* Points that go with a box that is stretched, the same numbers as float32 and as float64: most of
+ * the skin is left, and as much of it. */
+static void
+what_goes_with_the_box_uses_little_in_both_types(void)
+{
+    harness_random random = {41};
+    hs_box         box = {.ndim = 3,
+                          .periodic = {true, true, true},
+                          .rows = {{8.0, 0.0, 0.0}, {1.0, 8.0, 0.0}, {0.0, 1.0, 8.0}}};
+    hs_box         stretched = box;
+    double         x[3 * POINTS], y[3 * POINTS], margin[2];
+    for (int k = 0; k < 9; k++)
+        stretched.rows[k / 3][k % 3] *= 1.0625;
+    for (int e = 0; e < 3 * POINTS; e++) {
+        x[e] = floor(random_unit(&random) * 512.0) / 64.0;
+        y[e] = 1.0625 * x[e];
+    }
+    const brute_scene before = {.ndim = 3, .n = POINTS, .x = x, .box = &box};
+    const brute_scene after = {.ndim = 3, .n = POINTS, .x = y, .box = &stretched};
+    for (int real = 0; real < 2; real++) {
+        two_steps s = {.margin = 0.0};
+        take_frame(&before, real ? HS_FLOAT32 : HS_FLOAT64, &s.built);
+        take_frame(&after, real ? HS_FLOAT32 : HS_FLOAT64, &s.now);
+        find_margin(&s, 2.0, 1.5, NULL);
+        CHECK(s.status == HS_OK && s.margin > 0.25);
+        margin[real] = s.margin;
+        free_steps(&s);
+    }
+    CHECK(margin[0] == margin[1]);
+}
+
 /* What all points share costs nothing: the mean of a sample, where there are many. */
 static void
 drift_is_taken_away(void)
@@ -293,6 +324,7 @@ test_motion(void)
 {
     RUN(margins_are_promises);
     RUN(what_does_not_move_uses_nothing);
+    RUN(what_goes_with_the_box_uses_little_in_both_types);
     RUN(drift_is_taken_away);
     RUN(nothing_is_promised_beyond_the_numbers);
     RUN(jumps_need_not_fit_the_given_box_vectors);
