@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_candidates.c: what cells say without a distance test: where points are, which points the
  * cells around a query hold. */
-#include "arguments.h"
+#include "request.h"
 #include "api_cells.h"
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
@@ -334,11 +334,10 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
     if (!hs_can_return(result, options) || cells == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_pairs *rows = hs_pairs_new();
+    hs_pairs *rows = hs_pairs_begin(options, &failure);
     if (rows == NULL) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure);
+        return HS_ERR_MEMORY;
     }
-    failure = hs_call_enter(options, failure, &rows->call);
     const hs_status status = find_candidates(cells, queries, rows, failure);
     return hs_pairs_finish(rows, status, 0, result);
 }

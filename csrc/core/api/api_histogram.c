@@ -188,13 +188,10 @@ count_pairs(hs_search *search, const hs_tally_plan *plan, const hs_histogram *hi
 static hs_options
 options_of(const hs_histogram *histogram, const hs_options *options)
 {
-    hs_options counting = *options;
+    hs_options counting = hs_options_of_count(options);
     counting.cutoff = histogram->edges[histogram->n_edges - 1];
     counting.inclusive = histogram->last_inclusive;
     counting.precision = HS_EXACT;
-    counting.want = 0;
-    counting.sorted = false;
-    counting.out = NULL;
     return counting;
 }
 

@@ -73,17 +73,16 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_pairs *rows = hs_pairs_new();
-    if (rows == NULL) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure);
-    }
     sets->is_plain = sets->is_wide = true;
     hs_options of_rows = *options;
     of_rows.sorted = false;
     of_rows.out = NULL;
     of_rows.precision = HS_EXACT;
     of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    failure = hs_call_enter(&of_rows, failure, &rows->call);
+    hs_pairs *rows = hs_pairs_begin(&of_rows, &failure);
+    if (rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
     hs_search_begin(&rows->call, &search);
     hs_near   near = {.search = &search,
                       .k = k,

@@ -116,9 +116,7 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
     if (options == NULL || !hs_has_entries(counts, asking)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_options counting = options_of_rows(options);
-    counting.want = 0;
-    counting.out = NULL;
+    const hs_options counting = hs_options_of_count(options);
     request.options = &counting;
     return hs_request_use(&request, count_rows, counts, failure);
 }

@@ -120,10 +120,7 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
     if (count == NULL || options == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_options       counting = *options;
+    const hs_options counting = hs_options_of_count(options);
     const hs_request request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
-    counting.want = 0;
-    counting.sorted = false;
-    counting.out = NULL;
     return hs_request_use(&request, count_pairs, count, failure);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_systems.c: the public searches of many systems: find and count. Threads take ranges of
  * them. */
-#include "arguments.h"
+#include "request.h"
 #include "../search/estimate.h"
 #include "../collect/result.h"
 #include "../base/poll.h"
@@ -126,13 +126,12 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_pairs *pairs = hs_pairs_new();
+    hs_pairs *pairs = hs_pairs_begin(options, &failure);
     if (pairs == NULL) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure);
+        return HS_ERR_MEMORY;
     }
     hs_systems_crew crew = {.points = points, .systems = systems, .output = &pairs->output};
-    failure = hs_call_enter(options, failure, &pairs->call);
-    hs_status status = check_shared(points, systems, options, failure);
+    hs_status       status = check_shared(points, systems, options, failure);
     if (status == HS_OK) {
         hs_pairs_open(pairs, points->ndim);
         status = search_systems(&crew, &pairs->call, failure);
@@ -151,10 +150,7 @@ hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_op
     if (options == NULL || (counts == NULL && systems != NULL && systems->n > 0)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    hs_options counting = *options;
-    counting.want = 0;
-    counting.sorted = false;
-    counting.out = NULL;
+    const hs_options counting = hs_options_of_count(options);
     failure = hs_call_enter(&counting, failure, &total);
     hs_status status = check_shared(points, systems, &counting, failure);
     if (status == HS_OK) {

@@ -3,7 +3,7 @@
 #include "../verlet/pair_list.h"
 #include "../verlet/recheck.h"
 
-#include "arguments.h"
+#include "request.h"
 #include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../memory/account.h"
@@ -190,12 +190,13 @@ hs_verlet_find(const hs_verlet *list, const hs_options *options, hs_pairs **resu
     hs_options of_list = *options;
     of_list.cutoff = list->cutoff;
     of_list.precision = HS_EXACT;
-    hs_status status = hs_check_options(&of_list);
-    hs_pairs *pairs = status == HS_OK ? hs_pairs_new() : NULL;
-    if (pairs == NULL) {
-        return hs_end_early(status == HS_OK ? HS_ERR_MEMORY : status, options, failure);
+    if (hs_check_options(&of_list) != HS_OK) {
+        return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    failure = hs_call_enter(&of_list, failure, &pairs->call);
-    status = hs_recheck_find(list, pairs, failure);
+    hs_pairs *pairs = hs_pairs_begin(&of_list, &failure);
+    if (pairs == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    const hs_status status = hs_recheck_find(list, pairs, failure);
     return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
 }

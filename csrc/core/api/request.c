@@ -70,18 +70,37 @@ hs_request_use(const hs_request *request, hs_use_fn use, void *context, hs_failu
     return status;
 }
 
+hs_pairs *
+hs_pairs_begin(const hs_options *options, hs_failure **failure)
+{
+    hs_pairs *pairs = hs_pairs_new();
+    if (pairs == NULL) {
+        (void)hs_end_early(HS_ERR_MEMORY, options, *failure);
+        return NULL;
+    }
+    *failure = hs_call_enter(options, *failure, &pairs->call);
+    return pairs;
+}
+
+hs_options
+hs_options_of_count(const hs_options *options)
+{
+    hs_options counting = *options;
+    counting.want = 0;
+    counting.sorted = false;
+    counting.out = NULL;
+    return counting;
+}
+
 hs_status
 hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, hs_failure *failure)
 {
-    const hs_options *options = request->options;
-    hs_search         search;
-    hs_pairs         *pairs = hs_pairs_new();
+    hs_search search;
+    hs_pairs *pairs = hs_pairs_begin(request->options, &failure);
     if (pairs == NULL) {
-        return hs_end_early(HS_ERR_MEMORY, options, failure);
+        return HS_ERR_MEMORY;
     }
-    hs_call *call = &pairs->call;
-    failure = hs_call_enter(options, failure, call);
-    hs_status status = hs_request_open(request, call, &search, failure);
+    hs_status status = hs_request_open(request, &pairs->call, &search, failure);
     if (status == HS_OK) {
         hs_pairs_open(pairs, search.scene.ndim);
         status = fill(&search, pairs, failure);

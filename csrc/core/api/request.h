@@ -41,6 +41,13 @@ hs_status hs_request_use(const hs_request *request, hs_use_fn use, void *context
 /* Fills the output, which is empty and of the options' columns, from an open search. */
 typedef hs_status (*hs_fill_fn)(hs_search *search, hs_pairs *pairs, hs_failure *failure);
 
+/* A result whose call, with these options, has been entered; *failure becomes where the failure
+ * goes. hs_pairs_finish must follow. NULL when memory is short: then the call has ended. */
+hs_pairs *hs_pairs_begin(const hs_options *options, hs_failure **failure);
+
+/* These options for a search that only counts. */
+hs_options hs_options_of_count(const hs_options *options);
+
 /* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
 hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
                           hs_failure *failure);
