@@ -8,6 +8,7 @@
  *   count    counts them, and lists none
  *   squares  lists them too, with the float32 square of each, and notes none as unsure
  *   emit     writes listed hits as pairs, i < j, int32 or int64
+ *   write    does so with all that is measured of them
  *   relate   gathers candidates of a search for the nearest
  *   order    puts the squares of a few hits in order
  *   near_boxes  lists boxes within a distance of another one
@@ -29,6 +30,7 @@
 #include "../core/exact/filter.h"
 #include "../halfshell.h"
 #include "batch.h"
+#include "write.h"
 
 /* Kernels may read this many entries past the last one of their inputs, and write as many past the
  * last one of their outputs: twice the widest vector. */
@@ -206,6 +208,7 @@ typedef struct hs_kernel {
     hs_boxes_fn   near_boxes;
     hs_judge_fn   judge; /* batch.h */
     hs_measure_fn measure;
+    hs_write_fn   write; /* write.h; or NULL */
 } hs_kernel;
 
 /* The fields that each kernel's file fills with its own functions of these names. */

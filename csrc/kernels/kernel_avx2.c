@@ -33,6 +33,7 @@ const hs_kernel hs_kernel_avx2 = {
     HS_KERNEL_LOOPS,
     .judge = hs_judge_avx2,
     .measure = hs_measure_avx2,
+    .write = hs_write_avx2,
 };
 #else
 typedef int hs_kernel_avx2_is_for_x86_64; /* a translation unit must not be empty */

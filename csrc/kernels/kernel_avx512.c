@@ -33,6 +33,7 @@ const hs_kernel hs_kernel_avx512 = {
     HS_KERNEL_LOOPS,
     .judge = hs_judge_avx512,
     .measure = hs_measure_avx512,
+    .write = hs_write_avx512,
 };
 #else
 typedef int hs_kernel_avx512_is_for_x86_64; /* a translation unit must not be empty */

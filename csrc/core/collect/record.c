@@ -3,6 +3,7 @@
 #include "record.h"
 
 #include "record_measures.h"
+#include "record_write.h"
 
 /* i and j side by side. */
 static void
@@ -40,9 +41,14 @@ put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits 
 static hs_status
 record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    const int32_t  n = hits->end[hits->n - 1];
-    const int32_t *id = scanner->block.id;
-    hs_hits        by_id = *hits;
+    const int32_t   n = hits->end[hits->n - 1];
+    const int32_t  *id = scanner->block.id;
+    hs_hits         by_id = *hits;
+    bool            written;
+    const hs_status status = hs_write_hits(recorder, scanner, first, hits, &written);
+    if (status != HS_OK || written) {
+        return status;
+    }
     for (int32_t h = 0; h < n; h++) {
         recorder->ids[h] = id[hits->label[h]];
     }

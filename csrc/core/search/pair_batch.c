@@ -38,7 +38,7 @@ is_narrow(const hs_search *search)
             return false;
         }
     }
-    return is_plain(&scene->lattice) && !search->bins.keeps_originals &&
+    return is_plain(&scene->lattice) &&
            (!search->bins.turns.known ||
             hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
 }
@@ -60,9 +60,12 @@ static bool
 allocate(hs_account *account, hs_trace *trace)
 {
     const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
-    const int     m_given = trace->needs_given && !trace->is_narrow ? m : 0;
+    const bool    as_given = trace->search->bins.keeps_originals;
+    const int     m_given = trace->needs_given && (as_given || !trace->is_narrow) ? m : 0;
+    const int     m_turned = trace->is_narrow ? 0 : m_given;
     const int     m_narrow = trace->needs_given && trace->is_narrow ? m : 0;
-    const int64_t block = trace->block->capacity, batch = HS_BATCH + HS_BATCH_PADDING;
+    const int64_t batch = HS_BATCH + HS_BATCH_PADDING;
+    const int64_t block = (int64_t)trace->block->capacity * trace->of.width;
     const size_t  wide = sizeof(int64_t), narrow = sizeof(int32_t);
     return new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->place) &&
            new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->si) &&
@@ -72,10 +75,10 @@ allocate(hs_account *account, hs_trace *trace)
            new_arrays(account, m, HS_BATCH, wide, (void **)trace->image) &&
            new_arrays(account, m_given, HS_BATCH, wide, (void **)trace->given) &&
            new_arrays(account, m_narrow, HS_BATCH, narrow, (void **)trace->shift) &&
-           new_arrays(account, d, block, sizeof(double), (void **)trace->of.q) &&
-           new_arrays(account, m, block, wide, (void **)trace->of.image) &&
-           new_arrays(account, m_given, block, wide, (void **)trace->of.turned) &&
-           new_arrays(account, m_narrow, block, narrow, (void **)trace->of.few);
+           new_arrays(account, 1, block, sizeof(double), (void **)&trace->of.q) &&
+           new_arrays(account, m > 0, block, narrow, (void **)&trace->of.image) &&
+           new_arrays(account, m_turned > 0, block, wide, (void **)&trace->of.turned) &&
+           new_arrays(account, m_narrow > 0, block, narrow, (void **)&trace->of.few);
 }
 
 hs_status
@@ -85,6 +88,7 @@ hs_trace_init(hs_search *search, const hs_block *block, bool needs_given, hs_tra
     trace->is_plain = is_plain(&search->scene.lattice);
     trace->needs_given = needs_given || search->bins.keeps_originals;
     trace->is_narrow = is_narrow(search);
+    trace->of.width = search->scene.ndim <= HS_RECORD ? HS_RECORD : 2 * HS_RECORD;
     if (!allocate(&search->call->account, trace)) {
         hs_trace_free(&search->call->account, trace);
         return HS_ERR_MEMORY;
@@ -96,11 +100,11 @@ void
 hs_trace_free(hs_account *account, hs_trace *trace)
 {
     const int ndim = trace->search != NULL ? trace->search->scene.ndim : 0;
+    hs_free(account, trace->of.few);
+    hs_free(account, trace->of.turned);
+    hs_free(account, trace->of.image);
+    hs_free(account, trace->of.q);
     for (int k = ndim - 1; k >= 0; k--) {
-        hs_free(account, trace->of.few[k]);
-        hs_free(account, trace->of.turned[k]);
-        hs_free(account, trace->of.image[k]);
-        hs_free(account, trace->of.q[k]);
         hs_free(account, trace->shift[k]);
         hs_free(account, trace->given[k]);
         hs_free(account, trace->image[k]);
@@ -125,19 +129,20 @@ static void
 load_given(hs_trace *trace, const hs_run *run, int32_t n)
 {
     const hs_bins *bins = &trace->search->bins;
+    const int      width = trace->of.width;
     for (int r = 0; r < bins->n_periodic; r++) {
         const int64_t image = run->image[r];
         if (trace->is_narrow) {
             HS_ASSERT(!bins->turns.known || bins->turns.narrow[r] != NULL);
-            const int32_t *turns = bins->turns.known ? bins->turns.narrow[r] + run->si : NULL;
-            int32_t       *few = trace->of.few[r] + run->at;
+            const int32_t *turns = bins->turns.narrow[r] + run->si;
+            int32_t       *few = trace->of.few + (int64_t)run->at * width + r;
             for (int32_t c = 0; c < n; c++) {
-                few[c] = (int32_t)image - (turns != NULL ? turns[c] : 0);
+                few[c * width] = (int32_t)image - turns[c];
             }
         } else {
-            int64_t *turned = trace->of.turned[r] + run->at;
+            int64_t *turned = trace->of.turned + (int64_t)run->at * width + r;
             for (int32_t c = 0; c < n; c++) {
-                turned[c] = image - turns_of(bins, r, run->si + c);
+                turned[c * width] = image - turns_of(bins, r, run->si + c);
             }
         }
     }
@@ -145,38 +150,87 @@ load_given(hs_trace *trace, const hs_run *run, int32_t n)
 
 /* Looks up what the metric needs of the candidates of one run. */
 static void
-load_metric(hs_trace *trace, const hs_run *run, int32_t n)
+load_points(hs_trace *trace, const hs_run *run, int32_t n)
 {
     const hs_bins *bins = &trace->search->bins;
-    for (int k = 0; k < bins->ndim; k++) {
-        const double *from = bins->keeps_originals ? bins->originals[k] : bins->x[k];
-        memcpy(trace->of.q[k] + run->at, from + run->si, (size_t)n * sizeof(double));
-    }
-    for (int r = 0; r < bins->n_periodic; r++) {
-        const int64_t image = run->image[r];
-        int64_t      *to = trace->of.image[r] + run->at;
-        for (int32_t c = 0; c < n; c++) {
-            to[c] = image;
+    double *const *from = bins->keeps_originals ? bins->originals : bins->x;
+    const int      d = bins->ndim, width = trace->of.width;
+    double        *to = trace->of.q + (int64_t)run->at * width;
+    for (int32_t c = 0; c < n; c++, to += width) {
+        const int64_t number = bins->order[run->si + c];
+        for (int k = 0; k < d; k++) {
+            to[k] = from[k][run->si + c];
         }
-        trace->has_images = trace->has_images || image != 0;
+        if (d < HS_RECORD) {
+            memcpy(to + HS_RECORD - 1, &number, sizeof number);
+        }
     }
+}
+
+static void
+load_images(hs_trace *trace, const hs_run *run, int32_t n)
+{
+    const int m = trace->search->bins.n_periodic, width = trace->of.width;
+    int32_t  *to = trace->of.image + (int64_t)run->at * width;
+    int32_t   image[HS_MAX_DIM] = {0};
+    memcpy(image, run->image, (size_t)m * sizeof *image);
+    if (width == HS_RECORD) { /* a copy of constant size is one instruction */
+        for (int32_t c = 0; c < n; c++) {
+            memcpy(to + c * HS_RECORD, image, HS_RECORD * sizeof *image);
+        }
+        return;
+    }
+    for (int32_t c = 0; c < n; c++) {
+        memcpy(to + c * width, image, (size_t)width * sizeof *image);
+    }
+}
+
+/* Sets whether the block has images and turns. */
+static void
+note_moves(hs_trace *trace)
+{
+    const hs_bins *bins = &trace->search->bins;
+    int64_t        any_image = 0, any_turn = 0;
+    for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
+        const int32_t n = run[1].at - run->at;
+        for (int r = 0; r < bins->n_periodic; r++) {
+            any_image |= run->image[r];
+            if (trace->is_narrow && bins->turns.known) {
+                const int32_t *turns = bins->turns.narrow[r] + run->si;
+                int32_t        any = 0;
+                for (int32_t c = 0; c < n; c++) {
+                    any |= turns[c];
+                }
+                any_turn |= any;
+            }
+        }
+    }
+    trace->has_images = any_image != 0;
+    trace->has_turns = any_turn != 0;
 }
 
 /* Writes down all candidates of the block, as far as that is not done yet. */
 static hs_status
 load(hs_trace *trace, bool metric)
 {
-    int32_t    unpolled = 0;
-    const bool given = trace->needs_given && !trace->has_given;
+    int32_t unpolled = 0;
+    bool    given = trace->needs_given && !trace->has_given;
     metric = metric && !trace->has_metric;
-    trace->has_images = trace->has_images && !metric;
     if (!given && !metric) {
         return HS_OK;
     }
+    if (!trace->has_given && !trace->has_metric) {
+        note_moves(trace);
+    }
+    const bool images = trace->has_images && (metric || given);
+    given = given && (trace->has_turns || !trace->is_narrow);
     for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
         const int32_t n = run[1].at - run->at;
         if (metric) {
-            load_metric(trace, run, n);
+            load_points(trace, run, n);
+        }
+        if (images) {
+            load_images(trace, run, n);
         }
         if (given) {
             load_given(trace, run, n);
@@ -190,9 +244,14 @@ load(hs_trace *trace, bool metric)
         }
     }
     trace->has_given = trace->needs_given;
-    HS_ASSERT(!trace->has_metric); /* or both would have been there */
-    trace->has_metric = metric;
+    trace->has_metric = trace->has_metric || metric;
     return HS_OK;
+}
+
+hs_status
+hs_trace_load(hs_trace *trace)
+{
+    return load(trace, true);
 }
 
 int32_t
@@ -214,13 +273,14 @@ look_up_points(hs_trace *trace)
 {
     const hs_bins *bins = hs_search_asking(trace->search);
     const int32_t *place = trace->place, *si = trace->si;
+    const int      width = trace->of.width;
     for (int k = 0; k < bins->ndim; k++) {
         const double *of_p = bins->keeps_originals ? bins->originals[k] : bins->x[k];
-        const double *of_q = trace->of.q[k];
+        const double *of_q = trace->of.q + k;
         double       *p = trace->p[k], *q = trace->q[k];
         for (int32_t e = 0; e < trace->n; e++) {
             p[e] = of_p[si[e]];
-            q[e] = of_q[place[e]];
+            q[e] = of_q[(int64_t)place[e] * width];
         }
     }
 }
@@ -229,16 +289,22 @@ look_up_points(hs_trace *trace)
 static void
 look_up_narrow(hs_trace *trace)
 {
+    const bool      as_given = trace->search->bins.keeps_originals;
     const hs_turns *turns = &hs_search_asking(trace->search)->turns;
     const int32_t  *place = trace->place, *si = trace->si;
+    const int32_t  *few = trace->has_turns    ? trace->of.few
+                          : trace->has_images ? trace->of.image
+                                              : NULL;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        const int32_t *few = trace->of.few[r];
-        int32_t       *to = trace->shift[r];
+        int32_t *to = trace->shift[r];
         for (int32_t e = 0; e < trace->n; e++) {
-            to[e] = few[place[e]];
+            to[e] = few != NULL ? few[(int64_t)place[e] * trace->of.width + r] : 0;
         }
         for (int32_t e = 0; turns->known && e < trace->n; e++) {
             to[e] += (int32_t)hs_turns_get(turns, r, si[e]);
+        }
+        for (int32_t e = 0; as_given && e < trace->n; e++) {
+            trace->given[r][e] = to[e];
         }
     }
 }
@@ -252,10 +318,11 @@ look_up_given(hs_trace *trace)
     const hs_bins *asking = hs_search_asking(trace->search);
     const int      m = trace->search->bins.n_periodic;
     for (int r = 0; r < m; r++) {
-        const int64_t *turned = trace->of.turned[r];
+        const int64_t *turned = trace->of.turned + r;
         int64_t       *to = trace->given[r];
         for (int32_t e = 0; e < trace->n; e++) {
-            to[e] = turned[trace->place[e]] + turns_of(asking, r, trace->si[e]);
+            to[e] = turned[(int64_t)trace->place[e] * trace->of.width] +
+                    turns_of(asking, r, trace->si[e]);
         }
     }
     for (int32_t e = 0; !trace->is_plain && e < trace->n; e++) {
@@ -282,14 +349,14 @@ look_up_images(hs_trace *trace)
         return;
     }
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        const int64_t *from = trace->of.image[r];
+        const int32_t *from = trace->of.image + r;
         int64_t       *to = trace->image[r];
         if (zero) {
             memset(trace->image[r], 0, HS_BATCH * sizeof *to);
             memset(trace->times[r], 0, HS_BATCH * sizeof(double));
         }
         for (int32_t e = 0; e < trace->n && !zero; e++) {
-            to[e] = from[trace->place[e]];
+            to[e] = from[(int64_t)trace->place[e] * trace->of.width];
         }
     }
     trace->has_zeros = zero;

@@ -9,12 +9,15 @@
 #include "neighbourhood.h"
 #include "search.h"
 
-/* What is known of each candidate of a block. Owned, one entry for each place. */
+/* What is known of each candidate of a block: a record of `width` entries for each place, because
+ * hits are few and far between. Owned. */
 typedef struct hs_trace_block {
-    double  *q[HS_MAX_DIM];      /* what the metric measures to */
-    int64_t *image[HS_MAX_DIM];  /* shift over B, of X */
-    int64_t *turned[HS_MAX_DIM]; /* `image` less the turns by which the candidate was wrapped; */
-    int32_t *few[HS_MAX_DIM];    /* `turned` as int32, when is_narrow */
+    int      width;  /* HS_RECORD, or twice that where a record does not hold all axes */
+    double  *q;      /* what the metric measures to; last in a record of three or fewer, the bits of
+                      * the candidate's number */
+    int32_t *image;  /* shift over B, of X; unset without images */
+    int64_t *turned; /* `image` less the turns by which the candidate was wrapped; ... */
+    int32_t *few;    /* ... as int32, when is_narrow; unset without turns */
 } hs_trace_block;
 
 /* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more of doubles;
@@ -28,8 +31,10 @@ typedef struct hs_trace {
     bool              is_plain;              /* shifts over B are those over the box vectors as
                                               * given */
     bool              needs_given;
-    bool     is_narrow;  /* all S of the scene are few: `shift` has them, `given` is not set */
+    bool     is_narrow;  /* all S of the scene are few: `shift` has them, `given` is only set if
+                          * the metric measures between the points as given */
     bool     has_images; /* some candidate of the block is in another image */
+    bool     has_turns;  /* some candidate of it was wrapped */
     int32_t  n;
     int32_t *place, *si;                    /* of the candidate, and of the asking point */
     double  *p[HS_MAX_DIM], *q[HS_MAX_DIM]; /* what the metric measures between */
@@ -72,6 +77,10 @@ int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t
  * range, with the number of the point; HS_ERR_INTERRUPTED.
  */
 hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
+
+/* Fills `of` for all candidates of the block, as far as that is not done yet. HS_OK or
+ * HS_ERR_INTERRUPTED. */
+hs_status hs_trace_load(hs_trace *trace);
 
 /* The batch as the batch kernels take it. */
 hs_batch hs_trace_batch(hs_trace *trace);

@@ -52,9 +52,10 @@ points_have_as_many_coordinates_as_axes(void)
     const int64_t     block = 300 + HS_GROUP_POINTS;              /* all points are in reach */
     const int64_t     room = (block + HS_PADDING + 15) / 16 * 16; /* whole cache lines of floats */
     const int64_t     batch = HS_BATCH + HS_BATCH_PADDING;
-    /* float32 candidates; for decisions float64 ones, and both points of each pair of a batch */
+    /* float32 candidates; for decisions both points of each pair of a batch: records of candidates
+     * are of one size */
     CHECK(space.bytes[HS_FOR_CANDIDATES] - plane.bytes[HS_FOR_CANDIDATES] ==
-          4 * room + 8 * block + 2 * 8 * batch);
+          4 * room + 2 * 8 * batch);
 }
 
 static void

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* record_write.c: most scenes have few turns and ordinary numbers, in 2-D or 3-D. Their pairs are
+ * measured while they are written, without the arrays of a batch in between: the time goes into
+ * passes over these, not into arithmetic. */
+#include "record_write.h"
+
+#include "measures.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Whether hits of this search can be written so, to these columns. */
+static bool
+can_write(const hs_recorder *recorder, const hs_scanner *scanner)
+{
+    const hs_search *search = scanner->search;
+    const int        d = search->scene.ndim;
+    return search->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
+           (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) &&
+           !(recorder->columns & HS_WANT_BOTH) && scanner->trace.is_narrow &&
+           !search->scene.extreme && search->scene.metric.floats_usable;
+}
+
+/* Whether any of n points was wrapped. */
+static bool
+are_turned(const hs_turns *turns, int n_rows, int32_t first, int32_t n)
+{
+    int32_t any = 0;
+    for (int r = 0; turns->known && r < n_rows; r++) {
+        for (int32_t t = first; t < first + n; t++) {
+            any |= turns->narrow[r][t];
+        }
+    }
+    return any != 0;
+}
+
+/* What candidates and points are, of the hits of n points from `first` on. */
+static void
+describe(const hs_scanner *scanner, int32_t first, int32_t n, hs_write *write)
+{
+    const hs_search  *search = scanner->search;
+    const hs_trace   *trace = &scanner->trace;
+    const hs_bins    *asking = hs_search_asking(search);
+    const hs_lattice *lattice = &search->scene.lattice;
+    const bool        turned = are_turned(&asking->turns, lattice->n_periodic, first, n);
+    write->by_S = search->bins.keeps_originals;
+    write->is_shifted = trace->has_images || (write->by_S && (trace->has_turns || turned));
+    write->q = trace->of.q;
+    write->image = trace->has_images ? trace->of.image : NULL;
+    write->few = trace->has_turns ? trace->of.few : NULL;
+    for (int k = 0; k < search->scene.ndim; k++) {
+        write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        write->column[r] = lattice->vector_of_row[r];
+        write->turns[r] = turned ? asking->turns.narrow[r] + first : NULL;
+    }
+}
+
+/* Where the pairs go. */
+static void
+direct(const hs_recorder *recorder, hs_write *write)
+{
+    const hs_output *output = recorder->output;
+    write->index_bytes = output->index_bytes;
+    write->i = hs_output_next(output, HS_WANT_I);
+    write->j = hs_output_next(output, HS_WANT_J);
+    write->distance = hs_output_next(output, HS_WANT_DISTANCE);
+    write->vector = hs_output_next(output, HS_WANT_VECTOR);
+    write->shift = hs_output_next(output, HS_WANT_SHIFT);
+}
+
+hs_status
+hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits,
+              bool *written)
+{
+    const hs_search  *search = scanner->search;
+    const hs_options *options = &search->call->options;
+    const hs_scale    unscale = hs_measures_unscale(&search->scene);
+    *written = false;
+    if (!can_write(recorder, scanner)) {
+        return HS_OK;
+    }
+    if (hs_trace_load(&scanner->trace) != HS_OK) {
+        return HS_ERR_INTERRUPTED;
+    }
+    hs_write write = {.ndim = search->scene.ndim,
+                      .is_half = !search->is_full,
+                      .metric = &search->scene.metric,
+                      .first = unscale.first,
+                      .second = unscale.second,
+                      .cutoff = INFINITY,
+                      .largest = INFINITY};
+    if (options->precision == HS_EXACT) {
+        write.cutoff = options->cutoff;
+        write.largest = options->inclusive ? options->cutoff : nextafter(options->cutoff, 0.0);
+    }
+    describe(scanner, first, hits->n, &write);
+    memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));
+    direct(recorder, &write);
+    *written = search->call->kernel->write(&write, hits);
+    return HS_OK;
+}

@@ -1,0 +1,300 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_write.c: the writers of this CPU against the functions for one pair, bit by bit; they decline
+ * what they cannot be sure of, and only that. */
+#include <math.h>
+
+#include "../../../csrc/core/exact/metric_float.h"
+#include "../../../csrc/kernels/kernel.h"
+#include "../support/harness.h"
+
+void test_write(void);
+
+enum { POINTS = 5, PLACES = 64, MOST_HITS = 40, ROOM = MOST_HITS + HS_PADDING };
+
+/* Candidates, points and hits of both, with room for the pairs. */
+typedef struct scene {
+    hs_metric metric;
+    double    q[PLACES][HS_RECORD];
+    int32_t   image[PLACES][HS_RECORD], few[PLACES][HS_RECORD];
+    double    p[3][POINTS];
+    int32_t   turns[3][POINTS];
+    int32_t   point[POINTS], end[POINTS], label[ROOM];
+    bool      has_images, has_turns, is_inclusive;
+    int64_t   wide[2][ROOM];
+    int32_t   narrow[2][ROOM];
+    double    distance[ROOM], vector[3 * ROOM];
+    int32_t   shift[3 * ROOM];
+} scene;
+
+static scene it;
+
+static int64_t
+number_of(int32_t place)
+{
+    int64_t number;
+    memcpy(&number, &it.q[place][HS_RECORD - 1], sizeof number);
+    return number;
+}
+
+static void
+set_number(int32_t place, int64_t number)
+{
+    memcpy(&it.q[place][HS_RECORD - 1], &number, sizeof number);
+}
+
+/* Coordinates are multiples of `grain` if that is not 0, so that points coincide. */
+static double
+coordinate(harness_random *random, double grain)
+{
+    const double x = 10.0 * random_unit(random) - 5.0;
+    return grain > 0.0 ? grain * floor(x / grain) : x;
+}
+
+/* A few images and turns, or none; hits of some points, the last of which fill no vector. */
+static void
+make_scene(int ndim, bool is_coupled, bool has_images, bool has_turns, double grain,
+           harness_random *random)
+{
+    static const double coupled[3][HS_MAX_DIM] = {{9.0}, {2.7, 10.1}, {-3.1, 0.7, 8.3}};
+    static const double aligned[3][HS_MAX_DIM] = {{0.0, 9.3}, {10.7}, {0.0, 0.0, 8.0}};
+    memset(&it, 0, sizeof it);
+    hs_metric_init(&it.metric, ndim, ndim, is_coupled ? coupled : aligned, 8.0, true);
+    it.has_images = has_images;
+    it.has_turns = has_turns;
+    it.is_inclusive = true;
+    for (int32_t c = 0; c < PLACES; c++) {
+        set_number(c, (int64_t)(random_bits(random) % 70));
+        for (int k = 0; k < ndim; k++) {
+            it.q[c][k] = coordinate(random, grain);
+            it.image[c][k] = has_images ? (int32_t)(random_bits(random) % 3) - 1 : 0;
+            it.few[c][k] = it.image[c][k];
+            it.few[c][k] += has_turns ? (int32_t)(random_bits(random) % 5) - 2 : 0;
+        }
+    }
+    int32_t h = 0;
+    for (int32_t t = 0; t < POINTS; t++) {
+        for (int k = 0; k < 3; k++) {
+            it.p[k][t] = coordinate(random, grain);
+            it.turns[k][t] = has_turns ? (int32_t)(random_bits(random) % 5) - 2 : 0;
+        }
+        it.point[t] = (int32_t)(random_bits(random) % 70);
+        for (uint64_t n = random_bits(random) % (MOST_HITS / POINTS + 1); n > 0; n--) {
+            it.label[h++] = (int32_t)(random_bits(random) % PLACES);
+        }
+        it.end[t] = h;
+    }
+}
+
+static hs_write
+write_of(bool is_half, bool by_S, int index_bytes)
+{
+    const int ndim = it.metric.ndim;
+    hs_write  write = {.ndim = ndim,
+                       .is_half = is_half,
+                       .is_shifted = it.has_images || (by_S && it.has_turns),
+                       .by_S = by_S,
+                       .metric = &it.metric,
+                       .q = it.q[0],
+                       .image = it.has_images ? it.image[0] : NULL,
+                       .few = it.has_turns ? it.few[0] : NULL,
+                       .first = 0x1p3,
+                       .second = 0x1p-1,
+                       .cutoff = 20.0,
+                       .largest = it.is_inclusive ? 20.0 : nextafter(20.0, 0.0),
+                       .index_bytes = index_bytes,
+                       .i = index_bytes == 8 ? (void *)it.wide[0] : (void *)it.narrow[0],
+                       .j = index_bytes == 8 ? (void *)it.wide[1] : (void *)it.narrow[1],
+                       .distance = it.distance,
+                       .vector = it.vector,
+                       .shift = it.shift};
+    for (int k = 0; k < ndim; k++) {
+        write.p[k] = it.p[k];
+        write.turns[k] = it.has_turns ? it.turns[k] : NULL;
+        write.column[k] = (k + 1) % ndim;
+    }
+    return write;
+}
+
+/* What is right for hit h of point t. */
+static bool
+is_right(const hs_write *write, int32_t t, int32_t h)
+{
+    const int     ndim = it.metric.ndim;
+    const int32_t place = it.label[h];
+    const int64_t number = number_of(place), point = it.point[t];
+    double        p[3], vector[3];
+    int64_t       S[3], times[3];
+    bool          flips = number < point;
+    for (int r = ndim - 1; r >= 0; r--) {
+        const int64_t of_candidate = write->few != NULL ? it.few[place][r] : it.image[place][r];
+        p[r] = it.p[r][t];
+        S[r] = of_candidate + (it.has_turns ? it.turns[r][t] : 0);
+        times[r] = write->by_S ? S[r] : it.image[place][r];
+        flips = number == point && S[r] != 0 ? S[r] < 0 : flips;
+    }
+    flips = flips && write->is_half;
+    const double  length = hs_metric_measure(&it.metric, p, it.q[place], times, vector);
+    const double  distance = length * 4.0 < 20.0 ? length * 4.0 : write->largest;
+    const int64_t i = write->index_bytes == 8 ? it.wide[0][h] : it.narrow[0][h];
+    const int64_t j = write->index_bytes == 8 ? it.wide[1][h] : it.narrow[1][h];
+    bool right = i == (number < point ? number : point) && j == (number < point ? point : number) &&
+                 it.distance[h] == distance;
+    for (int k = 0; k < ndim; k++) {
+        const double D = (flips ? -vector[k] : vector[k]) * 4.0 + 0.0;
+        right = right && memcmp(&it.vector[h * ndim + k], &D, sizeof D) == 0 &&
+                it.shift[h * ndim + write->column[k]] == (int32_t)(flips ? -S[k] : S[k]);
+    }
+    return right;
+}
+
+/* Whether all pairs are right, if the writer took them. */
+static bool
+are_right(const hs_kernel *kernel, const hs_write *write, int *taken)
+{
+    const hs_hits hits = {.n = POINTS, .point = it.point, .end = it.end, .label = it.label};
+    if (!kernel->write(write, &hits)) {
+        return true;
+    }
+    *taken += 1;
+    for (int32_t t = 0, h = 0; t < POINTS; t++) {
+        for (; h < it.end[t]; h++) {
+            if (!is_right(write, t, h)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Calls test for each kernel of this CPU that has a writer. */
+static void
+with_each_writer(void (*test)(const hs_kernel *kernel))
+{
+    const char *names[8];
+    const int   n = hs_kernel_names(names, 8);
+    for (int k = 0; k < n; k++) {
+        const hs_kernel *kernel = hs_kernel_select(names[k]);
+        if (kernel->write != NULL) {
+            test(kernel);
+        }
+    }
+}
+
+static void
+random_pairs(const hs_kernel *kernel)
+{
+    harness_random random = {11};
+    int            taken = 0;
+    for (int trial = 0; trial < TRIALS(3000); trial++) {
+        const bool images = trial & 2, turns = trial & 4, by_S = trial & 8;
+        make_scene(2 + (trial & 1), by_S, images, turns, trial % 5 == 0 ? 0.5 : 0.0, &random);
+        const hs_write write = write_of(trial & 16, by_S, trial & 32 ? 8 : 4);
+        CHECK(are_right(kernel, &write, &taken));
+    }
+    CHECK(taken > TRIALS(3000) * 9 / 10);
+}
+
+static void
+pairs_have_the_bits_of_single_ones(void)
+{
+    with_each_writer(random_pairs);
+}
+
+/* One pair, of point 0 and a candidate at some distance from it along x. */
+static hs_write
+make_pair(double p, double q, int32_t image)
+{
+    harness_random random = {5};
+    make_scene(3, false, image != 0, false, 0.0, &random);
+    for (int k = 0; k < 3; k++) {
+        it.p[k][0] = it.q[7][k] = k == 0 ? 0.0 : 1.5;
+    }
+    it.p[0][0] = p;
+    it.q[7][0] = q;
+    memset(it.image, 0, sizeof it.image);
+    it.image[7][1] = image; /* row 1 is along x */
+    it.label[0] = 7;
+    for (int32_t t = 0; t < POINTS; t++) {
+        it.end[t] = 1;
+    }
+    return write_of(true, false, 8);
+}
+
+static void
+unsure_pairs(const hs_kernel *kernel)
+{
+    int      taken = 0;
+    hs_write write = make_pair(1.25, 1.25, 0); /* coinciding points are sure */
+    CHECK(are_right(kernel, &write, &taken) && taken == 1);
+    write = make_pair(0x1p-59, 0.0, 0);
+    CHECK(are_right(kernel, &write, &taken) && taken == 2);
+    write = make_pair(0x1p-61, 0.0, 0); /* where squares might leave the range of float32 */
+    CHECK(are_right(kernel, &write, &taken) && taken == 2);
+    write = make_pair(0x1p-538, 0.0, 0); /* a square that is zero, of a distance that is not */
+    CHECK(are_right(kernel, &write, &taken) && taken == 2);
+    write = make_pair(-5.35, 5.35 - 0x1p-30, -1);
+    CHECK(are_right(kernel, &write, &taken) && taken == 3);
+    write = make_pair(-5.35, 5.35 - 0x1p-49, -1); /* then roundings of the row may show */
+    CHECK(are_right(kernel, &write, &taken) && taken == 3);
+    write = make_pair(-5.35, 5.35, -1);
+    CHECK(are_right(kernel, &write, &taken) && taken == 3);
+}
+
+static void
+what_is_not_sure_is_declined(void)
+{
+    with_each_writer(unsure_pairs);
+}
+
+/* A distance of the cutoff, which is inclusive or not. */
+static void
+distances_at_the_cutoff(const hs_kernel *kernel)
+{
+    int      taken = 0;
+    hs_write write = make_pair(0.0, 5.0, 0); /* 20 in the caller's unit */
+    CHECK(are_right(kernel, &write, &taken) && it.distance[0] == 20.0);
+    write.largest = nextafter(20.0, 0.0);
+    CHECK(are_right(kernel, &write, &taken) && it.distance[0] < 20.0);
+    CHECK(taken == 2);
+}
+
+static void
+no_distance_passes_the_cutoff(void)
+{
+    with_each_writer(distances_at_the_cutoff);
+}
+
+/* Columns that are not wanted are left alone, and nothing is written far behind the last pair. */
+static void
+wanted_columns(const hs_kernel *kernel)
+{
+    harness_random random = {3};
+    int            taken = 0;
+    for (int without = 0; without < 5; without++) {
+        make_scene(3, false, true, true, 0.0, &random);
+        hs_write write = write_of(true, false, 4);
+        CHECK(are_right(kernel, &write, &taken));
+        write.i = without == 0 ? NULL : write.i;
+        write.j = without == 1 ? NULL : write.j;
+        write.distance = without == 2 ? NULL : write.distance;
+        write.vector = without == 3 ? NULL : write.vector;
+        write.shift = without == 4 ? NULL : write.shift;
+        CHECK(are_right(kernel, &write, &taken)); /* what is left out is there from before */
+    }
+    CHECK(taken == 10);
+}
+
+static void
+only_wanted_columns_are_written(void)
+{
+    with_each_writer(wanted_columns);
+}
+
+void
+test_write(void)
+{
+    RUN(pairs_have_the_bits_of_single_ones);
+    RUN(what_is_not_sure_is_declined);
+    RUN(no_distance_passes_the_cutoff);
+    RUN(only_wanted_columns_are_written);
+}
