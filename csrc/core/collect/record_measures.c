@@ -19,7 +19,7 @@ is_backward(const hs_trace *trace, int32_t e)
 {
     const int m = trace->search->scene.lattice.n_periodic;
     for (int l = 0; l < m; l++) {
-        const int64_t shift = trace->is_narrow ? trace->shift[l][e] : trace->given[l][e];
+        const int64_t shift = trace->of.is_narrow ? trace->shift[l][e] : trace->given[l][e];
         if (shift != 0) {
             return shift < 0;
         }
@@ -141,7 +141,7 @@ put_shifts(const hs_recorder *recorder, const hs_trace *trace, const double *sig
     if (m < d) {
         memset(to, 0, (size_t)trace->n * (size_t)d * sizeof *to);
     }
-    if (trace->is_narrow) { /* what is left out is zero, or common to all images */
+    if (trace->of.is_narrow) { /* what is left out is zero, or common to all images */
         put_narrow(trace, sign, to);
         return fitting;
     }

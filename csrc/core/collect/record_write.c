@@ -17,7 +17,7 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
     const int        d = search->scene.ndim;
     return search->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
            (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) &&
-           !(recorder->columns & HS_WANT_BOTH) && scanner->trace.is_narrow &&
+           !(recorder->columns & HS_WANT_BOTH) && scanner->trace.of.is_narrow &&
            !search->scene.extreme && search->scene.metric.floats_usable;
 }
 
@@ -44,10 +44,10 @@ describe(const hs_scanner *scanner, int32_t first, int32_t n, hs_write *write)
     const hs_lattice *lattice = &search->scene.lattice;
     const bool        turned = are_turned(&asking->turns, lattice->n_periodic, first, n);
     write->by_S = search->bins.keeps_originals;
-    write->is_shifted = trace->has_images || (write->by_S && (trace->has_turns || turned));
+    write->is_shifted = trace->of.has_images || (write->by_S && (trace->of.has_turns || turned));
     write->q = trace->of.q;
-    write->image = trace->has_images ? trace->of.image : NULL;
-    write->few = trace->has_turns ? trace->of.few : NULL;
+    write->image = trace->of.has_images ? trace->of.image : NULL;
+    write->few = trace->of.has_turns ? trace->of.few : NULL;
     for (int k = 0; k < search->scene.ndim; k++) {
         write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
     }
@@ -81,7 +81,7 @@ hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const h
     if (!can_write(recorder, scanner)) {
         return HS_OK;
     }
-    if (hs_trace_load(&scanner->trace) != HS_OK) {
+    if (hs_records_load(&scanner->trace.of, true) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
     hs_write write = {.ndim = search->scene.ndim,

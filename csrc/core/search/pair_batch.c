@@ -1,47 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* pair_batch.c: the candidates of a block are looked up once, run by run; each batch copies from
- * there. */
+/* pair_batch.c: each batch copies from the records of its candidates, axis by axis, as the batch
+ * kernels want them. */
 #include "pair_batch.h"
-
-#include "../base/poll.h"
 
 #include <string.h>
 
 /* Integers up to here are float64 numbers, and what the batch kernels take. */
 #define WIDEST_SHIFT (INT64_C(1) << 53)
-
-/* Turns and images up to here are few: sums of four of them are int32. */
-#define MOST_FEW 0x1p28
-
-/* Whether shifts over B are those over the box vectors as given. */
-static bool
-is_plain(const hs_lattice *lattice)
-{
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        for (int l = 0; l < lattice->n_periodic; l++) {
-            if (lattice->U[r][l] != (r == l)) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
-static bool
-is_narrow(const hs_search *search)
-{
-    const hs_scene *scene = &search->scene;
-    for (int k = 0; k < scene->ndim; k++) {
-        if (scene->lattice.row_of_axis[k] >= 0 &&
-            search->grid.reach[k] / search->grid.shape[k] >= MOST_FEW) {
-            return false;
-        }
-    }
-    return is_plain(&scene->lattice) &&
-           (!search->bins.turns.known ||
-            hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
-}
 
 /* n arrays of `length` entries. */
 static bool
@@ -60,50 +25,41 @@ static bool
 allocate(hs_account *account, hs_trace *trace)
 {
     const int     d = trace->search->scene.ndim, m = trace->search->scene.lattice.n_periodic;
-    const bool    as_given = trace->search->bins.keeps_originals;
-    const int     m_given = trace->needs_given && (as_given || !trace->is_narrow) ? m : 0;
-    const int     m_turned = trace->is_narrow ? 0 : m_given;
-    const int     m_narrow = trace->needs_given && trace->is_narrow ? m : 0;
+    const bool    as_given = trace->search->bins.keeps_originals, narrow = trace->of.is_narrow;
+    const int     m_given = trace->of.needs_given && (as_given || !narrow) ? m : 0;
+    const int     m_narrow = trace->of.needs_given && narrow ? m : 0;
     const int64_t batch = HS_BATCH + HS_BATCH_PADDING;
-    const int64_t block = (int64_t)trace->block->capacity * trace->of.width;
-    const size_t  wide = sizeof(int64_t), narrow = sizeof(int32_t);
-    return new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->place) &&
-           new_arrays(account, 1, HS_BATCH, narrow, (void **)&trace->si) &&
+    return new_arrays(account, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->place) &&
+           new_arrays(account, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->si) &&
            new_arrays(account, d, batch, sizeof(double), (void **)trace->p) &&
            new_arrays(account, d, batch, sizeof(double), (void **)trace->q) &&
            new_arrays(account, m, batch, sizeof(double), (void **)trace->times) &&
-           new_arrays(account, m, HS_BATCH, wide, (void **)trace->image) &&
-           new_arrays(account, m_given, HS_BATCH, wide, (void **)trace->given) &&
-           new_arrays(account, m_narrow, HS_BATCH, narrow, (void **)trace->shift) &&
-           new_arrays(account, 1, block, sizeof(double), (void **)&trace->of.q) &&
-           new_arrays(account, m > 0, block, narrow, (void **)&trace->of.image) &&
-           new_arrays(account, m_turned > 0, block, wide, (void **)&trace->of.turned) &&
-           new_arrays(account, m_narrow > 0, block, narrow, (void **)&trace->of.few);
+           new_arrays(account, m, HS_BATCH, sizeof(int64_t), (void **)trace->image) &&
+           new_arrays(account, m_given, HS_BATCH, sizeof(int64_t), (void **)trace->given) &&
+           new_arrays(account, m_narrow, HS_BATCH, sizeof(int32_t), (void **)trace->shift);
 }
 
 hs_status
-hs_trace_init(hs_search *search, const hs_block *block, bool needs_given, hs_trace *trace)
+hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls, bool needs_given,
+              hs_trace *trace)
 {
-    *trace = (hs_trace){.search = search, .block = block};
-    trace->is_plain = is_plain(&search->scene.lattice);
-    trace->needs_given = needs_given || search->bins.keeps_originals;
-    trace->is_narrow = is_narrow(search);
-    trace->of.width = search->scene.ndim <= HS_RECORD ? HS_RECORD : 2 * HS_RECORD;
-    if (!allocate(&search->call->account, trace)) {
-        hs_trace_free(&search->call->account, trace);
-        return HS_ERR_MEMORY;
+    hs_account *account = &search->call->account;
+    *trace = (hs_trace){.search = search, .is_plain = hs_has_plain_shifts(&search->scene.lattice)};
+    hs_status status = hs_records_init(search, block, polls, needs_given, &trace->of);
+    if (status == HS_OK && !allocate(account, trace)) {
+        status = HS_ERR_MEMORY;
     }
-    return HS_OK;
+    if (status != HS_OK) {
+        hs_trace_free(account, trace);
+    }
+    return status;
 }
 
 void
 hs_trace_free(hs_account *account, hs_trace *trace)
 {
     const int ndim = trace->search != NULL ? trace->search->scene.ndim : 0;
-    hs_free(account, trace->of.few);
-    hs_free(account, trace->of.turned);
-    hs_free(account, trace->of.image);
-    hs_free(account, trace->of.q);
+    hs_records_free(account, &trace->of);
     for (int k = ndim - 1; k >= 0; k--) {
         hs_free(account, trace->shift[k]);
         hs_free(account, trace->given[k]);
@@ -122,136 +78,6 @@ HS_ALWAYS_INLINE int64_t
 turns_of(const hs_bins *bins, int r, int64_t si)
 {
     return bins->turns.known ? hs_turns_get(&bins->turns, r, si) : 0;
-}
-
-/* Looks up the shifts of the candidates of one run, less their turns. */
-static void
-load_given(hs_trace *trace, const hs_run *run, int32_t n)
-{
-    const hs_bins *bins = &trace->search->bins;
-    const int      width = trace->of.width;
-    for (int r = 0; r < bins->n_periodic; r++) {
-        const int64_t image = run->image[r];
-        if (trace->is_narrow) {
-            HS_ASSERT(!bins->turns.known || bins->turns.narrow[r] != NULL);
-            const int32_t *turns = bins->turns.narrow[r] + run->si;
-            int32_t       *few = trace->of.few + (int64_t)run->at * width + r;
-            for (int32_t c = 0; c < n; c++) {
-                few[c * width] = (int32_t)image - turns[c];
-            }
-        } else {
-            int64_t *turned = trace->of.turned + (int64_t)run->at * width + r;
-            for (int32_t c = 0; c < n; c++) {
-                turned[c * width] = image - turns_of(bins, r, run->si + c);
-            }
-        }
-    }
-}
-
-/* Looks up what the metric needs of the candidates of one run. */
-static void
-load_points(hs_trace *trace, const hs_run *run, int32_t n)
-{
-    const hs_bins *bins = &trace->search->bins;
-    double *const *from = bins->keeps_originals ? bins->originals : bins->x;
-    const int      d = bins->ndim, width = trace->of.width;
-    double        *to = trace->of.q + (int64_t)run->at * width;
-    for (int32_t c = 0; c < n; c++, to += width) {
-        const int64_t number = bins->order[run->si + c];
-        for (int k = 0; k < d; k++) {
-            to[k] = from[k][run->si + c];
-        }
-        if (d < HS_RECORD) {
-            memcpy(to + HS_RECORD - 1, &number, sizeof number);
-        }
-    }
-}
-
-static void
-load_images(hs_trace *trace, const hs_run *run, int32_t n)
-{
-    const int m = trace->search->bins.n_periodic, width = trace->of.width;
-    int32_t  *to = trace->of.image + (int64_t)run->at * width;
-    int32_t   image[HS_MAX_DIM] = {0};
-    memcpy(image, run->image, (size_t)m * sizeof *image);
-    if (width == HS_RECORD) { /* a copy of constant size is one instruction */
-        for (int32_t c = 0; c < n; c++) {
-            memcpy(to + c * HS_RECORD, image, HS_RECORD * sizeof *image);
-        }
-        return;
-    }
-    for (int32_t c = 0; c < n; c++) {
-        memcpy(to + c * width, image, (size_t)width * sizeof *image);
-    }
-}
-
-/* Sets whether the block has images and turns. */
-static void
-note_moves(hs_trace *trace)
-{
-    const hs_bins *bins = &trace->search->bins;
-    int64_t        any_image = 0, any_turn = 0;
-    for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
-        const int32_t n = run[1].at - run->at;
-        for (int r = 0; r < bins->n_periodic; r++) {
-            any_image |= run->image[r];
-            if (trace->is_narrow && bins->turns.known) {
-                const int32_t *turns = bins->turns.narrow[r] + run->si;
-                int32_t        any = 0;
-                for (int32_t c = 0; c < n; c++) {
-                    any |= turns[c];
-                }
-                any_turn |= any;
-            }
-        }
-    }
-    trace->has_images = any_image != 0;
-    trace->has_turns = any_turn != 0;
-}
-
-/* Writes down all candidates of the block, as far as that is not done yet. */
-static hs_status
-load(hs_trace *trace, bool metric)
-{
-    int32_t unpolled = 0;
-    bool    given = trace->needs_given && !trace->has_given;
-    metric = metric && !trace->has_metric;
-    if (!given && !metric) {
-        return HS_OK;
-    }
-    if (!trace->has_given && !trace->has_metric) {
-        note_moves(trace);
-    }
-    const bool images = trace->has_images && (metric || given);
-    given = given && (trace->has_turns || !trace->is_narrow);
-    for (const hs_run *run = trace->block->runs; run->at < trace->block->n; run++) {
-        const int32_t n = run[1].at - run->at;
-        if (metric) {
-            load_points(trace, run, n);
-        }
-        if (images) {
-            load_images(trace, run, n);
-        }
-        if (given) {
-            load_given(trace, run, n);
-        }
-        unpolled += n;
-        if (unpolled > HS_POLL_CANDIDATES) {
-            unpolled = 0;
-            if (hs_poll(trace->polls, 0.0) != HS_OK) {
-                return HS_ERR_INTERRUPTED;
-            }
-        }
-    }
-    trace->has_given = trace->needs_given;
-    trace->has_metric = trace->has_metric || metric;
-    return HS_OK;
-}
-
-hs_status
-hs_trace_load(hs_trace *trace)
-{
-    return load(trace, true);
 }
 
 int32_t
@@ -292,9 +118,9 @@ look_up_narrow(hs_trace *trace)
     const bool      as_given = trace->search->bins.keeps_originals;
     const hs_turns *turns = &hs_search_asking(trace->search)->turns;
     const int32_t  *place = trace->place, *si = trace->si;
-    const int32_t  *few = trace->has_turns    ? trace->of.few
-                          : trace->has_images ? trace->of.image
-                                              : NULL;
+    const int32_t  *few = trace->of.has_turns    ? trace->of.few
+                          : trace->of.has_images ? trace->of.image
+                                                 : NULL;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
         int32_t *to = trace->shift[r];
         for (int32_t e = 0; e < trace->n; e++) {
@@ -344,7 +170,7 @@ look_up_given(hs_trace *trace)
 static void
 look_up_images(hs_trace *trace)
 {
-    const bool zero = !trace->has_images;
+    const bool zero = !trace->of.has_images;
     if (zero && trace->has_zeros) {
         return;
     }
@@ -385,24 +211,25 @@ hs_status
 hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
 {
     const hs_bins *bins = hs_search_asking(trace->search);
-    metric = metric || !trace->is_narrow; /* shifts of the points as given are the metric's too */
-    if (load(trace, metric) != HS_OK) {
+    metric = metric ||
+             !trace->of.is_narrow; /* shifts of the points as given are the metric's too */
+    if (hs_records_load(&trace->of, metric) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
     if (metric) {
         look_up_points(trace);
         look_up_images(trace);
     }
-    if (trace->needs_given && trace->is_narrow) {
+    if (trace->of.needs_given && trace->of.is_narrow) {
         look_up_narrow(trace);
-    } else if (trace->needs_given) {
+    } else if (trace->of.needs_given) {
         const int32_t fitting = look_up_given(trace);
         if (fitting < trace->n) {
             *failed_point = bins->order[trace->si[fitting]];
             return HS_ERR_SHIFT_RANGE;
         }
     }
-    if (metric && (trace->has_images || bins->keeps_originals)) {
+    if (metric && (trace->of.has_images || bins->keeps_originals)) {
         look_up_times(trace);
     }
     return HS_OK;

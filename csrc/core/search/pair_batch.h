@@ -6,40 +6,19 @@
 #ifndef HS_PAIR_BATCH_H
 #define HS_PAIR_BATCH_H
 
-#include "neighbourhood.h"
-#include "search.h"
-
-/* What is known of each candidate of a block: a record of `width` entries for each place, because
- * hits are few and far between. Owned. */
-typedef struct hs_trace_block {
-    int      width;  /* HS_RECORD, or twice that where a record does not hold all axes */
-    double  *q;      /* what the metric measures to; last in a record of three or fewer, the bits of
-                      * the candidate's number */
-    int32_t *image;  /* shift over B, of X; unset without images */
-    int64_t *turned; /* `image` less the turns by which the candidate was wrapped; ... */
-    int32_t *few;    /* ... as int32, when is_narrow; unset without turns */
-} hs_trace_block;
+#include "records.h"
 
 /* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more of doubles;
  * those of shifts are one for each row of B. */
 typedef struct hs_trace {
-    const hs_search  *search; /* borrowed */
-    const hs_block   *block;  /* borrowed */
-    const hs_options *polls;  /* borrowed; polled while a large block is loaded */
-    hs_trace_block    of;
-    bool              has_metric, has_given; /* `of` is the block's: q and image; turned or few */
-    bool              is_plain;              /* shifts over B are those over the box vectors as
-                                              * given */
-    bool              needs_given;
-    bool     is_narrow;  /* all S of the scene are few: `shift` has them, `given` is only set if
-                          * the metric measures between the points as given */
-    bool     has_images; /* some candidate of the block is in another image */
-    bool     has_turns;  /* some candidate of it was wrapped */
-    int32_t  n;
-    int32_t *place, *si;                    /* of the candidate, and of the asking point */
-    double  *p[HS_MAX_DIM], *q[HS_MAX_DIM]; /* what the metric measures between */
-    double  *times[HS_MAX_DIM];             /* its shift */
-    int64_t *image[HS_MAX_DIM];             /* shift over B, of X */
+    const hs_search *search;   /* borrowed */
+    hs_records       of;       /* the candidates */
+    bool             is_plain; /* shifts over B are those over the box vectors as given */
+    int32_t          n;
+    int32_t         *place, *si;                    /* of the candidate, and of the asking point */
+    double          *p[HS_MAX_DIM], *q[HS_MAX_DIM]; /* what the metric measures between */
+    double          *times[HS_MAX_DIM];             /* its shift */
+    int64_t         *image[HS_MAX_DIM];             /* shift over B, of X */
     int64_t *given[HS_MAX_DIM]; /* S over the periodic box vectors as given; when needs_given */
     int32_t *shift[HS_MAX_DIM]; /* S as int32, when is_narrow */
     bool     has_zeros;         /* image and times hold nothing but zeros */
@@ -48,8 +27,8 @@ typedef struct hs_trace {
 } hs_trace;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
-hs_status hs_trace_init(hs_search *search, const hs_block *block, bool needs_given,
-                        hs_trace *trace);
+hs_status hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls,
+                        bool needs_given, hs_trace *trace);
 void      hs_trace_free(hs_account *account, hs_trace *trace);
 
 /* Empties the batch. */
@@ -58,13 +37,6 @@ hs_trace_clear(hs_trace *trace)
 {
     trace->n = 0;
     trace->is_shifted = trace->is_wide = false;
-}
-
-/* Call when the block has new candidates: they will be looked up again. */
-HS_ALWAYS_INLINE void
-hs_trace_reset(hs_trace *trace)
-{
-    trace->has_metric = trace->has_given = false;
 }
 
 /* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
@@ -77,10 +49,6 @@ int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t
  * range, with the number of the point; HS_ERR_INTERRUPTED.
  */
 hs_status hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point);
-
-/* Fills `of` for all candidates of the block, as far as that is not done yet. HS_OK or
- * HS_ERR_INTERRUPTED. */
-hs_status hs_trace_load(hs_trace *trace);
 
 /* The batch as the batch kernels take it. */
 hs_batch hs_trace_batch(hs_trace *trace);

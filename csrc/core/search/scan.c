@@ -163,7 +163,7 @@ fill_block(hs_scanner *scanner)
     if (status != HS_OK) {
         return status;
     }
-    hs_trace_reset(&scanner->trace);
+    hs_records_reset(&scanner->trace.of);
     set_form(scanner);
     if (!scanner->is_ordered) {
         return HS_OK;
@@ -340,9 +340,8 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     hs_status status =
         hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);
     if (status == HS_OK) {
-        status =
-            hs_trace_init(search, &scanner->block, use == HS_BLOCK_LISTS_PLACES, &scanner->trace);
-        scanner->trace.polls = &scanner->options;
+        status = hs_trace_init(search, &scanner->block, &scanner->options,
+                               use == HS_BLOCK_LISTS_PLACES, &scanner->trace);
     }
     if (status == HS_OK && is_ordered) {
         status = hs_order_init(account, &scanner->block, &scanner->order);

@@ -18,8 +18,9 @@ is_narrow(void)
     hs_walker walker;
     hs_trace  trace;
     CHECK(hs_walker_init(&unit.search, HS_BLOCK_COUNTS, NULL, NULL, &walker) == HS_OK);
-    CHECK(hs_trace_init(&unit.search, &walker.scanner.block, true, &trace) == HS_OK);
-    const bool narrow = trace.is_narrow;
+    CHECK(hs_trace_init(&unit.search, &walker.scanner.block, &walker.scanner.options, true,
+                        &trace) == HS_OK);
+    const bool narrow = trace.of.is_narrow;
     hs_trace_free(&unit.call.account, &trace);
     hs_walker_close(&unit.search, &walker);
     return narrow;

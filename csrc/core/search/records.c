@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* records.c: runs of candidates are consecutive points, so records are written run by run. What is
+ * zero throughout the block is not written at all: most blocks have no image and no turn. */
+#include "records.h"
+
+#include "../base/poll.h"
+
+#include <string.h>
+
+/* Turns and images up to here are few: sums of four of them are int32. */
+#define MOST_FEW 0x1p28
+
+bool
+hs_has_plain_shifts(const hs_lattice *lattice)
+{
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        for (int l = 0; l < lattice->n_periodic; l++) {
+            if (lattice->U[r][l] != (r == l)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
+static bool
+is_narrow(const hs_search *search)
+{
+    const hs_scene *scene = &search->scene;
+    for (int k = 0; k < scene->ndim; k++) {
+        if (scene->lattice.row_of_axis[k] >= 0 &&
+            search->grid.reach[k] / search->grid.shape[k] >= MOST_FEW) {
+            return false;
+        }
+    }
+    return hs_has_plain_shifts(&scene->lattice) &&
+           (!search->bins.turns.known ||
+            hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
+}
+
+/* An array, if it is needed. */
+static bool
+new_array(hs_account *account, bool needed, int64_t length, size_t size, void **array)
+{
+    *array = needed ? hs_alloc(account, HS_FOR_CANDIDATES, length, size) : NULL;
+    return !needed || *array != NULL;
+}
+
+hs_status
+hs_records_init(hs_search *search, const hs_block *block, const hs_options *polls, bool needs_given,
+                hs_records *records)
+{
+    hs_account   *account = &search->call->account;
+    const bool    has_rows = search->scene.lattice.n_periodic > 0;
+    const int     width = search->scene.ndim <= HS_RECORD ? HS_RECORD : 2 * HS_RECORD;
+    const int64_t n = (int64_t)block->capacity * width;
+    *records = (hs_records){.search = search, .block = block, .polls = polls, .width = width};
+    records->needs_given = needs_given || search->bins.keeps_originals;
+    records->is_narrow = is_narrow(search);
+    const bool shifts = has_rows && records->needs_given;
+    if (!new_array(account, true, n, sizeof(double), (void **)&records->q) ||
+        !new_array(account, has_rows, n, sizeof(int32_t), (void **)&records->image) ||
+        !new_array(account, shifts && records->is_narrow, n, sizeof(int32_t),
+                   (void **)&records->few) ||
+        !new_array(account, shifts && !records->is_narrow, n, sizeof(int64_t),
+                   (void **)&records->turned)) {
+        hs_records_free(account, records);
+        return HS_ERR_MEMORY;
+    }
+    return HS_OK;
+}
+
+void
+hs_records_free(hs_account *account, hs_records *records)
+{
+    hs_free(account, records->turned);
+    hs_free(account, records->few);
+    hs_free(account, records->image);
+    hs_free(account, records->q);
+    *records = (hs_records){0};
+}
+
+/* Looks up the shifts of the candidates of one run, less their turns. */
+static void
+load_given(hs_records *records, const hs_run *run, int32_t n)
+{
+    const hs_bins *bins = &records->search->bins;
+    const int      width = records->width;
+    for (int r = 0; r < bins->n_periodic; r++) {
+        const int64_t image = run->image[r];
+        if (records->is_narrow) {
+            HS_ASSERT(!bins->turns.known || bins->turns.narrow[r] != NULL);
+            const int32_t *turns = bins->turns.narrow[r] + run->si;
+            int32_t       *few = records->few + (int64_t)run->at * width + r;
+            for (int32_t c = 0; c < n; c++) {
+                few[c * width] = (int32_t)image - turns[c];
+            }
+        } else {
+            int64_t *turned = records->turned + (int64_t)run->at * width + r;
+            for (int32_t c = 0; c < n; c++) {
+                turned[c * width] =
+                    image - (bins->turns.known ? hs_turns_get(&bins->turns, r, run->si + c) : 0);
+            }
+        }
+    }
+}
+
+/* Looks up what the metric needs of the candidates of one run. */
+static void
+load_points(hs_records *records, const hs_run *run, int32_t n)
+{
+    const hs_bins *bins = &records->search->bins;
+    double *const *from = bins->keeps_originals ? bins->originals : bins->x;
+    const int      d = bins->ndim, width = records->width;
+    double        *to = records->q + (int64_t)run->at * width;
+    for (int32_t c = 0; c < n; c++, to += width) {
+        const int64_t number = bins->order[run->si + c];
+        for (int k = 0; k < d; k++) {
+            to[k] = from[k][run->si + c];
+        }
+        if (d < HS_RECORD) {
+            memcpy(to + HS_RECORD - 1, &number, sizeof number);
+        }
+    }
+}
+
+static void
+load_images(hs_records *records, const hs_run *run, int32_t n)
+{
+    const int m = records->search->bins.n_periodic, width = records->width;
+    int32_t  *to = records->image + (int64_t)run->at * width;
+    int32_t   image[HS_MAX_DIM] = {0};
+    memcpy(image, run->image, (size_t)m * sizeof *image);
+    if (width == HS_RECORD) { /* a copy of constant size is one instruction */
+        for (int32_t c = 0; c < n; c++) {
+            memcpy(to + c * HS_RECORD, image, HS_RECORD * sizeof *image);
+        }
+        return;
+    }
+    for (int32_t c = 0; c < n; c++) {
+        memcpy(to + c * width, image, (size_t)width * sizeof *image);
+    }
+}
+
+/* Sets whether the block has images and turns. */
+static void
+note_moves(hs_records *records)
+{
+    const hs_bins *bins = &records->search->bins;
+    int64_t        any_image = 0, any_turn = 0;
+    for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
+        const int32_t n = run[1].at - run->at;
+        for (int r = 0; r < bins->n_periodic; r++) {
+            any_image |= run->image[r];
+            if (records->is_narrow && bins->turns.known) {
+                const int32_t *turns = bins->turns.narrow[r] + run->si;
+                int32_t        any = 0;
+                for (int32_t c = 0; c < n; c++) {
+                    any |= turns[c];
+                }
+                any_turn |= any;
+            }
+        }
+    }
+    records->has_images = any_image != 0;
+    records->has_turns = any_turn != 0;
+}
+
+/* Writes down all candidates of the block, as far as that is not done yet. */
+hs_status
+hs_records_load(hs_records *records, bool metric)
+{
+    int32_t unpolled = 0;
+    bool    given = records->needs_given && !records->has_given;
+    metric = metric && !records->has_metric;
+    if (!given && !metric) {
+        return HS_OK;
+    }
+    if (!records->has_given && !records->has_metric) {
+        note_moves(records);
+    }
+    const bool images = records->has_images && (metric || given);
+    given = given && (records->has_turns || !records->is_narrow);
+    for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
+        const int32_t n = run[1].at - run->at;
+        if (metric) {
+            load_points(records, run, n);
+        }
+        if (images) {
+            load_images(records, run, n);
+        }
+        if (given) {
+            load_given(records, run, n);
+        }
+        unpolled += n;
+        if (unpolled > HS_POLL_CANDIDATES) {
+            unpolled = 0;
+            if (hs_poll(records->polls, 0.0) != HS_OK) {
+                return HS_ERR_INTERRUPTED;
+            }
+        }
+    }
+    records->has_given = records->needs_given;
+    records->has_metric = records->has_metric || metric;
+    return HS_OK;
+}
