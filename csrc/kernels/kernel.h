@@ -208,7 +208,10 @@ typedef struct hs_kernel {
     hs_boxes_fn   near_boxes;
     hs_judge_fn   judge; /* batch.h */
     hs_measure_fn measure;
-    hs_write_fn   write; /* write.h; or NULL */
+    /* write.h; or all NULL: */
+    hs_write_fn         write;
+    hs_point_records_fn point_records;
+    hs_shift_records_fn shift_records;
 } hs_kernel;
 
 /* The fields that each kernel's file fills with its own functions of these names. */

@@ -34,6 +34,8 @@ const hs_kernel hs_kernel_avx512 = {
     .judge = hs_judge_avx512,
     .measure = hs_measure_avx512,
     .write = hs_write_avx512,
+    .point_records = hs_point_records_avx2,
+    .shift_records = hs_shift_records_avx2,
 };
 #else
 typedef int hs_kernel_avx512_is_for_x86_64; /* a translation unit must not be empty */

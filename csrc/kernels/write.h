@@ -54,6 +54,19 @@ typedef struct hs_write {
 /* False: declined. */
 typedef bool (*hs_write_fn)(const hs_write *write, const struct hs_hits *hits);
 
+/* Records of n points of space: x[0 ... 2] and the number. */
+typedef void (*hs_point_records_fn)(const double *const *x, const int32_t *order, int32_t n,
+                                    double *to);
+
+/* Records of n points of one image in a box of three box vectors: image less turns. */
+typedef void (*hs_shift_records_fn)(const int32_t *image, const int32_t *const *turns, int32_t n,
+                                    int32_t *to);
+
+/* records_avx2.c: x86-64 only. */
+void hs_point_records_avx2(const double *const *x, const int32_t *order, int32_t n, double *to);
+void hs_shift_records_avx2(const int32_t *image, const int32_t *const *turns, int32_t n,
+                           int32_t *to);
+
 /* write_avx2.c, write_avx512.c: x86-64 only. */
 bool hs_write_avx2(const hs_write *write, const struct hs_hits *hits);
 bool hs_write_avx512(const hs_write *write, const struct hs_hits *hits);

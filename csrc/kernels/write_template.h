@@ -84,6 +84,18 @@ find_plain(const hs_write *write, int32_t t, const record *candidates, lanes *of
     }
 }
 
+/* As bits, the pairs that no row moves. */
+HS_ALWAYS_INLINE unsigned
+resting(const hs_write *write, const lanes *of)
+{
+    const places *shift = write->by_S ? of->S : of->image;
+    unsigned      lanes_left = EVERY_LANE;
+    for (int l = 0; l < write->metric->n_rows; l++) {
+        lanes_left &= mark_bits(place_equal(shift[l], broadcast_place(0)));
+    }
+    return lanes_left;
+}
+
 /* Adds shift * rows. A row that does not move a pair adds zero, which changes nothing but the sign
  * of a zero, and that is not written. */
 HS_ALWAYS_INLINE void
@@ -142,11 +154,7 @@ find_distances(const lanes *of, double least, reals *distance, const int ndim, c
 HS_ALWAYS_INLINE unsigned
 coinciding(const hs_write *write, const lanes *of, const int ndim)
 {
-    const places *shift = write->by_S ? of->S : of->image;
-    unsigned      lanes_left = EVERY_LANE;
-    for (int l = 0; l < write->metric->n_rows; l++) {
-        lanes_left &= mark_bits(place_equal(shift[l], broadcast_place(0)));
-    }
+    unsigned lanes_left = resting(write, of);
     for (int k = 0; k < ndim; k++) {
         lanes_left &= bits(is_equal(of->D[k].hi, broadcast(0.0)));
     }
@@ -236,7 +244,7 @@ write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bo
             find_shifts(write, t, hits->label + e, &of);
             find_flips(write, point, &of);
             find_plain(write, t, &candidates, &of, ndim);
-            if (shifted) {
+            if (shifted && resting(write, &of) != EVERY_LANE) {
                 add_rows(write, &of, ndim);
             }
             const unsigned present = end - e < LANES ? (1u << (end - e)) - 1 : EVERY_LANE;

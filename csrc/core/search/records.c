@@ -58,6 +58,7 @@ hs_records_init(hs_search *search, const hs_block *block, const hs_options *poll
     *records = (hs_records){.search = search, .block = block, .polls = polls, .width = width};
     records->needs_given = needs_given || search->bins.keeps_originals;
     records->is_narrow = is_narrow(search);
+    records->has_turns = search->bins.turns.known;
     const bool shifts = has_rows && records->needs_given;
     if (!new_array(account, true, n, sizeof(double), (void **)&records->q) ||
         !new_array(account, has_rows, n, sizeof(int32_t), (void **)&records->image) ||
@@ -83,25 +84,42 @@ hs_records_free(hs_account *account, hs_records *records)
 
 /* Looks up the shifts of the candidates of one run, less their turns. */
 static void
+load_few(hs_records *records, const hs_run *run, int32_t n)
+{
+    const hs_search *search = records->search;
+    const hs_kernel *kernel = search->call->kernel;
+    const int        m = search->bins.n_periodic, width = records->width;
+    int32_t         *few = records->few + (int64_t)run->at * width;
+    const int32_t   *turns[HS_MAX_DIM];
+    for (int r = 0; r < m; r++) {
+        turns[r] = search->bins.turns.narrow[r] + run->si;
+    }
+    if (m == 3 && width == HS_RECORD && kernel->shift_records != NULL) {
+        kernel->shift_records(run->image, turns, n, few);
+        return;
+    }
+    for (int32_t c = 0; c < n; c++) {
+        for (int r = 0; r < m; r++) {
+            few[c * width + r] = run->image[r] - turns[r][c];
+        }
+    }
+}
+
+static void
 load_given(hs_records *records, const hs_run *run, int32_t n)
 {
     const hs_bins *bins = &records->search->bins;
     const int      width = records->width;
+    if (records->is_narrow) {
+        load_few(records, run, n);
+        return;
+    }
     for (int r = 0; r < bins->n_periodic; r++) {
-        const int64_t image = run->image[r];
-        if (records->is_narrow) {
-            HS_ASSERT(!bins->turns.known || bins->turns.narrow[r] != NULL);
-            const int32_t *turns = bins->turns.narrow[r] + run->si;
-            int32_t       *few = records->few + (int64_t)run->at * width + r;
-            for (int32_t c = 0; c < n; c++) {
-                few[c * width] = (int32_t)image - turns[c];
-            }
-        } else {
-            int64_t *turned = records->turned + (int64_t)run->at * width + r;
-            for (int32_t c = 0; c < n; c++) {
-                turned[c * width] =
-                    image - (bins->turns.known ? hs_turns_get(&bins->turns, r, run->si + c) : 0);
-            }
+        int64_t *turned = records->turned + (int64_t)run->at * width + r;
+        for (int32_t c = 0; c < n; c++) {
+            const int64_t turns = bins->turns.known ? hs_turns_get(&bins->turns, r, run->si + c)
+                                                    : 0;
+            turned[c * width] = run->image[r] - turns;
         }
     }
 }
@@ -110,16 +128,25 @@ load_given(hs_records *records, const hs_run *run, int32_t n)
 static void
 load_points(hs_records *records, const hs_run *run, int32_t n)
 {
-    const hs_bins *bins = &records->search->bins;
-    double *const *from = bins->keeps_originals ? bins->originals : bins->x;
-    const int      d = bins->ndim, width = records->width;
-    double        *to = records->q + (int64_t)run->at * width;
+    const hs_bins   *bins = &records->search->bins;
+    const hs_kernel *kernel = records->search->call->kernel;
+    const int        d = bins->ndim, width = records->width;
+    const int32_t   *order = bins->order + run->si;
+    double          *to = records->q + (int64_t)run->at * width;
+    const double    *from[HS_MAX_DIM];
+    for (int k = 0; k < d; k++) {
+        from[k] = (bins->keeps_originals ? bins->originals[k] : bins->x[k]) + run->si;
+    }
+    if (d == 3 && kernel->point_records != NULL) {
+        kernel->point_records(from, order, n, to);
+        return;
+    }
     for (int32_t c = 0; c < n; c++, to += width) {
-        const int64_t number = bins->order[run->si + c];
         for (int k = 0; k < d; k++) {
-            to[k] = from[k][run->si + c];
+            to[k] = from[k][c];
         }
         if (d < HS_RECORD) {
+            const int64_t number = order[c];
             memcpy(to + HS_RECORD - 1, &number, sizeof number);
         }
     }
@@ -143,28 +170,17 @@ load_images(hs_records *records, const hs_run *run, int32_t n)
     }
 }
 
-/* Sets whether the block has images and turns. */
-static void
-note_moves(hs_records *records)
+/* Whether some candidate of the block is in another image. */
+static bool
+has_images(const hs_records *records)
 {
-    const hs_bins *bins = &records->search->bins;
-    int64_t        any_image = 0, any_turn = 0;
+    int32_t any = 0;
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
-        const int32_t n = run[1].at - run->at;
-        for (int r = 0; r < bins->n_periodic; r++) {
-            any_image |= run->image[r];
-            if (records->is_narrow && bins->turns.known) {
-                const int32_t *turns = bins->turns.narrow[r] + run->si;
-                int32_t        any = 0;
-                for (int32_t c = 0; c < n; c++) {
-                    any |= turns[c];
-                }
-                any_turn |= any;
-            }
+        for (int r = 0; r < records->search->bins.n_periodic; r++) {
+            any |= run->image[r];
         }
     }
-    records->has_images = any_image != 0;
-    records->has_turns = any_turn != 0;
+    return any != 0;
 }
 
 /* Writes down all candidates of the block, as far as that is not done yet. */
@@ -177,10 +193,8 @@ hs_records_load(hs_records *records, bool metric)
     if (!given && !metric) {
         return HS_OK;
     }
-    if (!records->has_given && !records->has_metric) {
-        note_moves(records);
-    }
-    const bool images = records->has_images && (metric || given);
+    records->has_images = has_images(records);
+    const bool images = records->has_images;
     given = given && (records->has_turns || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;

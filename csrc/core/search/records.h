@@ -25,7 +25,7 @@ typedef struct hs_records {
     bool              is_narrow;   /* all S of the scene are few */
     bool has_metric, has_given;    /* arrays are the block's: q and image; turned or few */
     bool has_images;               /* some candidate is in another image */
-    bool has_turns;                /* some candidate was wrapped; known when is_narrow */
+    bool has_turns;                /* points may have been wrapped */
 } hs_records;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
