@@ -4,7 +4,7 @@
 
 #include "request.h"
 #include "../search/estimate.h"
-#include "../collect/crew.h"
+#include "../collect/parallel.h"
 #include "../collect/record.h"
 #include "../collect/sort_pairs.h"
 

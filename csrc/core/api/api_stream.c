@@ -5,7 +5,7 @@
 
 #include "../base/fpenv.h"
 #include "../collect/result.h"
-#include "../collect/crew.h"
+#include "../collect/parallel.h"
 #include "../base/poll.h"
 
 #include <math.h>
