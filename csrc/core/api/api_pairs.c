@@ -9,7 +9,6 @@
 #include "../collect/sort_pairs.h"
 
 #include <math.h>
-#include <string.h>
 
 hs_options
 hs_options_default(void)

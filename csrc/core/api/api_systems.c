@@ -4,7 +4,7 @@
 #include "request.h"
 #include "../search/estimate.h"
 #include "../collect/result.h"
-#include "../box/box_check.h"
+#include "../box/lattice.h"
 #include "systems_thread.h"
 
 #include <math.h>

@@ -7,8 +7,9 @@
 #include "../base/poll.h"
 #include "../collect/crew.h"
 #include "../collect/parallel.h"
+#include "../collect/record.h"
 #include "../collect/sort_pairs.h"
-#include "../search/search_build.h"
+#include "../search/search_open.h"
 
 #include <string.h>
 

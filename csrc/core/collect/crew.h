@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * crew.h: the threads of a call at one job. Each has a worker of its own, a struct that the caller's
- * thread opens before the job and closes after it, also when opening a later one has failed. Work
- * that is cut into ranges is handed out one range at a time, and written in their order (in_turn.h).
+ * crew.h: the threads of a call at one job. Each has a worker of its own, a struct that the
+ * caller's thread opens before the job and closes after it, also when opening a later one has
+ * failed. Work that is cut into ranges is handed out one range at a time; what is found is written
+ * in their order (in_turn.h).
  */
 #ifndef HS_CREW_H
 #define HS_CREW_H

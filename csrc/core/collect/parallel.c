@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* parallel.c: the worker of each thread has a walker and a backlog; ranges are committed in turn. */
+/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. */
 #include "parallel.h"
 
 #include "../base/outcome.h"
 #include "crew.h"
+#include "record.h"
 
 /* Points of a range: some groups at least, and so few that their pairs, with all quantities, fit
  * what a thread can hold back: it seldom waits for others. */

@@ -10,7 +10,7 @@
 #include "../search/walk.h"
 #include "columns.h"
 #include "in_turn.h"
-#include "record.h"
+#include "recorder.h"
 
 /* What each thread's walker shall do with its hits, in place of recording them. */
 typedef struct hs_visitors {

@@ -9,7 +9,7 @@
 
 #include "edges.h"
 #include "weights.h"
-#include "../search/walk.h"
+#include "../search/scanner.h"
 
 /* What all threads count by; only read. */
 typedef struct hs_tally_plan {

@@ -7,8 +7,6 @@
  * Points that found too few, and groups for which the guess is of no use, are searched one by one,
  * with a radius that surely suffices: so the cost follows n and k, however unevenly points lie.
  */
-#include "nearest_search.h"
-
 #include "../collect/crew.h"
 #include "nearest_write.h"
 #include "../base/outcome.h"

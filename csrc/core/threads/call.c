@@ -3,7 +3,7 @@
  * adds. */
 #include "call.h"
 
-#include "../base/poll.h"
+#include "../base/outcome.h"
 
 #include <string.h>
 

@@ -64,20 +64,16 @@ make_room(hs_piece *piece, int m)
         return true;
     }
     const int64_t capacity = piece->capacity > 0 ? 2 * piece->capacity : FIRST_SHIFTED;
-    int64_t      *at = hs_alloc(NULL, HS_FOR_SHIFTS, capacity, sizeof *at);
-    int32_t      *shift = hs_alloc(NULL, HS_FOR_SHIFTS, capacity * m, sizeof *shift);
-    if (at == NULL || shift == NULL) {
-        hs_free(NULL, at);
-        hs_free(NULL, shift);
+    int64_t *at = hs_grow(NULL, HS_FOR_SHIFTS, piece->at, piece->n_shifted, capacity, sizeof *at);
+    if (at == NULL) {
         return false;
     }
-    if (piece->n_shifted > 0) {
-        memcpy(at, piece->at, (size_t)piece->n_shifted * sizeof *at);
-        memcpy(shift, piece->shift, (size_t)(piece->n_shifted * m) * sizeof *shift);
-    }
-    hs_free(NULL, piece->at);
-    hs_free(NULL, piece->shift);
     piece->at = at;
+    int32_t *shift = hs_grow(NULL, HS_FOR_SHIFTS, piece->shift, piece->n_shifted * m, capacity * m,
+                             sizeof *shift);
+    if (shift == NULL) {
+        return false;
+    }
     piece->shift = shift;
     piece->capacity = capacity;
     return true;
