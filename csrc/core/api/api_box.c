@@ -3,10 +3,9 @@
 #include "../../halfshell.h"
 
 #include "arguments.h"
-#include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../scene/points.h"
-#include "../base/poll.h"
+#include "../threads/call.h"
 #include "../box/wrap.h"
 
 #include <math.h>
@@ -31,12 +30,10 @@ scale_of_box(const hs_box *box)
 hs_status
 hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *failure)
 {
-    hs_failure ignored;
+    hs_entry   entry;
     hs_lattice lattice;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = box != NULL ? hs_check_box(box, box->ndim) : HS_ERR_ARGUMENT;
+    failure = hs_enter(failure, &entry);
+    hs_status status = box != NULL ? hs_check_box(box, box->ndim) : HS_ERR_ARGUMENT;
     if (status == HS_OK) {
         status = hs_box_check(box, failure);
     }
@@ -52,7 +49,7 @@ hs_box_measure(const hs_box *box, double *heights, double *volume, hs_failure *f
             *volume = hs_lattice_volume(&lattice, scale.exponent);
         }
     }
-    hs_fpenv_leave(saved);
+    hs_leave(&entry);
     return status;
 }
 
@@ -155,15 +152,13 @@ hs_status
 hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t *shift,
             hs_failure *failure)
 {
-    hs_failure ignored;
-    hs_lattice lattice;
-    hs_cloud   cloud;
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
     const hs_options options = hs_options_default();
-    const hs_fpenv   saved = hs_fpenv_enter();
-    hs_status        status = box != NULL ? hs_check_arguments(points, NULL, box, &options, failure)
-                                          : HS_ERR_ARGUMENT;
+    hs_entry         entry;
+    hs_lattice       lattice;
+    hs_cloud         cloud;
+    failure = hs_enter(failure, &entry);
+    hs_status status = box != NULL ? hs_check_arguments(points, NULL, box, &options, failure)
+                                   : HS_ERR_ARGUMENT;
     if (status == HS_OK) {
         status = hs_box_check(box, failure);
     }
@@ -181,6 +176,6 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
         }
         hs_cloud_free(NULL, &cloud);
     }
-    hs_fpenv_leave(saved);
+    hs_leave(&entry);
     return status;
 }

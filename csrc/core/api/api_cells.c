@@ -3,28 +3,8 @@
  * times. */
 #include "arguments.h"
 #include "api_cells.h"
-#include "../base/poll.h"
-#include "../search/search_build.h"
-
-#include <string.h>
-
-static void
-copy_points(const hs_points *points, double *copy)
-{
-    for (int64_t i = 0; i < points->n; i++) {
-        const char *row = (const char *)points->data + i * points->row_stride;
-        for (int k = 0; k < points->ndim; k++) {
-            const char *entry = row + k * points->column_stride;
-            if (points->real == HS_FLOAT32) {
-                float value;
-                memcpy(&value, entry, sizeof value);
-                *copy++ = value;
-            } else {
-                memcpy(copy++, entry, sizeof *copy);
-            }
-        }
-    }
-}
+#include "../scene/points.h"
+#include "../search/search_open.h"
 
 /* The points in memory of the cells: the caller cannot change them between searches. */
 static hs_status
@@ -35,7 +15,7 @@ keep_points(const hs_points *points, hs_cells *cells)
     if (cells->copy == NULL) {
         return HS_ERR_MEMORY;
     }
-    copy_points(points, cells->copy);
+    hs_points_copy(points, cells->copy);
     cells->points = (hs_points){.data = cells->copy,
                                 .n = points->n,
                                 .ndim = points->ndim,

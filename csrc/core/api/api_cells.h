@@ -4,7 +4,6 @@
 #define HS_API_CELLS_H
 
 #include "../nearest/nearest_kept.h"
-#include "../collect/result.h"
 #include "../search/search.h"
 
 struct hs_cells {

@@ -2,12 +2,7 @@
 /* api_nearest.c: the public search for the k nearest points: prepares trees, then searches group by
  * group. */
 #include "request.h"
-#include "../base/fpenv.h"
-#include "../nearest/nearest_prepare.h"
-#include "../nearest/nearest_search.h"
-#include "../collect/columns.h"
-#include "../collect/result.h"
-#include "../base/poll.h"
+#include "../nearest/nearest.h"
 
 /* Room for k entries for each asking point. */
 static hs_status

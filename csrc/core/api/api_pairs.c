@@ -4,12 +4,11 @@
 
 #include "request.h"
 #include "../search/estimate.h"
-#include "../collect/crew.h"
+#include "../collect/parallel.h"
 #include "../collect/record.h"
 #include "../collect/sort_pairs.h"
 
 #include <math.h>
-#include <string.h>
 
 hs_options
 hs_options_default(void)

@@ -3,9 +3,8 @@
  * how far that has come, and the pairs that were found and not yet handed out. */
 #include "request.h"
 
-#include "../base/fpenv.h"
 #include "../collect/result.h"
-#include "../collect/crew.h"
+#include "../collect/parallel.h"
 #include "../base/poll.h"
 
 #include <math.h>
@@ -175,17 +174,15 @@ hs_status
 hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **block,
                hs_failure *failure)
 {
-    hs_failure ignored;
     if (block != NULL) {
         *block = NULL;
     }
     if (stream == NULL || block == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    const hs_fpenv saved = hs_fpenv_enter();
-    hs_status      status = HS_OK;
+    hs_entry *entry = &stream->call.entry;
+    hs_status status = HS_OK;
+    failure = hs_enter(failure, entry);
     stream->poll = poll;
     stream->context = context;
     hs_call_set_poll(poll != NULL ? tell : NULL, stream, &stream->call);
@@ -199,7 +196,7 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
         failure->limit_bytes = stream->call.account.limit;
     }
     hs_call_set_poll(NULL, NULL, &stream->call);
-    hs_fpenv_leave(saved);
+    hs_leave(entry);
     return status;
 }
 

@@ -4,10 +4,9 @@
 #include "../verlet/recheck.h"
 
 #include "request.h"
-#include "../base/fpenv.h"
 #include "../box/lattice.h"
 #include "../memory/account.h"
-#include "../base/poll.h"
+#include "../verlet/motion.h"
 #include "../exact/doubleword.h"
 
 #include <math.h>
@@ -168,15 +167,13 @@ hs_verlet_update(hs_verlet *list, const hs_points *points, const hs_box *box,
                  const hs_options *options, double skin, bool rebuild, bool *rebuilt,
                  hs_failure *failure)
 {
-    hs_failure ignored;
+    hs_entry entry;
     if (list == NULL || options == NULL || rebuilt == NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    failure = failure != NULL ? failure : &ignored;
-    *failure = HS_NO_FAILURE;
-    const hs_fpenv  saved = hs_fpenv_enter();
+    failure = hs_enter(failure, &entry);
     const hs_status status = update(list, points, box, options, skin, rebuild, rebuilt, failure);
-    hs_fpenv_leave(saved);
+    hs_leave(&entry);
     return status;
 }
 

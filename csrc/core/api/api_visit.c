@@ -5,7 +5,7 @@
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../collect/crew.h"
-#include "../base/poll.h"
+#include "../collect/parallel.h"
 #include "../collect/record.h"
 
 #define WANTED (HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)
@@ -65,73 +65,66 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
     return stops != 0 ? HS_ENOUGH : HS_OK;
 }
 
+/* What the threads share. */
+typedef struct visiting {
+    const hs_visit *visit;
+    hs_search      *search;
+    int64_t        *n_visited; /* by those that have ended */
+} visiting;
+
 static hs_status
-open_visitor(hs_search *search, const hs_visit *visit, visitor *doing)
+open_visitor(void *job, void *place)
 {
-    *doing = (visitor){.visit = visit};
-    hs_output_init(NULL, search->scene.ndim, WANTED, sizeof(int64_t), &doing->part);
-    return hs_recorder_init(&search->call->account, &doing->part, HS_MOST_HITS, &doing->recorder);
+    const visiting *shared = job;
+    visitor        *doing = place;
+    doing->visit = shared->visit;
+    hs_output_init(NULL, shared->search->scene.ndim, WANTED, sizeof(int64_t), &doing->part);
+    return hs_recorder_init(&shared->search->call->account, &doing->part, HS_MOST_HITS,
+                            &doing->recorder);
 }
 
 static void
-close_visitor(hs_search *search, visitor *doing)
+close_visitor(void *job, void *place)
 {
-    hs_recorder_free(&search->call->account, &doing->recorder);
+    const visiting *shared = job;
+    visitor        *doing = place;
+    *shared->n_visited += doing->n_visited;
+    hs_recorder_free(&shared->search->call->account, &doing->recorder);
     hs_output_free(&doing->part);
 }
 
-/* Each thread visits the pairs that it finds. */
-static hs_status
-visit_all(hs_search *search, const hs_visit *visit, int64_t *n_visited, hs_failure *failure)
-{
-    const int n_threads = hs_team_size(search->call->team);
-    visitor  *visitors =
-        hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n_threads, sizeof *visitors);
-    hs_status status = visitors != NULL ? HS_OK : HS_ERR_MEMORY;
-    int       opened = 0;
-    while (status == HS_OK && opened < n_threads) {
-        status = open_visitor(search, visit, &visitors[opened++]);
-    }
-    if (status == HS_OK) {
-        const hs_visitors all = {.use = HS_BLOCK_LISTS_PLACES,
-                                 .visit = visit_hits,
-                                 .contexts = visitors,
-                                 .context_size = sizeof *visitors};
-        status = hs_parallel_visit(search, &all, NULL, failure);
-    }
-    *n_visited = 0;
-    while (opened > 0) {
-        *n_visited += visitors[--opened].n_visited;
-        close_visitor(search, &visitors[opened]);
-    }
-    hs_free(&search->call->account, visitors);
-    return status == HS_ENOUGH ? HS_OK : status;
-}
-
-/* What a search calls, and how many pairs it has handed over. */
-typedef struct visiting {
-    const hs_visit *visit;
-    int64_t        *n_visited;
-} visiting;
-
-/* A hs_use_fn. */
+/* A hs_use_fn: each thread visits the pairs that it finds. */
 static hs_status
 visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
-    const visiting *doing = context;
-    if (!doing->visit->thread_safe) { /* other threads only make the search ready */
+    visiting *shared = context;
+    hs_crew   crew = {.call = search->call,
+                      .job = shared,
+                      .worker_size = sizeof(visitor),
+                      .open = open_visitor,
+                      .close = close_visitor};
+    shared->search = search;
+    if (!shared->visit->thread_safe) { /* other threads only make the search ready */
         hs_call_dismiss(search->call);
     }
-    const hs_status status = visit_all(search, doing->visit, n_pairs, failure);
-    *doing->n_visited = *n_pairs;
-    return status;
+    hs_status status = hs_crew_open(&crew);
+    if (status == HS_OK) {
+        const hs_visitors all = {.use = HS_BLOCK_LISTS_PLACES,
+                                 .visit = visit_hits,
+                                 .contexts = crew.workers,
+                                 .context_size = crew.worker_size};
+        status = hs_parallel_visit(search, &all, NULL, failure);
+    }
+    hs_crew_close(&crew);
+    *n_pairs = *shared->n_visited;
+    return status == HS_ENOUGH ? HS_OK : status;
 }
 
 hs_status
 hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
                int64_t *n_visited, hs_failure *failure)
 {
-    visiting doing = {.visit = visit, .n_visited = n_visited};
+    visiting shared = {.visit = visit, .n_visited = n_visited};
     if (n_visited != NULL) {
         *n_visited = 0;
     }
@@ -146,5 +139,5 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
     of_visit.index_bytes = 8;
     of_visit.out = NULL;
     request.sets.keeps_none = true;
-    return hs_request_use(&request, visit_pairs, &doing, failure);
+    return hs_request_use(&request, visit_pairs, &shared, failure);
 }

@@ -6,7 +6,7 @@
 #include <limits.h>
 #include <math.h>
 
-#include "../base/poll.h"
+#include "../base/outcome.h"
 #include "../base/want.h"
 
 /* Most bytes from one end of an array to the other: a little less than addresses allow, because the

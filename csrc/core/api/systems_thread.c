@@ -5,22 +5,42 @@
 
 #include "../search/estimate.h"
 #include "../base/poll.h"
+#include "../collect/crew.h"
+#include "../collect/parallel.h"
+#include "../collect/record.h"
 #include "../collect/sort_pairs.h"
-#include "../search/search_build.h"
+#include "../search/search_open.h"
 
 #include <string.h>
+
+/* Points that a range of systems should have: their pairs fit the backlog of a thread, so that
+ * it seldom waits for others, and taking a range costs little beside them. */
+#define RANGE_POINTS 512
 
 /* Candidates between two polls, and as how many the rest of a system counts. */
 #define POLL_WORK   (INT64_C(1) << 21)
 #define SYSTEM_WORK 1024
 
+/* What one thread works with. */
+typedef struct worker {
+    hs_committer          committer;
+    const hs_systems_job *job;
+    hs_call               call;   /* with this thread's poll */
+    hs_search             search; /* of one system after the other */
+    hs_box                box;    /* of the present system, where each has its own */
+    hs_output            *target; /* the job's output, or the backlog's */
+    hs_backlog            backlog;
+    hs_output             found; /* pairs of one system before they are sorted */
+    int64_t               work;  /* since the last poll */
+} worker;
+
 const hs_box *
-hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points, hs_box *own_box)
+hs_systems_take(const hs_systems_job *job, int64_t s, hs_points *points, hs_box *own_box)
 {
-    const hs_systems *systems = crew->systems;
+    const hs_systems *systems = job->systems;
     const int64_t     first = systems->first[s];
-    const int         d = crew->points->ndim;
-    *points = *crew->points;
+    const int         d = job->points->ndim;
+    *points = *job->points;
     points->n = systems->first[s + 1] - first;
     if (points->n > 0) { /* without points there is no first row */
         points->data = (const char *)points->data + first * points->row_stride;
@@ -39,47 +59,47 @@ hs_systems_take(const hs_systems_crew *crew, int64_t s, hs_points *points, hs_bo
 /* Makes the scene of system s ready; its points keep their numbers among the points of all
  * systems. */
 static hs_status
-build_system(hs_systems_worker *worker, int64_t s)
+build_system(worker *me, int64_t s)
 {
-    const hs_systems_crew *crew = worker->crew;
-    const hs_systems      *systems = crew->systems;
-    const int64_t          first = systems->first[s];
-    hs_points              points;
-    const hs_box          *box = hs_systems_take(crew, s, &points, &worker->box);
+    const hs_systems_job *job = me->job;
+    const hs_systems     *systems = job->systems;
+    const int64_t         first = systems->first[s];
+    hs_points             points;
+    const hs_box         *box = hs_systems_take(job, s, &points, &me->box);
     if (systems->cutoffs != NULL) {
-        worker->call.options.cutoff = systems->cutoffs[s];
+        me->call.options.cutoff = systems->cutoffs[s];
     }
     const hs_status status =
-        hs_search_build(&(hs_sets){.points = &points}, box, &worker->search, &worker->failure);
+        hs_search_build(&(hs_sets){.points = &points}, box, &me->search, &me->committer.failure);
     if (status == HS_OK) {
-        hs_search_renumber(first, crew->points->n, &worker->search);
+        hs_search_renumber(first, job->points->n, &me->search);
     } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE ||
                status == HS_ERR_ROUNDING) {
-        worker->failure.row += first;
+        me->committer.failure.row += first;
     }
     return status;
 }
 
 /* What a walker did, before it is closed. */
 static void
-note_walk(hs_systems_worker *worker, const hs_walker *walker, hs_status status)
+note_walk(worker *me, const hs_walker *walker, hs_status status)
 {
-    worker->work += walker->scanner.n_candidates;
+    me->work += walker->scanner.n_candidates;
     if (status == HS_ERR_SHIFT_RANGE) {
-        worker->failure.row = walker->scanner.failed_point;
+        me->committer.failure.row = walker->scanner.failed_point;
     }
 }
 
 static hs_status
-count_system(hs_systems_worker *worker, int64_t s)
+count_system(worker *me, int64_t s)
 {
-    hs_search *search = &worker->search;
+    hs_search *search = &me->search;
     hs_walker  walker;
     hs_status  status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
     if (status == HS_OK) {
         status = hs_walk(&walker, 0, (int32_t)search->bins.n);
-        worker->crew->counts[s] = walker.scanner.n_found;
-        note_walk(worker, &walker, status);
+        me->job->counts[s] = walker.scanner.n_found;
+        note_walk(me, &walker, status);
         hs_walker_close(search, &walker);
     }
     return status;
@@ -87,10 +107,10 @@ count_system(hs_systems_worker *worker, int64_t s)
 
 /* Records all pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
 static hs_status
-record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, void *context)
+record_system(worker *me, hs_output *output, hs_visit_fn visit, void *context)
 {
-    hs_search   *search = &worker->search;
-    hs_recorder *recorder = &worker->backlog.recorder;
+    hs_search   *search = &me->search;
+    hs_recorder *recorder = &me->backlog.recorder;
     hs_walker    walker;
     hs_status    status =
         hs_walker_init(search, hs_record_use(output->columns), visit, context, &walker);
@@ -102,7 +122,7 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
     if (status == HS_OK) {
         status = hs_walk(&walker, 0, (int32_t)search->bins.n);
     }
-    note_walk(worker, &walker, status);
+    note_walk(me, &walker, status);
     hs_recorder_free(&search->call->account, recorder);
     hs_walker_close(search, &walker);
     return status;
@@ -110,62 +130,61 @@ record_system(hs_systems_worker *worker, hs_output *output, hs_visit_fn visit, v
 
 /* Writes the pairs of the present system in ascending order. */
 static hs_status
-sort_system(hs_systems_worker *worker)
+sort_system(worker *me)
 {
-    hs_search     *search = &worker->search;
-    hs_output     *found = &worker->found;
+    hs_search     *search = &me->search;
+    hs_output     *found = &me->found;
     const unsigned columns = hs_sort_columns(search);
     if (found->columns != columns) { /* systems with images need more of them */
         hs_output_free(found);
         hs_output_init(&search->call->account, search->scene.ndim, columns, 4, found);
     }
     found->n_pairs = 0;
-    hs_status status = record_system(worker, found, hs_record_hits, &worker->backlog.recorder);
+    hs_status status = record_system(me, found, hs_record_hits, &me->backlog.recorder);
     if (status == HS_OK) {
-        status = hs_sort_pairs(search->call, search->first_point, search->scene.n, found,
-                               worker->target);
+        status =
+            hs_sort_pairs(search->call, search->first_point, search->scene.n, found, me->target);
     }
     if (status == HS_ERR_MEMORY) {
-        worker->failure.expected_pairs = (double)found->n_pairs;
+        me->committer.failure.expected_pairs = (double)found->n_pairs;
     }
     return status;
 }
 
 static hs_status
-find_system(hs_systems_worker *worker)
+find_system(worker *me)
 {
-    hs_status status = hs_estimate_by_sample(&worker->search, &worker->failure);
+    hs_status status = hs_estimate_by_sample(&me->search, &me->committer.failure);
     if (status != HS_OK) {
         return status;
     }
-    if (worker->call.options.sorted) {
-        return sort_system(worker);
+    if (me->call.options.sorted) {
+        return sort_system(me);
     }
-    return worker->crew->is_direct
-               ? record_system(worker, worker->target, hs_record_hits, &worker->backlog.recorder)
-               : record_system(worker, worker->target, hs_backlog_hits, &worker->backlog);
+    return me->job->is_direct ? record_system(me, me->target, hs_record_hits, &me->backlog.recorder)
+                              : record_system(me, me->target, hs_backlog_hits, &me->backlog);
 }
 
 static hs_status
-search_system(hs_systems_worker *worker, int64_t s)
+search_system(worker *me, int64_t s)
 {
-    hs_search *search = &worker->search;
-    hs_status  status = build_system(worker, s);
+    hs_search *search = &me->search;
+    hs_status  status = build_system(me, s);
     if (status == HS_OK) {
-        status = worker->crew->output == NULL ? count_system(worker, s) : find_system(worker);
+        status = me->job->output == NULL ? count_system(me, s) : find_system(me);
     }
     hs_search_close(search);
     hs_account_reset(&search->call->account);
     if (status != HS_OK) {
-        worker->failure.system = s;
+        me->committer.failure.system = s;
         return status;
     }
-    worker->work += SYSTEM_WORK;
-    if (worker->work > POLL_WORK) {
-        const hs_systems_crew *crew = worker->crew;
-        worker->work = 0;
+    me->work += SYSTEM_WORK;
+    if (me->work > POLL_WORK) {
+        const hs_systems_job *job = me->job;
+        me->work = 0;
         status = hs_poll(&search->call->options,
-                         (double)crew->systems->first[s + 1] / (double)crew->points->n);
+                         (double)job->systems->first[s + 1] / (double)job->points->n);
     }
     return status;
 }
@@ -174,64 +193,86 @@ search_system(hs_systems_worker *worker, int64_t s)
 static hs_status
 search_range(void *context, int64_t range)
 {
-    hs_systems_worker     *worker = context;
-    const hs_systems_crew *crew = worker->crew;
-    const int64_t          first = range * crew->in_range, left = crew->systems->n - first;
-    const int64_t          end = first + (left < crew->in_range ? left : crew->in_range);
-    hs_status              status = HS_OK;
+    worker               *me = context;
+    const hs_systems_job *job = me->job;
+    const int64_t         first = range * job->in_range, left = job->systems->n - first;
+    const int64_t         end = first + (left < job->in_range ? left : job->in_range);
+    hs_status             status = HS_OK;
     for (int64_t s = first; s < end && status == HS_OK; s++) {
-        status = search_system(worker, s);
+        status = search_system(me, s);
     }
-    if (status != HS_OK || crew->output == NULL) {
+    if (status != HS_OK || job->output == NULL) {
         return status;
     }
-    const double done = (double)crew->systems->first[end] / (double)crew->points->n;
-    if (crew->is_direct && first == 0 && done > 0.0) {
+    const double done = (double)job->systems->first[end] / (double)job->points->n;
+    if (job->is_direct && first == 0 && done > 0.0) {
         /* most batches have systems of similar size */
-        hs_output_expect(crew->output, (double)crew->output->n_pairs / done);
+        hs_output_expect(job->output, (double)job->output->n_pairs / done);
     }
     /* Of nothing, where pairs are written directly: then it only says how far this has come. */
-    return hs_commit(&worker->committer, done, true);
+    return hs_commit(&me->committer, done, true);
 }
 
-void
-hs_systems_work(void *context, int64_t task)
+/* Cannot fail: memory is taken as it is needed. */
+static hs_status
+open_worker(void *context, void *place)
 {
-    hs_systems_crew   *crew = context;
-    hs_systems_worker *worker = &crew->workers[task];
-    hs_commits_join(crew->commits, &worker->call.options, &worker->backlog.pairs,
-                    &worker->committer);
-    hs_search_begin(&worker->call, &worker->search);
-    hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
-}
-
-void
-hs_systems_open_worker(hs_systems_crew *crew, const hs_options *options, hs_systems_worker *worker)
-{
-    memset(worker, 0, sizeof *worker);
-    worker->crew = crew;
-    hs_call_begin(options, &worker->call);
-    worker->call.options = *options; /* their poll counts already, for the whole call */
-    worker->failure = HS_NO_FAILURE;
-    if (crew->systems->box != NULL) {
-        worker->box = *crew->systems->box;
+    const hs_systems_job *job = context;
+    const hs_options     *options = &job->total->options;
+    worker               *me = place;
+    me->job = job;
+    hs_call_begin(options, &me->call);
+    me->call.options = *options; /* their poll counts already, for the whole call */
+    hs_search_begin(&me->call, &me->search);
+    me->committer.options = &me->call.options;
+    if (job->systems->box != NULL) {
+        me->box = *job->systems->box;
     }
-    if (crew->output != NULL) {
-        hs_backlog_init(crew->output, &worker->committer, &worker->backlog);
-        worker->target = crew->is_direct ? crew->output : &worker->backlog.pairs;
+    if (job->output != NULL) {
+        me->committer.pairs = &me->backlog.pairs;
+        hs_backlog_init(job->output, &me->committer, &me->backlog);
+        me->target = job->is_direct ? job->output : &me->backlog.pairs;
     }
+    return HS_OK;
 }
 
-void
-hs_systems_close_worker(hs_systems_worker *worker, hs_call *total)
+/* Adds what the worker did to `total`, and frees what it has. */
+static void
+close_worker(void *context, void *place)
 {
-    hs_account *account = &worker->call.account;
-    hs_backlog_free(account, &worker->backlog);
-    hs_output_free(&worker->found);
-    hs_call_note(total, &worker->call.done);
+    hs_call    *total = ((hs_systems_job *)context)->total;
+    worker     *me = place;
+    hs_account *account = &me->call.account;
+    hs_backlog_free(account, &me->backlog);
+    hs_output_free(&me->found);
+    hs_call_note(total, &me->call.done);
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         total->account.total.bytes[p] += account->total.bytes[p];
     }
     total->account.total.bytes_peak += account->total.bytes_peak;
     hs_account_close(account);
+}
+
+hs_status
+hs_systems_search(hs_systems_job *job, hs_failure *failure)
+{
+    const int64_t n_systems = job->systems->n;
+    const int64_t in_range = RANGE_POINTS * n_systems / (job->points->n + 1);
+    job->in_range = in_range > 1 ? in_range : 1;
+    job->is_direct = hs_team_size(job->total->team) == 1 && job->output != NULL &&
+                     !job->output->fixed;
+    hs_ranges ranges = {.n = (n_systems + job->in_range - 1) / job->in_range,
+                        .search = search_range,
+                        .output = job->output};
+    hs_crew   crew = {.call = job->total,
+                      .job = job,
+                      .worker_size = sizeof(worker),
+                      .open = open_worker,
+                      .close = close_worker};
+    hs_status status = hs_crew_open(&crew);
+    if (status == HS_OK) {
+        status = hs_crew_search(&crew, &ranges, failure);
+    }
+    hs_crew_close(&crew);
+    return status;
 }

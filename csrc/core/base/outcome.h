@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * outcome.h: how a step inside the core can end besides with a status of halfshell.h. Each function
- * that returns one of these says so; none reaches the caller of the library.
+ * outcome.h: a failure that is still to be told, and how a step inside the core can end besides
+ * with a status of halfshell.h. Each function that returns one of these says so; none reaches the
+ * caller of the library.
  */
 #ifndef HS_OUTCOME_H
 #define HS_OUTCOME_H
 
 #include "../../halfshell.h"
+
+/* A failure without details. */
+#define HS_NO_FAILURE ((hs_failure){.row = -1, .column = -1, .system = -1})
 
 /* What was kept (cells, a tree, a list) does not serve: it is to be made anew. */
 #define HS_UNSERVED ((hs_status)(HS_STATUS_END + 1))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* poll.h: asking the caller whether to go on, and the failure that the caller gets. */
+/* poll.h: asking the caller whether to go on. */
 #ifndef HS_POLL_H
 #define HS_POLL_H
 
@@ -11,9 +11,6 @@
 
 /* Candidates of one neighbourhood that a pass handles between two polls: some milliseconds. */
 #define HS_POLL_CANDIDATES (1 << 18)
-
-/* A failure without details. */
-#define HS_NO_FAILURE ((hs_failure){.row = -1, .column = -1, .system = -1})
 
 /* HS_OK, or HS_ERR_INTERRUPTED when the caller wants to stop. */
 HS_ALWAYS_INLINE hs_status

@@ -2,8 +2,8 @@
 /*
  * bins.c: a stable counting sort, O(n + cells).
  *
- * The point numbers are sorted first, then the columns are gathered in their order
- * (hs_columns_gather). While the numbers are sorted the spare column holds the cell of every point.
+ * The point numbers are sorted first, then the columns are gathered in their order. While the
+ * numbers are sorted the spare column holds the cell of every point.
  *
  * With a team the points are cut into strips, each with counts of its own. Cell after cell, the
  * strips' points follow each other in the order of the strips, which is that of the points: the
@@ -163,13 +163,95 @@ sort_numbers(hs_account *account, hs_team *team, const hs_options *options, sort
     return status;
 }
 
+/* A column on its way to cell order. */
+typedef struct moving {
+    const int32_t *order;
+    const void    *from;
+    void          *to;
+    size_t         size; /* 4 or 8 bytes an entry */
+} moving;
+
+static hs_status
+gather_slab(void *context, int slab, int64_t first, int64_t last)
+{
+    const moving              *move = context;
+    const int32_t *HS_RESTRICT order = move->order;
+    (void)slab;
+    if (move->size == sizeof(double)) {
+        const uint64_t *HS_RESTRICT from = move->from;
+        uint64_t *HS_RESTRICT       to = move->to;
+        for (int64_t si = first; si < last; si++) {
+            to[si] = from[order[si]];
+        }
+    } else {
+        const uint32_t *HS_RESTRICT from = move->from;
+        uint32_t *HS_RESTRICT       to = move->to;
+        for (int64_t si = first; si < last; si++) {
+            to[si] = from[order[si]];
+        }
+    }
+    return HS_OK;
+}
+
+/* Gathers a column into the free one, and leaves its own place free. */
+static hs_status
+gather_column(hs_team *team, const hs_options *options, const hs_bins *bins, size_t size,
+              void **column, void **free_column)
+{
+    moving move = {bins->order, *column, *free_column, size};
+    *free_column = *column;
+    *column = move.to;
+    return hs_walk_slabs(team, options, bins->n, gather_slab, &move);
+}
+
+static hs_status
+gather_doubles(hs_team *team, const hs_options *options, const hs_bins *bins,
+               double *columns[HS_MAX_DIM], void **free_column)
+{
+    hs_status status = HS_OK;
+    for (int k = 0; k < bins->ndim && status == HS_OK; k++) {
+        void *column = columns[k];
+        status = gather_column(team, options, bins, sizeof(double), &column, free_column);
+        columns[k] = column;
+    }
+    return status;
+}
+
+/*
+ * Columns of x, originals and turns, as bins->order says, in the order in which they lie behind the
+ * free column: the wide ones go before the narrow ones. x_is_beside: the originals lie behind the
+ * free column, X lies apart. *end: where the last column ends that is still needed. HS_OK or
+ * HS_ERR_INTERRUPTED.
+ */
+static hs_status
+gather_columns(hs_team *team, const hs_options *options, bool x_is_beside, hs_bins *bins,
+               void *free_column, char **end)
+{
+    double  **first = x_is_beside ? bins->originals : bins->x;
+    double  **second = x_is_beside ? bins->x : bins->originals;
+    hs_status status = gather_doubles(team, options, bins, first, &free_column);
+    if (status == HS_OK && bins->keeps_originals) {
+        status = gather_doubles(team, options, bins, second, &free_column);
+    }
+    for (int r = 0; bins->turns.known && r < bins->n_periodic && status == HS_OK; r++) {
+        const bool   narrow = bins->turns.narrow[r] != NULL;
+        const size_t size = narrow ? sizeof(int32_t) : sizeof(int64_t);
+        void        *column = narrow ? (void *)bins->turns.narrow[r] : bins->turns.wide[r];
+        status = gather_column(team, options, bins, size, &column, &free_column);
+        bins->turns.narrow[r] = narrow ? column : NULL;
+        bins->turns.wide[r] = narrow ? NULL : column;
+    }
+    *end = free_column;
+    return status;
+}
+
 hs_status
 hs_bins_arrange(hs_account *account, hs_team *team, const hs_options *options,
                 const hs_scene *scene, hs_bins *bins)
 {
     char           *end = NULL;
     const hs_status status =
-        hs_columns_gather(team, options, scene->x_is_beside, bins, scene->cloud.spare, &end);
+        gather_columns(team, options, scene->x_is_beside, bins, scene->cloud.spare, &end);
     if (status == HS_OK) {
         void *last = bins->beside != NULL ? bins->beside : bins->points;
         hs_trim(account, last, (size_t)(end - (char *)last) + HS_COLUMN_PADDING);
@@ -238,80 +320,4 @@ hs_bins_free(hs_account *account, hs_bins *bins)
     bins->points = NULL;
     bins->beside = NULL;
     bins->start = NULL;
-}
-
-/* A column on its way to cell order. */
-typedef struct moving {
-    const int32_t *order;
-    const void    *from;
-    void          *to;
-    size_t         size; /* 4 or 8 bytes an entry */
-} moving;
-
-static hs_status
-gather_slab(void *context, int slab, int64_t first, int64_t last)
-{
-    const moving              *move = context;
-    const int32_t *HS_RESTRICT order = move->order;
-    (void)slab;
-    if (move->size == sizeof(double)) {
-        const uint64_t *HS_RESTRICT from = move->from;
-        uint64_t *HS_RESTRICT       to = move->to;
-        for (int64_t si = first; si < last; si++) {
-            to[si] = from[order[si]];
-        }
-    } else {
-        const uint32_t *HS_RESTRICT from = move->from;
-        uint32_t *HS_RESTRICT       to = move->to;
-        for (int64_t si = first; si < last; si++) {
-            to[si] = from[order[si]];
-        }
-    }
-    return HS_OK;
-}
-
-/* Gathers a column into the free one, and leaves its own place free. */
-static hs_status
-gather_column(hs_team *team, const hs_options *options, const hs_bins *bins, size_t size,
-              void **column, void **free_column)
-{
-    moving move = {bins->order, *column, *free_column, size};
-    *free_column = *column;
-    *column = move.to;
-    return hs_walk_slabs(team, options, bins->n, gather_slab, &move);
-}
-
-static hs_status
-gather_doubles(hs_team *team, const hs_options *options, const hs_bins *bins,
-               double *columns[HS_MAX_DIM], void **free_column)
-{
-    hs_status status = HS_OK;
-    for (int k = 0; k < bins->ndim && status == HS_OK; k++) {
-        void *column = columns[k];
-        status = gather_column(team, options, bins, sizeof(double), &column, free_column);
-        columns[k] = column;
-    }
-    return status;
-}
-
-hs_status
-hs_columns_gather(hs_team *team, const hs_options *options, bool x_is_beside, hs_bins *bins,
-                  void *free_column, char **end)
-{
-    double  **first = x_is_beside ? bins->originals : bins->x;
-    double  **second = x_is_beside ? bins->x : bins->originals;
-    hs_status status = gather_doubles(team, options, bins, first, &free_column);
-    if (status == HS_OK && bins->keeps_originals) {
-        status = gather_doubles(team, options, bins, second, &free_column);
-    }
-    for (int r = 0; bins->turns.known && r < bins->n_periodic && status == HS_OK; r++) {
-        const bool   narrow = bins->turns.narrow[r] != NULL;
-        const size_t size = narrow ? sizeof(int32_t) : sizeof(int64_t);
-        void        *column = narrow ? (void *)bins->turns.narrow[r] : bins->turns.wide[r];
-        status = gather_column(team, options, bins, size, &column, &free_column);
-        bins->turns.narrow[r] = narrow ? column : NULL;
-        bins->turns.wide[r] = narrow ? NULL : column;
-    }
-    *end = free_column;
-    return status;
 }

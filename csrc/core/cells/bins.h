@@ -50,13 +50,4 @@ void hs_bins_free(hs_account *account, hs_bins *bins);
  * so that this takes room for one column and no more.
  */
 
-/*
- * Columns of x, originals and turns, as bins->order says, in the order in which they lie behind the
- * free column: the wide ones go before the narrow ones. x_is_beside: the originals lie behind the
- * free column, X lies apart. *end: where the last column ends that is still needed. HS_OK or
- * HS_ERR_INTERRUPTED.
- */
-hs_status hs_columns_gather(hs_team *team, const hs_options *options, bool x_is_beside,
-                            hs_bins *bins, void *free_column, char **end);
-
 #endif

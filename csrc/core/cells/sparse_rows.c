@@ -3,7 +3,7 @@
  * double, then by halves. */
 #include "sparse_rows.h"
 
-#include "../base/poll.h"
+#include "sparse_grid.h"
 #include "../base/radix_sort.h"
 
 void

@@ -28,7 +28,6 @@
 #define HS_SPARSE_ROWS_H
 
 #include "bins.h"
-#include "sparse_grid.h"
 
 typedef struct hs_sparse {
     int            ndim;

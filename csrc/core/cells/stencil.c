@@ -231,13 +231,12 @@ hs_stencil_bytes(const hs_grid *grid, bool is_full)
 static bool
 grow(hs_account *account, int64_t *capacity, hs_stencil *stencil)
 {
-    hs_stencil_row *more = hs_alloc(account, HS_FOR_STENCIL, 2 * *capacity, sizeof(hs_stencil_row));
+    hs_stencil_row *more = hs_grow(account, HS_FOR_STENCIL, stencil->rows, stencil->n_rows,
+                                   2 * *capacity, sizeof(hs_stencil_row));
     if (more == NULL) {
         hs_stencil_free(account, stencil);
         return false;
     }
-    memcpy(more, stencil->rows, (size_t)stencil->n_rows * sizeof(hs_stencil_row));
-    hs_free(account, stencil->rows);
     stencil->rows = more;
     *capacity *= 2;
     return true;

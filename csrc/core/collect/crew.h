@@ -1,62 +1,48 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * crew.h: the walk over all points by several threads. Points are handed out in ranges; what a
- * thread finds in one waits in a backlog of its own until all earlier ranges have been written, so
- * that the result does not depend on the number of threads.
+ * crew.h: the threads of a call at one job. Each has a worker of its own, a struct that the
+ * caller's thread opens before the job and closes after it, also when opening a later one has
+ * failed. Work that is cut into ranges is handed out one range at a time; what is found is written
+ * in their order (in_turn.h).
  */
 #ifndef HS_CREW_H
 #define HS_CREW_H
 
-#include "../search/walk.h"
-#include "columns.h"
+#include "../threads/call.h"
 #include "in_turn.h"
-#include "record.h"
 
-/* What each thread's walker shall do with its hits, in place of recording them. */
-typedef struct hs_visitors {
-    hs_block_use            use;
-    const hs_neighbourhood *most; /* NULL, or for hs_walker_init_ordered */
-    hs_visit_fn             visit;
-    void                   *contexts; /* borrowed; of each thread, one behind another */
-    size_t                  context_size;
-} hs_visitors;
+typedef struct hs_crew {
+    hs_call *call;        /* borrowed */
+    void    *job;         /* borrowed; what the workers share */
+    size_t   worker_size; /* bytes */
+    /* The worker is zero before. It is closed also when this fails. */
+    hs_status (*open)(void *job, void *worker);
+    void (*close)(void *job, void *worker);
+    void *workers; /* owned; one for each thread, one behind another */
+    int   n_open;  /* so many of them */
+} hs_crew;
 
-/* Records all pairs in the output, by search->call->team. HS_ERR_SHIFT_RANGE sets failure->row. */
-hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
+/* Opens a worker for each thread. hs_crew_close must follow, also on failure. */
+hs_status hs_crew_open(hs_crew *crew);
+void      hs_crew_close(hs_crew *crew);
 
-/*
- * Records pairs from the bookmark on, until the output has `enough` pairs or all have been found:
- * then the bookmark says where to go on. The output has at most HS_COMMIT_BYTES a thread and one
- * block of candidates more than that. A failure leaves the bookmark, and in the output what it may.
- */
-hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough,
-                                hs_bookmark *bookmark, hs_failure *failure);
+HS_ALWAYS_INLINE void *
+hs_crew_worker(const hs_crew *crew, int64_t number)
+{
+    return (char *)crew->workers + (size_t)number * crew->worker_size;
+}
 
-/* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
-hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
-                            hs_failure *failure);
+/* Work in numbered ranges. */
+typedef struct hs_ranges {
+    int64_t     n;
+    hs_range_fn search;
+    hs_output  *output;       /* borrowed; NULL when nothing is committed */
+    int64_t     enough, most; /* pairs in the output, for hs_commits_limit; 0: all */
+    int64_t     n_written;    /* set at the end: the first ones, written to their end */
+} hs_ranges;
 
-/* Counts all pairs. */
-hs_status hs_parallel_count(hs_search *search, int64_t *count, hs_failure *failure);
-
-/*
- * Pairs on their way to a result that they cannot be written to at once, because it is
- * the caller's and has no room to spare, or because several threads fill it in a fixed order.
- */
-
-typedef struct hs_backlog {
-    hs_output     pairs; /* owned; on no account: it is small and does not stay */
-    hs_recorder   recorder;
-    hs_committer *committer; /* borrowed; takes the pairs when they are many */
-} hs_backlog;
-
-/* Columns as those of `target`; no recorder yet. */
-void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlog *backlog);
-
-/* Its pairs and recorder; harmless twice. */
-void hs_backlog_free(hs_account *account, hs_backlog *backlog);
-
-/* A hs_visit_fn. */
-hs_status hs_backlog_hits(void *backlog, hs_scanner *scanner, int32_t first, const hs_hits *hits);
+/* All workers of an open crew take ranges. Each worker begins with a hs_committer, of which it has
+ * set `options` and `pairs`. Returns the failure of the earliest range that had one. */
+hs_status hs_crew_search(hs_crew *crew, hs_ranges *ranges, hs_failure *failure);
 
 #endif

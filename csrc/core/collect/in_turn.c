@@ -102,14 +102,14 @@ ask_caller(void *context, double fraction)
 }
 
 void
-hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs, hs_committer *committer)
+hs_commits_join(hs_commits *commits, hs_committer *committer)
 {
-    *committer = (hs_committer){.commits = commits,
-                                .options = options,
-                                .pairs = pairs,
-                                .poll = options->poll,
-                                .poll_context = options->poll_context,
-                                .range = -1};
+    hs_options *options = committer->options;
+    committer->failure = HS_NO_FAILURE;
+    committer->commits = commits;
+    committer->poll = options->poll;
+    committer->poll_context = options->poll_context;
+    committer->range = -1;
     hs_mutex_lock(&commits->mutex);
     commits->n_working++;
     hs_mutex_unlock(&commits->mutex);
@@ -141,7 +141,7 @@ take_range(hs_committer *committer)
 /* This range has failed: all threads stop. A status that only follows from another failure is not
  * noted. */
 static void
-fail(hs_committer *committer, hs_status status, const hs_failure *failure)
+fail(hs_committer *committer, hs_status status)
 {
     hs_commits *commits = committer->commits;
     const bool  stopped = status == HS_STOPPED ||
@@ -149,7 +149,7 @@ fail(hs_committer *committer, hs_status status, const hs_failure *failure)
     hs_mutex_lock(&commits->mutex);
     if (!stopped && (commits->status == HS_OK || committer->range < commits->failed_range)) {
         commits->status = status;
-        commits->failure = *failure;
+        commits->failure = committer->failure;
         commits->failed_range = committer->range;
     }
     hs_condition_wake(&commits->changed);
@@ -294,8 +294,7 @@ leave(hs_committer *committer)
 }
 
 void
-hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
-                const hs_failure *failure)
+hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker)
 {
     hs_status status = HS_OK;
     while (status == HS_OK && take_range(committer)) {
@@ -305,10 +304,10 @@ hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
         status = write_parts(committer, true);
     }
     if (status != HS_OK) {
-        fail(committer, status, failure);
+        fail(committer, status);
     }
     status = leave(committer);
     if (status != HS_OK) {
-        fail(committer, status, failure);
+        fail(committer, status);
     }
 }

@@ -4,9 +4,9 @@
  * ranges, which are handed out one at a time; what is found in one is written when all earlier
  * ranges have been, so that the result does not depend on the number of threads.
  *
- * Usage, in each thread of a crew:
- *     hs_commits_join(commits, options, pairs, &committer);
- *     hs_commits_work(&committer, search_range, worker, &failure);
+ * Usage, in each thread of a crew (crew.h), with the committer's options and pairs set:
+ *     hs_commits_join(commits, &committer);
+ *     hs_commits_work(&committer, search_range, worker);
  * where search_range collects pairs and calls hs_commit, for the last time at its end.
  */
 #ifndef HS_IN_TURN_H
@@ -32,11 +32,12 @@ typedef struct hs_commit_part {
 
 /* What one thread needs to take ranges and commit their pairs. */
 typedef struct hs_committer {
-    hs_commits    *commits; /* borrowed */
     hs_options    *options; /* borrowed; its poll tells whether to go on */
+    hs_output     *pairs;   /* borrowed: where the thread collects them; NULL when counting */
+    hs_failure     failure; /* of its range that fails */
+    hs_commits    *commits; /* borrowed */
     hs_poll_fn     poll;    /* as it was before; for the caller's thread */
     void          *poll_context;
-    hs_output     *pairs;   /* borrowed: where the thread collects them; NULL when counting */
     int64_t        range;   /* that the thread is working on */
     int64_t        written; /* of the pairs, those that are in the output already */
     bool           is_full; /* the output has most pairs, and the range goes on: leave it */
@@ -61,19 +62,17 @@ int64_t hs_commits_written(const hs_commits *commits);
 /* After all threads are done: HS_OK, or the failure of the earliest range that had one. Frees. */
 hs_status hs_commits_end(hs_account *account, hs_commits *commits, hs_failure *failure);
 
-/* Called by the thread itself. pairs: NULL when it commits nothing. options: those that it works
- * with; they are changed: threads that may not poll look whether another has failed, and the
- * caller's thread tells a fraction that never falls. committer must outlive them. */
-void hs_commits_join(hs_commits *commits, hs_options *options, hs_output *pairs,
-                     hs_committer *committer);
+/* Called by the thread itself, whose committer has options and pairs, and nothing else. The options
+ * are changed: threads that may not poll look whether another has failed, and the caller's thread
+ * tells a fraction that never falls. committer must outlive them. */
+void hs_commits_join(hs_commits *commits, hs_committer *committer);
 
 /*
  * Takes ranges as long as there are any and no thread has failed, and waits until all that was
- * committed has been written. All threads stop when a range fails; `failure` tells why it did. The
- * caller's thread then waits for the others, and polls meanwhile.
+ * committed has been written. All threads stop when a range fails; the committer's failure tells
+ * why it did. The caller's thread then waits for the others, and polls meanwhile.
  */
-void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker,
-                     const hs_failure *failure);
+void hs_commits_work(hs_committer *committer, hs_range_fn search_range, void *worker);
 
 /*
  * Commits what has been collected: with `ends` the whole range, else a part of it. Writes it if the

@@ -74,4 +74,10 @@ double hs_keep_within(double distance, double cutoff, bool inclusive);
 bool hs_metric_within_double(const hs_metric *metric, const double *p, const double *q,
                              const int64_t *shift);
 
+/* Which of two points is nearer: the sign of |D1|^2 - |D2|^2 for two vectors of one metric, -1, 0
+ * or 1; its cutoff plays no part, but for floats_usable. Callers must have set round to nearest
+ * without flushing. In metric_compare.c. */
+int hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span *other,
+                      hs_stages *stages);
+
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* metric_compare.c: double-words first, then integers. docs/exactness.md derives the bounds. */
-#include "metric_compare.h"
+#include "metric.h"
 
 #include "metric_float.h"
 #include "metric_integer.h"

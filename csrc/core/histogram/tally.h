@@ -9,7 +9,7 @@
 
 #include "edges.h"
 #include "weights.h"
-#include "../search/walk.h"
+#include "../search/scanner.h"
 
 /* What all threads count by; only read. */
 typedef struct hs_tally_plan {
@@ -23,6 +23,12 @@ typedef struct hs_tally_plan {
     int64_t          n_groups; /* pairs of types that are told apart */
     int32_t         *group;    /* owned; n_types * n_types; when has_types */
 } hs_tally_plan;
+
+/* In tally_plan.c. The plan is zero before. hs_tally_plan_close must follow, also on failure: of
+ * HS_ERR_MEMORY, HS_ERR_EDGES, HS_ERR_TYPES and HS_ERR_WEIGHTS. */
+hs_status hs_tally_plan_open(hs_search *search, const hs_histogram *histogram, hs_tally_plan *plan,
+                             hs_failure *failure);
+void      hs_tally_plan_close(hs_tally_plan *plan);
 
 #define HS_TALLY_TABLES 4 /* extents that a walk may meet again; each a power of two */
 #define HS_TALLY_COPIES 4 /* of small histograms: counting does not wait for the last count */

@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #ifdef HS_TESTING
 #include <stdatomic.h>
 #endif
@@ -217,6 +218,19 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
         hs_account_take(account, purpose, (int64_t)bytes);
     }
     return block;
+}
+
+void *
+hs_grow(hs_account *account, hs_purpose purpose, void *block, int64_t held, int64_t count,
+        size_t size)
+{
+    void *larger = hs_alloc(account, purpose, count, size);
+    if (larger != NULL && block != NULL) {
+        HS_ASSERT(held <= count);
+        memcpy(larger, block, (size_t)held * size);
+        hs_free(account, block);
+    }
+    return larger;
 }
 
 void

@@ -63,6 +63,11 @@ void hs_account_give(hs_account *account, int64_t bytes);
  * account NULL: neither counted nor limited. */
 void *hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size);
 
+/* A larger block with the first `held` of its entries in place of one from hs_alloc, or of NULL.
+ * NULL when refused: then that one is as it was. */
+void *hs_grow(hs_account *account, hs_purpose purpose, void *block, int64_t held, int64_t count,
+              size_t size);
+
 /*
  * Keeps the first `bytes` bytes of a block and gives the rest back, where the system takes it:
  * large blocks on Linux. Elsewhere nothing happens. The block stays where it is.

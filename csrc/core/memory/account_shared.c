@@ -7,8 +7,6 @@
 
 #include "../base/os_thread.h"
 
-#include <string.h>
-
 struct hs_shared {
     hs_account *account;
     hs_mutex    mutex; /* guards it */
@@ -38,13 +36,8 @@ bool
 hs_shared_resize(hs_shared *shared, void **block, int64_t held, int64_t count, size_t size)
 {
     hs_mutex_lock(&shared->mutex);
-    void *larger = hs_alloc(shared->account, HS_FOR_CANDIDATES, count, size);
+    void *larger = hs_grow(shared->account, HS_FOR_CANDIDATES, *block, held, count, size);
     if (larger != NULL) {
-        if (*block != NULL) {
-            HS_ASSERT(held <= count);
-            memcpy(larger, *block, (size_t)held * size);
-        }
-        hs_free(shared->account, *block);
         *block = larger;
     }
     hs_mutex_unlock(&shared->mutex);

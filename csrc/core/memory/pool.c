@@ -6,6 +6,7 @@
 #endif
 #include "pool.h"
 
+#include "../../halfshell.h"
 #include "chunk.h"
 
 #include <string.h>

@@ -17,7 +17,6 @@
 #ifndef HS_POOL_H
 #define HS_POOL_H
 
-#include "../../halfshell.h"
 #include "../base/base.h"
 
 #define HS_POOL_LIMIT ((size_t)256 << 20) /* bytes kept, unless set: one large result */

@@ -121,4 +121,18 @@ hs_status hs_near_bound(const hs_near *near, const hs_options *options, hs_near_
 /* Exponent of the radius: 2^-exponent is the unit in which it is between 1 and 2. */
 int hs_near_exponent(double radius);
 
+/*
+ * A scene and trees, made anew or borrowed from cells that keep them: everything of `near` but k,
+ * of_spot, omits_self and rows, which are set already, as is its search but for scene, bins, kernel
+ * and threads. sets->trees: NULL, or what keeps a tree of the points. `limit`: the largest
+ * distance. hs_near_release in any case. In nearest_prepare.c.
+ */
+hs_status hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
+                          hs_failure *failure);
+void      hs_near_release(hs_near *near);
+
+/* Writes all rows, by all threads of the team. HS_ERR_MEMORY, HS_ERR_INTERRUPTED;
+ * HS_ERR_SHIFT_RANGE sets failure->row. In nearest_search.c. */
+hs_status hs_near_search(hs_near *near, hs_failure *failure);
+
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* nearest_prepare.c: chooses a cutoff that scales the scene without loss, then builds the trees or
  * borrows the kept one. */
-#include "nearest_prepare.h"
+#include "nearest.h"
 
 #include "nearest_kept.h"
 #include "../base/outcome.h"

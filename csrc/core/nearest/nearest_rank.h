@@ -6,7 +6,6 @@
 #ifndef HS_NEAREST_RANK_H
 #define HS_NEAREST_RANK_H
 
-#include "../exact/metric_compare.h"
 #include "nearest_block.h"
 #include "nearest_keys.h"
 

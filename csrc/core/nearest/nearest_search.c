@@ -7,9 +7,7 @@
  * Points that found too few, and groups for which the guess is of no use, are searched one by one,
  * with a radius that surely suffices: so the cost follows n and k, however unevenly points lie.
  */
-#include "nearest_search.h"
-
-#include "../collect/in_turn.h"
+#include "../collect/crew.h"
 #include "nearest_write.h"
 #include "../base/outcome.h"
 #include "../base/poll.h"
@@ -39,37 +37,34 @@ typedef struct near_part {
     int32_t first, last;
 } near_part;
 
-typedef struct near_crew {
-    hs_near            *near;
-    near_part          *parts;
-    int64_t             n_parts;
-    int64_t            *ranges; /* the first part of each, and behind the last one n_parts */
-    int64_t             n_ranges;
-    hs_commits         *commits;
-    struct near_worker *workers;
-} near_crew;
+/* What the threads share. */
+typedef struct near_job {
+    hs_near   *near;
+    near_part *parts;
+    int64_t    n_parts;
+    int64_t   *ranges; /* the first part of each, and behind the last one n_parts */
+    int64_t    n_ranges;
+} near_job;
 
-/* What one thread works with. */
+/* What one thread works with; rows are written where they belong, not committed. */
 typedef struct near_worker {
-    near_crew      *crew;
-    hs_options      options;
     hs_committer    committer;
-    hs_output       nothing; /* rows are written where they belong, not committed */
+    const near_job *job;
+    hs_options      options;
     hs_near_group   groups[RANGE_GROUPS];
     hs_near_leaves  leaves;
     hs_near_block   block;
     hs_near_bounder bounder;
     hs_near_ranker  ranker;
     hs_near_writer  writer;
-    hs_failure      failure;
     int64_t         n_groups, n_candidates;
 } near_worker;
 
 static hs_status
 fail_shift(near_worker *worker)
 {
-    worker->failure.row = worker->writer.failed;
-    worker->failure.in_queries = worker->crew->near->search->has_queries;
+    worker->committer.failure.row = worker->writer.failed;
+    worker->committer.failure.in_queries = worker->job->near->search->has_queries;
     return HS_ERR_SHIFT_RANGE;
 }
 
@@ -98,7 +93,7 @@ finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_
 static hs_status
 finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
 {
-    const hs_near *near = worker->crew->near;
+    const hs_near *near = worker->job->near;
     const int32_t  n_points = group->last - group->first;
     int32_t        end[HS_GROUP_POINTS];
     hs_status      status = HS_OK;
@@ -125,7 +120,7 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
 static hs_status
 search_point(near_worker *worker, int32_t si, double guess)
 {
-    const hs_near *near = worker->crew->near;
+    const hs_near *near = worker->job->near;
     hs_near_group  alone;
     uint64_t       left = 1;
     hs_near_group_set(near, si, si + 1, &alone);
@@ -144,7 +139,7 @@ search_point(near_worker *worker, int32_t si, double guess)
 static hs_status
 search_group(near_worker *worker, hs_near_group *group)
 {
-    const hs_near *near = worker->crew->near;
+    const hs_near *near = worker->job->near;
     const int32_t  n_points = group->last - group->first;
     const double   more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
     const double   most = more * MOST_CANDIDATES * ((double)near->k + n_points) + 64.0;
@@ -169,45 +164,35 @@ search_group(near_worker *worker, hs_near_group *group)
 static hs_status
 search_range(void *context, int64_t range)
 {
-    near_worker     *worker = context;
-    const near_crew *crew = worker->crew;
-    const int64_t    first = crew->ranges[range];
-    const int32_t    n = (int32_t)(crew->ranges[range + 1] - first);
-    hs_status        status = HS_OK;
+    near_worker    *worker = context;
+    const near_job *job = worker->job;
+    const int64_t   first = job->ranges[range];
+    const int32_t   n = (int32_t)(job->ranges[range + 1] - first);
+    hs_status       status = HS_OK;
     for (int32_t g = 0; g < n; g++) {
-        const near_part *part = &crew->parts[first + g];
-        hs_near_group_set(crew->near, part->first, part->last, &worker->groups[g]);
-        hs_near_guess(crew->near, &worker->groups[g]);
+        const near_part *part = &job->parts[first + g];
+        hs_near_group_set(job->near, part->first, part->last, &worker->groups[g]);
+        hs_near_guess(job->near, &worker->groups[g]);
     }
-    hs_near_leaves_find(crew->near, worker->groups, n, &worker->leaves);
+    hs_near_leaves_find(job->near, worker->groups, n, &worker->leaves);
     for (int32_t g = 0; g < n && status == HS_OK; g++) {
         status = search_group(worker, &worker->groups[g]);
     }
     if (status == HS_OK) {
-        status = hs_poll(&worker->options, (double)first / (double)crew->n_parts);
+        status = hs_poll(&worker->options, (double)first / (double)job->n_parts);
     }
     return status;
 }
 
-/* A hs_task_fn: ranges, as long as there are any. */
-static void
-work(void *context, int64_t task)
-{
-    near_crew   *crew = context;
-    near_worker *worker = &crew->workers[task];
-    hs_commits_join(crew->commits, &worker->options, &worker->nothing, &worker->committer);
-    hs_commits_work(&worker->committer, search_range, worker, &worker->failure);
-    hs_near_flush(&worker->writer);
-}
-
 static hs_status
-open_worker(near_crew *crew, near_worker *worker)
+open_worker(void *context, void *place)
 {
-    const hs_near *near = crew->near;
-    memset(worker, 0, sizeof *worker);
-    worker->crew = crew;
+    const near_job *job = context;
+    const hs_near  *near = job->near;
+    near_worker    *worker = place;
+    worker->job = job;
     worker->options = near->search->call->options;
-    worker->failure = HS_NO_FAILURE;
+    worker->committer.options = &worker->options;
     worker->ranker = (hs_near_ranker){
         .near = near, .block = &worker->block, .pace = {.options = &worker->options}};
     hs_near_writer_init(near, &worker->writer);
@@ -219,8 +204,10 @@ open_worker(near_crew *crew, near_worker *worker)
 }
 
 static void
-close_worker(const near_crew *crew, near_worker *worker)
+close_worker(void *context, void *place)
 {
+    const near_job   *job = context;
+    near_worker      *worker = place;
     const hs_stages  *stages = &worker->ranker.stages;
     const hs_counters walked = {.groups = worker->n_groups,
                                 .candidates = worker->n_candidates,
@@ -228,30 +215,31 @@ close_worker(const near_crew *crew, near_worker *worker)
                                 .by_float64 = stages->by_float64,
                                 .by_double_word = stages->by_double_word,
                                 .by_integers = stages->by_integers};
-    hs_call_note(crew->near->search->call, &walked);
+    hs_near_flush(&worker->writer);
+    hs_call_note(job->near->search->call, &walked);
     hs_near_ranker_free(&worker->ranker);
-    hs_near_bounder_free(crew->near, &worker->bounder);
-    hs_near_leaves_free(crew->near, &worker->leaves);
-    hs_near_block_free(crew->near, &worker->block);
+    hs_near_bounder_free(job->near, &worker->bounder);
+    hs_near_leaves_free(job->near, &worker->leaves);
+    hs_near_block_free(job->near, &worker->block);
 }
 
 /* Adds the points of a node, as one group or several, to the present range and new ones. */
 static void
-add_parts(near_crew *crew, const hs_tree_node *node)
+add_parts(near_job *job, const hs_tree_node *node)
 {
     for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
         const int32_t last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
-        if (crew->n_parts - crew->ranges[crew->n_ranges - 1] == RANGE_GROUPS) {
-            crew->ranges[crew->n_ranges++] = crew->n_parts;
+        if (job->n_parts - job->ranges[job->n_ranges - 1] == RANGE_GROUPS) {
+            job->ranges[job->n_ranges++] = job->n_parts;
         }
-        crew->parts[crew->n_parts++] = (near_part){first, last};
+        job->parts[job->n_parts++] = (near_part){first, last};
     }
 }
 
 /* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
  * which are larger subtrees. A larger leaf becomes several groups. */
 static void
-list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
+list_parts(near_job *job, const hs_tree *tree, int32_t *stack)
 {
     const int32_t n = tree->nodes[0].end;
     const int32_t part = n / RANGES < MOST_RANGE ? n / RANGES : MOST_RANGE;
@@ -264,47 +252,34 @@ list_parts(near_crew *crew, const hs_tree *tree, int32_t *stack)
         const int32_t       points = node->end - node->first;
         const bool          is_leaf = node->left == 0;
         if (node->first >= range_end && (points <= range_points || is_leaf)) {
-            crew->ranges[crew->n_ranges++] = crew->n_parts;
+            job->ranges[job->n_ranges++] = job->n_parts;
             range_end = node->end;
         }
         if (points <= GROUP_POINTS || is_leaf) {
-            add_parts(crew, node);
+            add_parts(job, node);
             number = stack[--n_waiting];
         } else {
             stack[n_waiting++] = node->left + 1;
             number = node->left;
         }
     }
-    crew->ranges[crew->n_ranges] = crew->n_parts;
+    job->ranges[job->n_ranges] = job->n_parts;
 }
 
-/* Runs all workers. */
 static hs_status
-run_crew(near_crew *crew, hs_account *account, hs_failure *failure)
+search_ranges(near_job *job, hs_failure *failure)
 {
-    hs_search *search = crew->near->search;
-    const int  n_workers = hs_team_size(search->call->team);
-    int        opened = 0;
-    hs_status  status = HS_OK;
-    crew->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof(near_worker));
-    crew->commits = hs_commits_new(account, NULL, crew->n_ranges);
-    if (crew->workers == NULL || crew->commits == NULL) {
-        status = HS_ERR_MEMORY;
-    }
-    while (status == HS_OK && opened < n_workers) {
-        status = open_worker(crew, &crew->workers[opened++]);
-    }
+    hs_ranges ranges = {.n = job->n_ranges, .search = search_range};
+    hs_crew   crew = {.call = job->near->search->call,
+                      .job = job,
+                      .worker_size = sizeof(near_worker),
+                      .open = open_worker,
+                      .close = close_worker};
+    hs_status status = hs_crew_open(&crew);
     if (status == HS_OK) {
-        hs_team_run(search->call->team, n_workers, work, crew);
+        status = hs_crew_search(&crew, &ranges, failure);
     }
-    for (int w = 0; w < opened; w++) {
-        close_worker(crew, &crew->workers[w]);
-    }
-    if (crew->commits != NULL) {
-        const hs_status ended = hs_commits_end(account, crew->commits, failure);
-        status = status == HS_OK ? ended : status;
-    }
-    hs_free(account, crew->workers);
+    hs_crew_close(&crew);
     return status;
 }
 
@@ -313,7 +288,7 @@ hs_near_search(hs_near *near, hs_failure *failure)
 {
     hs_search    *search = near->search;
     hs_account   *account = &search->call->account;
-    near_crew     crew = {.near = near};
+    near_job      job = {.near = near};
     const int64_t n = hs_search_asking(search)->n;
     for (int64_t row = 0; near->tree.n_nodes == 0 && row < n; row++) {
         hs_near_write_nothing(near, row, 0);
@@ -323,17 +298,17 @@ hs_near_search(hs_near *near, hs_failure *failure)
     }
     const int64_t most_parts = near->asking->n_nodes + n / GROUP_POINTS + 1;
     int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
-    crew.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *crew.parts);
-    crew.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *crew.ranges);
+    job.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *job.parts);
+    job.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *job.ranges);
     near->shared = hs_shared_new(account);
     hs_status status = HS_ERR_MEMORY;
-    if (stack != NULL && crew.parts != NULL && crew.ranges != NULL && near->shared != NULL) {
-        list_parts(&crew, near->asking, stack);
-        status = run_crew(&crew, account, failure);
+    if (stack != NULL && job.parts != NULL && job.ranges != NULL && near->shared != NULL) {
+        list_parts(&job, near->asking, stack);
+        status = search_ranges(&job, failure);
     }
     hs_shared_free(near->shared);
-    hs_free(account, crew.ranges);
-    hs_free(account, crew.parts);
+    hs_free(account, job.ranges);
+    hs_free(account, job.parts);
     hs_free(account, stack);
     return status;
 }

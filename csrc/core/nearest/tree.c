@@ -43,12 +43,11 @@ grow(tree_builder *builder)
     if (tree->capacity == INT32_MAX) {
         return false;
     }
-    hs_tree_node *nodes = hs_alloc(builder->account, HS_FOR_CELLS, capacity, sizeof *nodes);
+    hs_tree_node *nodes = hs_grow(builder->account, HS_FOR_CELLS, tree->nodes, tree->n_nodes,
+                                  capacity, sizeof *nodes);
     if (nodes == NULL) {
         return false;
     }
-    memcpy(nodes, tree->nodes, (size_t)tree->n_nodes * sizeof *nodes);
-    hs_free(builder->account, tree->nodes);
     tree->nodes = nodes;
     tree->capacity = capacity;
     return true;

@@ -3,7 +3,7 @@
  * write j, then i. */
 #include "once.h"
 
-#include "table_rows.h"
+#include "table.h"
 #include "../base/outcome.h"
 #include "../base/poll.h"
 #include "../search/walk.h"

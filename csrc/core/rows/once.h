@@ -7,7 +7,7 @@
 #ifndef HS_ONCE_H
 #define HS_ONCE_H
 
-#include "table.h"
+#include "table_rows.h"
 
 /* Whether to try: i and j, nothing else, in columns of the search's own, by one thread. */
 bool hs_once_applies(const hs_table *table);

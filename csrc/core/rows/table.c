@@ -5,6 +5,7 @@
 
 #include "../base/outcome.h"
 #include "../collect/crew.h"
+#include "../collect/parallel.h"
 
 #include <string.h>
 
@@ -111,31 +112,36 @@ hs_table_measure(hs_table *table, hs_failure *failure)
 }
 
 static hs_status
+open_filler(void *table, void *filler)
+{
+    return hs_filler_open(table, ((hs_table *)table)->entries, filler);
+}
+
+static void
+close_filler(void *table, void *filler)
+{
+    (void)table;
+    hs_filler_close(filler);
+}
+
+static hs_status
 fill_all(hs_table *table, hs_failure *failure)
 {
-    hs_account *account = &table->search->call->account;
-    const int   n_fillers = hs_team_size(table->search->call->team);
-    hs_status   status = HS_OK;
-    int         opened = 0;
-    hs_filler  *fillers = hs_alloc(account, HS_FOR_CANDIDATES, n_fillers, sizeof *fillers);
-    if (fillers == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    while (opened < n_fillers && status == HS_OK) {
-        status = hs_filler_open(table, table->entries, &fillers[opened++]);
-    }
+    hs_crew   crew = {.call = table->search->call,
+                      .job = table,
+                      .worker_size = sizeof(hs_filler),
+                      .open = open_filler,
+                      .close = close_filler};
+    hs_status status = hs_crew_open(&crew);
     if (status == HS_OK) {
         const hs_visitors visitors = {.use = hs_record_use(table->entries->columns),
                                       .most = &table->most,
                                       .visit = hs_fill_rows,
-                                      .contexts = fillers,
-                                      .context_size = sizeof *fillers};
+                                      .contexts = crew.workers,
+                                      .context_size = crew.worker_size};
         status = hs_parallel_visit(table->search, &visitors, NULL, failure);
     }
-    while (opened > 0) {
-        hs_filler_close(&fillers[--opened]);
-    }
-    hs_free(account, fillers);
+    hs_crew_close(&crew);
     return status;
 }
 

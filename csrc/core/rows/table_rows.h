@@ -4,7 +4,7 @@
 #ifndef HS_TABLE_ROWS_H
 #define HS_TABLE_ROWS_H
 
-#include "../collect/record.h"
+#include "../collect/recorder.h"
 
 /* Columns of a table that are measured, not numbers. */
 #define HS_MEASURES (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT)

@@ -8,7 +8,6 @@
 #ifndef HS_CLOSE_GAPS_H
 #define HS_CLOSE_GAPS_H
 
-#include "../box/lattice.h"
 #include "points.h"
 
 /* Points, queries. */

@@ -206,6 +206,32 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
     return status;
 }
 
+/* Coordinate k of point i. */
+static double
+entry_at(const hs_points *points, int64_t i, int k)
+{
+    const char *entry =
+        (const char *)points->data + i * points->row_stride + k * points->column_stride;
+    float  narrow;
+    double x;
+    if (points->real == HS_FLOAT32) {
+        memcpy(&narrow, entry, sizeof narrow);
+        return (double)narrow;
+    }
+    memcpy(&x, entry, sizeof x);
+    return x;
+}
+
+void
+hs_points_copy(const hs_points *points, double *rows)
+{
+    for (int64_t i = 0; i < points->n; i++) {
+        for (int k = 0; k < points->ndim; k++) {
+            *rows++ = entry_at(points, i, k);
+        }
+    }
+}
+
 void
 hs_points_range(const hs_points *points, double *lower, double *upper)
 {
@@ -213,16 +239,7 @@ hs_points_range(const hs_points *points, double *lower, double *upper)
         lower[k] = INFINITY;
         upper[k] = -INFINITY;
         for (int64_t i = 0; i < points->n; i++) {
-            const char *entry =
-                (const char *)points->data + i * points->row_stride + k * points->column_stride;
-            float  narrow;
-            double x;
-            if (points->real == HS_FLOAT32) {
-                memcpy(&narrow, entry, sizeof narrow);
-                x = (double)narrow;
-            } else {
-                memcpy(&x, entry, sizeof x);
-            }
+            const double x = entry_at(points, i, k);
             lower[k] = hs_smaller(x, lower[k]);
             upper[k] = hs_larger(x, upper[k]);
         }

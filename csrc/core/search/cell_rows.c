@@ -2,6 +2,8 @@
 /* cell_rows.c: dense rows go by cell ids, sparse rows by a search for their indices. */
 #include "cell_rows.h"
 
+#include "../cells/sparse_grid.h"
+
 #include <math.h>
 
 /*

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* search_build.c: the scene first, then the grid, its stencil, and the points sorted into its
  * cells. */
-#include "search_build.h"
+#include "search_open.h"
 
 #include "../base/outcome.h"
+#include "../cells/sparse_grid.h"
 
 #include "estimate.h"
 

@@ -4,9 +4,6 @@
 
 #include "../base/outcome.h"
 
-#include "search_build.h"
-#include "search_reuse.h"
-
 /* Records the limit for the MemoryError message. */
 static hs_status
 tell_limit(const hs_call *call, hs_status status, hs_failure *failure)

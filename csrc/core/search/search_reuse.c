@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* search_reuse.c: a copy of the other search that borrows its arrays, with a reach and queries of
  * its own. */
-#include "search_reuse.h"
+#include "search_open.h"
 
 #include "../base/outcome.h"
 
 #include "estimate.h"
-#include "search_build.h"
 
 /* Scaled cutoffs as small as this keep all their digits. */
 #define SMALLEST_CUTOFF 0x1p-500

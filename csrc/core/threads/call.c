@@ -3,7 +3,7 @@
  * adds. */
 #include "call.h"
 
-#include "../base/poll.h"
+#include "../base/outcome.h"
 
 #include <string.h>
 
@@ -37,11 +37,24 @@ hs_call_begin(const hs_options *options, hs_call *call)
 }
 
 hs_failure *
+hs_enter(hs_failure *failure, hs_entry *entry)
+{
+    failure = failure != NULL ? failure : &entry->ignored;
+    *failure = HS_NO_FAILURE;
+    entry->saved = hs_fpenv_enter();
+    return failure;
+}
+
+void
+hs_leave(const hs_entry *entry)
+{
+    hs_fpenv_leave(entry->saved);
+}
+
+hs_failure *
 hs_call_enter(const hs_options *options, hs_failure *failure, hs_call *call)
 {
-    failure = failure != NULL ? failure : &call->ignored;
-    *failure = HS_NO_FAILURE;
-    call->saved = hs_fpenv_enter();
+    failure = hs_enter(failure, &call->entry);
     hs_call_begin(options, call);
     return failure;
 }
@@ -51,7 +64,7 @@ hs_call_leave(hs_call *call, int64_t n_pairs)
 {
     hs_call_dismiss(call);
     hs_call_report(call, n_pairs);
-    hs_fpenv_leave(call->saved);
+    hs_leave(&call->entry);
 }
 
 int

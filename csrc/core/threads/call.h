@@ -13,6 +13,12 @@
 
 #include "../../kernels/kernel.h"
 
+/* The way into a public function and out of it. */
+typedef struct hs_entry {
+    hs_failure ignored; /* written to when the caller does not want to know */
+    hs_fpenv   saved;   /* the caller's floating-point environment */
+} hs_entry;
+
 typedef struct hs_call {
     hs_account       account;
     hs_options       options;      /* the caller's; their poll counts how often it is called */
@@ -21,17 +27,19 @@ typedef struct hs_call {
     hs_counters      done;         /* by walkers that have finished */
     hs_poll_fn       callers_poll; /* behind options.poll */
     void            *callers_context;
-    hs_failure       ignored; /* written to when the caller does not want to know */
-    hs_fpenv         saved;   /* the caller's floating-point environment */
+    hs_entry         entry;
 } hs_call;
+
+/* Into the library's floating-point environment. Returns where the failure is to be written,
+ * cleared: `failure`, unless that is NULL. hs_leave must follow. */
+hs_failure *hs_enter(hs_failure *failure, hs_entry *entry);
+void        hs_leave(const hs_entry *entry);
 
 /* An account, options and their kernel; no threads yet. The call must not move while its poll is
  * used. */
 void hs_call_begin(const hs_options *options, hs_call *call);
 
-/* hs_call_begin for a public function, in the library's floating-point environment. Returns
- * where the failure is to be written, cleared: `failure`, unless that is NULL.
- * hs_call_leave must follow. */
+/* hs_enter and hs_call_begin, for a public function. hs_call_leave must follow. */
 hs_failure *hs_call_enter(const hs_options *options, hs_failure *failure, hs_call *call);
 
 /* Ends the threads, writes the counters if they are wanted, and restores the caller's environment.

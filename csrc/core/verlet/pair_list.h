@@ -5,7 +5,6 @@
 
 #include "../scene/snapshot.h"
 #include "shift_table.h"
-#include "motion.h"
 
 /*
  * The pairs within `radius` of one step, as places of points in the cell order of that step, and

@@ -3,8 +3,7 @@
  * block. */
 #include "pair_list_search.h"
 
-#include "../collect/in_turn.h"
-#include "../base/poll.h"
+#include "../collect/crew.h"
 #include "../search/walk.h"
 
 #include <string.h>
@@ -12,29 +11,20 @@
 #define PIECES_A_THREAD 4 /* so that none waits long for the others */
 #define FIRST_SHIFTED   256
 
-typedef struct crew crew;
-
 /* What one thread works with. */
 typedef struct worker {
-    crew        *of;
+    hs_committer committer;
+    hs_search   *search; /* borrowed */
+    hs_pieces   *pieces; /* borrowed */
     hs_walker    walker;
     hs_piece    *piece; /* that it is working on */
     int32_t     *ids;   /* owned; places in cell order of hits */
-    hs_committer committer;
-    hs_failure   failure;
     /* Of the block that was looked at last: */
     int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool     has_images;
     bool    *is_shifted; /* owned; whether a run is in another image ... */
     int32_t *shift;      /* owned; ... and which, over the given box vectors: m numbers */
 } worker;
-
-struct crew {
-    hs_search  *search;
-    hs_pieces  *pieces;
-    worker     *workers;
-    hs_commits *commits;
-};
 
 /* The shift of a run over the box vectors as given. */
 static bool
@@ -74,20 +64,16 @@ make_room(hs_piece *piece, int m)
         return true;
     }
     const int64_t capacity = piece->capacity > 0 ? 2 * piece->capacity : FIRST_SHIFTED;
-    int64_t      *at = hs_alloc(NULL, HS_FOR_SHIFTS, capacity, sizeof *at);
-    int32_t      *shift = hs_alloc(NULL, HS_FOR_SHIFTS, capacity * m, sizeof *shift);
-    if (at == NULL || shift == NULL) {
-        hs_free(NULL, at);
-        hs_free(NULL, shift);
+    int64_t *at = hs_grow(NULL, HS_FOR_SHIFTS, piece->at, piece->n_shifted, capacity, sizeof *at);
+    if (at == NULL) {
         return false;
     }
-    if (piece->n_shifted > 0) {
-        memcpy(at, piece->at, (size_t)piece->n_shifted * sizeof *at);
-        memcpy(shift, piece->shift, (size_t)(piece->n_shifted * m) * sizeof *shift);
-    }
-    hs_free(NULL, piece->at);
-    hs_free(NULL, piece->shift);
     piece->at = at;
+    int32_t *shift = hs_grow(NULL, HS_FOR_SHIFTS, piece->shift, piece->n_shifted * m, capacity * m,
+                             sizeof *shift);
+    if (shift == NULL) {
+        return false;
+    }
     piece->shift = shift;
     piece->capacity = capacity;
     return true;
@@ -208,78 +194,73 @@ take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits
 static hs_status
 search_piece(void *context, int64_t piece)
 {
-    worker       *me = context;
-    crew         *all = me->of;
-    const int64_t n = all->search->bins.n, n_pieces = all->pieces->n;
-    me->piece = &all->pieces->of[piece];
-    hs_output_expect(&me->piece->pairs, all->search->grid.expected_pairs / (double)n_pieces);
+    worker          *me = context;
+    const hs_search *search = me->search;
+    const int64_t    n = search->bins.n, n_pieces = me->pieces->n;
+    me->piece = &me->pieces->of[piece];
+    hs_output_expect(&me->piece->pairs, search->grid.expected_pairs / (double)n_pieces);
     return hs_walk_or_tell(&me->walker, (int32_t)(n * piece / n_pieces),
-                           (int32_t)(n * (piece + 1) / n_pieces), &me->failure);
+                           (int32_t)(n * (piece + 1) / n_pieces), &me->committer.failure);
 }
 
-/* A hs_task_fn: pieces, as long as there are any. */
+/* What the threads share. */
+typedef struct piece_job {
+    hs_search *search;
+    hs_pieces *pieces;
+} piece_job;
+
+static hs_status
+open_worker(void *context, void *place)
+{
+    const piece_job *job = context;
+    hs_search       *search = job->search;
+    worker          *me = place;
+    me->committer.options = &me->walker.scanner.options;
+    me->search = search;
+    me->pieces = job->pieces;
+    me->block = -1;
+    const hs_status status =
+        hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
+    if (status != HS_OK) {
+        return status;
+    }
+    hs_account     *account = &search->call->account;
+    const hs_block *block = &me->walker.scanner.block;
+    const int64_t   n_runs = block->most_runs + 1, m = search->bins.n_periodic;
+    me->ids = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING, sizeof *me->ids);
+    me->is_shifted = hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
+    me->shift = hs_alloc(account, HS_FOR_CANDIDATES, n_runs * m, sizeof *me->shift);
+    const bool complete = me->ids != NULL && me->is_shifted != NULL && me->shift != NULL;
+    return complete ? HS_OK : HS_ERR_MEMORY;
+}
+
 static void
-work(void *context, int64_t task)
+close_worker(void *context, void *place)
 {
-    crew   *all = context;
-    worker *me = &all->workers[task];
-    hs_commits_join(all->commits, &me->walker.scanner.options, NULL, &me->committer);
-    hs_commits_work(&me->committer, search_piece, me, &me->failure);
+    const piece_job *job = context;
+    hs_account      *account = &job->search->call->account;
+    worker          *me = place;
+    hs_walker_close(job->search, &me->walker);
+    hs_free(account, me->shift);
+    hs_free(account, me->is_shifted);
+    hs_free(account, me->ids);
 }
 
 static hs_status
-open_worker(crew *all, worker *me)
+search_pieces(hs_search *search, hs_pieces *pieces, hs_failure *failure)
 {
-    hs_search *search = all->search;
-    me->of = all;
-    me->failure = HS_NO_FAILURE;
-    hs_status status = hs_walker_init(search, HS_BLOCK_LISTS_PLACES, take_hits, me, &me->walker);
+    piece_job job = {.search = search, .pieces = pieces};
+    hs_ranges ranges = {.n = pieces->n, .search = search_piece};
+    hs_crew   crew = {.call = search->call,
+                      .job = &job,
+                      .worker_size = sizeof(worker),
+                      .open = open_worker,
+                      .close = close_worker};
+    hs_status status = hs_crew_open(&crew);
     if (status == HS_OK) {
-        hs_account     *account = &search->call->account;
-        const hs_block *block = &me->walker.scanner.block;
-        const int64_t   n_runs = block->most_runs + 1;
-        me->ids =
-            hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING, sizeof *me->ids);
-        me->is_shifted = hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
-        me->shift = hs_alloc(account, HS_FOR_CANDIDATES, n_runs * search->bins.n_periodic,
-                             sizeof *me->shift);
-        me->block = -1;
-        status = me->ids != NULL && me->is_shifted != NULL && me->shift != NULL ? HS_OK
-                                                                                : HS_ERR_MEMORY;
+        status = hs_crew_search(&crew, &ranges, failure);
     }
-    return status;
-}
-
-static hs_status
-run_crew(crew *all, hs_failure *failure)
-{
-    hs_account *account = &all->search->call->account;
-    const int   n_workers = hs_team_size(all->search->call->team);
-    hs_status   status = HS_OK;
-    int         opened = 0;
-    all->workers = hs_alloc(account, HS_FOR_CANDIDATES, n_workers, sizeof *all->workers);
-    if (all->workers == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    memset(all->workers, 0, (size_t)n_workers * sizeof *all->workers);
-    while (opened < n_workers && status == HS_OK) {
-        status = open_worker(all, &all->workers[opened++]);
-    }
-    if (status == HS_OK) {
-        all->commits = hs_commits_new(account, NULL, all->pieces->n);
-        status = all->commits != NULL ? HS_OK : HS_ERR_MEMORY;
-    }
-    if (status == HS_OK) {
-        hs_team_run(all->search->call->team, n_workers, work, all);
-        status = hs_commits_end(account, all->commits, failure);
-    }
-    for (int w = 0; w < opened; w++) {
-        hs_walker_close(all->search, &all->workers[w].walker);
-        hs_free(account, all->workers[w].shift);
-        hs_free(account, all->workers[w].is_shifted);
-        hs_free(account, all->workers[w].ids);
-    }
-    hs_free(account, all->workers);
+    hs_crew_close(&crew);
     return status;
 }
 
@@ -298,7 +279,6 @@ hs_pieces_free(hs_account *account, hs_pieces *pieces)
 hs_status
 hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
 {
-    crew all = {.search = search, .pieces = pieces};
     pieces->n = search->call->team == NULL ? 1 : PIECES_A_THREAD * hs_team_size(search->call->team);
     pieces->of = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, pieces->n, sizeof *pieces->of);
     if (pieces->of == NULL) {
@@ -308,7 +288,7 @@ hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
     for (int64_t p = 0; p < pieces->n; p++) {
         hs_output_init(NULL, search->scene.ndim, HS_WANT_I | HS_WANT_J, 4, &pieces->of[p].pairs);
     }
-    const hs_status status = run_crew(&all, failure);
+    const hs_status status = search_pieces(search, pieces, failure);
     if (status != HS_OK) {
         hs_pieces_free(&search->call->account, pieces);
     }

@@ -18,7 +18,7 @@
  * Everything that slabs share, read only while they work. Points are those of the list: in the cell
  * order of the step it was built for.
  */
-typedef struct hs_refilter {
+typedef struct hs_recheck {
     const hs_verlet *list;   /* borrowed */
     const hs_frame  *now;    /* the list's */
     hs_call         *call;   /* borrowed */
@@ -37,7 +37,7 @@ typedef struct hs_refilter {
     int64_t         *image;   /* owned; m for each image: its shift is image + lag_j - lag_i */
     int64_t         *lag;     /* owned; m a point */
     uint8_t         *lagging; /* owned; whether those are not all zero */
-} hs_refilter;
+} hs_recheck;
 
 /* The hits of one slab. */
 typedef struct hs_sifted {
@@ -52,45 +52,45 @@ typedef struct hs_sifted {
 } hs_sifted;
 
 /* Writes all pairs within the cutoff to the output. */
-hs_status hs_refilter_run(hs_refilter *refilter, hs_failure *failure);
+hs_status hs_recheck_run(hs_recheck *recheck, hs_failure *failure);
 
 /* The points as floats, their counts and thresholds. In recheck_points.c. */
-hs_status hs_refilter_prepare(hs_refilter *refilter);
+hs_status hs_recheck_prepare(hs_recheck *recheck);
 
 /* Decides the unsure hits of a slab, of which there are some, and takes those that are beyond the
  * cutoff from the hits. */
-void hs_refilter_settle(const hs_refilter *refilter, int32_t n_unsure, hs_sifted *slab);
+void hs_recheck_settle(const hs_recheck *recheck, int32_t n_unsure, hs_sifted *slab);
 
 /* Writes the hits. */
-void hs_refilter_put(const hs_refilter *refilter, hs_sifted *slab);
+void hs_recheck_put(const hs_recheck *recheck, hs_sifted *slab);
 
 /* Makes the scene ready that d and D are measured in, so that they have the bits that a search
  * finds, and writes them. In recheck_measure.c. */
-hs_status hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure);
-void      hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab);
+hs_status hs_recheck_open_scene(hs_recheck *recheck, hs_failure *failure);
+void      hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab);
 
 /* Room in the column of this HS_WANT_ bit for pair `at` of the output; NULL where not kept. */
 HS_ALWAYS_INLINE void *
-hs_refilter_column(const hs_refilter *refilter, unsigned bit, int64_t at)
+hs_recheck_column(const hs_recheck *recheck, unsigned bit, int64_t at)
 {
-    char *column = hs_output_column(refilter->output, bit);
-    return column == NULL ? NULL : column + (size_t)at * hs_output_width(refilter->output, bit);
+    char *column = hs_output_column(recheck->output, bit);
+    return column == NULL ? NULL : column + (size_t)at * hs_output_width(recheck->output, bit);
 }
 
 /* S of pair e over the box vectors that repeat. */
 HS_ALWAYS_INLINE void
-hs_refilter_shift(const hs_refilter *refilter, int64_t e, int64_t *shift)
+hs_recheck_shift(const hs_recheck *recheck, int64_t e, int64_t *shift)
 {
-    const hs_listing *listing = &refilter->list->listing;
-    const int         m = refilter->m;
+    const hs_listing *listing = &recheck->list->listing;
+    const int         m = recheck->m;
     for (int r = 0; r < m; r++) {
         shift[r] = e < listing->n_plain
                        ? 0
                        : listing->images.of[(int64_t)listing->code[e - listing->n_plain] * m + r];
-        if (refilter->counts != NULL) { /* modulo 2^64: exact, for the sum fits */
+        if (recheck->counts != NULL) { /* modulo 2^64: exact, for the sum fits */
             shift[r] = (int64_t)((uint64_t)shift[r] +
-                                 (uint64_t)refilter->counts[(int64_t)listing->i[e] * m + r] -
-                                 (uint64_t)refilter->counts[(int64_t)listing->j[e] * m + r]);
+                                 (uint64_t)recheck->counts[(int64_t)listing->i[e] * m + r] -
+                                 (uint64_t)recheck->counts[(int64_t)listing->j[e] * m + r]);
         }
     }
 }

@@ -9,23 +9,23 @@
 
 /* The columns that are found: those wanted, and what putting them in order needs beside them. */
 static unsigned
-columns_to_sort(const hs_refilter *refilter)
+columns_to_sort(const hs_recheck *recheck)
 {
-    const bool images = refilter->list->listing.images.n > 0;
-    return (refilter->call->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I | HS_WANT_J |
+    const bool images = recheck->list->listing.images.n > 0;
+    return (recheck->call->options.want & ~(unsigned)HS_WANT_BOTH) | HS_WANT_I | HS_WANT_J |
            (images ? HS_WANT_SHIFT : 0);
 }
 
 static hs_status
-find_sorted(hs_refilter *refilter, hs_output *output, hs_failure *failure)
+find_sorted(hs_recheck *recheck, hs_output *output, hs_failure *failure)
 {
-    hs_call  *call = refilter->call;
+    hs_call  *call = recheck->call;
     hs_output found;
-    hs_output_init(&call->account, refilter->d, columns_to_sort(refilter), 4, &found);
-    refilter->output = &found;
-    hs_status status = hs_refilter_run(refilter, failure);
+    hs_output_init(&call->account, recheck->d, columns_to_sort(recheck), 4, &found);
+    recheck->output = &found;
+    hs_status status = hs_recheck_run(recheck, failure);
     if (status == HS_OK) {
-        status = hs_sort_pairs(call, 0, refilter->now->points.n, &found, output);
+        status = hs_sort_pairs(call, 0, recheck->now->points.n, &found, output);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (double)found.n_pairs;
@@ -35,15 +35,15 @@ find_sorted(hs_refilter *refilter, hs_output *output, hs_failure *failure)
 }
 
 static hs_status
-find_pairs(hs_refilter *refilter, hs_output *output, hs_failure *failure)
+find_pairs(hs_recheck *recheck, hs_output *output, hs_failure *failure)
 {
-    const hs_call *call = refilter->call;
+    const hs_call *call = recheck->call;
     hs_status      status;
     if (call->options.sorted) {
-        status = find_sorted(refilter, output, failure);
+        status = find_sorted(recheck, output, failure);
     } else {
-        refilter->output = output;
-        status = hs_refilter_run(refilter, failure);
+        recheck->output = output;
+        status = hs_recheck_run(recheck, failure);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
@@ -53,28 +53,28 @@ find_pairs(hs_refilter *refilter, hs_output *output, hs_failure *failure)
 }
 
 static void
-set_refilter(const hs_verlet *list, hs_call *call, hs_refilter *refilter)
+set_recheck(const hs_verlet *list, hs_call *call, hs_recheck *recheck)
 {
     const hs_frame *now = &list->frames[list->now];
     double          rows[HS_MAX_DIM][HS_MAX_DIM];
-    memset(refilter, 0, sizeof *refilter);
-    refilter->list = list;
-    refilter->now = now;
-    refilter->call = call;
-    refilter->d = now->points.ndim;
-    refilter->m = hs_frame_periodic(now, refilter->vector_of_row);
-    refilter->measures = call->options.want & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
-    for (int r = 0; r < refilter->m; r++) {
-        memcpy(rows[r], now->box.rows[refilter->vector_of_row[r]], sizeof rows[r]);
+    memset(recheck, 0, sizeof *recheck);
+    recheck->list = list;
+    recheck->now = now;
+    recheck->call = call;
+    recheck->d = now->points.ndim;
+    recheck->m = hs_frame_periodic(now, recheck->vector_of_row);
+    recheck->measures = call->options.want & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
+    for (int r = 0; r < recheck->m; r++) {
+        memcpy(rows[r], now->box.rows[recheck->vector_of_row[r]], sizeof rows[r]);
     }
-    hs_metric_init(&refilter->given, refilter->d, refilter->m, (const double(*)[HS_MAX_DIM])rows,
+    hs_metric_init(&recheck->given, recheck->d, recheck->m, (const double(*)[HS_MAX_DIM])rows,
                    list->cutoff, call->options.inclusive);
 }
 
 hs_status
 hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure)
 {
-    hs_refilter      refilter;
+    hs_recheck       recheck;
     hs_call         *call = &pairs->call;
     const hs_points *points = &list->frames[list->now].points;
     if (call->kernel == NULL) {
@@ -82,8 +82,8 @@ hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure)
     }
     hs_call_gather(call, points->n);
     hs_pairs_open(pairs, points->ndim);
-    set_refilter(list, call, &refilter);
-    const hs_status status = find_pairs(&refilter, &pairs->output, failure);
-    hs_scene_free(&call->account, &refilter.scene);
+    set_recheck(list, call, &recheck);
+    const hs_status status = find_pairs(&recheck, &pairs->output, failure);
+    hs_scene_free(&call->account, &recheck.scene);
     return status;
 }

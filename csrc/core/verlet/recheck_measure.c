@@ -54,17 +54,17 @@ reduce_shift(int m, const int64_t over[][HS_MAX_DIM], const int64_t *shift, int6
 }
 
 static bool
-allocate(hs_refilter *refilter)
+allocate(hs_recheck *recheck)
 {
-    hs_account   *account = &refilter->call->account;
-    const int64_t n = refilter->now->points.n, m = refilter->m;
-    const int64_t n_images = refilter->list->listing.images.n;
-    refilter->x = hs_alloc(account, HS_FOR_POINTS, n * refilter->d, sizeof *refilter->x);
-    refilter->image = hs_alloc(account, HS_FOR_WRAPS, n_images * m, sizeof *refilter->image);
-    refilter->lag = hs_alloc(account, HS_FOR_WRAPS, n * m, sizeof *refilter->lag);
-    refilter->lagging = hs_alloc(account, HS_FOR_WRAPS, n, sizeof *refilter->lagging);
-    return refilter->x != NULL && refilter->image != NULL && refilter->lag != NULL &&
-           refilter->lagging != NULL;
+    hs_account   *account = &recheck->call->account;
+    const int64_t n = recheck->now->points.n, m = recheck->m;
+    const int64_t n_images = recheck->list->listing.images.n;
+    recheck->x = hs_alloc(account, HS_FOR_POINTS, n * recheck->d, sizeof *recheck->x);
+    recheck->image = hs_alloc(account, HS_FOR_WRAPS, n_images * m, sizeof *recheck->image);
+    recheck->lag = hs_alloc(account, HS_FOR_WRAPS, n * m, sizeof *recheck->lag);
+    recheck->lagging = hs_alloc(account, HS_FOR_WRAPS, n, sizeof *recheck->lagging);
+    return recheck->x != NULL && recheck->image != NULL && recheck->lag != NULL &&
+           recheck->lagging != NULL;
 }
 
 /*
@@ -72,37 +72,37 @@ allocate(hs_refilter *refilter)
  * over A is, for X, image + lag_j - lag_i over B with lag = w - count. For points as given, w is 0.
  */
 static void
-set_lags(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_DIM])
+set_lags(hs_recheck *recheck, bool over_given, const int64_t over[][HS_MAX_DIM])
 {
-    const hs_scene *scene = &refilter->scene;
-    const int       m = refilter->m;
-    for (int64_t a = 0; m > 0 && a < refilter->now->points.n; a++) {
-        const int64_t i = refilter->list->listing.order[a];
+    const hs_scene *scene = &recheck->scene;
+    const int       m = recheck->m;
+    for (int64_t a = 0; m > 0 && a < recheck->now->points.n; a++) {
+        const int64_t i = recheck->list->listing.order[a];
         int64_t       count[HS_MAX_DIM] = {0}, reduced[HS_MAX_DIM], any = 0;
-        if (refilter->counts != NULL) {
-            memcpy(count, refilter->counts + a * m, (size_t)m * sizeof *count);
+        if (recheck->counts != NULL) {
+            memcpy(count, recheck->counts + a * m, (size_t)m * sizeof *count);
         }
         if (!over_given) {
             reduce_shift(m, over, count, reduced);
         }
         for (int r = 0; r < m; r++) {
-            refilter->lag[a * m + r] =
+            recheck->lag[a * m + r] =
                 over_given
                     ? -count[r]
                     : (int64_t)((uint64_t)hs_turns_get(&scene->turns, r, i) - (uint64_t)reduced[r]);
-            any |= refilter->lag[a * m + r];
+            any |= recheck->lag[a * m + r];
         }
-        refilter->lagging[a] = any != 0;
+        recheck->lagging[a] = any != 0;
     }
 }
 
 static void
-set_images(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_DIM])
+set_images(hs_recheck *recheck, bool over_given, const int64_t over[][HS_MAX_DIM])
 {
-    const hs_images *images = &refilter->list->listing.images;
-    const int        m = refilter->m;
+    const hs_images *images = &recheck->list->listing.images;
+    const int        m = recheck->m;
     for (int64_t number = 0; number < images->n; number++) {
-        int64_t shift[HS_MAX_DIM], *to = refilter->image + number * m;
+        int64_t shift[HS_MAX_DIM], *to = recheck->image + number * m;
         for (int r = 0; r < m; r++) {
             shift[r] = images->of[number * m + r];
         }
@@ -115,65 +115,65 @@ set_images(hs_refilter *refilter, bool over_given, const int64_t over[][HS_MAX_D
 }
 
 static void
-set_coordinates(hs_refilter *refilter)
+set_coordinates(hs_recheck *recheck)
 {
-    const hs_scene *scene = &refilter->scene;
+    const hs_scene *scene = &recheck->scene;
     double *const  *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
-    const int       d = refilter->d;
-    const int32_t  *order = refilter->list->listing.order;
-    const int64_t   n = refilter->now->points.n;
+    const int       d = recheck->d;
+    const int32_t  *order = recheck->list->listing.order;
+    const int64_t   n = recheck->now->points.n;
     for (int64_t a = 0; a < n; a++) {
         for (int k = 0; k < d; k++) {
             if (a + AHEAD < n) {
                 HS_PREFETCH(x[k] + order[a + AHEAD]);
             }
-            refilter->x[a * d + k] = x[k][order[a]];
+            recheck->x[a * d + k] = x[k][order[a]];
         }
     }
 }
 
 hs_status
-hs_refilter_open_scene(hs_refilter *refilter, hs_failure *failure)
+hs_recheck_open_scene(hs_recheck *recheck, hs_failure *failure)
 {
-    hs_call   *call = refilter->call;
-    hs_scene  *scene = &refilter->scene;
+    hs_call   *call = recheck->call;
+    hs_scene  *scene = &recheck->scene;
     hs_options options = call->options;
     int64_t    over[HS_MAX_DIM][HS_MAX_DIM] = {{0}};
     options.want |= HS_WANT_SHIFT; /* the turns by which points were wrapped are needed */
-    const hs_status status = hs_scene_init(&call->account, call->team, &refilter->now->points,
-                                           hs_frame_box(refilter->now), &options, scene, failure);
+    const hs_status status = hs_scene_init(&call->account, call->team, &recheck->now->points,
+                                           hs_frame_box(recheck->now), &options, scene, failure);
     if (status != HS_OK) {
         return status;
     }
-    if (!allocate(refilter)) {
+    if (!allocate(recheck)) {
         return HS_ERR_MEMORY;
     }
     const bool over_given = scene->keeps_originals;
-    if (!over_given && refilter->m > 0) {
+    if (!over_given && recheck->m > 0) {
         divide_rows(&scene->lattice, over);
     }
-    set_lags(refilter, over_given, (const int64_t(*)[HS_MAX_DIM])over);
-    set_images(refilter, over_given, (const int64_t(*)[HS_MAX_DIM])over);
-    set_coordinates(refilter);
+    set_lags(recheck, over_given, (const int64_t(*)[HS_MAX_DIM])over);
+    set_images(recheck, over_given, (const int64_t(*)[HS_MAX_DIM])over);
+    set_coordinates(recheck);
     return HS_OK;
 }
 
 /* The shifts of the batch, for the scene's metric. */
 static void
-fill_shifts(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *hits,
+fill_shifts(const hs_recheck *recheck, const hs_sifted *slab, const uint16_t *hits,
             hs_measured *batch)
 {
-    const hs_listing *listing = &refilter->list->listing;
-    const int         m = refilter->m;
+    const hs_listing *listing = &recheck->list->listing;
+    const int         m = recheck->m;
     const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
     const int32_t    *code =
         slab->first < listing->n_plain ? NULL : listing->code + (slab->first - listing->n_plain);
     for (int32_t b = 0; b < batch->n; b++) {
         const int32_t  e = hits[b];
-        const int64_t *lag_i = refilter->lag + (int64_t)i[e] * m;
-        const int64_t *lag_j = refilter->lag + (int64_t)j[e] * m;
+        const int64_t *lag_i = recheck->lag + (int64_t)i[e] * m;
+        const int64_t *lag_j = recheck->lag + (int64_t)j[e] * m;
         for (int r = 0; r < m; r++) {
-            const int64_t image = code != NULL ? refilter->image[(int64_t)code[e] * m + r] : 0;
+            const int64_t image = code != NULL ? recheck->image[(int64_t)code[e] * m + r] : 0;
             const int64_t shift =
                 (int64_t)((uint64_t)image + (uint64_t)lag_j[r] - (uint64_t)lag_i[r]);
             hs_measured_shift(batch, b, r, shift);
@@ -182,46 +182,46 @@ fill_shifts(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *
 }
 
 HS_ALWAYS_INLINE void
-fill_points(const hs_refilter *refilter, const hs_sifted *slab, const uint16_t *hits, const int d,
+fill_points(const hs_recheck *recheck, const hs_sifted *slab, const uint16_t *hits, const int d,
             hs_measured *batch)
 {
-    const int32_t *i = refilter->list->listing.i + slab->first;
-    const int32_t *j = refilter->list->listing.j + slab->first;
+    const int32_t *i = recheck->list->listing.i + slab->first;
+    const int32_t *j = recheck->list->listing.j + slab->first;
     unsigned       lagging = 0;
     for (int32_t b = 0; b < batch->n; b++) {
         const int64_t p = i[hits[b]], q = j[hits[b]];
         for (int k = 0; k < d; k++) {
-            batch->p[k][b] = refilter->x[p * d + k];
-            batch->q[k][b] = refilter->x[q * d + k];
+            batch->p[k][b] = recheck->x[p * d + k];
+            batch->q[k][b] = recheck->x[q * d + k];
         }
-        lagging |= refilter->m > 0 ? refilter->lagging[p] | refilter->lagging[q] : 0;
+        lagging |= recheck->m > 0 ? recheck->lagging[p] | recheck->lagging[q] : 0;
     }
     batch->is_shifted = batch->is_wide = false;
-    if (refilter->m > 0 && (lagging != 0 || slab->first >= refilter->list->listing.n_plain)) {
-        fill_shifts(refilter, slab, hits, batch);
+    if (recheck->m > 0 && (lagging != 0 || slab->first >= recheck->list->listing.n_plain)) {
+        fill_shifts(recheck, slab, hits, batch);
     }
 }
 
 static void
-fill(const hs_refilter *refilter, const hs_sifted *slab, int32_t first, hs_measured *batch)
+fill(const hs_recheck *recheck, const hs_sifted *slab, int32_t first, hs_measured *batch)
 {
     const uint16_t *hits = slab->hits + first;
-    switch (refilter->d) {
-    case 2: fill_points(refilter, slab, hits, 2, batch); break;
-    case 3: fill_points(refilter, slab, hits, 3, batch); break;
-    default: fill_points(refilter, slab, hits, refilter->d, batch);
+    switch (recheck->d) {
+    case 2: fill_points(recheck, slab, hits, 2, batch); break;
+    case 3: fill_points(recheck, slab, hits, 3, batch); break;
+    default: fill_points(recheck, slab, hits, recheck->d, batch);
     }
 }
 
 void
-hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab)
+hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab)
 {
-    const hs_scene   *scene = &refilter->scene;
-    const hs_options *options = &refilter->call->options;
+    const hs_scene   *scene = &recheck->scene;
+    const hs_options *options = &recheck->call->options;
     const hs_scale    unscale = hs_measures_unscale(scene);
-    const int         d = refilter->d;
-    double           *distance = hs_refilter_column(refilter, HS_WANT_DISTANCE, slab->at);
-    double           *vectors = hs_refilter_column(refilter, HS_WANT_VECTOR, slab->at);
+    const int         d = recheck->d;
+    double           *distance = hs_recheck_column(recheck, HS_WANT_DISTANCE, slab->at);
+    double           *vectors = hs_recheck_column(recheck, HS_WANT_VECTOR, slab->at);
     double           *vector[HS_MAX_DIM], sign[HS_BATCH];
     hs_measured       batch;
     memset(&batch, 0, sizeof batch); /* kernels read a little beyond the last pair */
@@ -234,8 +234,8 @@ hs_refilter_measure(const hs_refilter *refilter, const hs_sifted *slab)
     for (int32_t first = 0; first < slab->n_hits; first += HS_BATCH) {
         const int32_t left = slab->n_hits - first;
         batch.n = left < HS_BATCH ? left : HS_BATCH;
-        fill(refilter, slab, first, &batch);
-        hs_measured_find(refilter->call->kernel, &scene->metric, vectors != NULL, &batch);
+        fill(recheck, slab, first, &batch);
+        hs_measured_find(recheck->call->kernel, &scene->metric, vectors != NULL, &batch);
         if (distance != NULL) {
             hs_restore_distances(batch.distance, batch.n, unscale);
             hs_keep_all_within(batch.distance, batch.n, options->cutoff, options->inclusive);

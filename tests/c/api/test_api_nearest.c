@@ -4,7 +4,7 @@
  * of the nearest, against all neighbours within a cutoff, put in order by such integers.
  */
 #include "../../../csrc/core/exact/metric_integer.h"
-#include "../../../csrc/core/exact/metric_compare.h"
+#include "../../../csrc/core/exact/metric.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
 #include "../support/near_checks.h"

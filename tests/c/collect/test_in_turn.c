@@ -21,16 +21,15 @@ typedef struct collector {
     hs_committer committer;
     hs_output    pairs;
     hs_options   options;
-    hs_failure   failure;
 } collector;
 
 static void
 open_collector(hs_commits *commits, collector *me)
 {
     me->options = hs_options_default();
-    me->failure = HS_NO_FAILURE;
     hs_output_init(NULL, 3, HS_WANT_J, 4, &me->pairs);
-    hs_commits_join(commits, &me->options, &me->pairs, &me->committer);
+    me->committer = (hs_committer){.options = &me->options, .pairs = &me->pairs};
+    hs_commits_join(commits, &me->committer);
 }
 
 /* Pairs [first, end) of a range. */
@@ -88,7 +87,7 @@ work(void *context, int64_t task)
     crew      *all = context;
     collector *me = &all->of[task];
     open_collector(all->commits, me);
-    hs_commits_work(&me->committer, all->search_range, me, &me->failure);
+    hs_commits_work(&me->committer, all->search_range, me);
     hs_output_free(&me->pairs);
 }
 
@@ -188,7 +187,7 @@ static hs_status
 fail_in_turn(void *worker, int64_t range)
 {
     collector *me = worker;
-    me->failure.row = range;
+    me->committer.failure.row = range;
     if (range == 0) {
         while (!has_begun(false)) {
         }

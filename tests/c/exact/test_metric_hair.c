@@ -4,7 +4,7 @@
  * that is the cutoff or a hair less or more: decided as big integers say.
  */
 #include "../../../csrc/core/exact/metric.h"
-#include "../../../csrc/core/exact/metric_compare.h"
+#include "../../../csrc/core/exact/metric.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
 

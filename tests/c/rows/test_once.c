@@ -3,6 +3,7 @@
  * nothing is kept. */
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/rows/once.h"
+#include "../../../csrc/core/rows/table.h"
 #include "../support/search_unit.h"
 
 void test_once(void);

@@ -2,7 +2,6 @@
 /* test_scene_kept.c: which queries a scene that was kept takes, step by step; and points that are
  * wrapped before they are scaled. */
 #include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/scene/close_gaps.h"
 #include "../../../csrc/core/scene/scene.h"
 #include "../support/harness.h"

@@ -4,6 +4,7 @@
  * not finite, and which frames a list can go from to which.
  */
 #include "../../../csrc/core/scene/snapshot.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/poll.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_pair_batch.c: shifts are kept as short as they are known to be, and those that pass the
  * integers are told, whoever looks them up. */
-#include "../../../csrc/core/collect/crew.h"
+#include "../../../csrc/core/collect/parallel.h"
 #include "../../../csrc/core/verlet/pair_list_search.h"
 #include "../support/among.h"
 #include "../support/search_unit.h"

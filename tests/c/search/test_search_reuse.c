@@ -6,7 +6,7 @@
 #include "../support/among.h"
 #include "../support/search_unit.h"
 
-#include "../../../csrc/core/search/search_reuse.h"
+#include "../../../csrc/core/search/search_open.h"
 
 void test_search_reuse(void);
 

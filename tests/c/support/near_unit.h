@@ -6,7 +6,7 @@
 
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/nearest/nearest_block.h"
-#include "../../../csrc/core/nearest/nearest_prepare.h"
+#include "../../../csrc/core/nearest/nearest.h"
 #include "harness.h"
 
 typedef struct near_unit {

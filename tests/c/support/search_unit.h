@@ -5,7 +5,6 @@
 #define HS_SEARCH_UNIT_H
 
 #include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/search/search_open.h"
 #include "../../../csrc/core/search/walk.h"
 #include "harness.h"

@@ -4,6 +4,7 @@
 #ifndef HS_SPARSE_WALK_H
 #define HS_SPARSE_WALK_H
 
+#include "../../../csrc/core/cells/sparse_grid.h"
 #include "../../../csrc/core/cells/sparse_rows.h"
 #include "../../../csrc/core/cells/stencil.h"
 #include "harness.h"

@@ -89,7 +89,8 @@ the_callers_environment_comes_back(void)
     hs_call_leave(&call, 3);
     CHECK(rounds_up() && counters.pairs == 3);
     /* A caller who does not want to know. */
-    CHECK(hs_call_enter(&options, NULL, &call) == &call.ignored && call.ignored.row == -1);
+    CHECK(hs_call_enter(&options, NULL, &call) == &call.entry.ignored &&
+          call.entry.ignored.row == -1);
     hs_call_leave(&call, 4);
     CHECK(rounds_up() && counters.pairs == 4);
     CHECK(fesetround(FE_TONEAREST) == 0);

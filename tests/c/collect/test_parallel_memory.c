@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_crew_memory.c: a search that is left half way needs room to the last pair that it leaves
+/* test_parallel_memory.c: a search that is left half way needs room to the last pair that it leaves
  * with: with one byte less it fails, and takes nothing with it. */
-#include "../../../csrc/core/collect/crew.h"
+#include "../../../csrc/core/collect/parallel.h"
 #include "../support/search_unit.h"
 
 #include <math.h>
 
-void test_crew_memory(void);
+void test_parallel_memory(void);
 
 enum { N = 700, ENOUGH = 20000 };
 
@@ -56,7 +56,7 @@ the_last_pairs_need_their_room(void)
 }
 
 void
-test_crew_memory(void)
+test_parallel_memory(void)
 {
     RUN(the_last_pairs_need_their_room);
 }
