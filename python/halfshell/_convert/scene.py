@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array, in_order
+from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
+
+if TYPE_CHECKING:
+    from halfshell._convert.types import FloatArray, PointArray
 
 MAX_DIM = 8
 MAX_POINTS = 2**31 - 1

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from halfshell._convert.arrays import PointArray
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.scene import as_points
 from halfshell._convert.search import as_rest
-from halfshell._convert.types import Precision, Progress, Search
+from halfshell._convert.types import PointArray, Precision, Progress, Search
 from halfshell._objects.origin import Origin
 
 # Of methods that search: inclusive, kernel, threads, memory_limit.
