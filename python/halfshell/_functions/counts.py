@@ -125,9 +125,9 @@ def count_pairs(
             points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
         )
         result: Any = (
-            _core.plain_count(*plain)
+            _core.plain(_core.count_pairs, *plain)
             if queries is None
-            else _core.plain_count_between(*plain, queries)
+            else _core.plain(_core.count_between, *plain, queries)
         )
         if result is not NotImplemented:
             return cast("int", result)

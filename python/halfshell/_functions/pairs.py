@@ -225,9 +225,9 @@ def pairs(
     if batch is None:
         # A small search takes as long as a handful of Python operations: none are made where the
         # arguments need no conversion.
-        result: Any = _core.plain_pairs(
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress,
-            threads, quantities, sort, index_dtype, out,
+        result: Any = _core.plain(
+            _core.pairs, points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit,
+            progress, threads, quantities, sort, index_dtype, out,
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
@@ -343,9 +343,9 @@ def pairs_between(
     """
     if type(box) is Box:
         box = box.vectors
-    result: Any = _core.plain_between(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        quantities, True, index_dtype, out, queries,
+    result: Any = _core.plain(
+        _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
+        memory_limit, None, threads, quantities, True, index_dtype, out, queries,
     )
     if result is not NotImplemented:
         return cast("Arrays", result)
