@@ -121,14 +121,15 @@ def count_pairs(
     if type(box) is Box:
         box = box.vectors
     if batch is None:
-        plain = (
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
-        )
         result: Any = (
-            _core.plain(_core.count_pairs, *plain)
-            if queries is None
-            else _core.plain(_core.count_between, *plain, queries)
-        )
+            _core.plain(
+                _core.count_pairs, points, cutoff, box, periodic, inclusive, precision, kernel,
+                memory_limit, None, threads,
+            ) if queries is None else _core.plain(
+                _core.count_between, points, cutoff, box, periodic, inclusive, precision, kernel,
+                memory_limit, None, threads, queries,
+            )
+        )  # fmt: skip
         if result is not NotImplemented:
             return cast("int", result)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
