@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Rows are as long as was asked for: what they need is known, and fewer would do. */
+/* Rows have k entries: what they need is known, and fewer would do. */
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
