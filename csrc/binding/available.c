@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* available.c: see available.h. Linux reads /proc and the control groups; other systems use what
- * physical memory they report. */
+/* available.c: Linux tells in /proc and in its control groups what memory is left; other systems
+ * report free or physical memory. */
 #include "available.h"
 
 #include "groups.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* capi.c: the table of functions for other extension modules; see halfshell_capi.h. */
+/* capi.c: the functions of halfshell.h in a table, which other extension modules find in a capsule
+ * and call without linking to this one. */
 #include "py_functions.h"
 
 #include "../halfshell_capi.h"

@@ -48,15 +48,18 @@ hs_cells_of(PyObject *object)
 }
 
 bool
-hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given)
+hs_repeats_of(PyObject *periodic, unsigned long *repeats)
+{
+    *repeats = PyLong_AsUnsignedLong(periodic);
+    return *repeats != (unsigned long)-1 || !PyErr_Occurred();
+}
+
+bool
+hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given)
 {
     *given = object != Py_None;
     if (!*given) {
         return true;
-    }
-    const unsigned long bits = PyLong_AsUnsignedLong(periodic);
-    if (bits == (unsigned long)-1 && PyErr_Occurred()) {
-        return false;
     }
     PyArrayObject *array = (PyArrayObject *)object;
     if (!PyArray_Check(object) || PyArray_TYPE(array) != NPY_DOUBLE ||
@@ -69,7 +72,7 @@ hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *giv
     const bool    has_rows = PyArray_NDIM(array) == 2;
     box->ndim = ndim;
     for (int l = 0; l < ndim; l++) {
-        box->periodic[l] = (bits >> l & 1) != 0;
+        box->periodic[l] = (repeats >> l & 1) != 0;
         for (int k = 0; k < ndim; k++) {
             box->rows[l][k] = has_rows ? entries[l * ndim + k] : k == l ? entries[l] : 0.0;
         }

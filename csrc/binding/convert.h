@@ -18,11 +18,12 @@ bool hs_points_of(PyObject *object, const char *name, hs_points *points);
 hs_cells *hs_cells_of(PyObject *object);
 #define HS_CELLS_NAME "halfshell.cells"
 
-/*
- * box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). periodic: int, bit
- * l set when box vector l repeats. *given tells whether there is a box at all.
- */
-bool hs_box_of(PyObject *object, PyObject *periodic, int ndim, hs_box *box, bool *given);
+/* periodic: int, bit l set when box vector l repeats. */
+bool hs_repeats_of(PyObject *periodic, unsigned long *repeats);
+
+/* box: None, or a C-contiguous float64 array: rows (d, d), or edge lengths (d,). *given tells
+ * whether there is a box at all. */
+bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *given);
 
 /* A string of the known letters, which are some of HS_LETTERS, each at most once, and its HS_WANT_
  * bits. */

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* errors.c: see errors.h. Messages say what was wrong, the value, and what is allowed. */
+/* errors.c: a function for each status. Messages say what was wrong, the value, and what is
+ * allowed. */
 #include "errors.h"
 
 #include "environment.h"
+#include "tuples.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -164,18 +166,9 @@ static PyObject *
 raise_kernel(const hs_options *options)
 {
     const char *names[8];
-    const int   n = hs_kernel_names(names, 8);
-    PyObject   *known = PyTuple_New(n);
+    PyObject   *known = hs_tuple_of_names(names, hs_kernel_names(names, 8));
     if (known == NULL) {
         return NULL;
-    }
-    for (int k = 0; k < n; k++) {
-        PyObject *name = PyUnicode_FromString(names[k]);
-        if (name == NULL) {
-            Py_DECREF(known);
-            return NULL;
-        }
-        PyTuple_SET_ITEM(known, k, name);
     }
     const char *name = options != NULL && options->kernel != NULL ? options->kernel : "";
     PyErr_Format(PyExc_ValueError, "kernel must be one of %R on this CPU, got '%.100s'%s", known,

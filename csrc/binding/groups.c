@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * groups.c: see groups.h. /proc/self/cgroup names the group of this process in each hierarchy,
- * /proc/self/mountinfo the folders where the hierarchies are mounted. In a container such a folder
- * may show but a part of the hierarchy, which begins at the `top` that mountinfo tells.
+ * groups.c: a limit may stand in any group from that of this process up. /proc/self/cgroup names
+ * that group in each hierarchy, /proc/self/mountinfo the folders where the hierarchies are mounted.
+ * In a container such a folder may show but a part of the hierarchy, which begins at the `top` that
+ * mountinfo tells.
  */
 #include "groups.h"
 

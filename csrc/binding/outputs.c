@@ -2,6 +2,8 @@
 /* outputs.c: one table of letters, from which arrays are checked and made. */
 #include "outputs.h"
 
+#include "tuples.h"
+
 #include <string.h>
 
 /* Bytes from which an array keeps the memory that the search wrote it to; smaller ones are copied,
@@ -89,17 +91,6 @@ new_offsets(hs_pairs *rows)
     return array_like(hs_pairs_offsets(rows), bytes, 1, &length, NPY_INT64);
 }
 
-/* Puts one array into a tuple, which is freed where there is none. */
-static void
-put_array(PyObject **tuple, Py_ssize_t at, PyObject *array)
-{
-    if (array == NULL) {
-        Py_CLEAR(*tuple);
-    } else {
-        PyTuple_SET_ITEM(*tuple, at, array);
-    }
-}
-
 PyObject *
 hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes)
 {
@@ -109,7 +100,7 @@ hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes)
     }
     PyObject *result = PyTuple_New(n);
     for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
-        put_array(&result, k, new_array(pairs, form_of(letters[k], ndim, index_bytes)));
+        hs_tuple_put(&result, k, new_array(pairs, form_of(letters[k], ndim, index_bytes)));
     }
     return result;
 }
@@ -120,10 +111,10 @@ hs_table_of(hs_pairs *rows, const char *letters, int ndim, int index_bytes)
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     PyObject        *table = PyTuple_New(n + 1);
     if (table != NULL) {
-        put_array(&table, 0, new_offsets(rows));
+        hs_tuple_put(&table, 0, new_offsets(rows));
     }
     for (Py_ssize_t k = 0; table != NULL && k < n; k++) {
-        put_array(&table, k + 1, new_array(rows, form_of(letters[k], ndim, index_bytes)));
+        hs_tuple_put(&table, k + 1, new_array(rows, form_of(letters[k], ndim, index_bytes)));
     }
     for (Py_ssize_t k = 0; table != NULL && k <= n; k++) {
         PyArray_CLEARFLAGS((PyArrayObject *)PyTuple_GET_ITEM(table, k), NPY_ARRAY_WRITEABLE);
@@ -182,51 +173,6 @@ item_of(PyObject *out, Py_ssize_t k, Py_ssize_t n)
     return PyTuple_GET_ITEM(out, k);
 }
 
-/* Two arrays of `out` must not share memory: each would overwrite the other. */
-static bool
-are_apart(PyObject *a, PyObject *b)
-{
-    const char *first = PyArray_BYTES((PyArrayObject *)a);
-    const char *second = PyArray_BYTES((PyArrayObject *)b);
-    const bool  apart = first + PyArray_NBYTES((PyArrayObject *)a) <= second ||
-                       second + PyArray_NBYTES((PyArrayObject *)b) <= first;
-    if (!apart) {
-        PyErr_SetString(PyExc_ValueError, "the arrays of out must not overlap");
-    }
-    return apart;
-}
-
-bool
-hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair_arrays *arrays)
-{
-    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
-    *arrays = (hs_pair_arrays){.capacity = INT64_MAX, .index_bytes = index_bytes};
-    for (Py_ssize_t k = 0; k < n; k++) {
-        const array_form form = form_of(letters[k], ndim, index_bytes);
-        PyObject        *item = item_of(out, k, n);
-        const npy_intp   capacity = item == NULL ? -1 : check_array(item, letters[k], form);
-        if (capacity < 0) {
-            return false;
-        }
-        for (Py_ssize_t l = 0; l < k; l++) {
-            if (!are_apart(item, item_of(out, l, n))) {
-                return false;
-            }
-        }
-        arrays->capacity = capacity < arrays->capacity ? capacity : arrays->capacity;
-        void *data = PyArray_DATA((PyArrayObject *)item);
-        switch (form.which) {
-        case HS_WANT_I: arrays->i = data; break;
-        case HS_WANT_J: arrays->j = data; break;
-        case HS_WANT_DISTANCE: arrays->distance = data; break;
-        case HS_WANT_VECTOR: arrays->vector = data; break;
-        case HS_WANT_SHIFT: arrays->shift = data; break;
-        default: arrays->both = data; break;
-        }
-    }
-    return true;
-}
-
 /* The bytes that an array reaches over, whatever its strides; false if it has none. */
 static bool
 range_of(PyArrayObject *array, const char **first, const char **end)
@@ -244,17 +190,54 @@ range_of(PyArrayObject *array, const char **first, const char **end)
     return true;
 }
 
+/* Whether two arrays may share memory: compares where they begin and end. */
+static bool
+overlap(PyObject *a, PyObject *b)
+{
+    const char *first, *end, *other_first, *other_end;
+    return range_of((PyArrayObject *)a, &first, &end) &&
+           range_of((PyArrayObject *)b, &other_first, &other_end) && first < other_end &&
+           other_first < end;
+}
+
+bool
+hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair_arrays *arrays)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    *arrays = (hs_pair_arrays){.capacity = INT64_MAX, .index_bytes = index_bytes};
+    for (Py_ssize_t k = 0; k < n; k++) {
+        const array_form form = form_of(letters[k], ndim, index_bytes);
+        PyObject        *item = item_of(out, k, n);
+        const npy_intp   capacity = item == NULL ? -1 : check_array(item, letters[k], form);
+        if (capacity < 0) {
+            return false;
+        }
+        for (Py_ssize_t l = 0; l < k; l++) {
+            if (overlap(item, item_of(out, l, n))) { /* each would overwrite the other */
+                PyErr_SetString(PyExc_ValueError, "the arrays of out must not overlap");
+                return false;
+            }
+        }
+        arrays->capacity = capacity < arrays->capacity ? capacity : arrays->capacity;
+        void *data = PyArray_DATA((PyArrayObject *)item);
+        switch (form.which) {
+        case HS_WANT_I: arrays->i = data; break;
+        case HS_WANT_J: arrays->j = data; break;
+        case HS_WANT_DISTANCE: arrays->distance = data; break;
+        case HS_WANT_VECTOR: arrays->vector = data; break;
+        case HS_WANT_SHIFT: arrays->shift = data; break;
+        default: arrays->both = data; break;
+        }
+    }
+    return true;
+}
+
 bool
 hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const char *name)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
-    const char      *first, *end, *out_first, *out_end;
-    if (!PyArray_Check(input) || !range_of((PyArrayObject *)input, &first, &end)) {
-        return true;
-    }
-    for (Py_ssize_t k = 0; k < n; k++) {
-        if (range_of((PyArrayObject *)item_of(out, k, n), &out_first, &out_end) &&
-            out_first < end && first < out_end) {
+    for (Py_ssize_t k = 0; PyArray_Check(input) && k < n; k++) {
+        if (overlap(item_of(out, k, n), input)) {
             PyErr_Format(PyExc_ValueError, "out for '%c' must not share memory with %s", letters[k],
                          name);
             return false;
@@ -286,20 +269,13 @@ PyObject *
 hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
-    PyObject        *result = PyTuple_New(n);
+    if (n == 1) {
+        return front_of((PyArrayObject *)item_of(out, 0, 1), (npy_intp)n_pairs);
+    }
+    PyObject *result = PyTuple_New(n);
     for (Py_ssize_t k = 0; result != NULL && k < n; k++) {
-        PyObject *view = front_of((PyArrayObject *)item_of(out, k, n), (npy_intp)n_pairs);
-        if (view == NULL) {
-            Py_CLEAR(result);
-        } else {
-            PyTuple_SET_ITEM(result, k, view);
-        }
+        PyArrayObject *array = (PyArrayObject *)item_of(out, k, n);
+        hs_tuple_put(&result, k, front_of(array, (npy_intp)n_pairs));
     }
-    if (result == NULL || n > 1) {
-        return result;
-    }
-    PyObject *only = PyTuple_GET_ITEM(result, 0);
-    Py_INCREF(only);
-    Py_DECREF(result);
-    return only;
+    return result;
 }

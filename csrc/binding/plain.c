@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* plain.c: see plain.h. Nothing here raises but for a wrong number of arguments. */
+/* plain.c: looks at types and shapes only: nothing here runs code of the arguments, or raises. */
 #include "plain.h"
 
-#include "py_call.h"
-#include "py_functions.h"
-
-#include <string.h>
+#include "../halfshell.h"
 
 enum { IS_NOT_PLAIN = -1 };
 
@@ -79,33 +76,8 @@ periodic_bits(PyObject *object, bool has_box, int ndim)
     return bits;
 }
 
-/* Puts periodic as the core's functions take it in place of the argument: a new reference, where
- * the others stay borrowed. False when some that all searches share are not plain. */
-static bool
-take_shared(PyObject *const *arguments, PyObject **taken)
-{
-    const int ndim = dimensions_of(arguments[0]);
-    PyObject *box = arguments[2];
-    if (ndim == IS_NOT_PLAIN || !PyFloat_Check(arguments[1]) || !is_flag(arguments[4]) ||
-        !(arguments[8] == Py_None || PyCallable_Check(arguments[8])) ||
-        !(box == Py_None || is_plain_box(box, ndim))) {
-        return false;
-    }
-    const int bits = periodic_bits(arguments[3], box != Py_None, ndim);
-    if (bits == IS_NOT_PLAIN) {
-        return false;
-    }
-    taken[3] = PyLong_FromLong(bits);
-    if (taken[3] == NULL) {
-        PyErr_Clear(); /* the way round will say so */
-        return false;
-    }
-    return true;
-}
-
-/* 4 or 8 for NumPy's types, or native dtypes of them, else IS_NOT_PLAIN. */
-static int
-index_bytes_of(PyObject *object)
+int
+hs_plain_index_bytes(PyObject *object)
 {
     if (object == (PyObject *)&PyInt64ArrType_Type) {
         return 8;
@@ -120,110 +92,55 @@ index_bytes_of(PyObject *object)
     return type == NPY_INT64 ? 8 : type == NPY_INT32 ? 4 : IS_NOT_PLAIN;
 }
 
-/* A function of the core, and where its arguments beyond those of py_call.h are; 0: nowhere. */
-typedef struct plain_form {
-    const char *name;
-    PyObject *(*function)(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
-    int n_arguments;
-    int sort;
-    int index_dtype;
-    int queries;
-} plain_form;
-
-enum { MOST_ARGUMENTS = HS_CALL_ARGUMENTS + 5 };
-
+/* An argument of the function's own. */
 static bool
-is_plain_rest(const plain_form *form, PyObject *const *arguments)
+is_plain(char letter, PyObject *object, int ndim)
 {
-    PyObject *queries = form->queries > 0 ? arguments[form->queries] : Py_None;
-    return (form->sort == 0 || is_flag(arguments[form->sort])) &&
-           (queries == Py_None || (dimensions_of(queries) != IS_NOT_PLAIN &&
-                                   dimensions_of(queries) == dimensions_of(arguments[0])));
+    switch (letter) {
+    case 's': return is_flag(object);
+    case 'b': return hs_plain_index_bytes(object) != IS_NOT_PLAIN;
+    case 'Q':
+    case 'R': return object == Py_None || dimensions_of(object) == ndim;
+    default: return true;
+    }
 }
 
-static PyObject *
-call_plain(const plain_form *form, PyObject *module, PyObject *const *arguments,
-           Py_ssize_t n_arguments)
+bool
+hs_plain_repeats(PyObject *const *arguments, const char *more, PyObject *const *own,
+                 unsigned long *repeats)
 {
-    PyObject *taken[MOST_ARGUMENTS], *index_bytes = NULL, *result = NULL;
-    if (!hs_expect_arguments(form->name, n_arguments, form->n_arguments)) {
+    const int  ndim = dimensions_of(arguments[0]);
+    PyObject  *box = arguments[2];
+    const bool has_box = box != Py_None;
+    if (ndim == IS_NOT_PLAIN || !PyFloat_Check(arguments[1]) || !is_flag(arguments[4]) ||
+        !(arguments[8] == Py_None || PyCallable_Check(arguments[8])) ||
+        (has_box && !is_plain_box(box, ndim))) {
+        return false;
+    }
+    for (int k = 0; more[k] != '\0'; k++) {
+        if (!is_plain(more[k], own[k], ndim)) {
+            return false;
+        }
+    }
+    const int bits = periodic_bits(arguments[3], has_box, ndim);
+    *repeats = (unsigned long)bits;
+    return bits != IS_NOT_PLAIN;
+}
+
+PyObject *
+hs_py_plain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
+{
+    typedef PyObject *(*search_fn)(PyObject *, PyObject *const *, Py_ssize_t);
+    if (n_arguments < 1 || !PyCFunction_Check(arguments[0]) ||
+        PyCFunction_GET_SELF(arguments[0]) != module ||
+        PyCFunction_GET_FLAGS(arguments[0]) != METH_FASTCALL) {
+        PyErr_SetString(PyExc_TypeError, "plain takes a function of this module");
         return NULL;
     }
-    memcpy(taken, arguments, (size_t)n_arguments * sizeof *taken);
-    const int bytes = form->index_dtype > 0 ? index_bytes_of(arguments[form->index_dtype]) : 0;
-    if (bytes == IS_NOT_PLAIN || !is_plain_rest(form, arguments) ||
-        !take_shared(arguments, taken)) {
+    const search_fn search = (search_fn)(void (*)(void))PyCFunction_GET_FUNCTION(arguments[0]);
+    PyObject       *result = search(module, arguments + 1, (n_arguments - 1) | HS_PLAIN);
+    if (result == NULL && !PyErr_Occurred()) {
         Py_RETURN_NOTIMPLEMENTED;
     }
-    if (form->index_dtype > 0) {
-        taken[form->index_dtype] = index_bytes = PyLong_FromLong(bytes);
-    }
-    if (form->index_dtype == 0 || index_bytes != NULL) {
-        result = form->function(module, taken, n_arguments);
-    }
-    Py_XDECREF(index_bytes);
-    Py_DECREF(taken[3]);
     return result;
-}
-
-PyObject *
-hs_py_plain_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    static const plain_form form = {.name = "plain_pairs",
-                                    .function = hs_py_pairs,
-                                    .n_arguments = HS_CALL_ARGUMENTS + 4,
-                                    .sort = HS_CALL_ARGUMENTS + 1,
-                                    .index_dtype = HS_CALL_ARGUMENTS + 2};
-    return call_plain(&form, module, arguments, n_arguments);
-}
-
-PyObject *
-hs_py_plain_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    static const plain_form form = {
-        .name = "plain_count", .function = hs_py_count_pairs, .n_arguments = HS_CALL_ARGUMENTS};
-    return call_plain(&form, module, arguments, n_arguments);
-}
-
-PyObject *
-hs_py_plain_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    static const plain_form form = {.name = "plain_between",
-                                    .function = hs_py_pairs_between,
-                                    .n_arguments = HS_CALL_ARGUMENTS + 5,
-                                    .sort = HS_CALL_ARGUMENTS + 1,
-                                    .index_dtype = HS_CALL_ARGUMENTS + 2,
-                                    .queries = HS_CALL_ARGUMENTS + 4};
-    return call_plain(&form, module, arguments, n_arguments);
-}
-
-PyObject *
-hs_py_plain_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    static const plain_form form = {.name = "plain_neighbors",
-                                    .function = hs_py_neighbors,
-                                    .n_arguments = HS_CALL_ARGUMENTS + 3,
-                                    .index_dtype = HS_CALL_ARGUMENTS + 1,
-                                    .queries = HS_CALL_ARGUMENTS + 2};
-    return call_plain(&form, module, arguments, n_arguments);
-}
-
-PyObject *
-hs_py_plain_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    static const plain_form form = {.name = "plain_count_between",
-                                    .function = hs_py_count_between,
-                                    .n_arguments = HS_CALL_ARGUMENTS + 1,
-                                    .queries = HS_CALL_ARGUMENTS};
-    return call_plain(&form, module, arguments, n_arguments);
-}
-
-PyObject *
-hs_py_plain_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
-{
-    static const plain_form form = {.name = "plain_coordination",
-                                    .function = hs_py_coordination,
-                                    .n_arguments = HS_CALL_ARGUMENTS + 1,
-                                    .queries = HS_CALL_ARGUMENTS};
-    return call_plain(&form, module, arguments, n_arguments);
 }

@@ -4,7 +4,6 @@
 
 #include "py_call.h"
 #include "errors.h"
-#include "py_result.h"
 
 #define FIRST_CAPACITY 1024               /* systems; doubled as needed */
 #define MOST_NUMBER    (INT64_C(1) << 62) /* so that counting on from it is safe */
@@ -158,7 +157,7 @@ take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
     if (n_cutoffs < 0 || n_boxes < 0) {
         return false;
     }
-    systems->box = hs_py_call_box(call);
+    systems->box = call->among.box;
     if (systems->rows != NULL) {
         const npy_intp *shape = PyArray_DIMS((PyArrayObject *)arguments[2]);
         if (systems->box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1] ||
@@ -179,71 +178,70 @@ take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
 }
 
 /* Systems are named where each has something of its own. */
-static PyObject *
-raise_failure(hs_status status, hs_failure *failure, const hs_py_call *call, const batch *given)
+static void
+forget_system(const batch *given, hs_failure *failure)
 {
     if (given->number != NULL) {
         failure->system = -1;
     }
-    return hs_raise(status, failure, &call->options);
 }
 
 PyObject *
 hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call call;
-    hs_result  result;
-    hs_failure failure;
-    hs_pairs  *pairs = NULL;
-    batch      given;
+    hs_py_call       call;
+    hs_pairs        *pairs = NULL;
+    batch            given;
+    PyObject *const *more = arguments + HS_CALL_ARGUMENTS + 4;
     (void)module;
-    if (!hs_expect_arguments("batch_pairs", n_arguments, HS_CALL_ARGUMENTS + 7)) {
-        return NULL;
-    }
-    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    if (!hs_py_call_init(&call, arguments) || !hs_result_init(&result, more, &call) ||
-        !hs_result_is_apart(&result, arguments[0], "points") ||
-        !hs_result_is_apart(&result, arguments[2], "box") ||
-        !hs_result_is_apart(&result, more[4], "batch") ||
-        !hs_result_is_apart(&result, more[5], "cutoff") ||
-        !hs_result_is_apart(&result, more[6], "box") || !take_batch(more + 4, &call, &given)) {
+    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaa", arguments, n_arguments) ||
+        !hs_py_call_is_apart(&call, more[0], "batch") ||
+        !hs_py_call_is_apart(&call, more[1], "cutoff") ||
+        !hs_py_call_is_apart(&call, more[2], "box") || !take_batch(more, &call, &given)) {
         return NULL;
     }
     hs_py_call_release(&call);
     const hs_status status =
-        hs_systems_find(&call.points, &given.systems, &call.options, &pairs, &failure);
+        hs_systems_find(&call.points, &given.systems, &call.options, &pairs, &call.failure);
     hs_py_call_acquire(&call);
-    PyObject *arrays = status == HS_OK ? hs_result_of(&result, pairs, &call)
-                                       : raise_failure(status, &failure, &call, &given);
-    hs_pairs_free(pairs);
+    forget_system(&given, &call.failure);
     free_batch(&given);
-    return arrays;
+    return hs_py_call_pairs(&call, status, pairs);
+}
+
+/* Zeros, one for each number up to the largest. */
+static PyObject *
+new_counts(const batch *given)
+{
+    npy_intp length = (npy_intp)given->n_numbers;
+    if (given->n_numbers > MOST_COUNTS) {
+        return PyErr_Format(PyExc_MemoryError,
+                            "the result would not fit: there would be %lld counts, one for each "
+                            "number up to the largest in batch",
+                            (long long)given->n_numbers);
+    }
+    return PyArray_ZEROS(1, &length, NPY_INT64, 0);
+}
+
+static void
+put_counts(const batch *given, const int64_t *counts, int64_t *to)
+{
+    for (int64_t s = 0; s < given->systems.n; s++) {
+        to[given->number != NULL ? given->number[s] : s] = counts[s];
+    }
 }
 
 PyObject *
 hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    hs_failure failure;
     batch      given;
     (void)module;
-    if (!hs_expect_arguments("batch_count", n_arguments, HS_CALL_ARGUMENTS + 3)) {
-        return NULL;
-    }
-    if (!hs_py_call_init(&call, arguments) ||
+    if (!hs_py_call_take(&call, "batch_count", "aaa", arguments, n_arguments) ||
         !take_batch(arguments + HS_CALL_ARGUMENTS, &call, &given)) {
         return NULL;
     }
-    if (given.n_numbers > MOST_COUNTS) {
-        PyErr_Format(PyExc_MemoryError,
-                     "the result would not fit: batch asks for %lld counts, one for each number up "
-                     "to its largest",
-                     (long long)given.n_numbers);
-        free_batch(&given);
-        return NULL;
-    }
-    npy_intp  length = (npy_intp)given.n_numbers;
-    PyObject *array = PyArray_ZEROS(1, &length, NPY_INT64, 0);
+    PyObject *array = new_counts(&given);
     int64_t  *counts = PyMem_Malloc((size_t)given.systems.n * sizeof *counts + 1);
     if (array != NULL && counts == NULL) {
         PyErr_NoMemory();
@@ -252,16 +250,15 @@ hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     if (array != NULL) {
         hs_py_call_release(&call);
         const hs_status status =
-            hs_systems_count(&call.points, &given.systems, &call.options, counts, &failure);
+            hs_systems_count(&call.points, &given.systems, &call.options, counts, &call.failure);
         hs_py_call_acquire(&call);
-        if (status != HS_OK) {
+        if (status == HS_OK) {
+            put_counts(&given, counts, PyArray_DATA((PyArrayObject *)array));
+        } else {
+            forget_system(&given, &call.failure);
             Py_CLEAR(array);
-            (void)raise_failure(status, &failure, &call, &given);
+            (void)hs_raise(status, &call.failure, &call.options);
         }
-    }
-    int64_t *to = array != NULL ? PyArray_DATA((PyArrayObject *)array) : NULL;
-    for (int64_t s = 0; to != NULL && s < given.systems.n; s++) {
-        to[given.number != NULL ? given.number[s] : s] = counts[s];
     }
     PyMem_Free(counts);
     free_batch(&given);

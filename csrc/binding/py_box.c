@@ -25,10 +25,11 @@ heights_and_volume(const double *heights, int ndim, double volume)
 PyObject *
 hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_box     box;
-    hs_failure failure;
-    bool       given;
-    double     heights[HS_MAX_DIM] = {0}, volume;
+    hs_box        box;
+    hs_failure    failure;
+    bool          given;
+    unsigned long repeats;
+    double        heights[HS_MAX_DIM] = {0}, volume;
     (void)module;
     if (n_arguments != 2 || !PyArray_Check(arguments[0]) ||
         PyArray_NDIM((PyArrayObject *)arguments[0]) != 2) {
@@ -40,7 +41,8 @@ hs_py_box_measure(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
         PyErr_Format(PyExc_ValueError, "box must have shape (d, d) with 1 <= d <= %d", HS_MAX_DIM);
         return NULL;
     }
-    if (!hs_box_of(arguments[0], arguments[1], (int)ndim, &box, &given)) {
+    if (!hs_repeats_of(arguments[1], &repeats) ||
+        !hs_box_of(arguments[0], repeats, (int)ndim, &box, &given)) {
         return NULL;
     }
     const hs_status status = hs_box_measure(&box, heights, &volume, &failure);
@@ -89,16 +91,17 @@ wrap_in_parts(const hs_box *box, const hs_points *points, double *wrapped, int64
 PyObject *
 hs_py_box_wrap(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_points points;
-    hs_box    box;
-    bool      given;
+    hs_points     points;
+    hs_box        box;
+    bool          given;
+    unsigned long repeats;
     (void)module;
     if (n_arguments != 3) {
         PyErr_SetString(PyExc_TypeError, "box_wrap takes points, a box and periodic bits");
         return NULL;
     }
-    if (!hs_points_of(arguments[0], "points", &points) ||
-        !hs_box_of(arguments[1], arguments[2], points.ndim, &box, &given)) {
+    if (!hs_repeats_of(arguments[2], &repeats) || !hs_points_of(arguments[0], "points", &points) ||
+        !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
         return NULL;
     }
     if (!given) {

@@ -1,17 +1,22 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_call.c: numbers first, views last: numbers may run code of their own. */
+/* py_call.c: numbers first, views last. What is taken when is the order of hs_py_call_take. */
 #include "py_call.h"
 
 #include "available.h"
 #include "convert.h"
 #include "environment.h"
+#include "errors.h"
 #include "foreign.h"
+#include "outputs.h"
+#include "plain.h"
 #include "threads.h"
 
 #include <math.h>
+#include <string.h>
 
-#define MOST_THREADS    1024 /* an explicit wish, but not any */
-#define THREADS_MUST_BE "threads must be a whole number from 1 to 1024 or None"
+#define AS_TEXT(number)      #number
+#define MUST_BE_UP_TO(limit) "threads must be a whole number from 1 to " AS_TEXT(limit) " or None"
+#define THREADS_MUST_BE      MUST_BE_UP_TO(HS_MOST_THREADS)
 
 /* Points below which a search is expected to be over before another thread could take the GIL: it
  * is kept until the first poll. */
@@ -64,7 +69,7 @@ take_threads(PyObject *object, hs_options *options)
     if (!hs_whole_of(object, THREADS_MUST_BE, &n)) {
         return false;
     }
-    if (!(n >= 1.0 && n <= MOST_THREADS)) {
+    if (!(n >= 1.0 && n <= HS_MOST_THREADS)) {
         hs_refuse(PyExc_ValueError, THREADS_MUST_BE, object);
         return false;
     }
@@ -76,14 +81,76 @@ take_threads(PyObject *object, hs_options *options)
     return true;
 }
 
+/* The shared arguments that are numbers or names. */
+static bool
+take_shared(PyObject *const *arguments, hs_py_call *call)
+{
+    hs_options *options = &call->options;
+    const int   inclusive = PyObject_IsTrue(arguments[4]);
+    options->inclusive = inclusive > 0;
+    call->progress = arguments[8] == Py_None ? NULL : arguments[8];
+    return inclusive >= 0 && take_memory_limit(arguments[7], options) &&
+           take_threads(arguments[9], options) && hs_cutoff_of(arguments[1], &options->cutoff) &&
+           hs_precision_of(arguments[5], &options->precision) &&
+           hs_kernel_of(arguments[6], &options->kernel);
+}
+
+static bool
+take_truth(PyObject *object, bool *value)
+{
+    const int truth = PyObject_IsTrue(object);
+    *value = truth > 0;
+    return truth >= 0;
+}
+
+static bool
+take_index_bytes(PyObject *object, bool is_plain, hs_options *options)
+{
+    options->index_bytes = is_plain ? hs_plain_index_bytes(object) : (int)PyLong_AsLong(object);
+    return options->index_bytes != -1 || !PyErr_Occurred();
+}
+
+/* A number of the function's own, by its letter; true for what is none. */
+static bool
+take_number(char letter, PyObject *object, bool is_plain, hs_py_call *call)
+{
+    hs_options *options = &call->options;
+    switch (letter) {
+    case 'q': return hs_quantities_of(object, HS_LETTERS, &call->letters, &options->want);
+    case 'r': return hs_quantities_of(object, HS_ROW_LETTERS, &call->letters, &options->want);
+    case 's': return take_truth(object, &options->sorted);
+    case 'b': return take_index_bytes(object, is_plain, options);
+    case 'f': return take_truth(object, &call->flag);
+    case 'i': call->integer = PyLong_AsLongLong(object); return !PyErr_Occurred();
+    case 'x': call->real = PyFloat_AsDouble(object); return !PyErr_Occurred();
+    default: return true;
+    }
+}
+
+/* Points and box: arrays, or what cells hold. */
+static bool
+take_scene(PyObject *points, PyObject *box, unsigned long repeats, hs_py_call *call)
+{
+    hs_among *among = &call->among;
+    bool      has_box;
+    among->cells = hs_cells_of(points);
+    if (among->cells != NULL) {
+        hs_cells_points(among->cells, &call->points);
+        return true;
+    }
+    if (!hs_points_of(points, "points", &call->points) ||
+        !hs_box_of(box, repeats, call->points.ndim, &call->box, &has_box)) {
+        return false;
+    }
+    among->points = &call->points;
+    among->box = has_box ? &call->box : NULL;
+    return true;
+}
+
 static bool
 take_queries(PyObject *object, hs_py_call *call)
 {
     const hs_points *points = &call->points, *queries = &call->queries;
-    call->has_queries = object != Py_None;
-    if (!call->has_queries) {
-        return true;
-    }
     if (!hs_points_of(object, "queries", &call->queries)) {
         return false;
     }
@@ -94,13 +161,39 @@ take_queries(PyObject *object, hs_py_call *call)
                      (long long)queries->n, queries->ndim, (long long)points->n, points->ndim);
         return false;
     }
+    call->among.queries = queries;
     return true;
+}
+
+static bool
+take_out(PyObject *object, hs_py_call *call)
+{
+    hs_options *options = &call->options;
+    call->out = object;
+    options->out = &call->arrays;
+    return hs_out_of(object, call->letters, call->points.ndim, options->index_bytes, &call->arrays);
+}
+
+/* What else is a view: queries, and `out`, which comes last and is compared with the others. */
+static bool
+take_more_views(PyObject *queries, PyObject *out, PyObject *const *arguments, hs_py_call *call)
+{
+    if (queries != NULL && !take_queries(queries, call)) {
+        return false;
+    }
+    if (out == NULL) {
+        return true;
+    }
+    return take_out(out, call) &&
+           (queries == NULL || hs_py_call_is_apart(call, queries, "queries")) &&
+           hs_py_call_is_apart(call, arguments[0], "points") &&
+           hs_py_call_is_apart(call, arguments[2], "box");
 }
 
 static int64_t
 count_points(const hs_py_call *call)
 {
-    return call->points.n + (call->has_queries ? call->queries.n : 0);
+    return call->points.n + (call->among.queries != NULL ? call->queries.n : 0);
 }
 
 bool
@@ -113,43 +206,37 @@ hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
 }
 
 bool
-hs_py_call_init(hs_py_call *call, PyObject *const *arguments)
+hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *const *arguments,
+                Py_ssize_t n_arguments)
 {
-    return hs_py_call_init_sets(call, arguments, Py_None);
-}
-
-/* Points and box: arrays, or what cells hold. */
-static bool
-take_scene(PyObject *points, PyObject *box, PyObject *periodic, hs_py_call *call)
-{
-    call->cells = hs_cells_of(points);
-    if (call->cells != NULL) {
-        const hs_box *of_cells = hs_cells_box(call->cells);
-        hs_cells_points(call->cells, &call->points);
-        call->has_box = of_cells != NULL;
-        if (call->has_box) {
-            call->box = *of_cells;
-        }
-        return true;
+    const bool       is_plain = (n_arguments & HS_PLAIN) != 0;
+    const int        n_more = (int)strlen(more);
+    PyObject *const *own = arguments + HS_CALL_ARGUMENTS;
+    PyObject        *queries = NULL, *out = NULL;
+    hs_options      *options = &call->options;
+    unsigned long    repeats;
+    if (!hs_expect_arguments(name, n_arguments & ~HS_PLAIN, HS_CALL_ARGUMENTS + n_more) ||
+        !(is_plain ? hs_plain_repeats(arguments, more, own, &repeats)
+                   : hs_repeats_of(arguments[3], &repeats))) {
+        return false;
     }
-    return hs_points_of(points, "points", &call->points) &&
-           hs_box_of(box, periodic, call->points.ndim, &call->box, &call->has_box);
-}
-
-bool
-hs_py_call_init_sets(hs_py_call *call, PyObject *const *arguments, PyObject *queries)
-{
-    call->options = hs_options_default();
+    *options = hs_options_default();
+    call->among = (hs_among){.points = NULL};
+    call->letters = "ij";
+    call->out = NULL;
     call->thread = NULL;
-    hs_options *options = &call->options;
-    const int   inclusive = PyObject_IsTrue(arguments[4]);
-    /* Numbers may run code of their own, which may give an array another shape or other memory:
-     * views are taken after them. */
-    if (inclusive < 0 || !take_memory_limit(arguments[7], options) ||
-        !take_threads(arguments[9], options) || !hs_cutoff_of(arguments[1], &options->cutoff) ||
-        !take_scene(arguments[0], arguments[2], arguments[3], call) ||
-        !take_queries(queries, call) || !hs_precision_of(arguments[5], &options->precision) ||
-        !hs_kernel_of(arguments[6], &options->kernel)) {
+    if (!take_shared(arguments, call)) {
+        return false;
+    }
+    for (int k = 0; k < n_more; k++) {
+        if (!take_number(more[k], own[k], is_plain, call)) {
+            return false;
+        }
+        queries = more[k] == 'R' || (more[k] == 'Q' && own[k] != Py_None) ? own[k] : queries;
+        out = more[k] == 'o' && own[k] != Py_None ? own[k] : out;
+    }
+    if (!take_scene(arguments[0], arguments[2], repeats, call) ||
+        !take_more_views(queries, out, arguments, call)) {
         return false;
     }
     if (options->threads == 0) {
@@ -157,11 +244,15 @@ hs_py_call_init_sets(hs_py_call *call, PyObject *const *arguments, PyObject *que
         const bool few = count_points(call) < HS_POINTS_FOR_THREADS;
         options->threads = few ? 1 : -hs_default_threads();
     }
-    options->inclusive = inclusive != 0;
-    call->progress = arguments[8] == Py_None ? NULL : arguments[8];
     options->poll = poll_python;
     options->poll_context = call;
     return true;
+}
+
+bool
+hs_py_call_is_apart(const hs_py_call *call, PyObject *input, const char *name)
+{
+    return call->out == NULL || hs_out_is_apart(call->out, call->letters, input, name);
 }
 
 void
@@ -181,12 +272,28 @@ hs_py_call_acquire(hs_py_call *call)
     }
 }
 
-hs_among
-hs_py_call_among(const hs_py_call *call)
+PyObject *
+hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
 {
-    const bool has_cells = call->cells != NULL;
-    return (hs_among){.points = has_cells ? NULL : &call->points,
-                      .box = has_cells ? NULL : hs_py_call_box(call),
-                      .queries = hs_py_call_queries(call),
-                      .cells = call->cells};
+    if (status != HS_OK) {
+        return hs_raise(status, &call->failure, &call->options);
+    }
+    PyObject *arrays =
+        call->out != NULL
+            ? hs_out_filled(call->out, call->letters, hs_pairs_length(pairs))
+            : hs_arrays_of(pairs, call->letters, call->points.ndim, call->options.index_bytes);
+    hs_pairs_free(pairs);
+    return arrays;
+}
+
+PyObject *
+hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows)
+{
+    if (status != HS_OK) {
+        return hs_raise(status, &call->failure, &call->options);
+    }
+    PyObject *table =
+        hs_table_of(rows, call->letters, call->points.ndim, call->options.index_bytes);
+    hs_pairs_free(rows);
+    return table;
 }

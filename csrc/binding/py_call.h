@@ -1,5 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* py_call.h: what the searching functions share: one set of arguments, and polling for Ctrl-C. */
+/*
+ * py_call.h: what the searching functions share. Each takes its arguments, lets others run Python
+ * meanwhile, calls the core, and makes arrays or an exception of the outcome.
+ *
+ * Numbers of Python may run code of their own, which may give an array another shape or other
+ * memory: so all numbers are read first, and views of arrays are taken last, here and nowhere else.
+ */
 #ifndef HS_PY_CALL_H
 #define HS_PY_CALL_H
 
@@ -8,17 +14,21 @@
 #include "../halfshell.h"
 
 /* The arguments of a search, as views; the Python arguments that they borrow from must stay
- * alive. */
+ * alive. It borrows from itself: it cannot be moved. */
 typedef struct hs_py_call {
-    hs_points       points;
-    const hs_cells *cells;   /* borrowed: points and box are theirs; or NULL */
-    hs_points       queries; /* when has_queries */
-    bool            has_queries;
-    hs_box          box;
-    bool            has_box;
-    hs_options      options;
-    PyObject       *progress; /* borrowed; called with the fraction done, or NULL */
-    PyThreadState  *thread;   /* saved while the GIL is released, else NULL */
+    hs_among       among; /* what is searched; `points` is NULL where there are cells */
+    hs_points      points, queries;
+    hs_box         box;
+    hs_options     options;
+    hs_failure     failure;
+    const char    *letters; /* borrowed: the quantities */
+    PyObject      *out;     /* borrowed: of the caller, or NULL: new arrays */
+    hs_pair_arrays arrays;  /* those of out */
+    bool           flag;
+    int64_t        integer;
+    double         real;
+    PyObject      *progress; /* borrowed; called with the fraction done, or NULL */
+    PyThreadState *thread;   /* saved while the GIL is released, else NULL */
 } hs_py_call;
 
 /* Whether a function got as many arguments as it takes; false with an exception set. */
@@ -26,36 +36,36 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
 
 /*
  * Positional arguments of every search, in this order: points (or cells of cells_build, with None
- * as box and 0 as periodic), cutoff, box, periodic, inclusive,
+ * as box and 0 as periodic), cutoff, box, periodic (bits), inclusive,
  * precision, kernel, memory_limit (None: ask the machine), progress (None: no calls), threads
- * (None: as many as pay). Returns false with an exception set.
+ * (None: as many as pay). Then what this function takes beyond them, a letter each:
+ *
+ *   q  quantities: some of HS_LETTERS        s  sort
+ *   r  quantities: some of HS_ROW_LETTERS    b  index_bytes
+ *   Q  queries, or None                      o  out, or None
+ *   R  queries                               f, i, x  `flag`, `integer`, `real` of the call
+ *   a  anything: left to the function, which runs no Python code for it
+ *
+ * Returns false with an exception set, or without one where HS_PLAIN is set: see plain.h.
  */
 enum { HS_CALL_ARGUMENTS = 10 };
-bool hs_py_call_init(hs_py_call *call, PyObject *const *arguments);
+bool hs_py_call_take(hs_py_call *call, const char *name, const char *more,
+                     PyObject *const *arguments, Py_ssize_t n_arguments);
 
-/* The same for two sets. queries: None, or an array as points, with as many columns. */
-bool hs_py_call_init_sets(hs_py_call *call, PyObject *const *arguments, PyObject *queries);
+/* Whether `out` lies apart from an input: else false with an exception set. Points, box and queries
+ * have been looked at. */
+bool hs_py_call_is_apart(const hs_py_call *call, PyObject *input, const char *name);
 
 /* Release and take the GIL around a call of the core; poll() takes it in between. With few points
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_py_call_release(hs_py_call *call);
 void hs_py_call_acquire(hs_py_call *call);
 
-/* Among what to search: the cells or the points of the call, which it borrows from. */
-hs_among hs_py_call_among(const hs_py_call *call);
+/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`;
+ * NULL with an exception set for a status other than HS_OK. */
+PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
 
-/* The box, or NULL for open space. */
-static inline const hs_box *
-hs_py_call_box(const hs_py_call *call)
-{
-    return call->has_box ? &call->box : NULL;
-}
-
-/* The queries, or NULL where there is one set. */
-static inline const hs_points *
-hs_py_call_queries(const hs_py_call *call)
-{
-    return call->has_queries ? &call->queries : NULL;
-}
+/* The same, as a table of rows. */
+PyObject *hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows);
 
 #endif

@@ -6,7 +6,6 @@
 #include "py_call.h"
 #include "convert.h"
 #include "errors.h"
-#include "outputs.h"
 #include "tuples.h"
 
 static void
@@ -19,23 +18,18 @@ PyObject *
 hs_py_cells_build(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    hs_failure failure;
     hs_cells  *cells = NULL;
     (void)module;
-    if (!hs_expect_arguments("cells_build", n_arguments, HS_CALL_ARGUMENTS + 1)) {
+    if (!hs_py_call_take(&call, "cells_build", "x", arguments, n_arguments)) {
         return NULL;
     }
-    const double cell_size = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS]);
-    if ((cell_size == -1.0 && PyErr_Occurred()) || !hs_py_call_init(&call, arguments)) {
-        return NULL;
-    }
-    call.options.cell_size = cell_size;
+    call.options.cell_size = call.real;
     hs_py_call_release(&call);
     const hs_status status =
-        hs_cells_build(&call.points, hs_py_call_box(&call), &call.options, &cells, &failure);
+        hs_cells_build(&call.points, call.among.box, &call.options, &cells, &call.failure);
     hs_py_call_acquire(&call);
     if (status != HS_OK) {
-        return hs_raise(status, &failure, &call.options);
+        return hs_raise(status, &call.failure, &call.options);
     }
     PyObject *capsule = PyCapsule_New(cells, HS_CELLS_NAME, free_cells);
     if (capsule == NULL) {
@@ -147,24 +141,15 @@ PyObject *
 hs_py_cells_candidates(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    hs_failure failure;
     hs_pairs  *ranges = NULL;
     (void)module;
-    if (!hs_expect_arguments("cells_candidates", n_arguments, HS_CALL_ARGUMENTS + 1)) {
-        return NULL;
-    }
-    if (!hs_py_call_init_sets(&call, arguments, arguments[HS_CALL_ARGUMENTS]) ||
-        !expect_cells(call.cells)) {
+    if (!hs_py_call_take(&call, "cells_candidates", "Q", arguments, n_arguments) ||
+        !expect_cells(call.among.cells)) {
         return NULL;
     }
     hs_py_call_release(&call);
-    const hs_status status = hs_cells_candidates(call.cells, hs_py_call_queries(&call),
-                                                 &call.options, &ranges, &failure);
+    const hs_status status = hs_cells_candidates(call.among.cells, call.among.queries,
+                                                 &call.options, &ranges, &call.failure);
     hs_py_call_acquire(&call);
-    if (status != HS_OK) {
-        return hs_raise(status, &failure, &call.options);
-    }
-    PyObject *table = hs_table_of(ranges, "ij", call.points.ndim, 8);
-    hs_pairs_free(ranges);
-    return table;
+    return hs_py_call_table(&call, status, ranges); /* "ij": where each begins and ends */
 }

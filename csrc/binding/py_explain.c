@@ -3,7 +3,6 @@
 #include "py_functions.h"
 
 #include "py_call.h"
-#include "convert.h"
 #include "errors.h"
 #include "tuples.h"
 
@@ -78,48 +77,25 @@ dictionary_of(const hs_plan *plan, const hs_counters *counters)
     return dict;
 }
 
-/* quantities, sort, index_bytes, measure. */
-static bool
-take_more(PyObject *const *more, hs_py_call *call, bool *measures)
-{
-    const char *letters;
-    if (!hs_quantities_of(more[0], HS_LETTERS, &letters, &call->options.want)) {
-        return false;
-    }
-    const int sorted = PyObject_IsTrue(more[1]);
-    const int measure = PyObject_IsTrue(more[3]);
-    call->options.index_bytes = (int)PyLong_AsLong(more[2]);
-    call->options.sorted = sorted > 0;
-    *measures = measure > 0;
-    return sorted >= 0 && measure >= 0 && !PyErr_Occurred();
-}
-
 PyObject *
 hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call  call;
-    hs_failure  failure;
     hs_plan     plan;
     hs_counters counters = {0};
     hs_pairs   *pairs = NULL;
-    bool        measures;
     (void)module;
-    if (!hs_expect_arguments("explain", n_arguments, HS_CALL_ARGUMENTS + 4)) {
+    if (!hs_py_call_take(&call, "explain", "qsbf", arguments, n_arguments)) {
         return NULL;
     }
-    if (!hs_py_call_init(&call, arguments) ||
-        !take_more(arguments + HS_CALL_ARGUMENTS, &call, &measures)) {
-        return NULL;
-    }
-    const hs_among among = hs_py_call_among(&call);
     hs_py_call_release(&call);
-    hs_status status = hs_plan_make(&among, &call.options, &plan, &failure);
-    if (status == HS_OK && measures) {
+    hs_status status = hs_plan_make(&call.among, &call.options, &plan, &call.failure);
+    if (status == HS_OK && call.flag) {
         call.options.counters = &counters;
-        status = hs_pairs_find(&among, &call.options, &pairs, &failure);
+        status = hs_pairs_find(&call.among, &call.options, &pairs, &call.failure);
     }
     hs_py_call_acquire(&call);
     hs_pairs_free(pairs);
-    return status == HS_OK ? dictionary_of(&plan, measures ? &counters : NULL)
-                           : hs_raise(status, &failure, &call.options);
+    return status == HS_OK ? dictionary_of(&plan, call.flag ? &counters : NULL)
+                           : hs_raise(status, &call.failure, &call.options);
 }

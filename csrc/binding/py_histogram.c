@@ -3,7 +3,6 @@
 #include "py_functions.h"
 
 #include "py_call.h"
-#include "convert.h"
 #include "errors.h"
 
 /* A C-contiguous array of this type and length; None, where that may be, leaves *data alone. */
@@ -35,29 +34,27 @@ take_marks(PyObject *types, PyObject *weights, const char *name, int64_t n, hs_m
     return true;
 }
 
-/* edges, last_inclusive, queries, n_types; types and weights of the points and of the queries. */
+/* The views among edges, last_inclusive, queries, n_types; types and weights of the points and of
+ * the queries. */
 static bool
 take_histogram(PyObject *const *more, const hs_py_call *call, hs_histogram *wanted)
 {
     const void *edges = NULL;
-    const int   last_inclusive = PyObject_IsTrue(more[1]);
-    const long  n_types = PyLong_AsLong(more[3]);
-    if (last_inclusive < 0 || (n_types == -1 && PyErr_Occurred()) ||
-        !take_column(more[0], NPY_DOUBLE, -1, "edges", &edges)) {
+    if (!take_column(more[0], NPY_DOUBLE, -1, "edges", &edges)) {
         return false;
     }
-    if (edges == NULL || n_types < 1 || n_types > INT32_MAX) {
+    if (edges == NULL || call->integer < 1 || call->integer > INT32_MAX) {
         PyErr_SetString(PyExc_ValueError, "edges and a number of types are expected");
         return false;
     }
     *wanted = (hs_histogram){.n_edges = PyArray_DIM((PyArrayObject *)more[0], 0),
                              .edges = edges,
                              .inclusive = call->options.inclusive,
-                             .last_inclusive = last_inclusive != 0,
-                             .n_types = (int32_t)n_types};
+                             .last_inclusive = call->flag,
+                             .n_types = (int32_t)call->integer};
     return take_marks(more[4], more[5], "types or weights", call->points.n, &wanted->of_points) &&
            take_marks(more[6], more[7], "types or weights of queries",
-                      call->has_queries ? call->queries.n : 0, &wanted->of_queries);
+                      call->among.queries != NULL ? call->queries.n : 0, &wanted->of_queries);
 }
 
 /* Zeros of shape (n_types, n_types, n_edges); of float64 where there are weights. */
@@ -78,28 +75,23 @@ new_result(hs_histogram *wanted)
 PyObject *
 hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    PyObject *const *more = arguments + HS_CALL_ARGUMENTS;
-    hs_py_call       call;
-    hs_failure       failure;
-    hs_histogram     wanted;
+    hs_py_call   call;
+    hs_histogram wanted;
     (void)module;
-    if (!hs_expect_arguments("histogram", n_arguments, HS_CALL_ARGUMENTS + 8)) {
-        return NULL;
-    }
-    if (!hs_py_call_init_sets(&call, arguments, more[2]) || !take_histogram(more, &call, &wanted)) {
+    if (!hs_py_call_take(&call, "histogram", "afQiaaaa", arguments, n_arguments) ||
+        !take_histogram(arguments + HS_CALL_ARGUMENTS, &call, &wanted)) {
         return NULL;
     }
     PyObject *array = new_result(&wanted);
     if (array == NULL) {
         return NULL;
     }
-    const hs_among among = hs_py_call_among(&call);
     hs_py_call_release(&call);
-    const hs_status status = hs_pairs_histogram(&among, &call.options, &wanted, &failure);
+    const hs_status status = hs_pairs_histogram(&call.among, &call.options, &wanted, &call.failure);
     hs_py_call_acquire(&call);
     if (status != HS_OK) {
         Py_DECREF(array);
-        return hs_raise(status, &failure, &call.options);
+        return hs_raise(status, &call.failure, &call.options);
     }
     return array;
 }

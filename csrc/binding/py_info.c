@@ -14,19 +14,9 @@ PyObject *
 hs_py_kernels(PyObject *module, PyObject *ignored)
 {
     const char *names[8];
-    const int   n = hs_kernel_names(names, 8);
-    PyObject   *tuple = PyTuple_New(n);
     (void)module;
     (void)ignored;
-    for (int k = 0; tuple != NULL && k < n; k++) {
-        PyObject *name = PyUnicode_FromString(names[k]);
-        if (name == NULL) {
-            Py_CLEAR(tuple);
-        } else {
-            PyTuple_SET_ITEM(tuple, k, name);
-        }
-    }
-    return tuple;
+    return hs_tuple_of_names(names, hs_kernel_names(names, 8));
 }
 
 PyObject *

@@ -3,14 +3,12 @@
 #include "py_functions.h"
 
 #include "py_call.h"
-#include "convert.h"
 #include "errors.h"
-#include "outputs.h"
 
 #include <math.h>
 #include <stdio.h>
 
-/* Rows are as long as was asked for: what they need is known, and fewer would do. */
+/* Rows have k entries: what they need is known, and fewer would do. */
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
@@ -37,37 +35,20 @@ raise_memory(const hs_failure *failure)
 PyObject *
 hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_py_call  call;
-    hs_failure  failure;
-    hs_pairs   *rows = NULL;
-    const char *letters;
+    hs_py_call call;
+    hs_pairs  *rows = NULL;
     (void)module;
-    if (!hs_expect_arguments("nearest", n_arguments, HS_CALL_ARGUMENTS + 4)) {
+    if (!hs_py_call_take(&call, "nearest", "rbQi", arguments, n_arguments)) {
         return NULL;
     }
-    PyObject *const *own = arguments + HS_CALL_ARGUMENTS;
-    const int        index_bytes = (int)PyLong_AsLong(own[1]);
-    const long long  k = PyLong_AsLongLong(own[3]);
-    if (k < 1) {
-        if (!PyErr_Occurred()) {
-            PyErr_SetString(PyExc_ValueError, "k must be 1 or more");
-        }
+    if (call.integer < 1) {
+        PyErr_SetString(PyExc_ValueError, "k must be 1 or more");
         return NULL;
     }
-    if (PyErr_Occurred() || !hs_py_call_init_sets(&call, arguments, own[2]) ||
-        !hs_quantities_of(own[0], HS_ROW_LETTERS, &letters, &call.options.want)) {
-        return NULL;
-    }
-    call.options.index_bytes = index_bytes;
-    const hs_among among = hs_py_call_among(&call);
     hs_py_call_release(&call);
-    const hs_status status = hs_nearest_find(&among, k, &call.options, &rows, &failure);
+    const hs_status status =
+        hs_nearest_find(&call.among, call.integer, &call.options, &rows, &call.failure);
     hs_py_call_acquire(&call);
-    if (status != HS_OK) {
-        return status == HS_ERR_MEMORY ? raise_memory(&failure)
-                                       : hs_raise(status, &failure, &call.options);
-    }
-    PyObject *arrays = hs_arrays_of(rows, letters, call.points.ndim, index_bytes);
-    hs_pairs_free(rows);
-    return arrays;
+    return status == HS_ERR_MEMORY ? raise_memory(&call.failure)
+                                   : hs_py_call_pairs(&call, status, rows);
 }

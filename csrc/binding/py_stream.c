@@ -3,9 +3,7 @@
 #include "py_functions.h"
 
 #include "py_call.h"
-#include "convert.h"
 #include "errors.h"
-#include "outputs.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -19,12 +17,11 @@ typedef struct pair_stream {
     hs_py_call call;       /* points: their number only */
     PyObject  *progress;   /* or NULL */
     char       letters[8]; /* of the quantities */
-    int64_t    max_pairs;
     bool       is_running; /* a thread is in a call of the core */
 } pair_stream;
 
-/* Marks it as running; false with an exception set when it is already: a hook that asks for the
- * next block, or another thread. */
+/* Marks it as running; false with an exception set when it is already: a hook that calls for
+ * the next block, or another thread. */
 static bool
 enter(pair_stream *self)
 {
@@ -63,7 +60,8 @@ raise_block_too_large(const pair_stream *self, const hs_failure *failure)
     snprintf(text, sizeof text,
              "no memory for blocks of max_pairs = %lld pairs: %s %s; use a smaller max_pairs or "
              "fewer quantities",
-             (long long)self->max_pairs, hs_format_bytes(failure->limit_bytes, limit, sizeof limit),
+             (long long)self->call.integer,
+             hs_format_bytes(failure->limit_bytes, limit, sizeof limit),
              isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
@@ -73,27 +71,22 @@ raise_block_too_large(const pair_stream *self, const hs_failure *failure)
 static PyObject *
 next_block(pair_stream *self)
 {
-    hs_failure failure;
-    hs_pairs  *block = NULL;
+    hs_pairs *block = NULL;
     if (self->stream == NULL || PyErr_CheckSignals() != 0) {
         return NULL;
     }
     hs_py_call_release(&self->call);
     const hs_status status = hs_stream_next(self->stream, self->call.options.poll,
-                                            self->call.options.poll_context, &block, &failure);
+                                            self->call.options.poll_context, &block,
+                                            &self->call.failure);
     hs_py_call_acquire(&self->call);
     if (status == HS_ERR_MEMORY) {
-        return raise_block_too_large(self, &failure);
+        return raise_block_too_large(self, &self->call.failure);
     }
-    if (status != HS_OK) {
-        return hs_raise(status, &failure, &self->call.options);
-    }
-    PyObject *arrays = block == NULL ? NULL
-                                     : hs_arrays_of(block, self->letters, self->call.points.ndim,
-                                                    self->call.options.index_bytes);
-    hs_pairs_free(block);
-    if (arrays == NULL) { /* the last one, or one that is lost: nothing may follow it */
-        end(self);
+    PyObject *arrays =
+        status == HS_OK && block == NULL ? NULL : hs_py_call_pairs(&self->call, status, block);
+    if (status == HS_OK && arrays == NULL) { /* the last one, or one that is lost */
+        end(self);                           /* nothing may follow it */
     }
     return arrays;
 }
@@ -181,48 +174,39 @@ hs_py_stream_type(PyObject *module)
     return PyType_FromModuleAndSpec(module, &stream_spec, NULL);
 }
 
-/* The arguments but for the stream itself. */
+/* The arguments but for the stream itself, and references to what it goes on to use. */
 static bool
-take_arguments(pair_stream *self, PyObject *const *arguments)
+take_arguments(pair_stream *self, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_options *options = &self->call.options;
-    const char *letters;
-    if (!hs_py_call_init(&self->call, arguments) ||
-        !hs_quantities_of(arguments[HS_CALL_ARGUMENTS], HS_LETTERS, &letters, &options->want)) {
+    hs_py_call *call = &self->call;
+    if (!hs_py_call_take(call, "iter_pairs", "qbi", arguments, n_arguments)) {
         return false;
     }
-    strcpy(self->letters, letters); /* six different ones at most */
-    options->index_bytes = (int)PyLong_AsLong(arguments[HS_CALL_ARGUMENTS + 1]);
-    self->max_pairs = PyLong_AsLongLong(arguments[HS_CALL_ARGUMENTS + 2]);
-    self->progress = self->call.progress;
-    Py_XINCREF(self->progress);
-    self->cells = self->call.cells != NULL ? Py_NewRef(arguments[0]) : NULL;
-    return !PyErr_Occurred();
+    strcpy(self->letters, call->letters); /* six different ones at most */
+    call->letters = self->letters;
+    self->progress = Py_XNewRef(call->progress);
+    self->cells = call->among.cells != NULL ? Py_NewRef(arguments[0]) : NULL;
+    return true;
 }
 
 PyObject *
 hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    hs_failure failure;
-    if (!hs_expect_arguments("iter_pairs", n_arguments, HS_CALL_ARGUMENTS + 3)) {
-        return NULL;
-    }
     PyTypeObject *type = *(PyTypeObject **)PyModule_GetState(module);
     pair_stream  *self = (pair_stream *)type->tp_alloc(type, 0); /* zeros */
-    if (self == NULL || !take_arguments(self, arguments)) {
+    if (self == NULL || !take_arguments(self, arguments, n_arguments)) {
         Py_XDECREF(self);
         return NULL;
     }
     hs_py_call *call = &self->call;
     self->is_running = true; /* the hook can get hold of it */
-    const hs_among among = hs_py_call_among(call);
     hs_py_call_release(call);
     const hs_status status =
-        hs_stream_open(&among, &call->options, self->max_pairs, &self->stream, &failure);
+        hs_stream_open(&call->among, &call->options, call->integer, &self->stream, &call->failure);
     hs_py_call_acquire(call);
     leave(self);
     if (status != HS_OK) {
-        PyObject *nothing = hs_raise(status, &failure, &call->options);
+        PyObject *nothing = hs_raise(status, &call->failure, &call->options);
         Py_DECREF(self);
         return nothing;
     }

@@ -4,7 +4,6 @@
 
 #include "py_call.h"
 #include "errors.h"
-#include "py_result.h"
 #include "threads.h"
 
 #define CAPSULE "halfshell._core.verlet"
@@ -31,51 +30,44 @@ hs_py_verlet_new(PyObject *module, PyObject *ignored)
     return capsule;
 }
 
-/* The list of the first argument, of which there must be n in all; NULL with an exception set. */
-static hs_verlet *
-list_of(PyObject *const *arguments, Py_ssize_t n_arguments, int n, const char *name)
+/* A list, and the arguments of a search; false with an exception set. */
+static bool
+take_call(hs_py_call *call, hs_verlet **list, const char *name, const char *more,
+          PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    return hs_expect_arguments(name, n_arguments, n) ? PyCapsule_GetPointer(arguments[0], CAPSULE)
-                                                     : NULL;
+    *list = n_arguments > 0 ? PyCapsule_GetPointer(arguments[0], CAPSULE) : NULL;
+    if (n_arguments == 0) {
+        PyErr_Format(PyExc_TypeError, "%s takes a list", name);
+    }
+    return *list != NULL && hs_py_call_take(call, name, more, arguments + 1, n_arguments - 1);
 }
 
 PyObject *
 hs_py_verlet_update(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    hs_failure failure;
+    hs_verlet *list;
     bool       rebuilt = false;
     (void)module;
-    hs_verlet *list = list_of(arguments, n_arguments, HS_CALL_ARGUMENTS + 3, "verlet_update");
-    if (list == NULL || !hs_py_call_init(&call, arguments + 1)) {
-        return NULL;
-    }
-    const double skin = PyFloat_AsDouble(arguments[HS_CALL_ARGUMENTS + 1]);
-    const int    rebuild = PyObject_IsTrue(arguments[HS_CALL_ARGUMENTS + 2]);
-    if (PyErr_Occurred()) {
+    if (!take_call(&call, &list, "verlet_update", "xf", arguments, n_arguments)) {
         return NULL;
     }
     hs_py_call_release(&call);
-    const hs_status status = hs_verlet_update(list, &call.points, hs_py_call_box(&call),
-                                              &call.options, skin, rebuild != 0, &rebuilt,
-                                              &failure);
+    const hs_status status = hs_verlet_update(list, &call.points, call.among.box, &call.options,
+                                              call.real, call.flag, &rebuilt, &call.failure);
     hs_py_call_acquire(&call);
-    if (status != HS_OK) {
-        return hs_raise(status, &failure, &call.options);
-    }
-    return PyBool_FromLong(rebuilt);
+    return status == HS_OK ? PyBool_FromLong(rebuilt)
+                           : hs_raise(status, &call.failure, &call.options);
 }
 
 PyObject *
 hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    hs_result  result;
-    hs_failure failure;
+    hs_verlet *list;
     hs_pairs  *pairs = NULL;
     (void)module;
-    hs_verlet *list = list_of(arguments, n_arguments, HS_CALL_ARGUMENTS + 5, "verlet_pairs");
-    if (list == NULL || !hs_py_call_init(&call, arguments + 1)) {
+    if (!take_call(&call, &list, "verlet_pairs", "qsbo", arguments, n_arguments)) {
         return NULL;
     }
     const hs_verlet_state state = hs_verlet_look(list);
@@ -87,18 +79,10 @@ hs_py_verlet_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
     if (arguments[HS_CALL_ARGUMENTS] == Py_None) {
         call.options.threads = -hs_default_threads();
     }
-    if (!hs_result_init(&result, arguments + HS_CALL_ARGUMENTS + 1, &call)) {
-        return NULL;
-    }
     hs_py_call_release(&call);
-    const hs_status status = hs_verlet_find(list, &call.options, &pairs, &failure);
+    const hs_status status = hs_verlet_find(list, &call.options, &pairs, &call.failure);
     hs_py_call_acquire(&call);
-    if (status != HS_OK) {
-        return hs_raise(status, &failure, &call.options);
-    }
-    PyObject *arrays = hs_result_of(&result, pairs, &call);
-    hs_pairs_free(pairs);
-    return arrays;
+    return hs_py_call_pairs(&call, status, pairs);
 }
 
 PyObject *

@@ -102,8 +102,6 @@ call_python(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user
 static bool
 take_function(PyObject *const *arguments, callable *to_call, hs_visit *visit)
 {
-    const int thread_safe = PyObject_IsTrue(arguments[2]);
-    visit->thread_safe = thread_safe > 0;
     if (PyLong_Check(arguments[0])) {
         const uintptr_t address = (uintptr_t)PyLong_AsVoidPtr(arguments[0]);
         visit->pair = (hs_pair_fn)address;
@@ -119,23 +117,19 @@ PyObject *
 hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call call;
-    hs_failure failure;
     callable   to_call = {0};
     hs_visit   visit = {0};
     int64_t    n = 0;
     (void)module;
-    if (!hs_expect_arguments("for_each_pair", n_arguments, HS_CALL_ARGUMENTS + 3)) {
-        return NULL;
-    }
-    if (!hs_py_call_init(&call, arguments) ||
+    if (!hs_py_call_take(&call, "for_each_pair", "aaf", arguments, n_arguments) ||
         !take_function(arguments + HS_CALL_ARGUMENTS, &to_call, &visit)) {
         return NULL;
     }
+    visit.thread_safe = call.flag;
     to_call.function = arguments[HS_CALL_ARGUMENTS];
     to_call.ndim = call.points.ndim;
-    const hs_among among = hs_py_call_among(&call);
     call.thread = PyEval_SaveThread(); /* also with few points: other threads may need it */
-    const hs_status status = hs_pairs_visit(&among, &call.options, &visit, &n, &failure);
+    const hs_status status = hs_pairs_visit(&call.among, &call.options, &visit, &n, &call.failure);
     hs_py_call_acquire(&call);
     if (to_call.type != NULL && !PyErr_Occurred()) {
         PyErr_Restore(to_call.type, to_call.value, to_call.traceback);
@@ -144,5 +138,6 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     Py_XDECREF(to_call.type);
     Py_XDECREF(to_call.value);
     Py_XDECREF(to_call.traceback);
-    return status == HS_OK ? PyLong_FromLongLong(n) : hs_raise(status, &failure, &call.options);
+    return status == HS_OK ? PyLong_FromLongLong(n)
+                           : hs_raise(status, &call.failure, &call.options);
 }

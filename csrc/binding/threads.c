@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* threads.c: see threads.h. Asked anew for each large search: both may change while we run. */
+/* threads.c: the environment and the system are asked anew for each large search: what they say may
+ * change while the process runs. */
 #if defined(__linux__)
 #define _GNU_SOURCE /* sched_getaffinity */
 #endif
@@ -15,7 +16,7 @@
 #include <unistd.h>
 #endif
 
-#define MOST_THREADS 256 /* more would only wait for their turn to write */
+#define MOST_USEFUL 256 /* more would only wait for their turn to write */
 
 static long
 count_cores(void)
@@ -35,7 +36,7 @@ hs_most_threads(void)
 {
     const long cores = count_cores();
     const long most = HS_THREADS_PER_CORE * (cores < 1 ? 1 : cores);
-    return most > MOST_THREADS ? MOST_THREADS : (int)most;
+    return most > MOST_USEFUL ? MOST_USEFUL : (int)most;
 }
 
 int

@@ -2,9 +2,8 @@
 /* tuples.c: results of several arrays. */
 #include "tuples.h"
 
-/* Puts entry k into the tuple and gives it up; where it is NULL, *tuple is given up. */
-static void
-put_entry(PyObject **tuple, int k, PyObject *entry)
+void
+hs_tuple_put(PyObject **tuple, Py_ssize_t k, PyObject *entry)
 {
     if (entry == NULL) {
         Py_CLEAR(*tuple);
@@ -18,7 +17,7 @@ hs_tuple_of_integers(const int64_t *values, int n)
 {
     PyObject *tuple = PyTuple_New(n);
     for (int k = 0; tuple != NULL && k < n; k++) {
-        put_entry(&tuple, k, PyLong_FromLongLong(values[k]));
+        hs_tuple_put(&tuple, k, PyLong_FromLongLong(values[k]));
     }
     return tuple;
 }
@@ -28,7 +27,17 @@ hs_tuple_of_reals(const double *values, int n)
 {
     PyObject *tuple = PyTuple_New(n);
     for (int k = 0; tuple != NULL && k < n; k++) {
-        put_entry(&tuple, k, PyFloat_FromDouble(values[k]));
+        hs_tuple_put(&tuple, k, PyFloat_FromDouble(values[k]));
+    }
+    return tuple;
+}
+
+PyObject *
+hs_tuple_of_names(const char *const *names, int n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    for (int k = 0; tuple != NULL && k < n; k++) {
+        hs_tuple_put(&tuple, k, PyUnicode_FromString(names[k]));
     }
     return tuple;
 }

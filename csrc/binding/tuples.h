@@ -7,9 +7,14 @@
 
 #include <stdbool.h>
 
-/* n numbers; a new reference, or NULL with an exception set. */
+/* Puts entry k into the tuple and gives it up; where it is NULL, the tuple is given up instead, and
+ * *tuple is NULL. */
+void hs_tuple_put(PyObject **tuple, Py_ssize_t k, PyObject *entry);
+
+/* n numbers, or names; a new reference, or NULL with an exception set. */
 PyObject *hs_tuple_of_integers(const int64_t *values, int n);
 PyObject *hs_tuple_of_reals(const double *values, int n);
+PyObject *hs_tuple_of_names(const char *const *names, int n);
 
 /* Puts a new reference into a dictionary and gives it up; false with an exception set, also where
  * `value` is NULL. */

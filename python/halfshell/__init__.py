@@ -8,22 +8,22 @@ from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_ca
 from halfshell._convert.options import kernels
 from halfshell._errors import CapacityError
 from halfshell._functions.counts import count_pairs
-from halfshell._functions.neighbors import coordination, neighbors
 from halfshell._functions.pairs import pairs, pairs_between
 from halfshell._objects.box import Box
-from halfshell._objects.graph import Graph
-from halfshell._objects.neighbor_table import NeighborTable
 
 if TYPE_CHECKING:
     from halfshell._check.verify import Verdict, verify
     from halfshell._functions.explain import Explanation, explain
     from halfshell._functions.histogram import pair_histogram
     from halfshell._functions.nearest import nearest
+    from halfshell._functions.neighbors import coordination, neighbors
     from halfshell._functions.rdf import RadialDistribution, rdf
     from halfshell._functions.report import report
     from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._include import get_include
     from halfshell._objects.cell_list import CellList
+    from halfshell._objects.graph import Graph
+    from halfshell._objects.neighbor_table import NeighborTable
     from halfshell._objects.verlet_list import VerletList
 
 __version__ = "0.1.0"
@@ -63,14 +63,18 @@ __all__ = [
 _LATER = {
     "CellList": "_objects.cell_list",
     "Explanation": "_functions.explain",
+    "Graph": "_objects.graph",
+    "NeighborTable": "_objects.neighbor_table",
     "RadialDistribution": "_functions.rdf",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
+    "coordination": "_functions.neighbors",
     "explain": "_functions.explain",
     "for_each_pair": "_functions.stream",
     "get_include": "_include",
     "iter_pairs": "_functions.stream",
     "nearest": "_functions.nearest",
+    "neighbors": "_functions.neighbors",
     "pair_histogram": "_functions.histogram",
     "rdf": "_functions.rdf",
     "report": "_functions.report",

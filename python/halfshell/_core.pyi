@@ -14,14 +14,9 @@ _Search = tuple[
     Any, float, _Floats | None, int, bool, str, str | None, float | None,
     Callable[[float], object] | None, int | None,
 ]  # fmt: skip
-# The same as a caller gives them. What needs a conversion is answered with NotImplemented.
-_Plain = tuple[
-    Any, Any, Any, Any, Any, Any, Any, Any, Callable[[float], object] | None, int | None
-]
 _Queries = npt.NDArray[Any] | None
-# Functions that return arrays go on with quantities, sort, index_bytes (or index_dtype), out.
+# Functions that return arrays go on with quantities, sort, index_bytes, out.
 _Result = tuple[str, bool, int, Any]
-_PlainResult = tuple[Any, Any, Any, Any]
 # Those for many systems end with batch, cutoffs, boxes.
 _Batch = tuple[npt.NDArray[np.int64], _Floats | None, _Floats | None]
 
@@ -56,14 +51,11 @@ def histogram(
 
 # quantities, sort, index_bytes, measure
 def explain(*arguments: *tuple[*_Search, str, bool, int, bool]) -> dict[str, Any]: ...
-def plain_pairs(*arguments: *tuple[*_Plain, *_PlainResult]) -> Any: ...
-def plain_count(*arguments: *_Plain) -> Any: ...
-def plain_between(*arguments: *tuple[*_Plain, *_PlainResult, Any]) -> Any: ...
-def plain_count_between(*arguments: *tuple[*_Plain, Any]) -> Any: ...
-def plain_coordination(*arguments: *tuple[*_Plain, Any]) -> Any: ...
 
-# quantities, index_dtype, queries
-def plain_neighbors(*arguments: *tuple[*_Plain, Any, Any, Any]) -> Any: ...
+# One of the functions above, called with arguments as users give them, with periodic in place of
+# bits and index_dtype in place of index_bytes. What needs a conversion is answered with
+# NotImplemented.
+def plain(function: Callable[..., Any], /, *arguments: Any) -> Any: ...
 
 # cell_size, or 0 -> a capsule
 def cells_build(*arguments: *tuple[*_Search, float]) -> Any: ...

@@ -21,10 +21,9 @@ NAME = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
 # Themes of each file of the binding, as names of tests say them, besides its own name.
 THEMES = {
     "convert": "core_arguments boundary_cases dtypes array_forms",
-    "py_call": "core_arguments interrupt threads boundary_cases",
+    "py_call": "core_arguments interrupt threads boundary_cases quantities",
     "plain": "plain array_forms",
     "outputs": "quantities table array_forms",
-    "py_result": "quantities boundary_cases",
     "foreign": "boundary",
     "tuples": "for_each_pair explain cell_list",
     "py_pairs": "quantities pairs_small count",

@@ -9,10 +9,17 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import PointArray, as_array
+from halfshell._convert.arrays import as_array
 from halfshell._convert.options import as_flag
 from halfshell._convert.search import as_search
-from halfshell._convert.types import ArrayLike, BoxLike, Number, PeriodicLike, PointsLike
+from halfshell._convert.types import (
+    ArrayLike,
+    BoxLike,
+    Number,
+    PeriodicLike,
+    PointArray,
+    PointsLike,
+)
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._functions.pairs import pairs_between as find_between
 from halfshell._objects.neighbor_table import NeighborTable

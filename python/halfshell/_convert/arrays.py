@@ -8,10 +8,9 @@ Types and shapes are settled here: an array is converted only when no value chan
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell._convert.foreign import (
     exact_number,
@@ -23,10 +22,12 @@ from halfshell._convert.foreign import (
 )
 from halfshell._convert.memory import refuse_large
 
-_BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-PointArray = npt.NDArray[np.float32] | FloatArray
+    from halfshell._convert.types import FloatArray
+
+_BIGGEST_INTEGER = 2**53  # from here on float64 does not hold every integer
 
 
 def as_real_array(

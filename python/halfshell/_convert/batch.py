@@ -3,22 +3,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array, in_order
+from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.scene import MAX_DIM, as_points, as_scene, brings_its_box, vectors_of
 
-# What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
-# shape; periodic bits.
-Scene = tuple[PointArray, float, FloatArray | None, int]
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
-# What each system has of its own: numbers, one a point; cutoffs and boxes, one a system.
-Systems = tuple[npt.NDArray[np.int64], FloatArray | None, FloatArray | None]
+    from halfshell._convert.types import FloatArray, PointArray
+
+    # What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
+    # shape; periodic bits.
+    Scene = tuple[PointArray, float, FloatArray | None, int]
+
+    # What each system has of its own: numbers, one a point; cutoffs and boxes, one a system.
+    Systems = tuple[npt.NDArray[np.int64], FloatArray | None, FloatArray | None]
 
 
 def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:

@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from halfshell._convert.arrays import FloatArray, as_real_array
+from halfshell._convert.arrays import as_real_array
 from halfshell._convert.foreign import is_a
 from halfshell._convert.memory import refuse_large, refuse_unavailable
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import FloatArray
 
 # The array, the one that it is checked with, and the counts.
 _EDGE_COPIES = 4

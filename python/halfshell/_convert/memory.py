@@ -6,12 +6,13 @@ The core looks after its own.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, SupportsIndex
-
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex
 
 from halfshell import _core
 from halfshell._convert.foreign import is_a, kind_of, shown, whole_number
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 _SMALL = 1 << 26  # bytes; below them the system is not asked what is left
 

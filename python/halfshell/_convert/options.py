@@ -10,6 +10,9 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
 
+# Blocks are counted by int64, and two of them must be.
+_MOST_PAIRS = 2**62
+
 
 def kernels() -> list[str]:
     """Names of the kernels that this CPU can run, the best one first.
@@ -41,6 +44,11 @@ def as_count(value: Any, name: str) -> int:
     if number < 1:
         raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
     return number
+
+
+def most_pairs(max_pairs: Any) -> int:
+    """A number of pairs from 1 on, as the core takes it."""
+    return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
 
 
 def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:

@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array, in_order
+from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
+
+if TYPE_CHECKING:
+    from halfshell._convert.types import FloatArray, PointArray
+
+    OwnBox = tuple[FloatArray | None, int]  # and the bits of the axes that repeat
 
 MAX_DIM = 8
 MAX_POINTS = 2**31 - 1
@@ -82,6 +87,31 @@ def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
     return sum(1 << axis for axis in range(ndim) if array[axis])
 
 
+def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
+    """Dimensions, box vectors and periodic bits for points that come later.
+
+    The box says how many dimensions there are, or else `periodic`; 3 if neither does.
+    """
+    counts = [3]
+
+    def check_box(shape: tuple[int, ...]) -> None:
+        if len(shape) > 2 or len(set(shape)) > 1 or not all(1 <= d <= MAX_DIM for d in shape):
+            raise ValueError(
+                f"box must have shape (d,) or (d, d) with 1 <= d <= {MAX_DIM}, or be one length, "
+                f"got {shape}"
+            )
+        counts[:0] = shape
+
+    if box is not None:
+        as_real_array(vectors_of(box), "box", "be lengths or vectors", check_box)
+    if len(counts) == 1 and not is_a(periodic, (str, bytes)):
+        axes = as_array(periodic, "periodic").shape
+        counts[:0] = axes if len(axes) == 1 and 1 <= axes[0] <= MAX_DIM else ()
+    ndim = counts[0]
+    vectors = None if box is None else as_box(box, ndim)
+    return ndim, vectors, as_periodic_bits(periodic, ndim, default=box is not None)
+
+
 def brings_its_box(points: Any, name: str = "points") -> bool:
     """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms."""
     return type(points) not in (np.ndarray, list) and all(
@@ -126,6 +156,24 @@ def as_scene(
     return array, as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
 
 
+def as_queries(
+    queries: Any, name: str = "queries", ndim: int = 3
+) -> tuple[PointArray, OwnBox | None]:
+    """Queries as points, and the box that they bring, if they are an ASE-like object."""
+    if brings_its_box(queries, name):
+        array, vectors, bits = _own_scene(queries, name, ndim)
+        return array, (vectors, bits)
+    return as_points(queries, name, ndim), None
+
+
+def check_own_box(name: str, own: OwnBox | None, of_points: OwnBox) -> None:
+    """ValueError if queries bring a box that is not that of the points."""
+    if own is not None and not _same_box(own, of_points):
+        raise ValueError(
+            f"{name} bring a box that is not that of points: give arrays, and box and periodic"
+        )
+
+
 def as_two_sets(
     queries: Any, points: Any, box: Any, periodic: Any
 ) -> tuple[PointArray, PointArray, FloatArray | None, int]:
@@ -133,8 +181,7 @@ def as_two_sets(
 
     The box of an ASE-like object holds for both sets: where both are such objects, they must agree.
     """
-    own = _own_scene(queries, "queries") if brings_its_box(queries, "queries") else None
-    asking = as_points(queries, "queries") if own is None else own[0]
+    asking, own = as_queries(queries)
     array, vectors, bits = as_scene(points, box, periodic, asking.shape[1])
     if len(asking) == 0 and own is None:
         asking = as_points(queries, "queries", array.shape[1])
@@ -143,10 +190,7 @@ def as_two_sets(
             "queries and points must have the same number of columns, got shapes "
             f"{asking.shape} and {array.shape}"
         )
-    if own is not None and not _same_box(own[1:], (vectors, bits)):
-        raise ValueError(
-            "queries bring a box that is not that of points: give arrays, and box and periodic"
-        )
+    check_own_box("queries", own, (vectors, bits))
     return asking, array, vectors, bits
 
 
@@ -159,9 +203,7 @@ def as_sets(
     return as_two_sets(queries, points, box, periodic)
 
 
-def _same_box(
-    one: tuple[FloatArray | None, int], other: tuple[FloatArray | None, int]
-) -> bool:
+def _same_box(one: OwnBox, other: OwnBox) -> bool:
     """Whether the same axes repeat by the same vectors."""
     if one[1] != other[1]:
         return False

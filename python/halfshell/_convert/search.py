@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arguments that every search begins with, brought to what the core takes."""
+"""What searches share: the arguments that each begins with, and counts within several cutoffs."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from halfshell._convert.arrays import PointArray
+import numpy as np
+
+from halfshell import _core
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_sets
-from halfshell._convert.types import Precision, Rest, Search
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import FloatArray, PointArray, Precision, Rest, Search
 
 
 def as_search(
@@ -43,3 +49,34 @@ def as_rest(
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     return as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress, threads
+
+
+def count_within(
+    cutoffs: float | FloatArray,
+    points: Any,
+    box: FloatArray | None,
+    bits: int,
+    rest: Rest,
+    queries: PointArray | None = None,
+) -> int | npt.NDArray[np.int64]:
+    """How many pairs are within a cutoff, or within each of some, which ascend and are at least 0.
+
+    points: an array, or cells of the core in place of points and box.
+    """
+
+    def count(one: float) -> int:
+        if queries is None:
+            return _core.count_pairs(points, one, box, bits, *rest)
+        return _core.count_between(points, one, box, bits, *rest, queries)
+
+    if isinstance(cutoffs, float):
+        return count(cutoffs)
+    if isinstance(rest[1], str) and rest[1] == "exact" and len(cutoffs) > 1:
+        edges = np.ascontiguousarray(cutoffs)
+        between: npt.NDArray[np.int64] = _core.histogram(
+            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None
+        )
+        return np.cumsum(between[0, 0])
+    # Without any, all else is checked as ever.
+    counts = [count(one) for one in cutoffs.tolist() or [0.0]]
+    return np.array(counts[: len(cutoffs)], dtype=np.int64)

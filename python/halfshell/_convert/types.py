@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Types of arguments and results, for signatures and type checkers; nothing here is called."""
+"""Types of arguments and results, for signatures and type checkers; nothing here is called.
+
+Modules that `import halfshell` loads import this one, and `numpy.typing`, for type checkers only.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, Protocol, TypedDict
+from typing import Any, Literal, Protocol, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 Precision = Literal["exact", "double", "single"]
+
+FloatArray = npt.NDArray[np.float64]
+PointArray = npt.NDArray[np.float32] | FloatArray
 
 # What functions return that take `quantities`, and one of its letters.
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
@@ -23,7 +29,7 @@ Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
 # The first arguments of all its searches: points, cutoff, box and periodic before these, or cells
 # in place of points and box.
 Search = tuple[
-    Any, float, npt.NDArray[np.float64] | None, int,
+    Any, float, FloatArray | None, int,
     bool, Precision, str | None, float | None, Progress, int | None,
 ]  # fmt: skip
 
@@ -78,3 +84,29 @@ class ArrayOptions(SearchOptions, total=False):
 
     index_dtype: npt.DTypeLike
     out: Out | None
+
+
+class PairOptions(ArrayOptions, total=False):
+    """Of `pairs`, without `quantities`."""
+
+    sort: bool
+    progress: Progress
+    batch: npt.ArrayLike | None
+
+
+class CountOptions(SearchOptions, total=False):
+    """Of `count_pairs`, without those that its type depends on."""
+
+    queries: PointsLike | None
+    batch: None
+
+
+Block = TypeVar("Block", covariant=True)
+
+
+class PairBlocks(Protocol[Block]):
+    """The iterator that `iter_pairs` returns."""
+
+    def __iter__(self) -> PairBlocks[Block]: ...
+    def __next__(self) -> Block: ...
+    def close(self) -> None: ...

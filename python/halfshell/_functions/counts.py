@@ -3,47 +3,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Unpack, cast, overload
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, cast, overload
 
 from halfshell import _core
-from halfshell._convert.arrays import FloatArray, PointArray
 from halfshell._convert.batch import as_systems
 from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.scene import as_sets
-from halfshell._convert.search import as_rest
-from halfshell._convert.types import (
-    BoxLike,
-    Number,
-    PeriodicLike,
-    PointsLike,
-    Precision,
-    Rest,
-    SearchOptions,
-)
+from halfshell._convert.search import as_rest, count_within
 from halfshell._objects.box import Box
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Unpack
+
+    import numpy as np
+    import numpy.typing as npt
+
+    from halfshell._convert.types import (
+        BoxLike,
+        CountOptions,
+        FloatArray,
+        Number,
+        PeriodicLike,
+        PointsLike,
+        Precision,
+        SearchOptions,
+    )
 
 _MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 
 
-class _CountOptions(SearchOptions, total=False):
-    """For overloads: the keywords of `count_pairs`, without those its type depends on."""
-
-    queries: PointsLike | None
-    batch: None
-
-
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: Number, **options: Unpack[_CountOptions]
+    points: PointsLike, cutoff: Number, **options: Unpack[CountOptions]
 ) -> int: ...
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[_CountOptions]
+    points: PointsLike, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[CountOptions]
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
@@ -55,7 +52,7 @@ def count_pairs(
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: npt.ArrayLike, **options: Unpack[_CountOptions]
+    points: PointsLike, cutoff: npt.ArrayLike, **options: Unpack[CountOptions]
 ) -> int | npt.NDArray[np.int64]: ...
 def count_pairs(
     points: PointsLike,
@@ -124,16 +121,17 @@ def count_pairs(
     if type(box) is Box:
         box = box.vectors
     if batch is None:
-        plain = (
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
-        )
         result: Any = (
-            _core.plain_count(*plain)
-            if queries is None
-            else _core.plain_count_between(*plain, queries)
-        )
+            _core.plain(
+                _core.count_pairs, points, cutoff, box, periodic, inclusive, precision, kernel,
+                memory_limit, None, threads,
+            ) if queries is None else _core.plain(
+                _core.count_between, points, cutoff, box, periodic, inclusive, precision, kernel,
+                memory_limit, None, threads, queries,
+            )
+        )  # fmt: skip
         if result is not NotImplemented:
-            return cast(int, result)
+            return cast("int", result)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
     if batch is not None:
         if queries is not None:
@@ -154,34 +152,3 @@ def _refuse_systems(
     last = int(numbers[-1])
     if _MANY_SYSTEMS < last < 2**62 and bool((numbers[1:] >= numbers[:-1]).all()):
         refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")
-
-
-def count_within(
-    cutoffs: float | FloatArray,
-    points: Any,
-    box: FloatArray | None,
-    bits: int,
-    rest: Rest,
-    queries: PointArray | None = None,
-) -> int | npt.NDArray[np.int64]:
-    """How many pairs are within a cutoff, or within each of some, which ascend and are at least 0.
-
-    points: an array, or cells of the core in place of points and box.
-    """
-
-    def count(one: float) -> int:
-        if queries is None:
-            return _core.count_pairs(points, one, box, bits, *rest)
-        return _core.count_between(points, one, box, bits, *rest, queries)
-
-    if isinstance(cutoffs, float):
-        return count(cutoffs)
-    if isinstance(rest[1], str) and rest[1] == "exact" and len(cutoffs) > 1:
-        edges = np.ascontiguousarray(cutoffs)
-        between: npt.NDArray[np.int64] = _core.histogram(
-            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None
-        )
-        return np.cumsum(between[0, 0])
-    # Without any, all else is checked as ever.
-    counts = [count(one) for one in cutoffs.tolist() or [0.0]]
-    return np.array(counts[: len(cutoffs)], dtype=np.int64)

@@ -3,33 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
-from halfshell._convert.arrays import FloatArray, PointArray, as_array, as_real_array
-from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_edges
-from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.marks import as_marks, binned
 from halfshell._convert.search import as_search
-from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike, Search
-
-# The counts of one thread, of two numbers for each bin; their sum; and the result.
-_COPIES = 4
-
-_Column = npt.NDArray[Any] | None
-
-
-class Marks(NamedTuple):
-    """Types and weights of the points and of the queries, as the core takes them."""
-
-    n_types: int
-    types: _Column
-    weights: _Column
-    query_types: _Column
-    query_weights: _Column
+from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike
 
 
 def pair_histogram(
@@ -122,74 +102,3 @@ def pair_histogram(
     )
     marks = as_marks(len(search[0]), asking, types, query_types, weights, query_weights)
     return binned(search, as_edges(edges), asking, marks)
-
-
-def binned(
-    search: Search,
-    edges: FloatArray,
-    queries: PointArray | None,
-    marks: Marks,
-    name: str = "edges[-1]",
-) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
-    """The histogram of points or cells, given as the first arguments of every search.
-
-    name: what a message calls the largest distance.
-    """
-    refuse_unavailable(
-        _COPIES * 8 * marks.n_types**2 * len(edges),
-        f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
-    )
-    with of_argument(name):
-        found = _core.histogram(*search, edges, True, queries, *marks)
-    # What the core counts first are the pairs closer than the first edge.
-    return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])
-
-
-def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
-    """The type of each of n points, from 0 on."""
-    array = as_array(values, name, "hold integers")
-    if array.shape != (n,):
-        raise ValueError(f"{name} must have shape ({n},), one a point, got {array.shape}")
-    if array.dtype.kind not in "iu" and n > 0:
-        raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
-    for k in np.flatnonzero((array < 0) | (array >= 2**31 - 1)):
-        raise ValueError(
-            f"{name} must be from 0 on and below 2**31 - 1, got {name}[{k}] = {array[k]}"
-        )
-    return np.ascontiguousarray(array, dtype=np.int32)
-
-
-def _as_weights(values: npt.ArrayLike, name: str, n: int) -> FloatArray:
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (n,):
-            raise ValueError(f"{name} must have shape ({n},), one a point, got {shape}")
-
-    array = as_real_array(values, name, check_shape=check)
-    return np.ascontiguousarray(array, dtype=np.float64)
-
-
-def as_marks(
-    n: int,
-    queries: PointArray | None,
-    types: Any,
-    query_types: Any,
-    weights: Any = None,
-    query_weights: Any = None,
-) -> Marks:
-    """Types and weights of n points and of the queries."""
-    if queries is None and (query_types is not None or query_weights is not None):
-        name = "query_types" if query_types is not None else "query_weights"
-        raise ValueError(f"{name} needs queries")
-    if queries is not None and (types is None) != (query_types is None):
-        raise ValueError("with queries, types and query_types must be given together")
-    q = 0 if queries is None else len(queries)
-    own = None if types is None else as_types(types, "types", n)
-    asking = None if query_types is None else as_types(query_types, "query_types", q)
-    largest = max((int(t.max(initial=0)) for t in (own, asking) if t is not None), default=0)
-    return Marks(
-        1 + largest,
-        own,
-        None if weights is None else _as_weights(weights, "weights", n),
-        asking,
-        None if query_weights is None else _as_weights(query_weights, "query_weights", q),
-    )

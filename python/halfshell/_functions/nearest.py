@@ -9,13 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.foreign import shown
-from halfshell._convert.lengths import as_number
-from halfshell._convert.options import as_count, as_index_bytes
+from halfshell._convert.nearest import as_k, as_max_distance, in_rows
+from halfshell._convert.options import as_index_bytes
 from halfshell._convert.scene import as_sets
 from halfshell._convert.types import Arrays, BoxLike, Number, PeriodicLike, PointsLike
-
-_MOST = 2**56  # more entries than any memory holds; NumPy has shapes (0, _MOST, 8)
 
 
 class _NearestOptions(TypedDict, total=False):
@@ -160,26 +157,3 @@ def nearest(
         quantities, as_index_bytes(index_dtype), asking, k,
     )
     return in_rows(result, len(array if asking is None else asking), k)
-
-
-def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:
-    """The arrays of the core, each with its entries as (rows, k)."""
-    if isinstance(arrays, tuple):
-        return tuple(column.reshape(n_rows, k, *column.shape[1:]) for column in arrays)
-    return arrays.reshape(n_rows, k, *arrays.shape[1:])
-
-
-def as_k(k: Any) -> int:
-    """How many are wanted: a whole number from 1 on."""
-    number = as_count(k, "k")
-    if number > _MOST:
-        raise MemoryError(f"k = {shown(number)} is more than any memory holds")
-    return number
-
-
-def as_max_distance(value: Any) -> float:
-    """A number that is not negative; infinity is one."""
-    number = as_number(value, "max_distance")
-    if not number >= 0.0:
-        raise ValueError(f"max_distance must not be negative or NaN, got {number}")
-    return number

@@ -100,9 +100,9 @@ def neighbors(
     vectors: Any = box
     periods: Any = periodic
     asking: Any = queries
-    arrays: Any = _core.plain_neighbors(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        quantities, index_dtype, queries,
+    arrays: Any = _core.plain(
+        _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
+        memory_limit, None, threads, quantities, index_dtype, queries,
     )
     if arrays is NotImplemented:
         search, asking = as_search(
@@ -163,9 +163,9 @@ def coordination(
     """
     if type(box) is Box:
         box = box.vectors
-    counts: Any = _core.plain_coordination(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        queries,
+    counts: Any = _core.plain(
+        _core.coordination, points, cutoff, box, periodic, inclusive, precision, kernel,
+        memory_limit, None, threads, queries,
     )
     if counts is not NotImplemented:
         return cast("npt.NDArray[np.int64]", counts)

@@ -3,37 +3,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Literal, Unpack, cast, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search
-from halfshell._convert.types import (
-    ArrayOptions,
-    Arrays,
-    BoxLike,
-    Letter,
-    Number,
-    Out,
-    PeriodicLike,
-    PointsLike,
-    Precision,
-)
 from halfshell._objects.box import Box
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Literal, Unpack
 
-class _PairOptions(ArrayOptions, total=False):
-    """For overloads: the keywords of `pairs`, without `quantities`."""
+    import numpy.typing as npt
 
-    sort: bool
-    progress: Callable[[float], object] | None
-    batch: npt.ArrayLike | None
+    from halfshell._convert.types import (
+        ArrayOptions,
+        Arrays,
+        BoxLike,
+        Letter,
+        Number,
+        Out,
+        PairOptions,
+        PeriodicLike,
+        PointsLike,
+        Precision,
+    )
 
 
 @overload
@@ -42,7 +40,7 @@ def pairs(
     cutoff: npt.ArrayLike,
     *,
     quantities: Literal["ij"] = "ij",
-    **options: Unpack[_PairOptions],
+    **options: Unpack[PairOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
 def pairs(
@@ -50,7 +48,7 @@ def pairs(
     cutoff: npt.ArrayLike,
     *,
     quantities: Letter,
-    **options: Unpack[_PairOptions],
+    **options: Unpack[PairOptions],
 ) -> npt.NDArray[Any]: ...
 @overload
 def pairs(
@@ -58,7 +56,7 @@ def pairs(
     cutoff: npt.ArrayLike,
     *,
     quantities: str,
-    **options: Unpack[_PairOptions],
+    **options: Unpack[PairOptions],
 ) -> Arrays: ...
 def pairs(
     points: PointsLike,
@@ -227,12 +225,12 @@ def pairs(
     if batch is None:
         # A small search takes as long as a handful of Python operations: none are made where the
         # arguments need no conversion.
-        result: Any = _core.plain_pairs(
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress,
-            threads, quantities, sort, index_dtype, out,
+        result: Any = _core.plain(
+            _core.pairs, points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit,
+            progress, threads, quantities, sort, index_dtype, out,
         )
         if result is not NotImplemented:
-            return cast(Arrays, result)
+            return cast("Arrays", result)
     check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch)
     if batch is None:
         search, _ = as_search(
@@ -345,12 +343,12 @@ def pairs_between(
     """
     if type(box) is Box:
         box = box.vectors
-    result: Any = _core.plain_between(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        quantities, True, index_dtype, out, queries,
+    result: Any = _core.plain(
+        _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
+        memory_limit, None, threads, quantities, True, index_dtype, out, queries,
     )
     if result is not NotImplemented:
-        return cast(Arrays, result)
+        return cast("Arrays", result)
     check_apart(out, queries=queries, points=points, box=box)
     search, asking = as_search(
         points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,

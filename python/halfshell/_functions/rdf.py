@@ -11,14 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import FloatArray, PointArray
 from halfshell._convert.lengths import as_positive
+from halfshell._convert.marks import Marks, as_marks, binned
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_count
 from halfshell._convert.search import as_search
-from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike
+from halfshell._convert.types import (
+    BoxLike,
+    FloatArray,
+    Number,
+    PeriodicLike,
+    PointArray,
+    PointsLike,
+)
 from halfshell._extras import needs
-from halfshell._functions.histogram import Marks, as_marks, binned
 
 _COLUMNS = 10
 

@@ -4,37 +4,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, Protocol, TypeVar, Unpack, cast, overload
+from typing import Any, Literal, Unpack, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.options import as_count, as_flag, as_index_bytes
+from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
 from halfshell._convert.search import as_search
 from halfshell._convert.types import (
     Arrays,
     BoxLike,
     Letter,
     Number,
+    PairBlocks,
     PeriodicLike,
     PointsLike,
     Precision,
     SearchOptions,
 )
-
-Block = TypeVar("Block", covariant=True)
-
-# Blocks are counted by int64, and two of them must be.
-_MOST_PAIRS = 2**62
-
-
-class PairBlocks(Protocol[Block]):
-    """For type checkers: the iterator that `iter_pairs` returns."""
-
-    def __iter__(self) -> PairBlocks[Block]: ...
-    def __next__(self) -> Block: ...
-    def close(self) -> None: ...
 
 
 class _StreamOptions(SearchOptions, total=False):
@@ -247,8 +235,3 @@ def for_each_pair(
     return _core.for_each_pair(
         *search, target.function, target.user, as_flag(thread_safe, "thread_safe")
     )
-
-
-def most_pairs(max_pairs: Any) -> int:
-    """A number of pairs from 1 on, as the core takes it."""
-    return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)

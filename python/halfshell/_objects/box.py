@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.arrays import as_real_array
@@ -20,7 +19,11 @@ from halfshell._convert.scene import (
     as_points,
     vectors_of,
 )
-from halfshell._convert.types import ArrayLike, BoxLike, PeriodicLike, PointsLike
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import ArrayLike, BoxLike, PeriodicLike, PointsLike
 
 
 class Box:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.lengths import as_cutoffs, as_edges
+from halfshell._convert.marks import as_marks, binned
+from halfshell._convert.search import count_within
 from halfshell._convert.types import Number, PointsLike
-from halfshell._functions.counts import count_within
-from halfshell._functions.histogram import as_marks, binned
 from halfshell._objects.kept_cells import KeptCells
 
 

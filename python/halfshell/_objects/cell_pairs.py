@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
-from halfshell._convert.options import as_flag, as_index_bytes
-from halfshell._convert.types import Arrays, Number, Out
-from halfshell._functions.stream import PairBlocks, most_pairs
+from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
+from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
 
 

@@ -10,12 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import PointArray
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_radii
+from halfshell._convert.nearest import as_k, as_max_distance, in_rows
 from halfshell._convert.options import as_flag, as_index_bytes
-from halfshell._convert.types import Arrays, Number, PointsLike
-from halfshell._functions.nearest import as_k, as_max_distance, in_rows
+from halfshell._convert.types import Arrays, Number, PointArray, PointsLike
 from halfshell._objects.kept_cells import KeptCells, Options
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from halfshell._convert.arrays import PointArray
 from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.scene import as_points
+from halfshell._convert.scene import as_queries, check_own_box
 from halfshell._convert.search import as_rest
-from halfshell._convert.types import Precision, Progress, Search
+from halfshell._convert.types import PointArray, Precision, Progress, Search
 from halfshell._objects.origin import Origin
 
 # Of methods that search: inclusive, kernel, threads, memory_limit.
@@ -33,11 +32,13 @@ class KeptCells:
     _threads: int | None
 
     def _queries(self, queries: Any, name: str = "queries") -> PointArray:
-        array = as_points(queries, name, self._ndim)
+        """Queries of the dimension of the points; a box that they bring must be that of these."""
+        array, own = as_queries(queries, name, self._ndim)
         if array.shape[1] != self._ndim:
             raise ValueError(
                 f"{name} must have {self._ndim} columns, as the points, got shape {array.shape}"
             )
+        check_own_box(name, own, self._origin.scene()[1:])
         return array
 
     def _arguments(self, cutoff: Any, options: Options, progress: Progress = None) -> Search:

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import PointArray
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_scene
+from halfshell._convert.types import PointArray
 
 FindShifts = Callable[["Origin"], npt.NDArray[Any]]
 Floats = npt.NDArray[np.float64]

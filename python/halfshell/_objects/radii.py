@@ -16,8 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import PointArray
 from halfshell._convert.memory import gigabytes, refuse_unavailable
+from halfshell._convert.types import PointArray
 
 Columns = tuple[npt.NDArray[Any], ...]
 Members = npt.NDArray[np.intp]  # queries, by number

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import threading
+from contextlib import suppress
 from time import perf_counter
 from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
 
@@ -15,7 +16,7 @@ from halfshell import _core
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_number
 from halfshell._convert.options import as_flag, as_index_bytes
-from halfshell._convert.scene import as_scene
+from halfshell._convert.scene import as_box_alone, as_scene
 from halfshell._convert.types import Arrays, BoxLike, Letter, Number, Out, PeriodicLike, PointsLike
 from halfshell._objects.skin import AutoSkin
 
@@ -53,10 +54,8 @@ class VerletList:
 
     Raises
     ------
-    TypeError
-        If an argument is of the wrong kind.
-    ValueError
-        If `cutoff` or `skin` is negative or not finite.
+    TypeError, ValueError, OverflowError
+        As `pairs`, for all of these arguments; ValueError also if `skin` is negative or not finite.
 
     See Also
     --------
@@ -113,11 +112,21 @@ class VerletList:
         self._threads = threads
         self._kernel = kernel
         self._memory_limit = memory_limit
+        self._check()
         self._list = _core.verlet_new()
         self._lock = threading.RLock()
         self._is_busy = False
         self._n_builds = 0
         self._n_updates = 0
+
+    def _check(self) -> None:
+        """Refuse what no step could be taken with, by a search among no points."""
+        ndim, vectors, bits = as_box_alone(self._box, self._periodic)
+        with suppress(MemoryError):  # each step says whether it fits
+            _core.count_pairs(
+                np.empty((0, ndim)), 0.0, vectors, 0 if vectors is None else bits,
+                self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
+            )
 
     def update(
         self,

@@ -126,3 +126,67 @@ def test_boxes_fit(name):
         with pytest.raises(ValueError, match="boxes do not fit points, box and cutoffs"):
             batch(name, BATCH, cutoffs, boxes, box, 0 if box is None else 7)
     assert len(batch(name, BATCH, CUTOFFS, BOXES, np.eye(3), 7)) > 0
+
+
+class Shrinks:
+    """A number that makes an array shorter, and gives its memory back, when it is read."""
+
+    def __init__(self, array, value):
+        self.array = array
+        self.value = value
+
+    def read(self):
+        self.array.resize((2, *self.array.shape[1:]), refcheck=False)
+        return self.value
+
+    __index__ = __float__ = __bool__ = read
+
+
+SHARED = (True, "exact", None, None, None, None)
+
+# How a function is called with its number, and how long what it returns is for two points.
+WITH_NUMBERS = {
+    "neighbors": (8, lambda p, n: _core.neighbors(p, 9.0, None, 0, *SHARED, "j", n, None), 2),
+    "explain": (
+        True, lambda p, n: _core.explain(p, 9.0, None, 0, *SHARED, "ij", False, 8, n)["pairs"], 1,
+    ),
+    "histogram": (
+        1,
+        lambda p, n: int(_core.histogram(
+            p, 0.0, None, 0, *SHARED, np.array([0.0, 9.0]), True, None, n, *[None] * 4
+        ).sum()),
+        1,
+    ),
+    "iter_pairs": (
+        5, lambda p, n: sum(len(i) for i in _core.iter_pairs(
+            p, 9.0, None, 0, *SHARED, "i", 8, n
+        )), 1,
+    ),
+    "nearest": (1, lambda p, n: len(_core.nearest(p, 9.0, None, 0, *SHARED, "j", 8, None, n)), 2),
+    "pairs": (False, lambda p, n: len(_core.pairs(p, 9.0, None, 0, *SHARED, "i", n, 8, None)), 1),
+    "inclusive": (
+        True, lambda p, n: _core.count_pairs(p, 9.0, None, 0, n, *SHARED[1:]), 1,
+    ),
+    "cells": (
+        1.0, lambda p, n: len(_core.cells_layout(
+            _core.cells_build(p, 9.0, None, 0, *SHARED, n)
+        )["order"]), 2,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WITH_NUMBERS)
+def test_numbers_are_read_before_arrays_are_looked_at(name):
+    value, call, expected = WITH_NUMBERS[name]
+    points = np.random.default_rng(5).random((20_000, 3))
+    found = call(points, Shrinks(points, value))
+    assert len(points) == 2
+    assert (len(found[0]) - 1 if name == "neighbors" else found) == expected
+
+
+def test_the_skin_is_read_before_the_points():
+    points = np.random.default_rng(5).random((20_000, 3))
+    pair_list = _core.verlet_new()
+    skin = Shrinks(points, 0.5)
+    assert _core.verlet_update(pair_list, points, 0.1, None, 0, *SHARED, skin, False)
+    assert _core.verlet_look(pair_list)["n_points"] == 2

@@ -31,7 +31,9 @@ class Subclass(np.ndarray):
 
 def plain(points, cutoff=1.5, *, quantities="ij", sort=False, index_dtype=np.int64, **options):
     shared = {**SHARED, **options}
-    return _core.plain_pairs(points, cutoff, *shared.values(), quantities, sort, index_dtype, None)
+    return _core.plain(
+        _core.pairs, points, cutoff, *shared.values(), quantities, sort, index_dtype, None
+    )
 
 
 PERIODIC = [None, True, False, (True, False, True), [False, True, True]]
@@ -52,7 +54,7 @@ def test_same_answer_as_converted_arguments(box, periodic, real, index_dtype):
         assert a.dtype == b.dtype == c.dtype
         assert a.tobytes() == b.tobytes() == c.tobytes()
     shared = SHARED | {"box": box, "periodic": periodic}
-    assert _core.plain_count(points, 1.5, *shared.values()) == len(direct[0])
+    assert _core.plain(_core.count_pairs, points, 1.5, *shared.values()) == len(direct[0])
 
 
 QUERIES = POINTS[:7] + 0.25
@@ -60,23 +62,23 @@ QUERIES = POINTS[:7] + 0.25
 # Each function of the core for plain arguments that may have queries, and its public counterpart;
 # what comes between the shared arguments and the queries.
 WITH_QUERIES = {
-    "plain_between": (
+    "pairs_between": (
         ("ijdS", True, np.int64, None),
         lambda points, queries, **how: hs.pairs_between(
             queries, points, 1.5, quantities="ijdS", **how
         ),
     ),
-    "plain_count_between": (
+    "count_between": (
         (),
         lambda points, queries, **how: hs.count_pairs(points, 1.5, queries=queries, **how),
     ),
-    "plain_neighbors": (
+    "neighbors": (
         ("jdS", np.int64),
         lambda points, queries, **how: hs.neighbors(
             points, 1.5, queries=queries, quantities="jdS", **how
         )._arrays,
     ),
-    "plain_coordination": (
+    "coordination": (
         (),
         lambda points, queries, **how: hs.coordination(points, 1.5, queries=queries, **how),
     ),
@@ -86,7 +88,7 @@ WITH_QUERIES = {
 def plain_with_queries(name, points, queries, **options):
     shared = {**SHARED, **options}
     more = WITH_QUERIES[name][0]
-    return getattr(_core, name)(points, 1.5, *shared.values(), *more, queries)
+    return _core.plain(getattr(_core, name), points, 1.5, *shared.values(), *more, queries)
 
 
 @pytest.mark.parametrize("name", WITH_QUERIES)
@@ -115,7 +117,7 @@ def test_other_queries_are_converted(name):
         assert plain_with_queries(name, POINTS, queries) is NotImplemented
     assert plain_with_queries(name, POINTS.tolist(), QUERIES) is NotImplemented
     with pytest.raises(TypeError, match="arguments"):
-        getattr(_core, name)(POINTS, 1.5)
+        _core.plain(getattr(_core, name), POINTS, 1.5)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +137,7 @@ def test_other_queries_are_converted(name):
 )
 def test_other_points_are_converted(points):
     assert plain(points) is NotImplemented
-    assert _core.plain_count(points, 1.5, *SHARED.values()) is NotImplemented
+    assert _core.plain(_core.count_pairs, points, 1.5, *SHARED.values()) is NotImplemented
 
 
 @pytest.mark.parametrize(
@@ -190,7 +192,7 @@ def test_arguments_are_not_kept():
 def test_progress_and_signals_reach_small_scenes_with_many_images():
     fractions = []
     shared = SHARED | {"box": LENGTHS, "progress": fractions.append}
-    n = _core.plain_count(POINTS, 40.0, *shared.values())
+    n = _core.plain(_core.count_pairs, POINTS, 40.0, *shared.values())
     assert n > 1_000_000
     assert fractions
 
@@ -198,4 +200,19 @@ def test_progress_and_signals_reach_small_scenes_with_many_images():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        _core.plain_count(POINTS, 40.0, *(shared | {"progress": stop}).values())
+        _core.plain(_core.count_pairs, POINTS, 40.0, *(shared | {"progress": stop}).values())
+
+
+@pytest.mark.parametrize("function", [len, _core.kernels, _core.cells_layout, hs.pairs, None])
+def test_only_searches_of_the_core_are_called(function):
+    with pytest.raises(TypeError, match="plain takes a function of this module"):
+        _core.plain(function, POINTS)
+    with pytest.raises(TypeError, match="plain takes a function of this module"):
+        _core.plain()
+
+
+@pytest.mark.parametrize("name", [n for n in dir(_core) if callable(getattr(_core, n))])
+def test_functions_without_plain_arguments_refuse_them(name):
+    if name not in ("plain", "PairBlocks"):
+        with pytest.raises((TypeError, ValueError)):
+            _core.plain(getattr(_core, name), POINTS)

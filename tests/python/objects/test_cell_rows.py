@@ -3,6 +3,8 @@
 
 import numpy as np
 import pytest
+from ase import Atoms
+from ase.build import bulk
 from numpy.testing import assert_array_equal
 
 import halfshell as hs
@@ -94,3 +96,34 @@ def test_radii_are_decided_by_the_precision_of_the_list():
         exact = hs.neighbors(points, radius, queries=queries[i : i + 1], box=box)
         differ += len(exact[0]) != len(alone[0])
     assert differ > 0
+
+
+def test_queries_may_bring_the_box_of_the_list():
+    crystal = bulk("Cu", cubic=True) * (2, 2, 2)
+    probe = Atoms("H2", positions=[[0.9, 0.9, 0.9], [30.0, -8.0, 1.0]], cell=crystal.cell, pbc=True)
+    cells = hs.CellList(crystal, 3.0)
+    calls = [
+        lambda asking: cells.neighbors(queries=asking).indices,
+        lambda asking: cells.query(asking, [3.0, 2.0]).indices,
+        lambda asking: cells.nearest(4, queries=asking, quantities="j"),
+        lambda asking: cells.pair_histogram([0.0, 1.0, 3.0], queries=asking),
+        lambda asking: cells.coordination(queries=asking),
+        lambda asking: cells.count_pairs(queries=asking),
+        lambda asking: cells.candidates(asking).start,
+        lambda asking: cells.cell_of(asking),
+    ]
+    for call in calls:
+        assert_array_equal(call(probe), call(probe.positions))
+    other = Atoms("H2", positions=probe.positions)
+    for call in calls:
+        with pytest.raises(ValueError, match="bring a box that is not that of points"):
+            call(other)
+    in_open_space = hs.CellList(crystal.positions, 3.0)
+    assert_array_equal(
+        in_open_space.neighbors(queries=other).indices,
+        hs.neighbors(crystal.positions, 3.0, queries=other).indices,
+    )
+    with pytest.raises(ValueError, match="bring a box that is not that of points"):
+        in_open_space.neighbors(queries=probe)
+    with pytest.raises(ValueError, match="queries must have 2 columns"):
+        hs.CellList([[0.0, 0.0]], 1.0).neighbors(queries=probe)

@@ -463,8 +463,6 @@ def test_bad_options(rng):
         pair_list.pairs(quantities="ix")
     with pytest.raises(ValueError, match="index_dtype"):
         pair_list.pairs(quantities="i", index_dtype=np.int16)
-    with pytest.raises(ValueError, match="kernel"):
-        hs.VerletList(0.3, kernel="none").update([[0.0]])
     with pytest.raises(TypeError, match="inclusive"):
         hs.VerletList(0.3, inclusive="yes")
 

@@ -15,7 +15,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 #: A folder of private modules -> the folders that it may import from; "": modules beside them.
 ALLOWED = {
     "_convert": {""},
-    "_objects": {"", "_convert", "_functions"},
+    "_objects": {"", "_convert"},
     "_functions": {"", "_convert", "_objects", "_report"},  # of the report its signature only
     "_check": {"", "_convert", "_functions", "_objects"},
     "_peers": {""},
