@@ -5,6 +5,11 @@
  * target region. Defines gather (hs_gather_fn), emit_int32 and emit_int64 (hs_emit_fn).
  */
 
+/* Bytes from a pair to where memory is prefetched for later ones, so that their stores find it in
+ * the cache. */
+#define AHEAD 1024
+#define LINE  64 /* bytes that are fetched at once */
+
 /* Largest magnitude of n floats. */
 HS_ALWAYS_INLINE integers
 largest_of(const float *y, int32_t n, integers largest)
@@ -61,6 +66,23 @@ gather(hs_gather *gather, const hs_run *runs, int32_t n)
     }
 }
 
+/* Writes entries of a column from `at` on. */
+HS_ALWAYS_INLINE void
+put(void *column, int32_t at, integers entries, const bool wide)
+{
+    const size_t    width = wide ? sizeof(int64_t) : sizeof(int32_t);
+    char           *to = (char *)column + (size_t)at * width;
+    const uintptr_t ahead = (uintptr_t)to + AHEAD; /* may lie behind the column */
+    for (size_t line = 0; line < LANES * width; line += LINE) {
+        HS_PREFETCH_WRITE((void *)(ahead + line));
+    }
+    if (wide) {
+        store_wide((int64_t *)(void *)to, entries);
+    } else {
+        store_integers((int32_t *)(void *)to, entries);
+    }
+}
+
 HS_ALWAYS_INLINE void
 emit(const hs_hits *hits, void *i, void *j, const bool wide)
 {
@@ -70,15 +92,11 @@ emit(const hs_hits *hits, void *i, void *j, const bool wide)
         const int32_t  end = hits->end[t];
         for (int32_t at = h; at < end; at += LANES) {
             const integers hit = load_integers(hits->label + at);
-            if (i != NULL && wide) {
-                store_wide((int64_t *)i + at, smaller(hit, point));
-            } else if (i != NULL) {
-                store_integers((int32_t *)i + at, smaller(hit, point));
+            if (i != NULL) {
+                put(i, at, smaller(hit, point), wide);
             }
-            if (j != NULL && wide) {
-                store_wide((int64_t *)j + at, larger(hit, point));
-            } else if (j != NULL) {
-                store_integers((int32_t *)j + at, larger(hit, point));
+            if (j != NULL) {
+                put(j, at, larger(hit, point), wide);
             }
         }
         h = end;
