@@ -21,48 +21,114 @@ largest_of(const float *y, int32_t n, integers largest)
     return c < n ? larger(largest, keep_lanes(magnitudes(load(y + c)), n - c)) : largest;
 }
 
-HS_ALWAYS_INLINE void
-gather_runs(hs_gather *gather, const hs_run *runs, int32_t n_runs, const int ndim)
+/* LANES candidates: points from number si on. */
+typedef struct gathered {
+    floats   y[HS_MAX_DIM];
+    floats   norm;
+    integers id, number;
+} gathered;
+
+HS_ALWAYS_INLINE gathered
+gather_lanes(const hs_gather *gather, const hs_run *run, int64_t si, const int ndim)
 {
-    const int32_t *order = gather->order;
-    int32_t       *id = gather->id;
-    const double  *x[HS_MAX_DIM];
-    float         *norm = gather->norm;
-    float         *y[HS_MAX_DIM];
+    gathered these;
+    these.norm = broadcast(0.0f);
     for (int k = 0; k < ndim; k++) {
-        x[k] = gather->x[k];
-        y[k] = gather->y[k];
+        these.y[k] = load_moved(gather->x[k] + si, run->moved[k]);
+        these.norm = multiply_add(these.y[k], these.y[k], these.norm);
     }
+    these.id = load_integers(gather->order + si);
+    these.number = add_integers(lane_numbers(), broadcast_integer((int32_t)si));
+    return these;
+}
+
+/* Those that are not surely far from the box. Never fused: every kernel leaves out the same. */
+HS_ALWAYS_INLINE mask
+near_lanes(const gathered *these, const hs_near_box *box, const int ndim)
+{
+    floats s = broadcast(0.0f);
+    for (int k = 0; k < ndim; k++) {
+        const floats below = subtract(broadcast(box->low[k]), these->y[k]);
+        const floats above = subtract(these->y[k], broadcast(box->high[k]));
+        const floats gap = larger_of(broadcast(0.0f), larger_of(below, above));
+        s = add(s, multiply(gap, gap));
+    }
+    return not_greater(s, broadcast(box->out));
+}
+
+HS_ALWAYS_INLINE void
+store_lanes(const hs_gather *gather, int32_t at, const gathered *these, const int ndim)
+{
+    for (int k = 0; k < ndim; k++) {
+        store(gather->y[k] + at, these->y[k]);
+    }
+    store(gather->norm + at, these->norm);
+    store_integers(gather->id + at, these->id);
+    store_integers(gather->number + at, these->number);
+}
+
+/* Stores those in m; returns how many. */
+HS_ALWAYS_INLINE int32_t
+append_lanes(const hs_gather *gather, int32_t at, const gathered *these, mask m, const int ndim)
+{
+    for (int k = 0; k < ndim; k++) {
+        append_floats(gather->y[k] + at, these->y[k], m);
+    }
+    append_floats(gather->norm + at, these->norm, m);
+    (void)append(gather->id + at, these->id, m);
+    return append(gather->number + at, these->number, m);
+}
+
+HS_ALWAYS_INLINE void
+gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, const bool prunes)
+{
+    const hs_gather own = *gather; /* arrays do not overlap it */
+    const int32_t   first = own.n;
+    int32_t         at = first, from = runs[0].at;
     for (int32_t r = 0; r < n_runs; r++) {
         const hs_run *run = &runs[r];
-        const int32_t end = run[1].at;
-        int64_t       si = run->si;
-        for (int32_t c = run->at; c < end; c += LANES, si += LANES) {
-            floats sum = broadcast(0.0f);
-            for (int k = 0; k < ndim; k++) {
-                const floats place = load_moved(x[k] + si, run->moved[k]);
-                store(y[k] + c, place);
-                sum = multiply_add(place, place, sum);
+        const int32_t n = runs[r + 1].at - from;
+        from = runs[r + 1].at;
+        runs[r].at = at;
+        for (int32_t c = 0; c < n; c += LANES) {
+            const gathered these = gather_lanes(&own, run, (int64_t)run->si + c, ndim);
+            if (!prunes) {
+                store_lanes(&own, at + c, &these, ndim);
+                continue;
             }
-            store(norm + c, sum);
-            store_integers(id + c, load_integers(order + si));
+            mask near = near_lanes(&these, &own.near, ndim);
+            if (HS_UNLIKELY(n - c < LANES)) {
+                near = (mask)(near & first_lanes(n - c));
+            }
+            at += append_lanes(&own, at, &these, near, ndim);
         }
+        at += prunes ? 0 : n;
     }
-    integers largest = broadcast_integer((int32_t)gather->largest);
+    integers largest = broadcast_integer((int32_t)own.largest);
     for (int k = 0; k < ndim; k++) {
-        const int32_t first = runs[0].at;
-        largest = largest_of(y[k] + first, runs[n_runs].at - first, largest);
+        largest = largest_of(own.y[k] + first, at - first, largest);
     }
     gather->largest = (uint32_t)largest_lane(largest);
+    gather->n = at;
+}
+
+HS_ALWAYS_INLINE void
+gather_dimensions(hs_gather *gather, hs_run *runs, int32_t n, const bool prunes)
+{
+    switch (gather->ndim) {
+    case 2: gather_runs(gather, runs, n, 2, prunes); break;
+    case 3: gather_runs(gather, runs, n, 3, prunes); break;
+    default: gather_runs(gather, runs, n, gather->ndim, prunes); break;
+    }
 }
 
 static void
-gather(hs_gather *gather, const hs_run *runs, int32_t n)
+gather(hs_gather *gather, hs_run *runs, int32_t n)
 {
-    switch (gather->ndim) {
-    case 2: gather_runs(gather, runs, n, 2); break;
-    case 3: gather_runs(gather, runs, n, 3); break;
-    default: gather_runs(gather, runs, n, gather->ndim); break;
+    if (gather->near.out < INFINITY) {
+        gather_dimensions(gather, runs, n, true);
+    } else {
+        gather_dimensions(gather, runs, n, false);
     }
 }
 

@@ -2,7 +2,7 @@
 /*
  * kernel.h: the contract of the kernels, the inner loops of a search, and the table of them.
  *
- *   gather   copies a run of points to float32, relative to a centre
+ *   gather   copies runs of points to float32, relative to a centre, as far as they are near a box
  *   list     compares the points of a group with gathered candidates in float32 and lists those
  *            that are not surely beyond the cutoff
  *   count    counts them, and lists none
@@ -31,6 +31,8 @@
 #include "../halfshell.h"
 #include "batch.h"
 #include "write.h"
+
+#include <math.h>
 
 /* Kernels may read this many entries past the last one of their inputs, and write as many past the
  * last one of their outputs: twice the widest vector. */
@@ -99,13 +101,19 @@ typedef struct hs_scan {
  */
 typedef int32_t (*hs_scan_fn)(hs_scan *scan, int32_t first);
 
-/* Consecutive candidates that are consecutive points in cell order, in one image. */
+/* Consecutive candidates that ascend in cell order, in one image. */
 typedef struct hs_run {
     int32_t at;                /* place of the first in the block; it ends where the next begins */
-    int32_t si;                /* its number in cell order */
+    int32_t si;                /* in cell order, the first point that it was made of */
     int32_t image[HS_MAX_DIM]; /* shift over the rows of B */
     double  moved[HS_MAX_DIM]; /* what is added to its coordinates */
 } hs_run;
+
+/* A box that candidates must be near to. */
+typedef struct hs_near_box {
+    float low[HS_MAX_DIM], high[HS_MAX_DIM];
+    float out; /* largest square of the distance; with infinity all are near */
+} hs_near_box;
 
 /* Where gathered candidates come from and go to; all arrays borrowed. */
 typedef struct hs_gather {
@@ -115,13 +123,20 @@ typedef struct hs_gather {
     float         *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
     float         *norm;          /* room for all candidates and HS_PADDING more */
     int32_t       *id;            /* room for all candidates and HS_PADDING more */
+    int32_t       *number;        /* in cell order; room as in id */
+    hs_near_box    near;          /* candidates that are not near it are left out */
+    int32_t        n;             /* candidates so far */
     uint32_t       largest;       /* bits of the largest |y| so far; infinity and NaN are largest */
 } hs_gather;
 
-/* Copies n runs, candidates runs[0].at to runs[n].at: y_k = (float)(x_k + moved_k), each operation
- * rounded once, norm = sum of y_k^2, fused or not, and id = order. Entries past the last may be
- * overwritten. */
-typedef void (*hs_gather_fn)(hs_gather *gather, const hs_run *runs, int32_t n);
+/*
+ * Appends n runs, points runs[0].at to runs[n].at of all that are to be gathered: y_k = (float)(x_k
+ * + moved_k), each operation rounded once, norm = sum of y_k^2, fused or not, and id = order.
+ * Points with s > near.out are left out, s = sum of max(low_k - y_k, y_k - high_k, 0)^2 with each
+ * operation rounded once; those with NaN are not. `at` of each run becomes the place of its first
+ * candidate, or of the next. Entries past the last may be overwritten.
+ */
+typedef void (*hs_gather_fn)(hs_gather *gather, hs_run *runs, int32_t n);
 
 /* Candidates that are consecutive points in tree order, in one image. */
 typedef struct hs_near_run {

@@ -165,35 +165,82 @@ square_points(hs_scan *scan, int32_t first, const int ndim)
 
 #include "scan_forms.h"
 
+/* Appends n points from number si on, all of them. */
 static void
-gather(hs_gather *gather, const hs_run *runs, int32_t n_runs)
+gather_points(const hs_gather *gather, const hs_run *run, int32_t at, int32_t n)
 {
-    uint32_t largest = gather->largest;
-    for (int32_t r = 0; r < n_runs; r++) {
-        const int32_t at = runs[r].at, n = runs[r + 1].at - at;
-        for (int k = 0; k < gather->ndim; k++) {
-            const double *HS_RESTRICT x = gather->x[k] + runs[r].si;
-            float *HS_RESTRICT        y = gather->y[k] + at;
-            const double              moved = runs[r].moved[k];
-            for (int32_t c = 0; c < n; c++) {
-                y[c] = (float)(x[c] + moved);
-            }
-        }
-        float *HS_RESTRICT norm = gather->norm + at;
+    float *HS_RESTRICT norm = gather->norm + at;
+    for (int k = 0; k < gather->ndim; k++) {
+        const double *HS_RESTRICT x = gather->x[k] + run->si;
+        float *HS_RESTRICT        y = gather->y[k] + at;
+        const double              moved = run->moved[k];
         for (int32_t c = 0; c < n; c++) {
-            const float place = gather->y[0][at + c];
-            norm[c] = place * place;
+            y[c] = (float)(x[c] + moved);
         }
-        for (int k = 1; k < gather->ndim; k++) {
-            const float *HS_RESTRICT y = gather->y[k] + at;
-            for (int32_t c = 0; c < n; c++) {
-                norm[c] += y[c] * y[c];
-            }
+    }
+    for (int32_t c = 0; c < n; c++) {
+        const float place = gather->y[0][at + c];
+        norm[c] = place * place;
+    }
+    for (int k = 1; k < gather->ndim; k++) {
+        const float *HS_RESTRICT y = gather->y[k] + at;
+        for (int32_t c = 0; c < n; c++) {
+            norm[c] += y[c] * y[c];
         }
-        memcpy(gather->id + at, gather->order + runs[r].si, (size_t)n * sizeof(int32_t));
+    }
+    memcpy(gather->id + at, gather->order + run->si, (size_t)n * sizeof(int32_t));
+    for (int32_t c = 0; c < n; c++) {
+        gather->number[at + c] = run->si + c;
+    }
+}
+
+static bool
+is_near(const hs_gather *gather, int32_t c)
+{
+    const hs_near_box *box = &gather->near;
+    float              s = 0.0f;
+    for (int k = 0; k < gather->ndim; k++) {
+        const float below = box->low[k] - gather->y[k][c], above = gather->y[k][c] - box->high[k];
+        const float most = below > above ? below : above;
+        const float gap = most <= 0.0f ? 0.0f : most; /* NaN is kept */
+        s = s + gap * gap;
+    }
+    return !(s > box->out);
+}
+
+/* Of n candidates from `at` on, those that are not surely far from the box, packed; returns how
+ * many. */
+static int32_t
+keep_near(const hs_gather *gather, int32_t at, int32_t n)
+{
+    int32_t to = at;
+    for (int32_t c = at; c < at + n; c++) {
+        const bool near = is_near(gather, c);
+        for (int k = 0; k < gather->ndim; k++) {
+            gather->y[k][to] = gather->y[k][c];
+        }
+        gather->norm[to] = gather->norm[c];
+        gather->id[to] = gather->id[c];
+        gather->number[to] = gather->number[c];
+        to += near;
+    }
+    return to - at;
+}
+
+static void
+gather(hs_gather *gather, hs_run *runs, int32_t n_runs)
+{
+    const int32_t first = gather->n;
+    uint32_t      largest = gather->largest;
+    for (int32_t r = 0, from = runs[0].at; r < n_runs; r++) {
+        const int32_t n = runs[r + 1].at - from;
+        from = runs[r + 1].at;
+        runs[r].at = gather->n;
+        gather_points(gather, &runs[r], gather->n, n);
+        gather->n += gather->near.out < INFINITY ? keep_near(gather, gather->n, n) : n;
     }
     for (int k = 0; k < gather->ndim; k++) {
-        for (int32_t c = runs[0].at; c < runs[n_runs].at; c++) {
+        for (int32_t c = first; c < gather->n; c++) {
             const uint32_t bits = hs_bits_of_float(gather->y[k][c]) & UINT32_C(0x7fffffff);
             largest = bits > largest ? bits : largest;
         }

@@ -90,7 +90,7 @@ list_boxes(const hs_boxes *boxes, const int ndim)
         if (HS_UNLIKELY(boxes->n - c < LANES)) {
             near = (mask)(near & first_lanes(boxes->n - c));
         }
-        at += append(boxes->hits + at, boxes->label + c, near);
+        at += append(boxes->hits + at, load_integers(boxes->label + c), near);
     }
     return at;
 }

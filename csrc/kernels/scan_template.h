@@ -93,7 +93,7 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
                 note_unsure(scan, t, c, near, maybe, (int32_t)(hit - scan->hits));
             }
             if (lists) {
-                hit += append(hit, label + c, near);
+                hit += append(hit, load_integers(label + c), near);
             } else {
                 count += popcount(near);
             }
@@ -136,7 +136,7 @@ square_points(hs_scan *scan, int32_t first, const int ndim)
                 near = (mask)(near & first_lanes(n - c));
             }
             append_floats(found + at, s, near);
-            at += append(hits + at, label + c, near);
+            at += append(hits + at, load_integers(label + c), near);
         }
         scan->end[t] = at;
     }

@@ -61,14 +61,13 @@ static const uint64_t packed_lanes[256] = {PACK64(0), PACK64(64), PACK64(128), P
 #undef PACK16
 #undef PACK64
 
-/* Packs the labels of the lanes in m to dst, writing LANES entries; returns how many count. */
+/* Packs the lanes in m to dst, writing LANES entries; returns how many count. */
 HS_ALWAYS_INLINE int32_t
-append(int32_t *dst, const int32_t *label, mask m)
+append(int32_t *dst, integers a, mask m)
 {
     const __m128i bytes = _mm_loadl_epi64((const __m128i *)&packed_lanes[m]);
-    const __m256i all = _mm256_loadu_si256((const __m256i *)label);
     _mm256_storeu_si256((__m256i *)dst,
-                        _mm256_permutevar8x32_epi32(all, _mm256_cvtepu8_epi32(bytes)));
+                        _mm256_permutevar8x32_epi32(a, _mm256_cvtepu8_epi32(bytes)));
     return (int32_t)_mm_popcnt_u32(m);
 }
 
@@ -146,6 +145,7 @@ within(floats a, float most)
 {
     return _mm256_max_ps(_mm256_min_ps(a, broadcast(most)), broadcast(-most));
 }
+/* b where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm256_max_ps(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)

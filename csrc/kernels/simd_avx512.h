@@ -39,15 +39,14 @@ and_not_less(mask m, floats a, floats b)
 /* The first n of them, 1 <= n < LANES. */
 HS_ALWAYS_INLINE mask first_lanes(int32_t n) { return (mask)((1u << n) - 1); }
 /*
- * Packs the labels of the lanes in m to dst, writing LANES entries; returns how many count. In a
+ * Packs the lanes in m to dst, writing LANES entries; returns how many count. In a
  * register and then stored: compressing straight to memory takes ten times as long on Zen 4, and
  * the zero-masked form waits for the register's old value.
  */
 HS_ALWAYS_INLINE int32_t
-append(int32_t *dst, const int32_t *label, mask m)
+append(int32_t *dst, integers a, mask m)
 {
-    const __m512i all = _mm512_loadu_si512(label);
-    _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(all, m, all));
+    _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(a, m, a));
     return (int32_t)_mm_popcnt_u32(m);
 }
 
@@ -115,6 +114,7 @@ within(floats a, float most)
 {
     return _mm512_max_ps(_mm512_min_ps(a, broadcast(most)), broadcast(-most));
 }
+/* b where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm512_max_ps(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)

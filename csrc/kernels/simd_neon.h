@@ -67,11 +67,11 @@ static const uint8_t packed_bytes[16][16] = {
 #undef LANE
 #undef LABELS
 
-/* Packs the labels of the lanes in m to dst, writing LANES entries; returns how many count. */
+/* Packs the lanes in m to dst, writing LANES entries; returns how many count. */
 HS_ALWAYS_INLINE int32_t
-append(int32_t *dst, const int32_t *label, mask m)
+append(int32_t *dst, integers a, mask m)
 {
-    const uint8x16_t all = vreinterpretq_u8_s32(vld1q_s32(label));
+    const uint8x16_t all = vreinterpretq_u8_s32(a);
     vst1q_s32(dst, vreinterpretq_s32_u8(vqtbl1q_u8(all, vld1q_u8(packed_bytes[m]))));
     return (int32_t)popcount(m);
 }
@@ -138,6 +138,7 @@ within(floats a, float most)
 {
     return vmaxq_f32(vminq_f32(a, broadcast(most)), broadcast(-most));
 }
+/* NaN where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return vmaxq_f32(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)

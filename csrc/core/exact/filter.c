@@ -27,18 +27,43 @@ multiply_down(double a, double b)
     return hs_next_down(a * b);
 }
 
-/*
- * How far the vector y - q that the kernel subtracts may be from D, Euclidean: the roundings of y
- * and q to floats, what the caller knows of errors before that, and numbers flushed to zero.
- */
+/* Roundings of y and of q, in units of their size. */
+static double
+input_rounding(double unit)
+{
+    return multiply_up(HS_FILTER_INPUT_ROUNDINGS + HS_FILTER_SLACK, unit);
+}
+
+/* What else may be wrong with a component of y - q: what the caller knows of errors before y and q
+ * were rounded to floats, and numbers flushed to zero. */
+static double
+other_error(double error, double tiny)
+{
+    return add_up(multiply_up(HS_FILTER_ERRORS, error), multiply_up(HS_FILTER_FLUSHES, tiny));
+}
+
+/* How far the vector y - q that the kernel subtracts may be from D, Euclidean. */
 static double
 input_error(int ndim, double extent, double error, double unit, double tiny)
 {
-    const double rounding = multiply_up(HS_FILTER_INPUT_ROUNDINGS + HS_FILTER_SLACK, unit);
     const double component =
-        add_up(multiply_up(rounding, extent),
-               add_up(multiply_up(HS_FILTER_ERRORS, error), multiply_up(HS_FILTER_FLUSHES, tiny)));
+        add_up(multiply_up(input_rounding(unit), extent), other_error(error, tiny));
     return multiply_up(hs_next_up(sqrt((double)ndim)), component);
+}
+
+double
+hs_reach_bound(double cutoff, double largest, double error, double unit, double tiny)
+{
+    const double rounding = input_rounding(unit);
+    const double apart = add_up(cutoff, other_error(error, tiny));
+    const double sum = add_up(multiply_up(2.0, largest), apart);
+    return rounding < 0.5 ? hs_next_up(sum / hs_next_down(1.0 - rounding)) : HUGE_VAL;
+}
+
+double
+hs_reach_extent(double cutoff, double largest, double error)
+{
+    return hs_reach_bound(cutoff, largest, error, HS_FILTER_UNIT, HS_FILTER_TINY);
 }
 
 void

@@ -40,6 +40,13 @@ hs_thresholds hs_thresholds_of(int ndim, double cutoff, double extent, double er
 void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
                          double tiny, double *in, double *out);
 
+/* For points of which no |q_k| passes `largest`: no |y_k| plus |q_k| of a pair within the cutoff
+ * passes this. It is an extent for the pairs of candidates that are not known yet. */
+double hs_reach_extent(double cutoff, double largest, double error);
+
+/* The bounds of hs_reach_extent for other arithmetic, as in hs_threshold_bounds. */
+double hs_reach_bound(double cutoff, double largest, double error, double unit, double tiny);
+
 /* The thresholds of the expanded form. Its extent is twice the largest of all |y_k| and |q_k|. */
 hs_expanded hs_expanded_of(int ndim, double cutoff, double extent, double error);
 void        hs_expanded_bounds(int ndim, double cutoff, double extent, double error, double unit,

@@ -117,16 +117,13 @@ load_block(hs_tally *tally, const hs_scanner *scanner)
         return;
     }
     tally->block = scanner->n_blocks;
-    for (const hs_run *run = block->runs; run < block->runs + block->n_runs; run++) {
-        const int32_t n = run[1].at - run->at;
-        for (int32_t c = 0; tally->value != NULL && c < n; c++) {
-            tally->value[run->at + c] = weights->value != NULL ? weights->value[run->si + c] : 1;
-            tally->place[run->at + c] = weights->place != NULL ? weights->place[run->si + c] : 0;
-        }
-        if (tally->type != NULL) {
-            memcpy(tally->type + run->at, tally->plan->points.type + run->si,
-                   (size_t)n * sizeof(int32_t));
-        }
+    for (int32_t c = 0; tally->value != NULL && c < block->n; c++) {
+        const int32_t si = block->number[c];
+        tally->value[c] = weights->value != NULL ? weights->value[si] : 1;
+        tally->place[c] = weights->place != NULL ? weights->place[si] : 0;
+    }
+    for (int32_t c = 0; tally->type != NULL && c < block->n; c++) {
+        tally->type[c] = tally->plan->points.type[block->number[c]];
     }
 }
 
@@ -343,7 +340,7 @@ hs_status
 hs_tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_tally            *tally = context;
-    const hs_edge_table *table = table_for(tally, scanner->extent);
+    const hs_edge_table *table = table_for(tally, scanner->form->extent);
     const int32_t        n = hits->end[hits->n - 1];
     if (table == NULL) {
         return HS_ERR_MEMORY;

@@ -91,9 +91,10 @@ own_place(const hs_scanner *scanner)
         for (int r = 0; r < m; r++) {
             is_home = is_home && run->image[r] == 0;
         }
-        const int32_t place = run->at + scanner->group.first - run->si;
-        if (is_home && place >= run->at && place < run[1].at) {
-            return place;
+        for (int32_t place = run->at; is_home && place < run[1].at; place++) {
+            if (block->number[place] == scanner->group.first) {
+                return place;
+            }
         }
     }
     return -1;

@@ -5,6 +5,7 @@
 
 #include "../base/poll.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Every array begins on a cache line. */
@@ -31,7 +32,8 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
         block->y[k] = block->y[0] + k * room;
     }
     block->norm = complete ? block->y[0] + ndim * room : NULL;
-    block->id = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
+    block->id = hs_alloc(account, HS_FOR_CANDIDATES, 2 * room, sizeof(int32_t));
+    block->number = block->id != NULL ? block->id + room : NULL;
     block->unsure = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(hs_unsure));
     block->runs = hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)most_runs + 1, sizeof(hs_run));
     complete = complete && block->id != NULL && block->unsure != NULL && block->runs != NULL;
@@ -78,6 +80,7 @@ hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *group
     group->first = first;
     group->last = last;
     group->largest = 0;
+    group->near.out = INFINITY;
     /* Any double will do as a centre; one of the points is near all of them. */
     const int32_t middle = first + (last - first) / 2;
     for (int k = 0; k < bins->ndim; k++) {
@@ -97,6 +100,24 @@ hs_group_load(const hs_bins *bins, hs_group *group)
             group->largest = bits > group->largest ? bits : group->largest;
         }
     }
+}
+
+float
+hs_group_bound(const hs_bins *bins, hs_group *group)
+{
+    float largest = 0.0f;
+    hs_group_load(bins, group);
+    for (int k = 0; k < bins->ndim; k++) {
+        float low = group->q[k][0], high = low;
+        for (int32_t t = 1; t < group->last - group->first; t++) {
+            low = group->q[k][t] < low ? group->q[k][t] : low;
+            high = group->q[k][t] > high ? group->q[k][t] : high;
+        }
+        group->near.low[k] = low;
+        group->near.high[k] = high;
+        largest = fmaxf(largest, fmaxf(-low, high));
+    }
+    return largest;
 }
 
 int32_t
@@ -124,7 +145,7 @@ gather_in_parts(const hs_kernel *kernel, const hs_options *options, const hs_blo
                 hs_gather *gather)
 {
     for (int32_t first = 0, end; first < block->n_runs; first = end) {
-        const hs_run *runs = block->runs + first;
+        hs_run       *runs = block->runs + first;
         const int32_t left = block->n_runs - first;
         if (first > 0 && hs_poll(options, 0.0) != HS_OK) {
             return HS_ERR_INTERRUPTED;
@@ -148,6 +169,9 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *
     gather.order = bins->order;
     gather.norm = block->norm;
     gather.id = block->id;
+    gather.number = block->number;
+    gather.near = group->near;
+    gather.n = 0;
     gather.largest = group->largest;
     block->runs[block->n_runs].at = block->n;
     const hs_status status = gather_in_parts(kernel, options, block, &gather);
@@ -155,6 +179,7 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *
         return status;
     }
     group->largest = gather.largest;
+    block->n = block->runs[block->n_runs].at = gather.n;
     for (int k = 0; k < bins->ndim; k++) {
         hs_pad_lanes(block->y[k], block->n);
     }
@@ -167,14 +192,4 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *
         }
     }
     return HS_OK;
-}
-
-double
-hs_group_extent(const hs_group *group)
-{
-    /* The top five bits of the mantissa, rounded up: at most 1/32 more. */
-    const uint32_t low = (UINT32_C(1) << 18) - 1;
-    const uint32_t bits = group->largest < UINT32_C(0x7f800000) ? (group->largest + low) & ~low
-                                                                : group->largest;
-    return 2.0 * (double)hs_float_of_bits(bits);
 }

@@ -19,11 +19,12 @@
 
 /* One block of candidates at a time, and what scans say about it. The arrays have capacity +
  * HS_PADDING entries where nothing else is said, and are owned: y and norm as one block, by
- * y[0]. */
+ * y[0], id and number by id. */
 typedef struct hs_block {
     float     *y[HS_MAX_DIM];
     float     *norm;    /* sum of y_k^2 */
     int32_t   *id;      /* point numbers of the candidates */
+    int32_t   *number;  /* their numbers in cell order, as they were gathered */
     int32_t   *place;   /* 0, 1, 2, ...; NULL unless hits are places */
     int32_t   *origin;  /* where candidates were before neighbourhood_sort.h put them in order; NULL
                         * when it did not */
@@ -47,10 +48,11 @@ typedef enum hs_block_use {
 
 /* The points whose neighbourhood it is: [first, last) in cell order. */
 typedef struct hs_group {
-    int32_t  first, last;
-    double   centre[HS_MAX_DIM];
-    float    q[HS_MAX_DIM][HS_GROUP_POINTS]; /* relative to the centre */
-    uint32_t largest; /* bits of the largest |q| or |y| gathered for it so far */
+    int32_t     first, last;
+    double      centre[HS_MAX_DIM];
+    float       q[HS_MAX_DIM][HS_GROUP_POINTS]; /* relative to the centre */
+    hs_near_box near;    /* its own box, and how near candidates must be; infinity: not set yet */
+    uint32_t    largest; /* bits of the largest |q| or |y| gathered for it so far */
 } hs_group;
 
 /* Room for so many candidates and runs at a time. */
@@ -60,6 +62,8 @@ void      hs_block_free(hs_account *account, hs_block *block);
 
 /* most_hits of a block of this capacity. */
 int32_t hs_block_most_hits(int32_t capacity);
+
+#define HS_EXTENT_SHIFT 18 /* bits of the mantissa that extents do without */
 
 /* Runs appended or gathered between two polls. Where there are so many each has few candidates. */
 #define HS_RUNS_PER_POLL (1 << 16)
@@ -71,6 +75,9 @@ void hs_group_start(const hs_bins *bins, int32_t first, int32_t last, hs_group *
  * after hs_group_start. Rounded as candidates are. */
 void hs_group_load(const hs_bins *bins, hs_group *group);
 
+/* Its box, from its points, which it loads; returns the largest |q_k|. */
+float hs_group_bound(const hs_bins *bins, hs_group *group);
+
 /*
  * Appends points [si, end) of one image to the block, as many as there is room for; returns how
  * many. shift: the image's displacement, ndim doubles; image: that displacement over the rows of B.
@@ -79,16 +86,21 @@ int32_t hs_block_append(hs_block *block, int32_t si, int32_t end, int ndim, cons
                         const int32_t *image, const hs_group *group);
 
 /*
- * Copies what was appended. The first block of a group must begin with the group's own points, in
- * the image 0: they are kept as its q. Fails when poll() stops the search; it is called now and
- * then for a large block.
+ * Copies what was appended, but for candidates that are not near the group. The first block of a
+ * group must begin with the group's own points, in the image 0: they are kept as its q. Fails when
+ * poll() stops the search; it is called now and then for a large block.
  */
 hs_status hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
                           bool is_first, hs_block *block, hs_group *group);
 
-/* A bound on |y_k| of the block plus |q_k| of the group: twice the largest so far, a little rounded
- * up, so that few different thresholds are needed; NaN or infinite if one is. */
-double hs_group_extent(const hs_group *group);
+/* The bits of a float >= 0, rounded up to the top five bits of the mantissa, which adds 1/32 at
+ * most: so that few different thresholds are needed. NaN and infinity remain. */
+HS_ALWAYS_INLINE uint32_t
+hs_extent_bits(uint32_t bits)
+{
+    const uint32_t low = (UINT32_C(1) << HS_EXTENT_SHIFT) - 1;
+    return bits < UINT32_C(0x7f800000) ? (bits + low) & ~low : bits;
+}
 
 HS_ALWAYS_INLINE bool
 hs_block_is_full(const hs_block *block)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* records.c: runs of candidates are consecutive points, so records are written run by run. What is
- * zero throughout the block is not written at all: most blocks have no image and no turn. */
+/* records.c: runs of candidates are of one image, and consecutive points unless some were left out,
+ * so records are written run by run. What is zero throughout the block is not written at all: most
+ * blocks have no image and no turn. */
 #include "records.h"
 
 #include "../base/poll.h"
@@ -82,6 +83,13 @@ hs_records_free(hs_account *account, hs_records *records)
     *records = (hs_records){0};
 }
 
+/* Whether these are all of the points from the first to the last. */
+static bool
+are_consecutive(const int32_t *number, int32_t n)
+{
+    return number[n - 1] - number[0] == n - 1;
+}
+
 /* Looks up the shifts of the candidates of one run, less their turns. */
 static void
 load_few(hs_records *records, const hs_run *run, int32_t n)
@@ -90,17 +98,19 @@ load_few(hs_records *records, const hs_run *run, int32_t n)
     const hs_kernel *kernel = search->call->kernel;
     const int        m = search->bins.n_periodic, width = records->width;
     int32_t         *few = records->few + (int64_t)run->at * width;
+    const int32_t   *number = records->block->number + run->at;
     const int32_t   *turns[HS_MAX_DIM];
     for (int r = 0; r < m; r++) {
-        turns[r] = search->bins.turns.narrow[r] + run->si;
+        turns[r] = search->bins.turns.narrow[r] + number[0];
     }
-    if (m == 3 && width == HS_RECORD && kernel->shift_records != NULL) {
+    if (m == 3 && width == HS_RECORD && kernel->shift_records != NULL &&
+        are_consecutive(number, n)) {
         kernel->shift_records(run->image, turns, n, few);
         return;
     }
     for (int32_t c = 0; c < n; c++) {
         for (int r = 0; r < m; r++) {
-            few[c * width + r] = run->image[r] - turns[r][c];
+            few[c * width + r] = run->image[r] - turns[r][number[c] - number[0]];
         }
     }
 }
@@ -109,6 +119,7 @@ static void
 load_given(hs_records *records, const hs_run *run, int32_t n)
 {
     const hs_bins *bins = &records->search->bins;
+    const int32_t *number = records->block->number + run->at;
     const int      width = records->width;
     if (records->is_narrow) {
         load_few(records, run, n);
@@ -117,8 +128,7 @@ load_given(hs_records *records, const hs_run *run, int32_t n)
     for (int r = 0; r < bins->n_periodic; r++) {
         int64_t *turned = records->turned + (int64_t)run->at * width + r;
         for (int32_t c = 0; c < n; c++) {
-            const int64_t turns = bins->turns.known ? hs_turns_get(&bins->turns, r, run->si + c)
-                                                    : 0;
+            const int64_t turns = bins->turns.known ? hs_turns_get(&bins->turns, r, number[c]) : 0;
             turned[c * width] = run->image[r] - turns;
         }
     }
@@ -131,23 +141,23 @@ load_points(hs_records *records, const hs_run *run, int32_t n)
     const hs_bins   *bins = &records->search->bins;
     const hs_kernel *kernel = records->search->call->kernel;
     const int        d = bins->ndim, width = records->width;
-    const int32_t   *order = bins->order + run->si;
+    const int32_t   *number = records->block->number + run->at;
     double          *to = records->q + (int64_t)run->at * width;
     const double    *from[HS_MAX_DIM];
     for (int k = 0; k < d; k++) {
-        from[k] = (bins->keeps_originals ? bins->originals[k] : bins->x[k]) + run->si;
+        from[k] = (bins->keeps_originals ? bins->originals[k] : bins->x[k]) + number[0];
     }
-    if (d == 3 && kernel->point_records != NULL) {
-        kernel->point_records(from, order, n, to);
+    if (d == 3 && kernel->point_records != NULL && are_consecutive(number, n)) {
+        kernel->point_records(from, bins->order + number[0], n, to);
         return;
     }
     for (int32_t c = 0; c < n; c++, to += width) {
         for (int k = 0; k < d; k++) {
-            to[k] = from[k][c];
+            to[k] = from[k][number[c] - number[0]];
         }
         if (d < HS_RECORD) {
-            const int64_t number = order[c];
-            memcpy(to + HS_RECORD - 1, &number, sizeof number);
+            const int64_t id = bins->order[number[c]];
+            memcpy(to + HS_RECORD - 1, &id, sizeof id);
         }
     }
 }
@@ -198,6 +208,9 @@ hs_records_load(hs_records *records, bool metric)
     given = given && (records->has_turns || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;
+        if (n == 0) { /* all of it was left out */
+            continue;
+        }
         if (metric) {
             load_points(records, run, n);
         }

@@ -1,21 +1,29 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* scan.c: the extent of group and block decides the form of the scan and its thresholds. */
+/* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided. */
 #include "scan.h"
 
 #include "decide.h"
+#include "form.h"
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK   (INT64_C(1) << 21)
 #define WORK_OF_RUN 32 /* candidates that could be tested while a run of them is found */
 
-/* Work of a group without candidates, in candidates. */
-#define LONE_GROUP 64
+/* Candidates from which on those are left out that are far from the whole group: with fewer that
+ * costs what it saves. */
+#ifdef HS_TESTING
+#define WORTH_PRUNING 24 /* so that small scenes have both */
+#else
+#define WORTH_PRUNING 250
+#endif
+
+/* Work of a block beside that of its candidates, in candidates. */
+#define WORK_OF_BLOCK 64
 
 /* Blocks with subnormal numbers before the filter flushes: some lie behind the last candidate. */
 #define FEW_SUBNORMAL 16
@@ -26,57 +34,6 @@
  * which costs up to 0.9 ns a pair.
  */
 #define BURST 128
-
-/* Thresholds of one float32 comparison: no hit is unsure. */
-static void
-set_single(hs_scanner *scanner)
-{
-    const double cutoff = scanner->search->scene.cutoff;
-    const float  square = (float)(cutoff * cutoff);
-    scanner->direct.out = scanner->options.inclusive ? square : nextafterf(square, -1.0f);
-    scanner->direct.in = INFINITY;
-}
-
-/* Sets thresholds for the present extent. A scaled cutoff may be known between bounds only. */
-static void
-set_thresholds(hs_scanner *scanner)
-{
-    const hs_scene *scene = &scanner->search->scene;
-    const double    extent = scanner->extent, error = scanner->search->filter_error;
-    scanner->direct = hs_thresholds_of(scene->ndim, scene->cutoff, extent, error);
-    scanner->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
-    if (scene->extreme) {
-        const double low = scene->cutoff_low;
-        scanner->direct.in = low > 0.0 ? hs_thresholds_of(scene->ndim, low, extent, error).in
-                                       : -1.0f;
-        scanner->expanded.in = low > 0.0 ? hs_expanded_of(scene->ndim, low, extent, error).in
-                                         : -INFINITY;
-    }
-}
-
-/* Chooses thresholds and form of the scan by the size of the present group and block. */
-static void
-set_form(hs_scanner *scanner)
-{
-    const hs_kernel *kernel = scanner->search->call->kernel;
-    const bool       counts = scanner->use == HS_BLOCK_COUNTS;
-    const double     extent = hs_group_extent(&scanner->group);
-    if (extent == scanner->extent) {
-        return;
-    }
-    scanner->extent = extent;
-    scanner->scan = counts ? kernel->count_direct : kernel->list_direct;
-    if (scanner->options.precision == HS_SINGLE) {
-        set_single(scanner);
-        return;
-    }
-    set_thresholds(scanner);
-    if (scanner->use == HS_BLOCK_LISTS_SQUARES) {
-        scanner->scan = kernel->squares;
-    } else if (hs_expanded_pays(scanner->search->scene.cutoff, extent)) {
-        scanner->scan = counts ? kernel->count : kernel->list;
-    }
-}
 
 /* The present block and group as a kernel sees them. */
 static void
@@ -96,8 +53,8 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->n_points = scanner->group.last - scanner->group.first;
     scan->triangular = scanner->block_is_first;
     scan->norm = block->norm;
-    scan->direct = scanner->direct;
-    scan->expanded = scanner->expanded;
+    scan->direct = scanner->form->direct;
+    scan->expanded = scanner->form->expanded;
     scan->hits = block->hits;
     scan->squares = block->squares;
     scan->unsure = block->unsure;
@@ -121,7 +78,7 @@ static int32_t
 run_scan(const hs_scanner *scanner, hs_scan *scan, int32_t first)
 {
     set_flushing(scanner, true);
-    const int32_t next = scanner->scan(scan, first);
+    const int32_t next = scanner->form->scan(scan, first);
     set_flushing(scanner, false);
     return next;
 }
@@ -155,6 +112,10 @@ fill_block(hs_scanner *scanner)
 {
     hs_block *block = &scanner->block;
     scanner->n_blocks++;
+    scanner->work_since_poll += WORK_OF_BLOCK + block->n;
+    if (block->n >= WORTH_PRUNING && !(scanner->group.near.out < INFINITY)) {
+        hs_form_prune(scanner);
+    }
     set_flushing(scanner, true);
     hs_status status = hs_block_gather(&scanner->search->bins, scanner->search->call->kernel,
                                        &scanner->options, scanner->block_is_first, block,
@@ -164,7 +125,7 @@ fill_block(hs_scanner *scanner)
         return status;
     }
     hs_records_reset(&scanner->trace.of);
-    set_form(scanner);
+    hs_form_set(scanner);
     if (!scanner->is_ordered) {
         return HS_OK;
     }
@@ -250,7 +211,7 @@ hs_scan_block(hs_scanner *scanner)
     }
     if (is_lone(scanner)) {
         empty_block(scanner);
-        scanner->work_since_poll += LONE_GROUP;
+        scanner->work_since_poll += WORK_OF_BLOCK;
         return end_block(scanner);
     }
     hs_status status = fill_block(scanner);
@@ -335,7 +296,7 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     scanner->options = search->call->options;
     scanner->use = use;
     scanner->is_ordered = is_ordered;
-    scanner->extent = -1.0;
+    hs_forms_init(scanner);
     scanner->candidate_limit = INT64_MAX;
     hs_status status =
         hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);

@@ -27,6 +27,17 @@ typedef struct hs_neighbourhood {
     int64_t candidates, runs;
 } hs_neighbourhood;
 
+/* How blocks of one extent are scanned. */
+typedef struct hs_form {
+    double        extent; /* a bound on |y_k| of the block plus |q_k| of the group; -1: not set */
+    hs_scan_fn    scan;
+    hs_thresholds direct;
+    hs_expanded   expanded;
+} hs_form;
+
+/* Forms that a scanner keeps: those of half a binary order (hs_extent_bits). */
+#define HS_FORMS 16
+
 /* Belongs to one thread. */
 struct hs_scanner {
     const hs_search *search;  /* borrowed, read only */
@@ -39,12 +50,10 @@ struct hs_scanner {
     hs_trace         trace;
     hs_visit_fn      visit; /* NULL when counting */
     void            *visit_context;
-    hs_scan_fn       scan; /* these are for groups of this extent: */
-    hs_thresholds    direct;
-    hs_expanded      expanded;
-    double           extent;
-    int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
-    bool             flushes;     /* too many: only gathering and scanning flush them from now on */
+    hs_form          forms[HS_FORMS]; /* by the last bits of the extent */
+    const hs_form   *form;            /* of the present group and block */
+    int64_t          n_subnormal;     /* blocks in which subnormal numbers were met */
+    bool             flushes; /* too many: only gathering and scanning flush them from now on */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;

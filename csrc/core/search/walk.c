@@ -195,7 +195,7 @@ hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *bytes)
 {
     const int ndim = search->scene.ndim, m = search->scene.lattice.n_periodic;
     /* Bytes that each candidate takes at least, gathered, sorted and looked up. */
-    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 3 * sizeof(int32_t)) +
+    const double each = (double)(sizeof(hs_unsure) + 2 * sizeof(uint64_t) + 4 * sizeof(int32_t)) +
                         (double)(ndim + 1) * sizeof(float) + (double)ndim * sizeof(double) +
                         (double)m * sizeof(int64_t);
     const double all = (double)most->candidates * each;

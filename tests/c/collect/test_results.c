@@ -282,10 +282,10 @@ poll_stops_the_search_whenever_it_says_so(void)
         x[e] = random_unit(&random);
     brute_scene many = {.ndim = 1, .n = n, .x = x, .box = &box, .cutoff = 1e-8};
     stop_at_every_poll(&many, false, 2); /* many points to read, wrap and sort */
-    brute_scene wide = {.ndim = 8, .n = 6000, .x = x, .cutoff = 0.3};
+    brute_scene wide = {.ndim = 8, .n = 16000, .x = x, .cutoff = 0.3};
     stop_at_every_poll(&wide, true, 2); /* many candidates */
     brute_scene lonely = {.ndim = 3, .n = 90000, .x = x, .cutoff = 1e-3};
-    stop_at_every_poll(&lonely, false, 3); /* many groups that meet nobody */
+    stop_at_every_poll(&lonely, false, 1); /* many groups that meet nobody */
     brute_scene dense = {.ndim = 1, .n = 1500, .x = x, .cutoff = 0.6};
     stop_at_every_poll(&dense, true, 3); /* many pairs to sort and write */
     stop_at_every_poll(&dense, false, 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * test_copies.c: what every kernel of this CPU brings in and puts out, between guard pages:
- * gathering runs of points to float32, emitting hits as pairs.
+ * gathering runs of points to float32, as far as they are near a box, emitting hits as pairs.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS */
 #include <math.h>
@@ -13,7 +13,7 @@ void test_copies(void);
 enum { N_POINTS = 600, MOST_RUNS = 200, MOST_HITS = 2 * HS_BLOCK_CANDIDATES };
 
 static guarded x_pages[HS_MAX_DIM], order_pages, y_pages[HS_MAX_DIM], norm_pages, id_pages;
-static guarded hits_pages, i_pages, j_pages;
+static guarded number_pages, hits_pages, i_pages, j_pages;
 
 static void
 guard_copies(void)
@@ -26,6 +26,7 @@ guard_copies(void)
     order_pages = guarded_pages((N_POINTS + HS_PADDING) * sizeof(int32_t));
     norm_pages = guarded_pages(block * sizeof(float));
     id_pages = guarded_pages(block * sizeof(int32_t));
+    number_pages = guarded_pages(block * sizeof(int32_t));
     hits_pages = guarded_pages(hits * sizeof(int32_t));
     i_pages = guarded_pages(hits * sizeof(int64_t));
     j_pages = guarded_pages(hits * sizeof(int64_t));
@@ -88,6 +89,8 @@ place_gather(harness_random *random, int ndim, int32_t n_points, int32_t n, bool
     g.order = order;
     g.norm = guarded_place(norm_pages, n + HS_PADDING, sizeof(float), at_end);
     g.id = guarded_place(id_pages, n + HS_PADDING, sizeof(int32_t), at_end);
+    g.number = guarded_place(number_pages, n + HS_PADDING, sizeof(int32_t), at_end);
+    g.near.out = INFINITY;
     return g;
 }
 
@@ -115,33 +118,73 @@ norm_is_near(const hs_gather *g, int32_t c)
     return fabs(norm - sum) <= d * unit * 1.000001 * sum + d * 0x1p-149;
 }
 
-/* The largest bits of all that was gathered, or 0 when something else is wrong. */
+/* y_k of point si of a run. */
+static float
+gathered_place(const hs_gather *g, const hs_run *run, int32_t si, int k)
+{
+    const volatile double moved = g->x[k][si] + run->moved[k];
+    const volatile float  y = (float)moved;
+    return y;
+}
+
+/* Whether point si of a run is to be kept, each operation rounded once. */
+static bool
+is_to_be_kept(const hs_gather *g, const hs_run *run, int32_t si)
+{
+    volatile float s = 0.0f;
+    bool           has_nan = false;
+    for (int k = 0; k < g->ndim; k++) {
+        const float          y = gathered_place(g, run, si, k);
+        const volatile float below = g->near.low[k] - y, above = y - g->near.high[k];
+        const volatile float gap = fmaxf(fmaxf(below, above), 0.0f), square = gap * gap;
+        s = s + square;
+        has_nan = has_nan || isnan(y);
+    }
+    return has_nan || !(s > g->near.out);
+}
+
+/* The largest bits of all that was gathered, or 0 when something else is wrong. given: the runs
+ * before. */
 static uint32_t
-check_gathered(const hs_gather *g, const hs_run *runs, int32_t n_runs)
+check_gathered(const hs_gather *g, const hs_run *given, const hs_run *runs, int32_t n_runs)
 {
     bool     same = true;
     uint32_t largest = 0;
+    int32_t  c = 0;
     for (int32_t r = 0; r < n_runs; r++) {
-        for (int32_t c = runs[r].at; c < runs[r + 1].at; c++) {
-            const int32_t si = runs[r].si + (c - runs[r].at);
+        same = same && runs[r].at == c && runs[r].si == given[r].si;
+        for (int32_t si = given[r].si; si < given[r].si + given[r + 1].at - given[r].at; si++) {
+            if (!is_to_be_kept(g, &given[r], si))
+                continue;
             for (int k = 0; k < g->ndim; k++) {
-                const volatile double moved = g->x[k][si] + runs[r].moved[k];
-                const volatile float  y = (float)moved;
+                const float y = gathered_place(g, &given[r], si, k);
                 same = same && (isnan(y) ? isnan(g->y[k][c]) : bits_of(y) == bits_of(g->y[k][c]));
                 const uint32_t size = bits_of(g->y[k][c]) & UINT32_C(0x7fffffff);
                 largest = size > largest ? size : largest;
             }
-            same = same && g->id[c] == g->order[si] && norm_is_near(g, c);
+            same = same && g->id[c] == g->order[si] && g->number[c] == si && norm_is_near(g, c);
+            c++;
         }
     }
-    CHECK(same);
+    CHECK(same && g->n == c);
     return same ? largest : 0;
 }
 
+/* A box of any size, about as far from the points as it is large, and how near is near. */
 static void
-gathering_copies_every_run(void)
+place_box(harness_random *random, hs_gather *g)
 {
-    static hs_run    runs[MOST_RUNS + 1];
+    for (int k = 0; k < g->ndim; k++) {
+        g->near.low[k] = (float)(8.0 * random_unit(random) - 6.0);
+        g->near.high[k] = g->near.low[k] + (float)(4.0 * random_unit(random));
+    }
+    g->near.out = (float)(random_bits(random) % 4 * g->ndim * random_unit(random));
+}
+
+static void
+gathering_copies_what_is_near(void)
+{
+    static hs_run    given[MOST_RUNS + 1], runs[MOST_RUNS + 1];
     harness_random   random = {112358};
     const hs_kernel *kernel;
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
@@ -149,13 +192,18 @@ gathering_copies_every_run(void)
             static const int32_t most[] = {1, 3, 15, 16, 17, 70, N_POINTS};
             const int            ndim = 1 + trial % HS_MAX_DIM;
             const int32_t        n_points = 1 + (int32_t)(random_bits(&random) % N_POINTS);
-            const int32_t        n_runs = make_runs(&random, ndim, n_points, most[trial % 7], runs);
-            hs_gather            g =
-                place_gather(&random, ndim, n_points, runs[n_runs].at, trial & 1, trial & 2);
+            const int32_t n_runs = make_runs(&random, ndim, n_points, most[trial % 7], given);
+            hs_gather     g =
+                place_gather(&random, ndim, n_points, given[n_runs].at, trial & 1, trial & 2);
             const uint32_t before = trial % 5 ? 0 : bits_of((float)(trial + 1));
+            const int32_t  half = trial % 3 == 0 ? n_runs / 2 : 0; /* in two parts */
             g.largest = before;
-            kernel->gather(&g, runs, n_runs);
-            const uint32_t largest = check_gathered(&g, runs, n_runs);
+            memcpy(runs, given, sizeof runs);
+            if (trial & 4)
+                place_box(&random, &g);
+            kernel->gather(&g, runs, half);
+            kernel->gather(&g, runs + half, n_runs - half);
+            const uint32_t largest = check_gathered(&g, given, runs, n_runs);
             CHECK(g.largest == (largest > before ? largest : before));
         }
     }
@@ -170,9 +218,9 @@ largest_finds_what_is_not_finite(void)
     for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
         for (int32_t at = 0; at < 40; at++) {
             for (int32_t n = at + 1; n <= 41; n++) {
-                const hs_run runs[2] = {{.at = 0, .si = 0}, {.at = n}};
-                hs_gather    g = place_gather(&random, 2, n, n, false, true);
-                double      *x = (double *)g.x[at % 2];
+                hs_run    runs[2] = {{.at = 0, .si = 0}, {.at = n}};
+                hs_gather g = place_gather(&random, 2, n, n, false, true);
+                double   *x = (double *)g.x[at % 2];
                 x[at] = at % 3 == 0 ? NAN : at % 3 == 1 ? -INFINITY : -100.0;
                 kernel->gather(&g, runs, 1);
                 CHECK(at % 3 == 0   ? g.largest > bits_of(INFINITY)
@@ -263,7 +311,7 @@ void
 test_copies(void)
 {
     guard_copies();
-    RUN(gathering_copies_every_run);
+    RUN(gathering_copies_what_is_near);
     RUN(largest_finds_what_is_not_finite);
     RUN(emitting_puts_the_lower_number_first);
     RUN(nothing_else_is_written);

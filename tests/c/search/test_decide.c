@@ -160,7 +160,7 @@ count_polls(void *context, double fraction)
 static void
 every_pair_is_tested_once(void)
 {
-    enum { MANY = 2000 };
+    enum { GROUPS = 31, MANY = 64 * GROUPS, CANDIDATES = MANY * (GROUPS + 1) / 2 };
     static double  x[MANY];
     hs_walker      walker;
     int            polls = 0;
@@ -186,8 +186,8 @@ every_pair_is_tested_once(void)
         CHECK(walker.scanner.n_found == (int64_t)times * MANY * (MANY - 1) / 2);
         CHECK(walker.scanner.n_candidates == walker.scanner.n_found);
         CHECK(walker.scanner.n_ambiguous == 0);
-        /* A row of the points costs a little beside. */
-        CHECK(polls == times * MANY / 2 * (MANY + 64) / (1 << 21));
+        /* Gathering counts as well, and each block. */
+        CHECK(polls == times * (65 * CANDIDATES + 64 * GROUPS) / (1 << 21));
         hs_walker_close(&unit.search, &walker);
     }
     search_unit_close(&unit);

@@ -9,7 +9,7 @@
 
 void test_large_blocks(void);
 
-enum { SPOTS = 1024, N = 110 * SPOTS }; /* in three images, more than 2^18 candidates */
+enum { SPOTS = 1024, N = 180 * SPOTS }; /* more than 2^18 candidates within 1.5 box lengths */
 
 static const hs_box box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
 
