@@ -17,6 +17,10 @@ note_unsure(hs_scan *scan, int32_t t, int32_t c, unsigned near, unsigned m, int3
     }
 }
 
+/* Vectors as wide as a cache line are taken where lines begin: others would lie across two. The
+ * first one of a point may then begin with lanes that do not count. */
+#define FILLS_LINE (LANES * sizeof(float) == 64)
+
 /* What scan_points keeps in registers. */
 typedef struct vector_scan {
     const float *y[HS_MAX_DIM];
@@ -82,9 +86,15 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
             break;
         }
         set_point(scan, t, ndim, expanded, &v);
-        for (int32_t c = scan->triangular ? t + 1 : 0; c < n; c += LANES) {
+        const int32_t from = scan->triangular ? t + 1 : 0;
+        mask          keep = (mask)(~0u << from % LANES);
+        for (int32_t c = FILLS_LINE ? from & ~(LANES - 1) : from; c < n; c += LANES) {
             const floats s = sums_of(&v, c, ndim, expanded);
             mask         near = not_greater(s, v.out);
+            if (FILLS_LINE) {
+                near = (mask)(near & keep);
+                keep = (mask)~0u;
+            }
             if (HS_UNLIKELY(n - c < LANES)) {
                 near = (mask)(near & first_lanes(n - c));
             }
