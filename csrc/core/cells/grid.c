@@ -264,8 +264,9 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
         return HS_OK;
     }
     const hs_grid single = *grid;
-    /* Narrower rows test fewer pairs that are too far apart, and cost more rows to visit. */
-    const int finer = neighbours < 150.0 ? 1 : neighbours < 700.0 ? 2 : 3;
+    /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered first
+     * (form.h). */
+    const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
     choose_counts(scene, grid, finer, density, counts, parts);
     const bool capped = hs_grid_cap_counts(scene, counts);
     if (capped && counts[0] < FEW_CELLS) {
