@@ -19,7 +19,7 @@
 #ifdef HS_TESTING
 #define WORTH_PRUNING 24 /* so that small scenes have both */
 #else
-#define WORTH_PRUNING 250
+#define WORTH_PRUNING 300
 #endif
 
 /* Work of a block beside that of its candidates, in candidates. */
