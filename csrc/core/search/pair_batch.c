@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* pair_batch.c: each batch copies from the records of its candidates, axis by axis, as the batch
- * kernels want them. */
+ * kernels want them, or for few pairs from the points themselves. */
 #include "pair_batch.h"
 
 #include <string.h>
 
 /* Integers up to here are float64 numbers, and what the batch kernels take. */
 #define WIDEST_SHIFT (INT64_C(1) << 53)
+
+/* One pair of so many candidates is looked up by itself, more by the records of the whole block. */
+#define FEW_OF_BLOCK 8
 
 /* n arrays of `length` entries. */
 static bool
@@ -92,6 +95,44 @@ hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
     }
     trace->n += n;
     return n;
+}
+
+/* The run that a place is in. */
+static const hs_run *
+run_of(const hs_block *block, int32_t place)
+{
+    int32_t low = 0, high = block->n_runs; /* runs[low].at <= place < runs[high].at */
+    while (high - low > 1) {
+        const int32_t middle = low + (high - low) / 2;
+        if (block->runs[middle].at <= place) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return &block->runs[low];
+}
+
+/* What the metric measures between, and shifts over B, without records. */
+static void
+look_up_few(hs_trace *trace)
+{
+    const hs_block *block = trace->of.block;
+    const hs_bins  *bins = &trace->search->bins, *asking = hs_search_asking(trace->search);
+    for (int k = 0; k < bins->ndim; k++) {
+        for (int32_t e = 0; e < trace->n; e++) {
+            trace->p[k][e] = asking->x[k][trace->si[e]];
+            trace->q[k][e] = bins->x[k][block->number[trace->place[e]]];
+        }
+    }
+    trace->of.has_images = trace->has_zeros = false;
+    for (int32_t e = 0; bins->n_periodic > 0 && e < trace->n; e++) {
+        const hs_run *run = run_of(block, trace->place[e]);
+        for (int r = 0; r < bins->n_periodic; r++) {
+            trace->image[r][e] = run->image[r];
+            trace->of.has_images = trace->of.has_images || run->image[r] != 0;
+        }
+    }
 }
 
 static void
@@ -213,10 +254,12 @@ hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
     const hs_bins *bins = hs_search_asking(trace->search);
     metric = metric ||
              !trace->of.is_narrow; /* shifts of the points as given are the metric's too */
-    if (hs_records_load(&trace->of, metric) != HS_OK) {
+    if (!trace->of.needs_given && !trace->of.has_metric &&
+        trace->n <= trace->of.block->n / FEW_OF_BLOCK) {
+        look_up_few(trace);
+    } else if (hs_records_load(&trace->of, metric) != HS_OK) {
         return HS_ERR_INTERRUPTED;
-    }
-    if (metric) {
+    } else if (metric) {
         look_up_points(trace);
         look_up_images(trace);
     }

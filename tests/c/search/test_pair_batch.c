@@ -155,9 +155,76 @@ many_runs_can_be_stopped(void)
     hs_pairs_free(rows);
 }
 
+/* Pairs of the visit's first point with its first hits, looked up. */
+static void
+look_up_some(hs_trace *trace, int32_t first, const hs_hits *hits)
+{
+    int64_t       failed;
+    const int32_t n = hits->end[0] < 4 ? hits->end[0] : 4;
+    hs_trace_clear(trace);
+    CHECK(hs_trace_add(trace, first, hits->label, n) == n);
+    CHECK(hs_trace_look_up(trace, true, &failed) == HS_OK);
+}
+
+/* Whether a look-up by itself and one of the loaded block agree; counts those by itself. */
+static hs_status
+compare_look_ups(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    static double  p[3][4], q[3][4];
+    static int64_t shift[3][4];
+    hs_trace      *trace = &scanner->trace;
+    hs_records_reset(&trace->of);
+    look_up_some(trace, first, hits);
+    *(int *)context += !trace->of.has_metric && trace->n > 0;
+    const int32_t n = trace->n;
+    const bool    is_shifted = trace->is_shifted;
+    for (int32_t e = 0; e < n; e++) {
+        double         of_p[3], of_q[3];
+        int64_t        image[3] = {0};
+        const int64_t *any = hs_trace_pair(trace, e, of_p, of_q, image);
+        for (int k = 0; k < 3; k++) {
+            p[k][e] = of_p[k];
+            q[k][e] = of_q[k];
+            shift[k][e] = any != NULL ? any[k] : 0;
+        }
+    }
+    CHECK(hs_records_load(&trace->of, true) == HS_OK);
+    look_up_some(trace, first, hits);
+    CHECK(trace->of.has_metric && trace->n == n && trace->is_shifted == is_shifted);
+    for (int32_t e = 0; e < n; e++) {
+        for (int k = 0; k < 3; k++) {
+            CHECK(trace->p[k][e] == p[k][e] && trace->q[k][e] == q[k][e]);
+            CHECK(!is_shifted || trace->image[k][e] == shift[k][e]);
+            CHECK(!is_shifted || trace->times[k][e] == (double)shift[k][e]);
+        }
+    }
+    return HS_OK;
+}
+
+/* Few pairs are looked up by themselves, to the same numbers as by the records of the block. */
+static void
+few_pairs_are_looked_up_as_many_are(void)
+{
+    hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{4.0}, {0.0, 4.0}, {0.0, 0.0, 4.0}}};
+    for (int periodic = 0; periodic < 2; periodic++) {
+        int       few = 0;
+        hs_walker walker;
+        search_unit_points(1618, 900, 3, 4.0, &unit);
+        search_unit_open(periodic ? &box : NULL, 1.0, false, HS_WANT_I, &unit);
+        CHECK(hs_walker_init(&unit.search, HS_BLOCK_LISTS_SQUARES, compare_look_ups, &few,
+                             &walker) == HS_OK);
+        CHECK(hs_walk(&walker, 0, 900) == HS_OK);
+        CHECK(few > 20);
+        hs_walker_close(&unit.search, &walker);
+        search_unit_close(&unit);
+    }
+}
+
 void
 test_pair_batch(void)
 {
+    RUN(few_pairs_are_looked_up_as_many_are);
     RUN(shifts_are_int32_where_they_are_known_to_be_few);
     RUN(shifts_beyond_the_integers_are_told);
     RUN(keys_beyond_the_integers_are_told);
