@@ -5,7 +5,6 @@
 #include "request.h"
 #include "../search/estimate.h"
 #include "../collect/parallel.h"
-#include "../collect/record.h"
 #include "../collect/sort_pairs.h"
 
 #include <math.h>
@@ -20,26 +19,6 @@ hs_options_default(void)
                         .memory_limit = INFINITY};
 }
 
-/* Records pairs by the caller's thread, straight into an output that grows. */
-static hs_status
-record_alone(hs_search *search, hs_output *output, hs_failure *failure)
-{
-    hs_recorder recorder = {0};
-    hs_walker   walker;
-    hs_status   status =
-        hs_walker_init(search, hs_record_use(output->columns), hs_record_hits, &recorder, &walker);
-    if (status == HS_OK) {
-        status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits,
-                                  &recorder);
-    }
-    if (status == HS_OK) {
-        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);
-    }
-    hs_recorder_free(&search->call->account, &recorder);
-    hs_walker_close(search, &walker);
-    return status;
-}
-
 /* Records all pairs, unsorted. */
 static hs_status
 record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
@@ -49,7 +28,7 @@ record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
     }
     hs_output_expect(output, search->grid.expected_pairs);
     return search->call->team != NULL ? hs_parallel_record(search, output, failure)
-                                      : record_alone(search, output, failure);
+                                      : hs_record_alone(search, output, failure);
 }
 
 /* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting

@@ -7,7 +7,6 @@
 #include "../base/poll.h"
 #include "../collect/crew.h"
 #include "../collect/parallel.h"
-#include "../collect/record.h"
 #include "../collect/sort_pairs.h"
 #include "../search/search_open.h"
 
@@ -80,16 +79,6 @@ build_system(worker *me, int64_t s)
     return status;
 }
 
-/* What a walker did, before it is closed. */
-static void
-note_walk(worker *me, const hs_walker *walker, hs_status status)
-{
-    me->work += walker->scanner.n_candidates;
-    if (status == HS_ERR_SHIFT_RANGE) {
-        me->committer.failure.row = walker->scanner.failed_point;
-    }
-}
-
 static hs_status
 count_system(worker *me, int64_t s)
 {
@@ -97,34 +86,10 @@ count_system(worker *me, int64_t s)
     hs_walker  walker;
     hs_status  status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
     if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)search->bins.n);
+        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, &me->committer.failure);
         me->job->counts[s] = walker.scanner.n_found;
-        note_walk(me, &walker, status);
         hs_walker_close(search, &walker);
     }
-    return status;
-}
-
-/* Records all pairs of the present system, unsorted; `visit` takes the backlog or its recorder. */
-static hs_status
-record_system(worker *me, hs_output *output, hs_visit_fn visit, void *context)
-{
-    hs_search   *search = &me->search;
-    hs_recorder *recorder = &me->backlog.recorder;
-    hs_walker    walker;
-    hs_status    status =
-        hs_walker_init(search, hs_record_use(output->columns), visit, context, &walker);
-    if (status != HS_OK) {
-        return status;
-    }
-    status =
-        hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits, recorder);
-    if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)search->bins.n);
-    }
-    note_walk(me, &walker, status);
-    hs_recorder_free(&search->call->account, recorder);
-    hs_walker_close(search, &walker);
     return status;
 }
 
@@ -140,7 +105,7 @@ sort_system(worker *me)
         hs_output_init(&search->call->account, search->scene.ndim, columns, 4, found);
     }
     found->n_pairs = 0;
-    hs_status status = record_system(me, found, hs_record_hits, &me->backlog.recorder);
+    hs_status status = hs_record_alone(search, found, &me->committer.failure);
     if (status == HS_OK) {
         status =
             hs_sort_pairs(search->call, search->first_point, search->scene.n, found, me->target);
@@ -161,15 +126,17 @@ find_system(worker *me)
     if (me->call.options.sorted) {
         return sort_system(me);
     }
-    return me->job->is_direct ? record_system(me, me->target, hs_record_hits, &me->backlog.recorder)
-                              : record_system(me, me->target, hs_backlog_hits, &me->backlog);
+    return me->job->is_direct
+               ? hs_record_alone(&me->search, me->target, &me->committer.failure)
+               : hs_backlog_record(&me->search, &me->backlog, &me->committer.failure);
 }
 
 static hs_status
 search_system(worker *me, int64_t s)
 {
-    hs_search *search = &me->search;
-    hs_status  status = build_system(me, s);
+    hs_search    *search = &me->search;
+    const int64_t before = me->call.done.candidates;
+    hs_status     status = build_system(me, s);
     if (status == HS_OK) {
         status = me->job->output == NULL ? count_system(me, s) : find_system(me);
     }
@@ -179,7 +146,7 @@ search_system(worker *me, int64_t s)
         me->committer.failure.system = s;
         return status;
     }
-    me->work += SYSTEM_WORK;
+    me->work += SYSTEM_WORK + me->call.done.candidates - before;
     if (me->work > POLL_WORK) {
         const hs_systems_job *job = me->job;
         me->work = 0;
@@ -261,18 +228,13 @@ hs_systems_search(hs_systems_job *job, hs_failure *failure)
     job->in_range = in_range > 1 ? in_range : 1;
     job->is_direct = hs_team_size(job->total->team) == 1 && job->output != NULL &&
                      !job->output->fixed;
-    hs_ranges ranges = {.n = (n_systems + job->in_range - 1) / job->in_range,
-                        .search = search_range,
-                        .output = job->output};
-    hs_crew   crew = {.call = job->total,
-                      .job = job,
-                      .worker_size = sizeof(worker),
-                      .open = open_worker,
-                      .close = close_worker};
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        status = hs_crew_search(&crew, &ranges, failure);
-    }
-    hs_crew_close(&crew);
-    return status;
+    hs_crew crew = {.call = job->total,
+                    .job = job,
+                    .worker_size = sizeof(worker),
+                    .open = open_worker,
+                    .close = close_worker,
+                    .n_ranges = (n_systems + job->in_range - 1) / job->in_range,
+                    .search = search_range,
+                    .output = job->output};
+    return hs_crew_run(&crew, failure);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* box_skew.c: tests of the reduced basis: how flat it is, and how large its coefficients are. */
-#include "box_skew.h"
+#include "lattice.h"
 
 #include <math.h>
 

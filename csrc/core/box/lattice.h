@@ -81,4 +81,12 @@ double hs_lattice_volume(const hs_lattice *lattice, int exponent);
 /* S over the periodic box vectors as given, from a shift over B; false when it passes 2^62. */
 bool hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *given);
 
+/* Whether reduction has failed: rows of B nearly depend on each other, or have coefficients over
+ * the given box vectors that no shift may have. In box_skew.c, as the next one. */
+bool hs_skew_is_left(const hs_lattice *lattice);
+
+/* Why a search would meet more images or rows of cells than any memory holds: HS_ERR_BOX_SKEWED or
+ * HS_ERR_MEMORY, because the cutoff spans them. */
+hs_status hs_skew_or_memory(const hs_lattice *lattice);
+
 #endif

@@ -9,8 +9,6 @@
  */
 #include "grid.h"
 
-#include "../box/box_skew.h"
-
 #include <math.h>
 #include <string.h>
 

@@ -10,7 +10,6 @@
 #include "stencil.h"
 
 #include "../base/poll.h"
-#include "../box/box_skew.h"
 
 #include <math.h>
 #include <string.h>

@@ -4,6 +4,12 @@
 
 #include <string.h>
 
+static void *
+worker_of(const hs_crew *crew, int64_t number)
+{
+    return (char *)crew->workers + (size_t)number * crew->worker_size;
+}
+
 hs_status
 hs_crew_open(hs_crew *crew)
 {
@@ -16,7 +22,7 @@ hs_crew_open(hs_crew *crew)
     }
     memset(crew->workers, 0, (size_t)n * crew->worker_size);
     while (crew->n_open < n && status == HS_OK) {
-        status = crew->open(crew->job, hs_crew_worker(crew, crew->n_open++));
+        status = crew->open(crew->job, worker_of(crew, crew->n_open++));
     }
     return status;
 }
@@ -25,16 +31,15 @@ void
 hs_crew_close(hs_crew *crew)
 {
     for (int w = 0; w < crew->n_open; w++) {
-        crew->close(crew->job, hs_crew_worker(crew, w));
+        crew->close(crew->job, worker_of(crew, w));
     }
     hs_free(&crew->call->account, crew->workers);
 }
 
-/* The ranges that a crew searches. */
+/* A crew at work. */
 typedef struct sharing {
-    const hs_crew   *crew;
-    const hs_ranges *ranges;
-    hs_commits      *commits;
+    const hs_crew *crew;
+    hs_commits    *commits;
 } sharing;
 
 /* A hs_task_fn: ranges, as long as there are any. */
@@ -42,24 +47,34 @@ static void
 work(void *context, int64_t task)
 {
     const sharing *shared = context;
-    hs_committer  *worker = hs_crew_worker(shared->crew, task);
+    hs_committer  *worker = worker_of(shared->crew, task);
     hs_commits_join(shared->commits, worker);
-    hs_commits_work(worker, shared->ranges->search, worker);
+    hs_commits_work(worker, shared->crew->search, worker);
 }
 
-hs_status
-hs_crew_search(hs_crew *crew, hs_ranges *ranges, hs_failure *failure)
+static hs_status
+search_ranges(hs_crew *crew, hs_failure *failure)
 {
     hs_account *account = &crew->call->account;
-    sharing     shared = {.crew = crew, .ranges = ranges};
-    shared.commits = hs_commits_new(account, ranges->output, ranges->n);
+    sharing     shared = {crew, hs_commits_new(account, crew->output, crew->n_ranges)};
     if (shared.commits == NULL) {
         return HS_ERR_MEMORY;
     }
-    if (ranges->enough > 0) {
-        hs_commits_limit(shared.commits, ranges->enough, ranges->most);
+    if (crew->enough > 0) {
+        hs_commits_limit(shared.commits, crew->enough, crew->most);
     }
     hs_team_run(crew->call->team, crew->n_open, work, &shared);
-    ranges->n_written = hs_commits_written(shared.commits);
+    crew->n_written = hs_commits_written(shared.commits);
     return hs_commits_end(account, shared.commits, failure);
+}
+
+hs_status
+hs_crew_run(hs_crew *crew, hs_failure *failure)
+{
+    hs_status status = hs_crew_open(crew);
+    if (status == HS_OK) {
+        status = search_ranges(crew, failure);
+    }
+    hs_crew_close(crew);
+    return status;
 }

@@ -20,29 +20,20 @@ typedef struct hs_crew {
     void (*close)(void *job, void *worker);
     void *workers; /* owned; one for each thread, one behind another */
     int   n_open;  /* so many of them */
+    /* For hs_crew_run: */
+    int64_t     n_ranges;
+    hs_range_fn search;
+    hs_output  *output;       /* borrowed; NULL when nothing is committed */
+    int64_t     enough, most; /* pairs in the output, for hs_commits_limit; 0: all */
+    int64_t     n_written;    /* set at the end: the first ranges, written to their end */
 } hs_crew;
 
 /* Opens a worker for each thread. hs_crew_close must follow, also on failure. */
 hs_status hs_crew_open(hs_crew *crew);
 void      hs_crew_close(hs_crew *crew);
 
-HS_ALWAYS_INLINE void *
-hs_crew_worker(const hs_crew *crew, int64_t number)
-{
-    return (char *)crew->workers + (size_t)number * crew->worker_size;
-}
-
-/* Work in numbered ranges. */
-typedef struct hs_ranges {
-    int64_t     n;
-    hs_range_fn search;
-    hs_output  *output;       /* borrowed; NULL when nothing is committed */
-    int64_t     enough, most; /* pairs in the output, for hs_commits_limit; 0: all */
-    int64_t     n_written;    /* set at the end: the first ones, written to their end */
-} hs_ranges;
-
-/* All workers of an open crew take ranges. Each worker begins with a hs_committer, of which it has
- * set `options` and `pairs`. Returns the failure of the earliest range that had one. */
-hs_status hs_crew_search(hs_crew *crew, hs_ranges *ranges, hs_failure *failure);
+/* Opens workers, each of which begins with a hs_committer and sets its `options` and `pairs`; they
+ * take ranges, and are closed. Returns the failure of the earliest range that had one. */
+hs_status hs_crew_run(hs_crew *crew, hs_failure *failure);
 
 #endif

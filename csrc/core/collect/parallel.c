@@ -68,6 +68,22 @@ search_range(void *context, int64_t range)
     return status;
 }
 
+/* A hs_visit_fn. */
+static hs_status
+backlog_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    hs_backlog      *backlog = context;
+    const hs_output *pairs = &backlog->pairs;
+    const hs_status  status = hs_record_hits(&backlog->recorder, scanner, first, hits);
+    if (status == HS_OK && pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
+        const hs_status committed =
+            hs_commit(backlog->committer, hs_scanner_fraction(scanner), false);
+        scanner->leaves = backlog->committer->is_full;
+        return committed;
+    }
+    return status;
+}
+
 /* A walker that visits; the workers take the contexts in turn. */
 static hs_status
 open_visitor(walk_job *job, hs_walker *walker)
@@ -97,7 +113,7 @@ open_worker(void *context, void *place)
     }
     hs_backlog_init(job->output, &me->committer, &me->backlog);
     me->committer.pairs = &me->backlog.pairs;
-    hs_status status = hs_walker_init(search, hs_record_use(job->output->columns), hs_backlog_hits,
+    hs_status status = hs_walker_init(search, hs_record_use(job->output->columns), backlog_hits,
                                       &me->backlog, &me->walker);
     if (status == HS_OK) {
         status = hs_recorder_init(&search->call->account, &me->backlog.pairs,
@@ -134,37 +150,26 @@ most_pairs(const walk_job *job)
     return job->enough <= INT64_MAX - slack ? job->enough + slack : INT64_MAX;
 }
 
-static hs_status
-search_ranges(walk_job *job, hs_crew *crew, hs_failure *failure)
-{
-    const int64_t   n_left = hs_search_asking(job->search)->n - job->start.point;
-    hs_ranges       ranges = {.n = (n_left + RANGE_POINTS - 1) / RANGE_POINTS,
-                              .search = search_range,
-                              .output = job->output,
-                              .enough = job->enough,
-                              .most = job->enough > 0 ? most_pairs(job) : 0};
-    const hs_status status = hs_crew_search(crew, &ranges, failure);
-    if (!job->is_left) {
-        const int64_t done = ranges.n_written * RANGE_POINTS;
-        job->left = (hs_bookmark){.point = job->start.point + (done < n_left ? done : n_left)};
-    }
-    return status;
-}
-
 /* Runs all workers. */
 static hs_status
 walk_together(walk_job *job, hs_failure *failure)
 {
-    hs_crew   crew = {.call = job->search->call,
-                      .job = job,
-                      .worker_size = sizeof(worker),
-                      .open = open_worker,
-                      .close = close_worker};
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        status = search_ranges(job, &crew, failure);
+    const int64_t   n_left = hs_search_asking(job->search)->n - job->start.point;
+    hs_crew         crew = {.call = job->search->call,
+                            .job = job,
+                            .worker_size = sizeof(worker),
+                            .open = open_worker,
+                            .close = close_worker,
+                            .n_ranges = (n_left + RANGE_POINTS - 1) / RANGE_POINTS,
+                            .search = search_range,
+                            .output = job->output,
+                            .enough = job->enough,
+                            .most = job->enough > 0 ? most_pairs(job) : 0};
+    const hs_status status = hs_crew_run(&crew, failure);
+    if (!job->is_left) {
+        const int64_t done = crew.n_written * RANGE_POINTS;
+        job->left = (hs_bookmark){.point = job->start.point + (done < n_left ? done : n_left)};
     }
-    hs_crew_close(&crew);
     return status;
 }
 
@@ -222,17 +227,35 @@ hs_backlog_free(hs_account *account, hs_backlog *backlog)
     hs_output_free(&backlog->pairs);
 }
 
-hs_status
-hs_backlog_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* By one walker; `visit` writes to the output by the recorder, which is free at the end. */
+static hs_status
+record_by(hs_search *search, hs_output *output, hs_recorder *recorder, hs_visit_fn visit,
+          void *context, hs_failure *failure)
 {
-    hs_backlog      *backlog = context;
-    const hs_output *pairs = &backlog->pairs;
-    const hs_status  status = hs_record_hits(&backlog->recorder, scanner, first, hits);
-    if (status == HS_OK && pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
-        const hs_status committed =
-            hs_commit(backlog->committer, hs_scanner_fraction(scanner), false);
-        scanner->leaves = backlog->committer->is_full;
-        return committed;
+    hs_walker walker;
+    hs_status status =
+        hs_walker_init(search, hs_record_use(output->columns), visit, context, &walker);
+    if (status == HS_OK) {
+        status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits,
+                                  recorder);
     }
+    if (status == HS_OK) {
+        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);
+    }
+    hs_recorder_free(&search->call->account, recorder);
+    hs_walker_close(search, &walker);
     return status;
+}
+
+hs_status
+hs_record_alone(hs_search *search, hs_output *output, hs_failure *failure)
+{
+    hs_recorder recorder = {0};
+    return record_by(search, output, &recorder, hs_record_hits, &recorder, failure);
+}
+
+hs_status
+hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_failure *failure)
+{
+    return record_by(search, &backlog->pairs, &backlog->recorder, backlog_hits, backlog, failure);
 }

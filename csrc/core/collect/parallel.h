@@ -21,6 +21,9 @@ typedef struct hs_visitors {
     size_t                  context_size;
 } hs_visitors;
 
+/* Records all pairs by this thread, straight into an output that grows. */
+hs_status hs_record_alone(hs_search *search, hs_output *output, hs_failure *failure);
+
 /* Records all pairs in the output, by search->call->team. HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
 
@@ -56,7 +59,7 @@ void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlo
 /* Its pairs and recorder; harmless twice. */
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
-/* A hs_visit_fn. */
-hs_status hs_backlog_hits(void *backlog, hs_scanner *scanner, int32_t first, const hs_hits *hits);
+/* hs_record_alone for a backlog. */
+hs_status hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_failure *failure);
 
 #endif

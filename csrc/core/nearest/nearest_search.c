@@ -269,18 +269,14 @@ list_parts(near_job *job, const hs_tree *tree, int32_t *stack)
 static hs_status
 search_ranges(near_job *job, hs_failure *failure)
 {
-    hs_ranges ranges = {.n = job->n_ranges, .search = search_range};
-    hs_crew   crew = {.call = job->near->search->call,
-                      .job = job,
-                      .worker_size = sizeof(near_worker),
-                      .open = open_worker,
-                      .close = close_worker};
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        status = hs_crew_search(&crew, &ranges, failure);
-    }
-    hs_crew_close(&crew);
-    return status;
+    hs_crew crew = {.call = job->near->search->call,
+                    .job = job,
+                    .worker_size = sizeof(near_worker),
+                    .open = open_worker,
+                    .close = close_worker,
+                    .n_ranges = job->n_ranges,
+                    .search = search_range};
+    return hs_crew_run(&crew, failure);
 }
 
 hs_status

@@ -3,7 +3,6 @@
  * it can. */
 #include "scene.h"
 
-#include "../box/box_skew.h"
 #include "../threads/passes.h"
 #include "../box/wrap.h"
 #include "unit.h"

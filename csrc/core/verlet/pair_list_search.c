@@ -246,24 +246,6 @@ close_worker(void *context, void *place)
     hs_free(account, me->ids);
 }
 
-static hs_status
-search_pieces(hs_search *search, hs_pieces *pieces, hs_failure *failure)
-{
-    piece_job job = {.search = search, .pieces = pieces};
-    hs_ranges ranges = {.n = pieces->n, .search = search_piece};
-    hs_crew   crew = {.call = search->call,
-                      .job = &job,
-                      .worker_size = sizeof(worker),
-                      .open = open_worker,
-                      .close = close_worker};
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        status = hs_crew_search(&crew, &ranges, failure);
-    }
-    hs_crew_close(&crew);
-    return status;
-}
-
 void
 hs_pieces_free(hs_account *account, hs_pieces *pieces)
 {
@@ -288,7 +270,15 @@ hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
     for (int64_t p = 0; p < pieces->n; p++) {
         hs_output_init(NULL, search->scene.ndim, HS_WANT_I | HS_WANT_J, 4, &pieces->of[p].pairs);
     }
-    const hs_status status = search_pieces(search, pieces, failure);
+    piece_job       job = {.search = search, .pieces = pieces};
+    hs_crew         crew = {.call = search->call,
+                            .job = &job,
+                            .worker_size = sizeof(worker),
+                            .open = open_worker,
+                            .close = close_worker,
+                            .n_ranges = pieces->n,
+                            .search = search_piece};
+    const hs_status status = hs_crew_run(&crew, failure);
     if (status != HS_OK) {
         hs_pieces_free(&search->call->account, pieces);
     }

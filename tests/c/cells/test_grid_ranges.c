@@ -2,7 +2,7 @@
 /* test_grid_ranges.c: how far apart the cells of a pair can be, in lattices that are worse than any
  * box gives; what cannot be counted is refused, what cannot be told is left alone. */
 #include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/box/box_skew.h"
+#include "../../../csrc/core/box/lattice.h"
 #include "../../../csrc/core/cells/sparse_grid.h"
 #include "../../../csrc/core/cells/stencil.h"
 #include "../support/harness.h"

@@ -76,19 +76,16 @@ search_all(counting *job, int n_threads, hs_range_fn search, hs_failure *failure
     hs_call_begin(&options, &call);
     call.team = hs_team_create(n_threads);
     account = &call.account;
-    hs_ranges ranges = {.n = RANGES, .search = search};
-    hs_crew   crew = {.call = &call,
-                      .job = job,
-                      .worker_size = sizeof(worker),
-                      .open = open_worker,
-                      .close = close_worker};
-    hs_status status = hs_crew_open(&crew);
-    if (status == HS_OK) {
-        CHECK(job->n_opened == hs_team_size(call.team) && job->n_closed == 0);
-        status = hs_crew_search(&crew, &ranges, failure);
-        CHECK(status != HS_OK || ranges.n_written == 0); /* nothing is committed */
-    }
-    hs_crew_close(&crew);
+    hs_crew         crew = {.call = &call,
+                            .job = job,
+                            .worker_size = sizeof(worker),
+                            .open = open_worker,
+                            .close = close_worker,
+                            .n_ranges = RANGES,
+                            .search = search};
+    const hs_status status = hs_crew_run(&crew, failure);
+    CHECK(status != HS_OK || job->n_opened == hs_team_size(call.team));
+    CHECK(crew.n_written == 0); /* nothing is committed */
     CHECK(call.account.held == 0);
     hs_call_dismiss(&call);
     hs_account_close(&call.account);
