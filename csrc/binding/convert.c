@@ -40,6 +40,14 @@ hs_points_of(PyObject *object, const char *name, hs_points *points)
     return true;
 }
 
+bool
+hs_is_array(PyObject *object, int type, int n_axes)
+{
+    PyArrayObject *array = (PyArrayObject *)object;
+    return PyArray_Check(object) && PyArray_TYPE(array) == type && PyArray_ISCARRAY_RO(array) &&
+           PyArray_NDIM(array) == n_axes;
+}
+
 hs_cells *
 hs_cells_of(PyObject *object)
 {
@@ -62,14 +70,13 @@ hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *
         return true;
     }
     PyArrayObject *array = (PyArrayObject *)object;
-    if (!PyArray_Check(object) || PyArray_TYPE(array) != NPY_DOUBLE ||
-        !PyArray_ISCARRAY_RO(array) || PyArray_NDIM(array) < 1 || PyArray_NDIM(array) > 2 ||
-        PyArray_DIM(array, 0) != ndim || PyArray_DIM(array, PyArray_NDIM(array) - 1) != ndim) {
+    const bool     has_rows = hs_is_array(object, NPY_DOUBLE, 2);
+    if ((!has_rows && !hs_is_array(object, NPY_DOUBLE, 1)) || PyArray_DIM(array, 0) != ndim ||
+        (has_rows && PyArray_DIM(array, 1) != ndim)) {
         PyErr_Format(PyExc_ValueError, "box must be a float64 array of shape (%d, %d)", ndim, ndim);
         return false;
     }
     const double *entries = PyArray_DATA(array);
-    const bool    has_rows = PyArray_NDIM(array) == 2;
     box->ndim = ndim;
     for (int l = 0; l < ndim; l++) {
         box->periodic[l] = (repeats >> l & 1) != 0;

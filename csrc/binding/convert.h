@@ -14,6 +14,9 @@
  * is that of the argument, for messages. */
 bool hs_points_of(PyObject *object, const char *name, hs_points *points);
 
+/* Whether it is a native, C-contiguous array of this type of NumPy with so many axes. */
+bool hs_is_array(PyObject *object, int type, int n_axes);
+
 /* The cells in an object of _core.cells_build, borrowed; NULL, without an exception, for others. */
 hs_cells *hs_cells_of(PyObject *object);
 #define HS_CELLS_NAME "halfshell.cells"

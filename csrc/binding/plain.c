@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* plain.c: looks at types and shapes only: nothing here runs code of the arguments, or raises. */
+/* plain.c: looks at types and shapes only, so that no code of the arguments runs. */
 #include "plain.h"
 
 #include "../halfshell.h"

@@ -2,6 +2,7 @@
 /* py_batch.c: _core.batch_pairs and _core.batch_count: many systems in one call. */
 #include "py_functions.h"
 
+#include "convert.h"
 #include "py_call.h"
 #include "errors.h"
 
@@ -125,18 +126,16 @@ find_all(const int64_t *numbers, int64_t n_points, int64_t n_systems, batch *giv
 static int64_t
 length_of(PyObject *object, int n_axes, int64_t otherwise, const double **data)
 {
-    PyArrayObject *array = (PyArrayObject *)object;
     *data = NULL;
     if (object == Py_None) {
         return otherwise;
     }
-    if (!PyArray_Check(object) || PyArray_TYPE(array) != NPY_DOUBLE ||
-        !PyArray_ISCARRAY_RO(array) || PyArray_NDIM(array) != n_axes) {
+    if (!hs_is_array(object, NPY_DOUBLE, n_axes)) {
         PyErr_Format(PyExc_TypeError, "a float64 array with %d axes is expected", n_axes);
         return -1;
     }
-    *data = PyArray_DATA(array);
-    return PyArray_DIM(array, 0);
+    *data = PyArray_DATA((PyArrayObject *)object);
+    return PyArray_DIM((PyArrayObject *)object, 0);
 }
 
 /* Three arguments: batch, int64 (n,); cutoffs, None or float64 (s,); boxes, None or float64
@@ -147,8 +146,7 @@ take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
     PyArrayObject *numbers = (PyArrayObject *)arguments[0];
     hs_systems    *systems = &given->systems;
     *given = (batch){.first = NULL};
-    if (!PyArray_Check(arguments[0]) || PyArray_TYPE(numbers) != NPY_INT64 ||
-        !PyArray_ISCARRAY_RO(numbers) || PyArray_SIZE(numbers) != call->points.n) {
+    if (!hs_is_array(arguments[0], NPY_INT64, 1) || PyArray_DIM(numbers, 0) != call->points.n) {
         PyErr_SetString(PyExc_TypeError, "batch must be an int64 array with a number a point");
         return false;
     }

@@ -2,6 +2,7 @@
 /* py_histogram.c: _core.histogram: pairs by distance, counted or weighted. */
 #include "py_functions.h"
 
+#include "convert.h"
 #include "py_call.h"
 #include "errors.h"
 
@@ -13,8 +14,7 @@ take_column(PyObject *object, int type, int64_t length, const char *name, const 
     if (object == Py_None) {
         return true;
     }
-    if (!PyArray_Check(object) || PyArray_TYPE(array) != type || !PyArray_ISCARRAY_RO(array) ||
-        PyArray_NDIM(array) != 1 || (length >= 0 && PyArray_DIM(array, 0) != length)) {
+    if (!hs_is_array(object, type, 1) || (length >= 0 && PyArray_DIM(array, 0) != length)) {
         PyErr_Format(PyExc_TypeError, "%s is not an array of the expected type and length", name);
         return false;
     }
