@@ -4,7 +4,6 @@
  * that is the cutoff or a hair less or more: decided as big integers say.
  */
 #include "../../../csrc/core/exact/metric.h"
-#include "../../../csrc/core/exact/metric.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"
 
@@ -98,43 +97,9 @@ double_takes_one_comparison(void)
     }
 }
 
-/* Each stage tells two distances apart that it can tell, and leaves the others to the next; equal
- * ones are so for the first that loses nothing. */
-static void
-the_first_stage_that_can_tell_which_is_nearer_does(void)
-{
-    const double p[2] = {0.0, 0.0}, rows[1][8] = {{0.0}};
-    const double odd = 1.0 + 0x1p-52; /* with a hair beside it more than two words hold */
-    const struct {
-        double        q[2];
-        const double *to;
-        int           sign;
-        int64_t       stages[3];
-    } cases[] = {
-        {{1.0, 0.5}, (const double[2]){1.0, 0.25}, 1, {1, 0, 0}},
-        {{1.0, 0x1p-30}, (const double[2]){1.0, 0.0}, 1, {0, 1, 0}},
-        {{1.0, 0x1p-30}, (const double[2]){1.0, 0x1.8p-30}, -1, {0, 1, 0}},
-        {{1.0, 0.5}, (const double[2]){-0.5, 1.0}, 0, {0, 1, 0}},
-        {{odd, 0x1p-80}, (const double[2]){0x1p-80, odd}, 0, {0, 0, 1}},
-        {{odd, 0x1.8p-80}, (const double[2]){odd, 0x1p-80}, 1, {0, 0, 1}},
-    };
-    hs_metric metric;
-    hs_metric_init(&metric, 2, 0, rows, 1.0, true);
-    for (int c = 0; c < 6; c++) {
-        hs_stages     stages = {0};
-        const hs_span one = {p, cases[c].q, NULL}, other = {p, cases[c].to, NULL};
-        CHECK(hs_metric_compare(&metric, &one, &other, &stages) == cases[c].sign);
-        CHECK(stages.by_float64 == cases[c].stages[0]);
-        CHECK(stages.by_double_word == cases[c].stages[1]);
-        CHECK(stages.by_integers == cases[c].stages[2]);
-        CHECK(hs_metric_compare(&metric, &other, &one, &stages) == -cases[c].sign);
-    }
-}
-
 void
 test_metric_hair(void)
 {
-    RUN(the_first_stage_that_can_tell_which_is_nearer_does);
     RUN(hairs_beside_the_cutoff);
     RUN(sums_a_little_below_the_cutoff);
     RUN(double_takes_one_comparison);

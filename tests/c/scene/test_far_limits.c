@@ -3,9 +3,6 @@
  * test_far_limits.c: where numbers of very different size meet, what a search costs follows its
  * points, and a refusal says why.
  */
-#include "../../../csrc/core/scene/scene.h"
-#include "../../../csrc/core/scene/unit.h"
-#include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/among.h"
@@ -142,83 +139,11 @@ one_cell_with_everything_says_so(void)
     hs_cells_free(cells);
 }
 
-/* What one row alone moves, for rows of a box and among those that count. */
-static void
-one_row_moves_a_column(void)
-{
-    const hs_box box = {.ndim = 3,
-                        .periodic = {true, true, false},
-                        .rows = {{0.0, 2.0, 0.0}, {3.0, 0.0, 0.0}, {1.0, 1.0, 1.0}}};
-    const bool   all[3] = {true, true, true};
-    CHECK(hs_mover_of(NULL, 0) == HS_OPEN && hs_mover_of(&box, 2) == HS_OPEN);
-    CHECK(hs_mover_of(&box, 0) == 1 && hs_mover_of(&box, 1) == 0);
-    hs_box coupled = box;
-    memcpy(coupled.periodic, all, sizeof all);
-    for (int k = 0; k < 3; k++)
-        CHECK(hs_mover_of(&coupled, k) == HS_COUPLED);
-    const hs_box_size size = hs_box_size_of(&box), of_coupled = hs_box_size_of(&coupled);
-    CHECK(!size.is_coupled && size.moved == 3 && of_coupled.is_coupled && of_coupled.moved == 7);
-    CHECK(hs_is_far(0x1.8p60, 6, 54) && !hs_is_far(0x1p60, 6, 54));
-    CHECK(hs_is_far(0x1p-1074, hs_exponent_of(0.0), 54));
-    CHECK(!hs_is_far(0x1p1023, hs_exponent_of(INFINITY), 54));
-}
-
-/* Scaling loses digits from the first number on that would be subnormal. */
-static void
-scaling_is_extreme_from_the_subnormal_numbers_on(void)
-{
-    for (int below = 0; below < 4; below++) {
-        double            x[1] = {ldexp(1.75, -722 - below)};
-        const hs_box_size none = hs_box_size_of(NULL);
-        bool              extreme;
-        hs_cloud          cloud = {.n = 1, .ndim = 1, .x = {x}, .largest = x[0]};
-        cloud.lower[0] = cloud.upper[0] = x[0];
-        const int exponent =
-            hs_choose_exponent(&cloud, &none, 0x1p300, 300, HS_LARGEST_EXPONENT, &extreme);
-        CHECK(exponent == 300 && extreme == (below > 0));
-    }
-}
-
-/* Points in several passes, one box away along one axis and inside along the other: turns of each
- * axis are those of its own points. */
-static void
-turns_of_an_axis_without_any_are_cleared_in_place(void)
-{
-    enum { MANY = 3 * HS_SLAB_POINTS + 5 };
-    double         *x = malloc(2 * MANY * sizeof *x);
-    harness_random  random = {73};
-    const hs_points points = {x, MANY, 2, HS_FLOAT64, 16, 8};
-    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0.0, 8.0}}};
-    hs_options      options = hs_options_default();
-    hs_account      account;
-    hs_scene        scene;
-    hs_failure      failure;
-    int64_t         wrong = 0;
-    options.want = HS_WANT_SHIFT;
-    options.cutoff = 1.0;
-    for (int i = 0; i < MANY; i++) {
-        x[2 * i] = 6.0 + random_unit(&random);
-        x[2 * i + 1] = random_unit(&random);
-    }
-    hs_account_init(&account, &options);
-    CHECK(hs_scene_init(&account, NULL, &points, &box, &options, &scene, &failure) == HS_OK);
-    for (int i = 0; i < MANY; i++)
-        wrong += hs_turns_get(&scene.turns, scene.lattice.row_of_axis[0], i) != 1 ||
-                 hs_turns_get(&scene.turns, scene.lattice.row_of_axis[1], i) != 0;
-    CHECK(wrong == 0);
-    hs_scene_free(&account, &scene);
-    hs_account_close(&account);
-    free(x);
-}
-
 void
 test_far_limits(void)
 {
-    RUN(turns_of_an_axis_without_any_are_cleared_in_place);
-    RUN(scaling_is_extreme_from_the_subnormal_numbers_on);
     RUN(a_bounded_search_costs_the_same_at_any_distance);
     RUN(images_of_one_point_are_found_on_a_long_axis);
     RUN(endless_images_are_refused_as_such);
     RUN(one_cell_with_everything_says_so);
-    RUN(one_row_moves_a_column);
 }

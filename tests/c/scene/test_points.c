@@ -98,25 +98,9 @@ precisions_agree_where_nothing_is_rounded(void)
     CHECK(n_pairs > 10000);
 }
 
-/* Each code has a sentence of its own; other numbers have one, too. */
-static void
-every_status_has_a_sentence(void)
-{
-    const char *unknown = hs_status_text(HS_STATUS_END);
-    for (int code = HS_OK; code < HS_STATUS_END; code++) {
-        const char *text = hs_status_text((hs_status)code);
-        CHECK(strcmp(text, unknown) != 0);
-        for (int other = HS_OK; other < code; other++) {
-            CHECK(strcmp(text, hs_status_text((hs_status)other)) != 0);
-        }
-    }
-    CHECK(strcmp(hs_status_text((hs_status)(HS_STATUS_END + 1)), unknown) == 0);
-}
-
 void
 test_points(void)
 {
     RUN(every_layout_is_the_same_points);
     RUN(precisions_agree_where_nothing_is_rounded);
-    RUN(every_status_has_a_sentence);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_metric.c: the decision, against exact arithmetic that shares no code with it. */
+/* test_metric_decide.c: the decision, against exact arithmetic that shares no code with it. */
 #include <float.h>
 
 #include "../../../csrc/core/exact/metric.h"
@@ -7,7 +7,7 @@
 #include "../support/bigint.h"
 #include "../support/harness.h"
 
-void test_metric(void);
+void test_metric_decide(void);
 
 typedef struct scene {
     int     ndim, n_rows;
@@ -424,7 +424,7 @@ double_formula_is_the_fixed_one(void)
 }
 
 void
-test_metric(void)
+test_metric_decide(void)
 {
     RUN(every_stage_agrees_with_exact_arithmetic);
     RUN(integers_of_every_size_agree);

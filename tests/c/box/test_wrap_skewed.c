@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_fold.c: wrapping many points at once gives the bits of wrapping them one by one. */
+/* test_wrap_skewed.c: wrapping many points at once gives the bits of wrapping them one by one. */
 #include <math.h>
 
 #include "../../../csrc/core/box/wrap.h"
 #include "../support/harness.h"
 #include "../support/random_scenes.h"
 
-void test_fold(void);
+void test_wrap_skewed(void);
 
 enum { POINTS = 700 }; /* two whole tiles and a part of one */
 
@@ -220,7 +220,7 @@ coordinates_are_summed_in_one_order(void)
 }
 
 void
-test_fold(void)
+test_wrap_skewed(void)
 {
     RUN(what_is_found_is_joined);
     RUN(coordinates_are_summed_in_one_order);
