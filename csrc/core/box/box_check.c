@@ -144,8 +144,8 @@ is_prime(uint64_t p)
     return true;
 }
 
-static uint64_t
-prime_below(uint64_t p)
+uint64_t
+hs_prime_below(uint64_t p)
 {
     do {
         p -= 2;
@@ -251,7 +251,7 @@ hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
     uint64_t p = FIRST_PRIME;
     for (int proven_bits = 0; proven_bits <= bound_bits; proven_bits += PRIME_BITS) {
         if (proven_bits != 0) {
-            p = prime_below(p);
+            p = hs_prime_below(p);
         }
         if (full_rank(p, ndim, n_rows, integers)) {
             return true;

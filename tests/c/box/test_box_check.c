@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_box_check.c: independence is decided for the numbers given, not for rounded determinants. */
 #include "../../../csrc/core/box/box_check.h"
-#include "../../../csrc/core/box/lattice.h"
 #include "../support/basis_checks.h"
 #include "../support/harness.h"
 
@@ -254,27 +253,63 @@ dimension_counts(void)
     }
 }
 
-/* A box of two dimensions has two rows of two numbers: what lies beyond is of no meaning. */
-static void
-numbers_beyond_the_dimension_are_not_read(void)
+/* a b modulo p < 2^63, by doubling. */
+static uint64_t
+product_modulo(uint64_t a, uint64_t b, uint64_t p)
 {
-    hs_failure failure;
-    for (int l = 0; l < 3; l++) {
-        for (int k = 0; k < 3; k++) {
-            hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.5, 1.0}}};
-            box.rows[l][k] = NAN;
-            const bool is_read = l < 2 && k < 2;
-            CHECK(hs_box_check(&box, &failure) == (is_read ? HS_ERR_BOX_FINITE : HS_OK));
-            CHECK(!is_read || (failure.row == l && failure.column == k && isnan(failure.value)));
-        }
+    uint64_t product = 0;
+    for (int bit = 62; bit >= 0; bit--) {
+        product = product + product >= p ? product + product - p : product + product;
+        if (a >> bit & 1)
+            product = product + b >= p ? product + b - p : product + b;
     }
-    CHECK(hs_box_check(NULL, &failure) == HS_OK);
+    return product;
+}
+
+/* Whether p passes the strong test to a base, the plain way. */
+static bool
+is_strong(uint64_t p, uint64_t base)
+{
+    int      halvings = 0;
+    uint64_t odd = p - 1, x = 1;
+    for (; odd % 2 == 0; odd /= 2)
+        halvings++;
+    for (int bit = 62; bit >= 0; bit--) {
+        x = product_modulo(x, x, p);
+        if (odd >> bit & 1)
+            x = product_modulo(x, base, p);
+    }
+    bool passes = x == 1;
+    for (int k = 0; k < halvings; k++) {
+        passes = passes || x == p - 1;
+        x = product_modulo(x, x, p);
+    }
+    return passes;
+}
+
+/* Every prime is found, and nothing else: a composite number does not tell the rank. */
+static void
+moduli_are_the_next_primes(void)
+{
+    uint64_t p = UINT64_C(1) << 62, wrong = 0;
+    for (int n = 0; n < 60; n++) {
+        const uint64_t next = hs_prime_below(n == 0 ? p + 1 : p);
+        for (uint64_t q = p - (n == 0 ? 1 : 2); q >= next; q -= 2) {
+            bool is_prime = q % 3 != 0 && q % 5 != 0 && q % 7 != 0;
+            for (uint64_t base = 2; is_prime && base < 40; base++)
+                is_prime = is_strong(q, base);
+            wrong += is_prime != (q == next);
+        }
+        CHECK(n > 0 || next == p - 57);
+        p = next;
+    }
+    CHECK(wrong == 0);
 }
 
 void
 test_box_check(void)
 {
-    RUN(numbers_beyond_the_dimension_are_not_read);
+    RUN(moduli_are_the_next_primes);
     RUN(no_rows_are_independent);
     RUN(a_zero_row_is_dependent);
     RUN(aligned_boxes_of_any_length_are_independent);
