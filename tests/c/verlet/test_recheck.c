@@ -215,65 +215,6 @@ box_vectors_may_be_any_sum_of_shorter_ones(void)
     CHECK(n_pairs > 10000);
 }
 
-static double
-small_limit(void *context)
-{
-    return *(double *)context;
-}
-
-/* Arrays of the caller that are too small say how many pairs there are; refusals name the limit. */
-static void
-what_does_not_fit_is_told(void)
-{
-    harness_random random = {7};
-    make_scene(&random, SCENE_TRICLINIC, 3, 300, 4.0, 0, &shared);
-    shared.scene.cutoff = 1.5;
-    const hs_points points = points_of(&shared.scene);
-    hs_options      options = options_of(&shared.scene);
-    hs_verlet      *list = hs_verlet_new();
-    hs_pairs       *pairs = NULL;
-    hs_failure      failure;
-    bool            rebuilt;
-    caller_arrays   c;
-    int64_t         count;
-    hs_status       status = HS_ERR_MEMORY;
-    int             n_told = 0;
-    double          limit;
-    CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.2, false, &rebuilt, NULL) ==
-          HS_OK);
-    CHECK(hs_pairs_count(AMONG(&points, shared.scene.box), &options, &count, NULL) == HS_OK);
-    CHECK(count > 5000);
-    make_arrays(options.want, 3, 8, 100, &c);
-    options.out = &c.arrays;
-    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_CAPACITY && pairs == NULL);
-    CHECK(failure.expected_pairs == (double)count && untouched_from(&c, 100));
-    free_arrays(&c);
-    options.out = NULL;
-    for (limit = 10000.0; status != HS_OK && limit < 1e9; limit *= 1.25) {
-        options.memory_limit = limit;
-        status = hs_verlet_find(list, &options, &pairs, &failure);
-        CHECK((status == HS_OK) == (pairs != NULL));
-        CHECK(pairs == NULL || hs_pairs_length(pairs) == count);
-        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && failure.limit_bytes == limit));
-        n_told += status != HS_OK && failure.expected_pairs > 0.0;
-        hs_pairs_free(pairs);
-    }
-    CHECK(status == HS_OK && n_told > 0);
-    options.memory_limit = INFINITY;
-    options.find_limit = small_limit; /* not heard below HS_LIMIT_FREE */
-    options.find_context = &limit;
-    limit = 10000.0;
-    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_OK);
-    CHECK(hs_pairs_length(pairs) == count);
-    hs_pairs_free(pairs);
-    options.kernel = "none of that name";
-    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_KERNEL && pairs == NULL);
-    options.kernel = NULL;
-    options.index_bytes = 5;
-    CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_ARGUMENT && pairs == NULL);
-    hs_verlet_free(list);
-}
-
 void
 test_recheck(void)
 {
@@ -281,5 +222,4 @@ test_recheck(void)
     RUN(digits_that_scaling_would_lose_are_kept);
     RUN(shifts_may_be_as_large_as_jumps_are);
     RUN(box_vectors_may_be_any_sum_of_shorter_ones);
-    RUN(what_does_not_fit_is_told);
 }
