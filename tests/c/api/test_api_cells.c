@@ -310,9 +310,32 @@ failures_leave_nothing_behind(void)
     CHECK(status == HS_OK);
 }
 
+/* Cells keep no pairs: as many as there are need not fit the limit. */
+static void
+cells_are_built_where_their_pairs_would_not_fit(void)
+{
+    enum { MANY = 2000 };
+    static double  many[3 * MANY];
+    harness_random random = {606};
+    const hs_box   box = {
+          .ndim = 3, .periodic = {true, true, true}, .rows = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}}};
+    hs_options options = hs_options_default();
+    hs_cells  *cells = NULL;
+    hs_pairs  *pairs = NULL;
+    for (int e = 0; e < 3 * MANY; e++)
+        many[e] = random_unit(&random);
+    const hs_points points = {many, MANY, 3, HS_FLOAT64, 24, 8};
+    options.cutoff = 0.9;
+    options.memory_limit = 4e6; /* of six million pairs */
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &pairs, NULL) == HS_ERR_MEMORY);
+    CHECK(hs_cells_build(&points, &box, &options, &cells, NULL) == HS_OK);
+    hs_cells_free(cells);
+}
+
 void
 test_api_cells(void)
 {
+    RUN(cells_are_built_where_their_pairs_would_not_fit);
     RUN(any_cutoff_and_any_queries);
     RUN(cells_that_are_few_and_far_between);
     RUN(the_layout_is_visible_and_holds_all_neighbours);

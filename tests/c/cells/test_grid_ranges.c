@@ -264,9 +264,56 @@ cells_without_a_range_can_be_counted(void)
     }
 }
 
+/* Images of rows that are rounded err by as much for each; every row counts. */
+static void
+images_err_with_their_rows(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 2.0}}};
+    hs_failure   failure = HS_NO_FAILURE;
+    fill_square(1.0);
+    open_scene(40, &box, 1.0);
+    const double exact = grid.shift_error;
+    double       density;
+    CHECK(exact > 2.0 * 0x1p-53 && exact < 0x1p-45);
+    for (int r = 0; r < 2; r++) {
+        scene.lattice.row_error[r] = 0x1p-20;
+        scene.lattice.row_error[1 - r] = 0.0;
+        CHECK(hs_grid_begin(&scene, &density, &grid, &failure) == HS_OK);
+        CHECK(grid.shift_error >= 3.0 * 0x1p-20 && grid.shift_error < 8.0 * 0x1p-20);
+    }
+    /* The larger of both columns: of images along the axis that is longer, too. */
+    scene.lattice.row_error[0] = scene.lattice.row_error[1] = 0.0;
+    scene.lattice.rows[0][0] = 0x1p30;
+    CHECK(hs_grid_begin(&scene, &density, &grid, &failure) == HS_OK);
+    CHECK(grid.shift_error > 0x1p-23 && grid.shift_error < 0x1p-15);
+    scene.lattice.rows[0][0] = 1.0;
+    scene.lattice.rows[1][1] = -0x1p30;
+    CHECK(hs_grid_begin(&scene, &density, &grid, &failure) == HS_OK);
+    CHECK(grid.shift_error > 0x1p-23 && grid.shift_error < 0x1p-15);
+    close_scene();
+}
+
+/* One factor for all axes, to whole numbers below; what is one cell stays one. */
+static void
+too_many_cells_are_lowered_by_one_factor(void)
+{
+    const double most = 2.0 * 40 + HS_GRID_SPARE_CELLS; /* 144 */
+    double       few[2] = {12.0, 12.0}, many[2] = {240.0, 60.0}, flat[2] = {1.0, 1000.0};
+    fill_square(1.0);
+    open_scene(40, NULL, 0.01);
+    CHECK(!hs_grid_cap_counts(&scene, few) && few[0] == 12.0 && few[1] == 12.0);
+    few[0] = 13.0;
+    CHECK(hs_grid_cap_counts(&scene, few) && few[0] == 12.0 && few[1] == 11.0);
+    CHECK(hs_grid_cap_counts(&scene, many) && many[0] == 24.0 && many[1] == 6.0);
+    CHECK(hs_grid_cap_counts(&scene, flat) && flat[0] == 1.0 && flat[1] == most);
+    close_scene();
+}
+
 void
 test_grid_ranges(void)
 {
+    RUN(images_err_with_their_rows);
+    RUN(too_many_cells_are_lowered_by_one_factor);
     RUN(cells_without_a_range_can_be_counted);
     RUN(endless_ranges_are_refused);
     RUN(ranges_have_room_for_roundings);

@@ -206,9 +206,35 @@ layers_are_upright(void)
     near_unit_close(&unit);
 }
 
+/* Box vectors that are rounded err by as much for each image. */
+static void
+errors_of_box_vectors_add_up(void)
+{
+    const double    x[4] = {0.0, 0.0, 0.5, 0.5};
+    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points points = points_in(x, 2, 2);
+    hs_near_images  images;
+    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    const hs_near_group group = near_unit_group(&unit, 3.0);
+    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    const double most[2] = {fmax(-(double)images.low[0], (double)images.high[0]),
+                            fmax(-(double)images.low[1], (double)images.high[1])};
+    const double exact = images.error;
+    CHECK(most[0] >= 3.0 && most[1] >= 3.0 && exact > 0.0 && exact < 0x1p-40);
+    unit.search.scene.lattice.row_error[0] = 0x1p-20;
+    unit.search.scene.lattice.row_error[1] = 0x1p-22;
+    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.error == exact + (most[0] * 0x1p-20 + most[1] * 0x1p-22));
+    unit.search.scene.x_error = 0x1p-10;
+    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.error >= 0x1p-9 + exact && images.error < 0x1.1p-9);
+    near_unit_close(&unit);
+}
+
 void
 test_nearest_images(void)
 {
+    RUN(errors_of_box_vectors_add_up);
     RUN(images_in_reach_are_met_once);
     RUN(there_may_be_no_image_in_reach);
     RUN(more_images_than_can_be_counted_are_refused);

@@ -237,9 +237,38 @@ ranking_can_be_stopped_anywhere(void)
     close_scene();
 }
 
+/* Points at one spot are told apart by their numbers alone, however many they are and whichever of
+ * them are wanted. */
+static void
+points_at_one_spot_are_in_order_of_number(void)
+{
+    for (int n = 3; n <= 8; n++) {
+        for (int at_spot = 2; at_spot <= n; at_spot++) {
+            double x[8];
+            for (int i = 0; i < n; i++) /* the others come first, and lie farther away */
+                x[i] = i < n - at_spot ? 0.25 + 0.0625 * i : 0.0;
+            for (int64_t k = 1; k < at_spot; k++) {
+                int64_t count;
+                open_scene(x, n, 1, NULL, k, 1.0);
+                for (int32_t i = n - at_spot; i < n; i++) {
+                    CHECK(hs_near_rank(&ranker, &group, place_of(i), hits, block.n, &count) ==
+                          HS_OK);
+                    CHECK(count == k);
+                    for (int32_t e = 0; e < count; e++) {
+                        const int32_t j = n - at_spot + e, sj = block.number[ranker.keys[e].place];
+                        CHECK(unit.search.bins.order[sj] == j + (j >= i));
+                    }
+                }
+                close_scene();
+            }
+        }
+    }
+}
+
 void
 test_nearest_rank(void)
 {
+    RUN(points_at_one_spot_are_in_order_of_number);
     RUN(order_is_exact_whatever_the_squares_err);
     RUN(what_the_radius_may_have_left_out_is_told);
     RUN(float32_tells_only_what_it_can);

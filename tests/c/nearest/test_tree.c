@@ -73,9 +73,44 @@ neighbouring_numbers_are_told_apart(void)
     }
 }
 
+static bool
+count_polls(void *context, double fraction)
+{
+    (void)context;
+    return fraction >= 0.0;
+}
+
+/* Splitting is polled once in HS_POLL_POINTS points of all levels, not at every node. */
+static void
+splitting_is_polled_now_and_then(void)
+{
+    enum { MANY = 40000 };
+    double         *x = array_of(MANY, sizeof *x);
+    harness_random  random = {404};
+    brute_scene     scene = {.ndim = 1, .n = MANY, .x = x, .cutoff = INFINITY};
+    const double    q = 0.5;
+    const hs_points query = {&q, 1, 1, HS_FLOAT64, 8, 8};
+    hs_counters     counters;
+    hs_pairs       *rows = NULL;
+    for (int i = 0; i < MANY; i++)
+        x[i] = random_unit(&random);
+    const hs_points points = points_of(&scene);
+    hs_options      options = options_of(&scene);
+    options.want = HS_WANT_J;
+    options.threads = 1;
+    options.counters = &counters;
+    options.poll = count_polls;
+    CHECK(hs_nearest_find(QUERIED(&points, &query, NULL), 1, &options, &rows, NULL) == HS_OK);
+    /* Some twelve levels: 480000 points. */
+    CHECK(counters.polls >= 3 && counters.polls <= 6);
+    hs_pairs_free(rows);
+    free(x);
+}
+
 void
 test_tree(void)
 {
+    RUN(splitting_is_polled_now_and_then);
     RUN(lopsided_points_need_many_nodes);
     RUN(whichever_allocation_fails_nothing_is_left);
     RUN(neighbouring_numbers_are_told_apart);

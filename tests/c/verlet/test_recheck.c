@@ -215,9 +215,42 @@ box_vectors_may_be_any_sum_of_shorter_ones(void)
     CHECK(n_pairs > 10000);
 }
 
+/* Each pair of the list is a candidate once for each find, and each that float32 cannot tell is
+ * decided by one stage. */
+static void
+what_is_counted_adds_up(void)
+{
+    harness_random random = {77};
+    int64_t        ambiguous = 0;
+    for (int trial = 0; trial < 8; trial++) {
+        make_scene(&random, trial % 2 ? SCENE_TRICLINIC : SCENE_ALIGNED, 3, 300, 4.0, 0, &shared);
+        for (int e = 0; e < 900; e++) /* a lattice: many distances are the cutoff */
+            shared.x[e] = floor(shared.x[e] * 4.0) * 0.25;
+        shared.scene.cutoff = 1.25;
+        const hs_points points = points_of(&shared.scene);
+        hs_options      options = options_of(&shared.scene);
+        hs_counters     counters;
+        hs_verlet      *list = hs_verlet_new();
+        hs_pairs       *pairs = NULL;
+        bool            rebuilt;
+        CHECK(hs_verlet_update(list, &points, shared.scene.box, &options, 0.25, false, &rebuilt,
+                               NULL) == HS_OK);
+        options.counters = &counters;
+        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
+        CHECK(counters.pairs == hs_pairs_length(pairs) && counters.candidates >= counters.pairs);
+        CHECK(counters.ambiguous ==
+              counters.by_float64 + counters.by_double_word + counters.by_integers);
+        ambiguous += counters.ambiguous;
+        hs_pairs_free(pairs);
+        hs_verlet_free(list);
+    }
+    CHECK(ambiguous > 1000);
+}
+
 void
 test_recheck(void)
 {
+    RUN(what_is_counted_adds_up);
     RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
     RUN(digits_that_scaling_would_lose_are_kept);
     RUN(shifts_may_be_as_large_as_jumps_are);
