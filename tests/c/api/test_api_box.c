@@ -284,46 +284,6 @@ no_points_are_no_pairs_whatever_the_cutoff(void)
     }
 }
 
-static void
-plans_describe_the_search(void)
-{
-    static double   x[3 * 4000];
-    harness_random  random = {20};
-    hs_box          box = {.ndim = 3, .periodic = {true, true, false}};
-    hs_plan         plan;
-    const char     *best = "";
-    int64_t         count = 0;
-    brute_scene     scene = {.ndim = 3, .n = 4000, .x = x, .box = &box, .cutoff = 1.0};
-    const hs_points points = points_of(&scene);
-    for (int k = 0; k < 3; k++)
-        box.rows[k][k] = 10.0;
-    for (int e = 0; e < 3 * 4000; e++)
-        x[e] = 10.0 * random_unit(&random);
-    hs_options options = options_of(&scene);
-    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
-    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, NULL) == HS_OK);
-    CHECK(plan.ndim == 3 && plan.n_periodic == 2 && plan.aligned && !plan.reduced);
-    CHECK(!plan.keeps_originals && !plan.all_pairs && plan.stencil_rows > 1);
-    CHECK(fabs(plan.expected_pairs / (double)count - 1.0) < 0.15);
-    CHECK(hs_kernel_names(&best, 1) >= 1 && strcmp(plan.kernel, best) == 0);
-    for (int k = 0; k < 3; k++) {
-        CHECK(plan.images[k] == (k < 2));
-        CHECK(fabs(plan.cell_size[k] * (double)plan.shape[k] - 10.0) < 0.1);
-        CHECK(plan.cell_size[k] * (double)plan.reach[k] >= 1.0);
-    }
-    box.rows[1][0] = 30.0; /* three whole widths: the same lattice */
-    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
-    CHECK(plan.reduced && plan.aligned);
-    box.rows[1][0] = 3.0;
-    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
-    CHECK(!plan.aligned && plan.keeps_originals);
-    options.cutoff = 100.0;
-    CHECK(hs_plan_make(AMONG(&points, &box), &options, &plan, NULL) == HS_OK);
-    CHECK(plan.images[0] >= 10 && plan.images[1] >= 10 && plan.images[2] == 0);
-    CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK);
-    CHECK(plan.all_pairs && plan.n_periodic == 0 && plan.images[0] == 0);
-}
-
 /* Box vectors near the end of the numbers, whose sums are beyond it, and as many binary orders
  * below as a product of doubles that is split needs. */
 static void
@@ -383,5 +343,4 @@ test_api_box(void)
     RUN(no_points_are_no_pairs_whatever_the_cutoff);
     RUN(the_largest_boxes_are_measured_and_wrapped_into);
     RUN(turns_of_a_sheared_box_may_be_too_many);
-    RUN(plans_describe_the_search);
 }

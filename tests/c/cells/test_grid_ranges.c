@@ -135,34 +135,6 @@ rows_that_no_shift_counts_mean_a_skewed_box(void)
     close_scene();
 }
 
-/* Boxes that are whole multiples of the cutoff get as many cells, unless the cutoff is 0. */
-static void
-faces_need_a_cutoff(void)
-{
-    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0}, {0.0, 8.0}}};
-    const double counts[2] = {7.0, 7.0}, parts[2] = {1.0, 1.0};
-    fill_square(8.0);
-    open_scene(N, &box, 1.0);
-    for (int with = 0; with < 2; with++) {
-        scene.radius = with ? 1.0 : 0.0;
-        CHECK(hs_grid_set_shape(&scene, counts, &grid) == HS_OK);
-        hs_grid_cut_by_faces(&scene, parts, 1000.0, &grid);
-        CHECK(grid.by_faces[0] == with && grid.by_faces[1] == with);
-        CHECK(grid.shape[0] == 7 + with && grid.n_cells == (7 + with) * (7 + with));
-    }
-    CHECK(hs_grid_set_shape(&scene, counts, &grid) == HS_OK);
-    const hs_grid seven = grid;
-    scene.upper[0] = -(scene.lower[0] = -0x1p31); /* more cells than can be told apart */
-    grid.shape[0] = INT64_C(1) << 31;
-    hs_grid_cut_by_faces(&scene, parts, 0x1p60, &grid);
-    CHECK(!grid.by_faces[0] && grid.shape[0] == INT64_C(1) << 31);
-    scene.upper[0] = -(scene.lower[0] = -4.0);
-    grid = seven;
-    hs_grid_cut_by_faces(&scene, parts, 56.0, &grid); /* room for a row more, not for two */
-    CHECK(grid.by_faces[0] && !grid.by_faces[1] && grid.n_cells == 56);
-    close_scene();
-}
-
 /* Cells of a row that a point may be near to: those that the circle around its cell meets. */
 static void
 rows_are_as_long_as_the_circle_is_wide(void)
@@ -318,7 +290,6 @@ test_grid_ranges(void)
     RUN(endless_ranges_are_refused);
     RUN(ranges_have_room_for_roundings);
     RUN(rows_that_no_shift_counts_mean_a_skewed_box);
-    RUN(faces_need_a_cutoff);
     RUN(rows_are_as_long_as_the_circle_is_wide);
     RUN(flat_frames_prune_nothing);
     RUN(lonely_points_get_narrow_cells);

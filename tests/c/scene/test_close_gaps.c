@@ -209,9 +209,45 @@ dense_scenes_are_left_alone(void)
     }
 }
 
+/* Columns that are wrapped are kept as given where scaling will make numbers smaller; turns are kept
+ * where they are wanted. */
+static void
+what_is_wrapped_is_kept_as_given(void)
+{
+    for (int unit = -1; unit <= 2; unit++) {
+        for (unsigned want = 0; want <= HS_WANT_SHIFT; want += HS_WANT_SHIFT) {
+            const double    length = ldexp(1.0, unit + 60), far = ldexp(5.25, unit + 60);
+            double          x[3] = {0.0, far, 1.0};
+            const hs_points points = {x, 3, 1, HS_FLOAT64, 8, 8};
+            const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{length}}};
+            hs_options      options = hs_options_default();
+            hs_account      account;
+            hs_cloud        cloud;
+            hs_condensed    condensed;
+            hs_failure      failure;
+            options.want = want;
+            hs_account_init(&account, &options);
+            CHECK(hs_cloud_load(&account, NULL, &points, &options, &cloud, &failure) == HS_OK);
+            CHECK(hs_condense(&account, &options, &box, unit, HS_FAR_EXPONENT, &cloud, NULL,
+                              &condensed, &failure) == HS_OK);
+            CHECK(condensed.has_turns == (want != 0) && condensed.is_scaled == (unit < 0));
+            CHECK((condensed.turns[0][0] != NULL) == (want != 0));
+            CHECK((condensed.given[0][0] != NULL) == (want != 0 && unit > 0));
+            if (condensed.given[0][0] != NULL)
+                CHECK(condensed.given[0][0][1] == far && condensed.given[0][0][2] == 1.0);
+            if (condensed.turns[0][0] != NULL)
+                CHECK(condensed.turns[0][0][1] == 5 && condensed.turns[0][0][0] == 0);
+            hs_condensed_free(&account, &condensed);
+            hs_cloud_free(&account, &cloud);
+            CHECK(account.held == 0);
+        }
+    }
+}
+
 void
 test_close_gaps(void)
 {
+    RUN(what_is_wrapped_is_kept_as_given);
     RUN(differences_are_kept_or_beyond_the_cutoff);
     RUN(images_are_kept_or_beyond_the_cutoff);
     RUN(dense_scenes_are_left_alone);

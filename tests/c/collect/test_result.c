@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_results.c: how points come in and pairs go out: strides, wants, widths, order, polls,
+ * test_result.c: how points come in and pairs go out: strides, wants, widths, order, polls,
  * refusals.
  */
+#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/collect/result.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
 
-void test_results(void);
+void test_result(void);
 
 static random_scene shared;
 
@@ -383,9 +385,72 @@ a_result_too_large_is_refused_before_it_is_found(void)
     hs_pairs_free(NULL);
 }
 
-void
-test_results(void)
+/* Of nothing, of what is no one quantity, and of what has been taken. */
+static void
+what_a_result_does_not_have_is_null(void)
 {
+    const brute_scene *scene = ordinary_scene();
+    const hs_points    points = points_of(scene);
+    hs_options         options = options_of(scene);
+    hs_pairs          *pairs = NULL;
+    CHECK(hs_pairs_length(NULL) == 0 && hs_pairs_rows(NULL) == 0);
+    CHECK(hs_pairs_array(NULL, HS_WANT_I) == NULL && hs_pairs_take(NULL, HS_WANT_I) == NULL);
+    CHECK(hs_pairs_offsets(NULL) == NULL && hs_pairs_take_offsets(NULL) == NULL);
+    options.want = HS_WANT_I | HS_WANT_J;
+    CHECK(hs_pairs_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_rows(pairs) == 0 && hs_pairs_offsets(pairs) == NULL);
+    CHECK(hs_pairs_array(pairs, 0) == NULL && hs_pairs_array(pairs, 1u << 6) == NULL);
+    CHECK(hs_pairs_array(pairs, HS_WANT_I | HS_WANT_J) == NULL);
+    CHECK(hs_pairs_take(pairs, HS_WANT_I | HS_WANT_J) == NULL);
+    CHECK(hs_pairs_array(pairs, HS_WANT_DISTANCE) == NULL);
+    CHECK(hs_pairs_take(pairs, HS_WANT_DISTANCE) == NULL);
+    const void *i = hs_pairs_array(pairs, HS_WANT_I);
+    void       *taken = hs_pairs_take(pairs, HS_WANT_I);
+    CHECK(i != NULL && taken != NULL && hs_pairs_array(pairs, HS_WANT_I) == NULL);
+    CHECK(hs_pairs_take(pairs, HS_WANT_I) == NULL && hs_pairs_length(pairs) > 0);
+    hs_pairs_free(pairs);
+    hs_array_free(taken);
+    CHECK(hs_neighbors_find(AMONG(&points, scene->box), &options, &pairs, NULL) == HS_OK);
+    CHECK(hs_pairs_rows(pairs) == scene->n && hs_pairs_offsets(pairs)[0] == 0);
+    int64_t *offsets = hs_pairs_take_offsets(pairs);
+    CHECK(offsets[scene->n] == hs_pairs_length(pairs) && hs_pairs_offsets(pairs) == NULL);
+    hs_array_free(offsets);
+    hs_pairs_free(pairs);
+}
+
+/* Other statuses stay; arrays of the caller must have held all, others are there also if empty. */
+static void
+searches_conclude_with_arrays_that_hold_all(void)
+{
+    static int64_t       i[8], j[8];
+    const hs_pair_arrays arrays = {.capacity = 8, .index_bytes = 8, .i = i, .j = j};
+    hs_failure           failure = HS_NO_FAILURE;
+    hs_account           account;
+    hs_options           options = hs_options_default();
+    hs_output            output;
+    hs_account_init(&account, &options);
+    hs_output_init(&account, 2, HS_WANT_I | HS_WANT_J, 8, &output);
+    CHECK(hs_pairs_conclude(&output, HS_ERR_INTERRUPTED, &failure) == HS_ERR_INTERRUPTED);
+    CHECK(hs_output_column(&output, HS_WANT_I) == NULL);
+    CHECK(hs_pairs_conclude(&output, HS_OK, &failure) == HS_OK);
+    CHECK(hs_output_column(&output, HS_WANT_I) != NULL);
+    hs_output_free(&output);
+    hs_output_init(&account, 2, HS_WANT_I | HS_WANT_J, 8, &output);
+    hs_output_fix(&output, &arrays);
+    output.n_pairs = 8;
+    CHECK(hs_pairs_conclude(&output, HS_OK, &failure) == HS_OK && failure.expected_pairs == 0.0);
+    output.n_pairs = 9;
+    CHECK(hs_pairs_conclude(&output, HS_OK, &failure) == HS_ERR_CAPACITY);
+    CHECK(failure.expected_pairs == 9.0);
+    hs_output_free(&output);
+    hs_account_close(&account);
+}
+
+void
+test_result(void)
+{
+    RUN(what_a_result_does_not_have_is_null);
+    RUN(searches_conclude_with_arrays_that_hold_all);
     RUN(any_strides_and_alignment_read_the_same_points);
     RUN(zero_strides_repeat_a_number);
     RUN(each_want_returns_the_same_numbers);
