@@ -76,15 +76,16 @@ the_first_that_is_not_finite_is_named(void)
     const double bad[] = {NAN, INFINITY, -INFINITY};
     hs_frame     frame = {0};
     hs_failure   failure;
-    for (int at = 0; at < 2 * N; at++) {
+    for (int trial = 0; trial < 4 * N; trial++) {
+        const int at = trial / 2;
         for (int e = 0; e < 2 * N; e++) {
             f[e] = (float)e;
             x[e] = e % 2 ? DBL_MAX : -DBL_MAX; /* sums of these would not be finite */
         }
         f[at] = (float)bad[at % 3];
         x[at] = bad[at % 3];
-        x[2 * N - 1] = NAN;
-        f[2 * N - 1] = NAN;
+        if (trial % 2) /* alone, or not the only one */
+            f[2 * N - 1] = (float)(x[2 * N - 1] = NAN);
         const hs_points narrow = {f, N, 2, HS_FLOAT32, 8, 4}, wide = {x, N, 2, HS_FLOAT64, 16, 8};
         for (int w = 0; w < 2; w++) {
             CHECK(take(w ? &wide : &narrow, &frame, &failure) == HS_ERR_NOT_FINITE);
