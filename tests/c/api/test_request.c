@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_request.c: what a search of one scene is for, and that each ends its call whatever happens. */
+/* test_request.c: what a search of one scene is for, and that each ends its call whatever
+ * happens. */
 #include "../../../csrc/core/api/api_cells.h"
 #include "../../../csrc/core/api/request.h"
 #include "../support/among.h"

@@ -166,7 +166,8 @@ normals_are_upright_unit_vectors(void)
     }
 }
 
-/* In the box vectors as given each axis is its vector's; heights and volume are those of the box. */
+/* In the box vectors as given each axis is its vector's; heights and volume are those of the
+ * box. */
 static void
 given_vectors_keep_their_axes(void)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_record_measures.c: d, D and S are those of the pair as it is listed: of i < j, or of a point and
- * its image in positive direction. */
+/* test_record_measures.c: d, D and S are those of the pair as it is listed: of i < j, or of a point
+ * and its image in positive direction. */
 #include "../support/record_unit.h"
 
 void test_record_measures(void);
@@ -39,8 +39,8 @@ wrong_pairs(const hs_box *box, double cutoff)
     return wrong;
 }
 
-/* In one to three dimensions, upright and tilted, with open axes: narrow shifts, and those of points
- * that were kept as given. */
+/* In one to three dimensions, upright and tilted, with open axes: narrow shifts, and those of
+ * points that were kept as given. */
 static void
 pairs_are_measured_as_they_are_listed(void)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_metric_integer.c: the last stage alone: signs and differences for every finite number, against
- * integers that share no code with it. */
+/* test_metric_integer.c: the last stage alone: signs and differences for every finite number,
+ * against integers that share no code with it. */
 #include "../../../csrc/core/exact/metric_integer.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"

@@ -131,10 +131,10 @@ static void
 failures_are_told(void)
 {
     const hs_points points = points_in(x, N), queries = points_in(q, N);
-    const hs_sets   sets = {
-          .points = &points, .queries = &queries, .is_full = true, .is_plain = true, .is_wide = true};
-    const hs_box flat = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {2.0}}};
-    hs_failure   failure;
+    hs_sets         sets = {.points = &points, .queries = &queries, .is_full = true};
+    const hs_box    flat = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {2.0}}};
+    hs_failure      failure;
+    sets.is_plain = sets.is_wide = true;
     fill(9, 1.0, x);
     fill(10, 1.0, q);
     CHECK(prepare(&sets, NULL, INFINITY, "none of that name", &failure) == HS_ERR_KERNEL);

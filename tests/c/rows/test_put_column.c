@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_put_column.c: numbers reach a column in their order, however many come at a time, and nothing
- * beyond it is written. */
+/* test_put_column.c: numbers reach a column in their order, however many come at a time, and
+ * nothing beyond it is written. */
 #include "../../../csrc/core/rows/put_column.h"
 #include "../support/harness.h"
 

@@ -209,8 +209,8 @@ dense_scenes_are_left_alone(void)
     }
 }
 
-/* Columns that are wrapped are kept as given where scaling will make numbers smaller; turns are kept
- * where they are wanted. */
+/* Columns that are wrapped are kept as given where scaling will make numbers smaller; turns are
+ * kept where they are wanted. */
 static void
 what_is_wrapped_is_kept_as_given(void)
 {

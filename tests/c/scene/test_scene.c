@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_scene.c: what a scene keeps of its points, what it refuses, and that nothing is left then. */
+/* test_scene.c: what a scene keeps of its points, what it refuses, and that nothing is left
+ * then. */
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/scene/scene.h"

@@ -165,7 +165,8 @@ ordinary_cutoffs_are_not_scaled(void)
     CHECK(hs_choose_exponent(&cloud, &none, 1.0, 0, 900, &extreme) == 50 && !extreme);
 }
 
-/* Points are 2^52 box vectors away at most, by the time they are scaled; along open axes anywhere. */
+/* Points are 2^52 box vectors away at most, by the time they are scaled; along open axes
+ * anywhere. */
 static void
 what_is_wrapped_does_not_choose(void)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_search_build.c: a search is built of points and queries, with cells of the caller's width or of
- * its own choice, and says what it lacks. */
+/* test_search_build.c: a search is built of points and queries, with cells of the caller's width or
+ * of its own choice, and says what it lacks. */
 #include "../../../csrc/core/search/search_build.h"
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
@@ -33,7 +33,8 @@ options_for(double cutoff)
     return options;
 }
 
-/* Points in two crowds far apart are in occupied cells only, unless cells have the caller's width. */
+/* Points in two crowds far apart are in occupied cells only, unless cells have the caller's
+ * width. */
 static void
 crowds_are_in_occupied_cells_only(void)
 {

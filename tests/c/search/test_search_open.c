@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_search_open.c: a search borrows cells that serve, and has its own where these do not; a refusal
- * names the limit. */
+/* test_search_open.c: a search borrows cells that serve, and has its own where these do not; a
+ * refusal names the limit. */
 #include "../support/search_unit.h"
 
 #include <math.h>

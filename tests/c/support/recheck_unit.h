@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* recheck_unit.h: a list of a few points, put together by hand, whose pairs are decided anew, so that
- * a test can take the steps of that one by one. */
+/* recheck_unit.h: a list of a few points, put together by hand, whose pairs are decided anew, so
+ * that a test can take the steps of that one by one. */
 #ifndef HS_RECHECK_UNIT_H
 #define HS_RECHECK_UNIT_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* record_unit.h: all pairs of an open search, recorded by one walk, and whether each is what it says. */
+/* record_unit.h: all pairs of an open search, recorded by one walk, and whether each is what it
+ * says. */
 #ifndef HS_RECORD_UNIT_H
 #define HS_RECORD_UNIT_H
 

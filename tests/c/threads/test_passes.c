@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_passes.c: a pass meets every point once, in rounds between which there is a poll, and ends with
- * the round that fails. */
+/* test_passes.c: a pass meets every point once, in rounds between which there is a poll, and ends
+ * with the round that fails. */
 #include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 

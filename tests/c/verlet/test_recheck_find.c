@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_recheck_find.c: what a list has found becomes a result, in its order or sorted; what does not
- * fit is told. */
+/* test_recheck_find.c: what a list has found becomes a result, in its order or sorted; what does
+ * not fit is told. */
 #include "../support/harness.h"
 #include "../support/list_checks.h"
 #include "../support/random_scenes.h"

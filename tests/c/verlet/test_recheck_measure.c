@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_recheck_measure.c: listed pairs are measured between points as the scene has them: with their
- * shift over its rows, whatever they were wrapped by and have jumped since. */
+/* test_recheck_measure.c: listed pairs are measured between points as the scene has them: with
+ * their shift over its rows, whatever they were wrapped by and have jumped since. */
 #include "../support/recheck_unit.h"
 
 #include <math.h>
