@@ -14,15 +14,15 @@ systems_are_ranges_of_the_points(void)
     const int64_t    first[] = {0, 2, 2, 5};
     const hs_points  points = {x, 5, 1, HS_FLOAT64, 8, 8}, none = {NULL, 0, 1, HS_FLOAT64, 8, 8};
     const hs_systems systems = {3, first, NULL, NULL, NULL};
-    hs_systems_crew  crew = {.points = &points, .systems = &systems};
+    hs_systems_job   job = {.points = &points, .systems = &systems};
     hs_points        own;
     hs_box           box;
-    CHECK(hs_systems_take(&crew, 0, &own, &box) == NULL && own.data == x && own.n == 2);
-    CHECK(hs_systems_take(&crew, 1, &own, &box) == NULL && own.n == 0);
-    CHECK(hs_systems_take(&crew, 2, &own, &box) == NULL && own.data == x + 2 && own.n == 3);
+    CHECK(hs_systems_take(&job, 0, &own, &box) == NULL && own.data == x && own.n == 2);
+    CHECK(hs_systems_take(&job, 1, &own, &box) == NULL && own.n == 0);
+    CHECK(hs_systems_take(&job, 2, &own, &box) == NULL && own.data == x + 2 && own.n == 3);
     CHECK(own.ndim == 1 && own.row_stride == 8);
-    crew.points = &none; /* no number is added to NULL */
-    CHECK(hs_systems_take(&crew, 1, &own, &box) == NULL && own.data == NULL && own.n == 0);
+    job.points = &none; /* no number is added to NULL */
+    CHECK(hs_systems_take(&job, 1, &own, &box) == NULL && own.data == NULL && own.n == 0);
 }
 
 /* One box for all, or rows for each, of which it says what repeats. */
@@ -35,15 +35,15 @@ each_system_has_its_box(void)
     const hs_box     box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 9.0}}};
     const hs_systems one = {2, first, &box, NULL, NULL}, each = {2, first, &box, rows, NULL};
     const hs_systems open = {2, first, NULL, rows, NULL};
-    hs_systems_crew  crew = {.points = &points, .systems = &one};
+    hs_systems_job   job = {.points = &points, .systems = &one};
     hs_points        own;
     hs_box           own_box;
-    CHECK(hs_systems_take(&crew, 1, &own, &own_box) == &box);
-    crew.systems = &open;
-    CHECK(hs_systems_take(&crew, 1, &own, &own_box) == NULL);
-    crew.systems = &each;
+    CHECK(hs_systems_take(&job, 1, &own, &own_box) == &box);
+    job.systems = &open;
+    CHECK(hs_systems_take(&job, 1, &own, &own_box) == NULL);
+    job.systems = &each;
     for (int s = 0; s < 2; s++) {
-        CHECK(hs_systems_take(&crew, s, &own, &own_box) == &own_box && own_box.ndim == 2);
+        CHECK(hs_systems_take(&job, s, &own, &own_box) == &own_box && own_box.ndim == 2);
         CHECK(own_box.periodic[0] && !own_box.periodic[1]);
         CHECK(own_box.rows[0][0] == 1.0 + 4 * s && own_box.rows[0][1] == 2.0 + 4 * s);
         CHECK(own_box.rows[1][0] == 3.0 + 4 * s && own_box.rows[1][1] == 4.0 + 4 * s);

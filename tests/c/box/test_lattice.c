@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_lattice.c: a lattice has the box's points, unit normals, heights and its volume, in a short
  * basis or in the box vectors as given. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/box/lattice.h"
 #include "../support/harness.h"
 

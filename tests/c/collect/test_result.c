@@ -3,7 +3,7 @@
  * test_result.c: how points come in and pairs go out: strides, wants, widths, order, polls,
  * refusals.
  */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/collect/result.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"

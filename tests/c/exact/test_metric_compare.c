@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_metric_compare.c: which of two is nearer, against integers that share no code with it. */
-#include "../../../csrc/core/exact/metric_compare.h"
+#include "../../../csrc/core/exact/metric.h"
 #include "../../../csrc/core/exact/metric_integer.h"
 #include "../support/bigint.h"
 #include "../support/harness.h"

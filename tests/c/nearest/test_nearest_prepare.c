@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest_prepare.c: a search for the nearest begins with a scene that keeps every digit and
  * with trees of points and queries, made anew or borrowed. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/nearest/nearest_kept.h"
 #include "../support/near_unit.h"
 #include "../support/poll_checks.h"

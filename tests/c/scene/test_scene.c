@@ -2,7 +2,6 @@
 /* test_scene.c: what a scene keeps of its points, what it refuses, and that nothing is left
  * then. */
 #include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/scene/scene.h"
 #include "../support/harness.h"
 #include "../support/poll_checks.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_scene_bounds.c: how far what is computed with may be from the numbers that were given. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/scene/scene.h"
 #include "../support/harness.h"
 

@@ -2,7 +2,6 @@
 /* test_scene_queries.c: points and queries get one scale and bounds that hold for both, also where
  * queries come later: which of these a scene that was kept takes, step by step. */
 #include "../../../csrc/core/base/outcome.h"
-#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/scene/scene.h"
 #include "../support/harness.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_scene_scale.c: whether gaps are closed, which cutoff and scale a scene goes by, and why some
  * boxes have none. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/scene/close_gaps.h"
 #include "../../../csrc/core/scene/scene.h"
 #include "../../../csrc/core/scene/unit.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_scene_wrap.c: points are wrapped axis by axis where that will do, their turns counted, and
  * those that are too far away wrapped before they are scaled. */
-#include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/scene/scene.h"
 #include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"

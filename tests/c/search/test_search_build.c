@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_search_build.c: a search is built of points and queries, with cells of the caller's width or
  * of its own choice, and says what it lacks. */
-#include "../../../csrc/core/search/search_build.h"
+#include "../../../csrc/core/search/search_open.h"
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
 

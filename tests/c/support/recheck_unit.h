@@ -11,12 +11,12 @@
 enum { RECHECK_POINTS = 6, RECHECK_IMAGES = 4 };
 
 typedef struct recheck_unit {
-    hs_call     call;
-    hs_verlet   list;
-    hs_refilter refilter;
-    int32_t     order[RECHECK_POINTS];
-    int64_t     counts[RECHECK_POINTS * 3], jumps[RECHECK_POINTS * 3];
-    int32_t     images[RECHECK_IMAGES * 3];
+    hs_call    call;
+    hs_verlet  list;
+    hs_recheck recheck;
+    int32_t    order[RECHECK_POINTS];
+    int64_t    counts[RECHECK_POINTS * 3], jumps[RECHECK_POINTS * 3];
+    int32_t    images[RECHECK_IMAGES * 3];
 } recheck_unit;
 
 /* All points in reverse, no jumps, counts and images of 0. */
@@ -24,10 +24,10 @@ static inline void
 recheck_unit_open(const hs_points *points, const hs_box *box, double cutoff, unsigned want,
                   recheck_unit *unit)
 {
-    hs_options   options = hs_options_default();
-    hs_failure   failure;
-    double       rows[HS_MAX_DIM][HS_MAX_DIM];
-    hs_refilter *refilter = &unit->refilter;
+    hs_options  options = hs_options_default();
+    hs_failure  failure;
+    double      rows[HS_MAX_DIM][HS_MAX_DIM];
+    hs_recheck *recheck = &unit->recheck;
     memset(unit, 0, sizeof *unit);
     options.cutoff = cutoff;
     options.want = want;
@@ -38,33 +38,33 @@ recheck_unit_open(const hs_points *points, const hs_box *box, double cutoff, uns
         unit->order[a] = (int32_t)points->n - 1 - a;
     unit->list.cutoff = cutoff;
     unit->list.jumps_now = -1;
-    refilter->list = &unit->list;
-    refilter->now = &unit->list.frames[0];
-    refilter->call = &unit->call;
-    refilter->d = points->ndim;
-    refilter->m = hs_frame_periodic(refilter->now, refilter->vector_of_row);
-    for (int r = 0; r < refilter->m; r++)
-        memcpy(rows[r], box->rows[refilter->vector_of_row[r]], sizeof rows[r]);
-    hs_metric_init(&refilter->given, refilter->d, refilter->m, (const double(*)[HS_MAX_DIM])rows,
+    recheck->list = &unit->list;
+    recheck->now = &unit->list.frames[0];
+    recheck->call = &unit->call;
+    recheck->d = points->ndim;
+    recheck->m = hs_frame_periodic(recheck->now, recheck->vector_of_row);
+    for (int r = 0; r < recheck->m; r++)
+        memcpy(rows[r], box->rows[recheck->vector_of_row[r]], sizeof rows[r]);
+    hs_metric_init(&recheck->given, recheck->d, recheck->m, (const double(*)[HS_MAX_DIM])rows,
                    cutoff, true);
     unit->list.listing.order = unit->order;
     unit->list.listing.images =
-        (hs_images){.width = refilter->m, .of = unit->images, .n = RECHECK_IMAGES};
+        (hs_images){.width = recheck->m, .of = unit->images, .n = RECHECK_IMAGES};
 }
 
 static inline void
 recheck_unit_close(recheck_unit *unit)
 {
-    hs_account  *account = &unit->call.account;
-    hs_refilter *refilter = &unit->refilter;
-    hs_scene_free(account, &refilter->scene);
-    hs_free(account, refilter->counts);
-    hs_free(account, refilter->y);
-    hs_free(account, refilter->offset);
-    hs_free(account, refilter->x);
-    hs_free(account, refilter->image);
-    hs_free(account, refilter->lag);
-    hs_free(account, refilter->lagging);
+    hs_account *account = &unit->call.account;
+    hs_recheck *recheck = &unit->recheck;
+    hs_scene_free(account, &recheck->scene);
+    hs_free(account, recheck->counts);
+    hs_free(account, recheck->y);
+    hs_free(account, recheck->offset);
+    hs_free(account, recheck->x);
+    hs_free(account, recheck->image);
+    hs_free(account, recheck->lag);
+    hs_free(account, recheck->lagging);
     hs_frame_free(&unit->list.frames[0]);
     CHECK(account->held == 0);
     hs_account_close(account);

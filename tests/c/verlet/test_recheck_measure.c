@@ -15,13 +15,13 @@ static recheck_unit unit;
 static void
 given_vector(const double *x, const hs_box *box, int i, int j, int image, double *D)
 {
-    const int m = unit.refilter.m, d = unit.refilter.d;
+    const int m = unit.recheck.m, d = unit.recheck.d;
     for (int k = 0; k < d; k++) {
         D[k] = x[unit.order[j] * d + k] - x[unit.order[i] * d + k];
         for (int r = 0; r < m; r++) {
             const int64_t S =
                 unit.images[image * m + r] + unit.counts[i * m + r] - unit.counts[j * m + r];
-            D[k] += (double)S * box->rows[unit.refilter.vector_of_row[r]][k];
+            D[k] += (double)S * box->rows[unit.recheck.vector_of_row[r]][k];
         }
     }
 }
@@ -31,9 +31,9 @@ given_vector(const double *x, const hs_box *box, int i, int j, int image, double
 static int
 check_vectors(const double *x, const hs_box *box)
 {
-    const hs_refilter *of = &unit.refilter;
-    const int          m = of->m, d = of->d;
-    int                wrong = 0, lagging = 0;
+    const hs_recheck *of = &unit.recheck;
+    const int         m = of->m, d = of->d;
+    int               wrong = 0, lagging = 0;
     for (int i = 0; i < N; i++) {
         bool lags = false;
         for (int r = 0; r < m; r++)
@@ -86,10 +86,10 @@ vectors_are_those_of_the_points_as_given(void)
         for (int e = 0; e < IMAGES * 3; e++)
             unit.images[e] = (int32_t)(random_bits(&random) % 7) - 3;
         if (trial % 3) {
-            unit.refilter.counts = hs_alloc(&unit.call.account, HS_FOR_WRAPS, N * 3, 8);
-            memcpy(unit.refilter.counts, unit.counts, N * 3 * sizeof(int64_t));
+            unit.recheck.counts = hs_alloc(&unit.call.account, HS_FOR_WRAPS, N * 3, 8);
+            memcpy(unit.recheck.counts, unit.counts, N * 3 * sizeof(int64_t));
         }
-        CHECK(hs_refilter_open_scene(&unit.refilter, &failure) == HS_OK);
+        CHECK(hs_recheck_open_scene(&unit.recheck, &failure) == HS_OK);
         lagging += check_vectors(x, box);
         recheck_unit_close(&unit);
     }
@@ -104,9 +104,9 @@ open_points_have_no_lag(void)
     const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8};
     hs_failure      failure;
     recheck_unit_open(&points, NULL, 1.0, HS_WANT_DISTANCE, &unit);
-    CHECK(hs_refilter_open_scene(&unit.refilter, &failure) == HS_OK);
+    CHECK(hs_recheck_open_scene(&unit.recheck, &failure) == HS_OK);
     for (int a = 0; a < N; a++)
-        CHECK(unit.refilter.x[a] == x[N - 1 - a]);
+        CHECK(unit.recheck.x[a] == x[N - 1 - a]);
     recheck_unit_close(&unit);
 }
 
@@ -128,7 +128,7 @@ hits_are_measured_in_their_order(void)
         unit.images[2] = unit.images[5] = 1;
         unit.images[7] = -1;
         hs_output_init(&unit.call.account, 2, HS_WANT_DISTANCE | HS_WANT_VECTOR, 4, &output);
-        unit.refilter.output = &output;
+        unit.recheck.output = &output;
         CHECK(hs_output_reserve(&output, PAIRS + AT, 0.0) == HS_OK);
         memset(&slab, 0, sizeof slab);
         for (int e = 0; e < PAIRS; e++) {
@@ -144,10 +144,10 @@ hits_are_measured_in_their_order(void)
         unit.list.listing.n_plain = plain ? PAIRS : 0;
         slab.n = PAIRS;
         slab.at = AT;
-        CHECK(hs_refilter_open_scene(&unit.refilter, &failure) == HS_OK);
-        hs_refilter_measure(&unit.refilter, &slab);
-        const double *distance = hs_refilter_column(&unit.refilter, HS_WANT_DISTANCE, AT);
-        const double *vector = hs_refilter_column(&unit.refilter, HS_WANT_VECTOR, AT);
+        CHECK(hs_recheck_open_scene(&unit.recheck, &failure) == HS_OK);
+        hs_recheck_measure(&unit.recheck, &slab);
+        const double *distance = hs_recheck_column(&unit.recheck, HS_WANT_DISTANCE, AT);
+        const double *vector = hs_recheck_column(&unit.recheck, HS_WANT_VECTOR, AT);
         int           wrong = 0;
         for (int h = 0; h < slab.n_hits; h++) {
             double    D[3];
@@ -174,7 +174,7 @@ any_allocation_may_be_refused(void)
     for (nth = 1; status != HS_OK && nth < 20; nth++) {
         recheck_unit_open(&points, &box, 1.0, HS_WANT_DISTANCE, &unit);
         hs_test_fail_allocation(nth);
-        status = hs_refilter_open_scene(&unit.refilter, &failure);
+        status = hs_recheck_open_scene(&unit.recheck, &failure);
         CHECK(status == (hs_test_failure_is_due() ? HS_OK : HS_ERR_MEMORY));
         hs_test_fail_allocation(0);
         recheck_unit_close(&unit);

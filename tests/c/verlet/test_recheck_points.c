@@ -28,16 +28,16 @@ points_are_floats_around_their_middle(void)
             x[e] = 1000.0 + e + (double)(e % d) * 100.0;
         const hs_points points = points_in(x, d);
         recheck_unit_open(&points, NULL, 1.0, HS_WANT_J, &unit);
-        CHECK(hs_refilter_prepare(&unit.refilter) == HS_OK && unit.refilter.counts == NULL);
+        CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK && unit.recheck.counts == NULL);
         for (int a = 0; a < N; a++) {
             for (int k = 0; k < stride; k++) {
                 const double centre = k < d ? 0.5 * (x[k] + x[(N - 1) * d + k]) : 0.0;
                 const double at = k < d ? x[(N - 1 - a) * d + k] : 0.0;
-                CHECK(unit.refilter.y[a * stride + k] == (float)(at - centre));
+                CHECK(unit.recheck.y[a * stride + k] == (float)(at - centre));
             }
         }
         const hs_thresholds exact = hs_thresholds_of(d, 1.0, (N - 1) * d, 0x1p-100);
-        CHECK(unit.refilter.plain.in == exact.in && unit.refilter.plain.out == exact.out);
+        CHECK(unit.recheck.plain.in == exact.in && unit.recheck.plain.out == exact.out);
         recheck_unit_close(&unit);
     }
 }
@@ -52,13 +52,13 @@ tiny_and_huge_cutoffs_are_scaled(void)
         hs_points    points = points_in(x, 1);
         points.n = 2;
         recheck_unit_open(&points, NULL, cutoff, HS_WANT_J, &unit);
-        CHECK(hs_refilter_prepare(&unit.refilter) == HS_OK);
-        CHECK(unit.refilter.y[4] == (float)ldexp(-1.0, exponents[e] - scaled[e]));
-        CHECK(unit.refilter.y[0] == (float)ldexp(1.0, exponents[e] - scaled[e]));
+        CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+        CHECK(unit.recheck.y[4] == (float)ldexp(-1.0, exponents[e] - scaled[e]));
+        CHECK(unit.recheck.y[0] == (float)ldexp(1.0, exponents[e] - scaled[e]));
         const double limit =
             ldexp(1.5, exponents[e] - scaled[e]) * ldexp(1.5, exponents[e] - scaled[e]);
-        CHECK(unit.refilter.plain.in < limit && unit.refilter.plain.out > limit);
-        CHECK(unit.refilter.plain.in > 0.99 * limit && unit.refilter.plain.out < 1.01 * limit);
+        CHECK(unit.recheck.plain.in < limit && unit.recheck.plain.out > limit);
+        CHECK(unit.recheck.plain.in > 0.99 * limit && unit.recheck.plain.out < 1.01 * limit);
         recheck_unit_close(&unit);
     }
 }
@@ -92,14 +92,14 @@ jumps_are_counted_off(void)
                 most = count > most ? count : -count > most ? -count : most;
             }
         }
-        CHECK(hs_refilter_prepare(&unit.refilter) == HS_OK);
-        CHECK((unit.refilter.counts != NULL) == (kind > 0));
-        CHECK(unit.refilter.most_counts == (double)most);
+        CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+        CHECK((unit.recheck.counts != NULL) == (kind > 0));
+        CHECK(unit.recheck.most_counts == (double)most);
         for (int a = 0; kind > 0 && a < N; a++) {
             const int64_t *count = &expected[a * 2], *last = &expected[(N - 1) * 2];
-            const float   *y = &unit.refilter.y[a * 4], *from = &unit.refilter.y[(N - 1) * 4];
+            const float   *y = &unit.recheck.y[a * 4], *from = &unit.recheck.y[(N - 1) * 4];
             const double   off = (double)(count[0] - last[0]), other = (double)(count[1] - last[1]);
-            CHECK(memcmp(&unit.refilter.counts[a * 2], count, 2 * sizeof *count) == 0);
+            CHECK(memcmp(&unit.recheck.counts[a * 2], count, 2 * sizeof *count) == 0);
             CHECK(y[0] - from[0] == (float)(x[2 * (N - 1 - a)] - 4.0 * off - other));
             CHECK(y[1] - from[1] == (float)(x[2 * (N - 1 - a) + 1] - 8.0 * other));
         }
@@ -111,9 +111,9 @@ jumps_are_counted_off(void)
 static void
 check_thresholds(double largest, double offset, double size, double error)
 {
-    const hs_refilter *of = &unit.refilter;
-    const double       cutoff = of->given.cutoff, roundings = (2 * of->m + 2) * 0x1p-53;
-    const double       more = 0x1p-24 * (2.0 * largest + offset) + roundings * size;
+    const hs_recheck *of = &unit.recheck;
+    const double      cutoff = of->given.cutoff, roundings = (2 * of->m + 2) * 0x1p-53;
+    const double      more = 0x1p-24 * (2.0 * largest + offset) + roundings * size;
     for (int slack = 0; slack < 2; slack++) { /* no narrower, and not much wider */
         const double        factor = slack ? 1.25 : 1.0;
         const hs_thresholds plain = hs_thresholds_of(of->d, cutoff, 2.0 * largest, factor * error);
@@ -137,11 +137,11 @@ thresholds_have_room_for_images(void)
     recheck_unit_open(&points, &box, 0.75, HS_WANT_J, &unit);
     unit.images[2] = unit.images[3] = 1; /* (0, 4) */
     unit.images[4] = unit.images[5] = -2;
-    CHECK(hs_refilter_prepare(&unit.refilter) == HS_OK);
-    CHECK(unit.refilter.offset[0] == 0.0f && unit.refilter.offset[1] == 0.0f);
-    CHECK(unit.refilter.offset[4] == 0.0f && unit.refilter.offset[5] == 4.0f);
-    CHECK(unit.refilter.offset[8] == 0.0f && unit.refilter.offset[9] == -8.0f);
-    CHECK(unit.refilter.offset[6] == 0.0f && unit.refilter.offset[7] == 0.0f);
+    CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+    CHECK(unit.recheck.offset[0] == 0.0f && unit.recheck.offset[1] == 0.0f);
+    CHECK(unit.recheck.offset[4] == 0.0f && unit.recheck.offset[5] == 4.0f);
+    CHECK(unit.recheck.offset[8] == 0.0f && unit.recheck.offset[9] == -8.0f);
+    CHECK(unit.recheck.offset[6] == 0.0f && unit.recheck.offset[7] == 0.0f);
     check_thresholds(0.5, 8.0, 4.0 * big, 0.0);
     recheck_unit_close(&unit);
 }
@@ -162,8 +162,8 @@ thresholds_have_room_for_counts(void)
     unit.list.listing.counts = unit.counts;
     for (int a = 0; a < N; a++)
         unit.counts[2 * a] = 1 << 30;
-    CHECK(hs_refilter_prepare(&unit.refilter) == HS_OK);
-    CHECK(unit.refilter.y[0] == 0.3125f && unit.refilter.y[1] == 0.0f);
+    CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+    CHECK(unit.recheck.y[0] == 0.3125f && unit.recheck.y[1] == 0.0f);
     check_thresholds(0.3125, 0.0, 0.0, 8.0 * 0x1p-53 * (0x1p32 + 0x1p30 * 12.0));
     recheck_unit_close(&unit);
 }
@@ -175,9 +175,9 @@ numbers_beyond_floats_are_never_sure(void)
     const double x[N] = {0x1p200, -0x1p200, 0.0, 0.0, 0.0, 1.0};
     hs_points    points = points_in(x, 1);
     recheck_unit_open(&points, NULL, 1.0, HS_WANT_J, &unit);
-    CHECK(hs_refilter_prepare(&unit.refilter) == HS_OK);
-    CHECK(unit.refilter.plain.in == -1.0f && unit.refilter.plain.out == INFINITY);
-    CHECK(unit.refilter.shifted.in == -1.0f && unit.refilter.shifted.out == INFINITY);
+    CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+    CHECK(unit.recheck.plain.in == -1.0f && unit.recheck.plain.out == INFINITY);
+    CHECK(unit.recheck.shifted.in == -1.0f && unit.recheck.shifted.out == INFINITY);
     recheck_unit_close(&unit);
 }
 
@@ -191,7 +191,7 @@ any_allocation_may_be_refused(void)
         recheck_unit_open(&points, &box, 1.0, HS_WANT_J, &unit);
         unit.list.listing.counts = unit.counts;
         hs_test_fail_allocation(nth);
-        const hs_status status = hs_refilter_prepare(&unit.refilter);
+        const hs_status status = hs_recheck_prepare(&unit.recheck);
         hs_test_fail_allocation(0);
         CHECK(status == (nth <= 3 ? HS_ERR_MEMORY : HS_OK));
         recheck_unit_close(&unit);
