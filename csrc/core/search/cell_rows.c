@@ -67,7 +67,6 @@ hs_row_open(const hs_search *search, int64_t number, hs_row *row)
     row->first = row->next = first_point(search, number);
     row->end = first_point(search, number + 1);
     row->x = 0;
-    row->index[0] = 0;
     if (search->is_sparse) {
         row->base = number;
         for (int k = 1; k < grid->ndim; k++) {
