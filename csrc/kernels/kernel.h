@@ -30,6 +30,7 @@
 #include "../core/exact/filter.h"
 #include "../halfshell.h"
 #include "batch.h"
+#include "sift.h"
 #include "write.h"
 
 #include <math.h>
@@ -221,6 +222,7 @@ typedef struct hs_kernel {
     hs_relate_fn  relate;
     hs_order_fn   order;
     hs_boxes_fn   near_boxes;
+    hs_sift_fn    sift;  /* sift.h */
     hs_judge_fn   judge; /* batch.h */
     hs_measure_fn measure;
     /* write.h; or all NULL: */

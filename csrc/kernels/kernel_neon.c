@@ -11,6 +11,7 @@
 #include "copy_template.h"
 #include "near_template.h"
 #include "scan_template.h"
+#include "sift_template.h"
 
 static bool
 supported(void)
@@ -22,6 +23,7 @@ const hs_kernel hs_kernel_neon = {
     .name = "neon",
     .supported = supported,
     HS_KERNEL_LOOPS,
+    .sift = sift,
     .judge = hs_judge_baseline, /* NEON is the baseline */
     .measure = hs_measure_baseline,
 };

@@ -357,6 +357,7 @@ const hs_kernel hs_kernel_scalar = {
     .name = "scalar",
     .supported = supported,
     HS_KERNEL_LOOPS,
+    .sift = hs_sift_baseline,
     .judge = hs_judge_baseline,
     .measure = hs_measure_baseline,
 };

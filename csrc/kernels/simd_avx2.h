@@ -71,6 +71,16 @@ append(int32_t *dst, integers a, mask m)
     return (int32_t)_mm_popcnt_u32(m);
 }
 
+/* The same for labels in a register. */
+HS_ALWAYS_INLINE int32_t
+append_integers(int32_t *dst, integers all, mask m)
+{
+    const __m128i bytes = _mm_loadl_epi64((const __m128i *)&packed_lanes[m]);
+    _mm256_storeu_si256((__m256i *)dst,
+                        _mm256_permutevar8x32_epi32(all, _mm256_cvtepu8_epi32(bytes)));
+    return (int32_t)_mm_popcnt_u32(m);
+}
+
 /* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)
@@ -173,6 +183,26 @@ largest_lane(integers a)
     b = _mm_max_epi32(b, _mm_shuffle_epi32(b, 0x4e));
     b = _mm_max_epi32(b, _mm_shuffle_epi32(b, 0xb1));
     return _mm_cvtsi128_si32(b);
+}
+/* Four floats each of lanes n and n + 4. */
+HS_ALWAYS_INLINE floats
+load_rows(const float *y, int64_t stride, const int32_t *number)
+{
+    const __m256 rows = _mm256_castps128_ps256(_mm_loadu_ps(y + number[0] * stride));
+    return _mm256_insertf128_ps(rows, _mm_loadu_ps(y + number[4] * stride), 1);
+}
+/* to[k], lane by lane: y[number * stride + k], for k = 0, 1, 2, 3. */
+HS_ALWAYS_INLINE void
+load_points(const float *y, int64_t stride, const int32_t *number, floats *to)
+{
+    const __m256 a = load_rows(y, stride, number), b = load_rows(y, stride, number + 1);
+    const __m256 c = load_rows(y, stride, number + 2), d = load_rows(y, stride, number + 3);
+    const __m256 ab = _mm256_unpacklo_ps(a, b), cd = _mm256_unpacklo_ps(c, d);
+    const __m256 high_ab = _mm256_unpackhi_ps(a, b), high_cd = _mm256_unpackhi_ps(c, d);
+    to[0] = _mm256_shuffle_ps(ab, cd, 0x44);
+    to[1] = _mm256_shuffle_ps(ab, cd, 0xee);
+    to[2] = _mm256_shuffle_ps(high_ab, high_cd, 0x44);
+    to[3] = _mm256_shuffle_ps(high_ab, high_cd, 0xee);
 }
 
 #endif

@@ -49,6 +49,13 @@ append(int32_t *dst, integers a, mask m)
     _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(a, m, a));
     return (int32_t)_mm_popcnt_u32(m);
 }
+/* The same for labels in a register. */
+HS_ALWAYS_INLINE int32_t
+append_integers(int32_t *dst, integers all, mask m)
+{
+    _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(all, m, all));
+    return (int32_t)_mm_popcnt_u32(m);
+}
 
 /* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
@@ -137,5 +144,27 @@ count_greater(integers counts, integers a, integers b)
     return _mm512_mask_add_epi32(counts, greater, counts, broadcast_integer(1));
 }
 HS_ALWAYS_INLINE int32_t largest_lane(integers a) { return _mm512_reduce_max_epi32(a); }
+/* Four floats each of lanes n, n + 4, n + 8, n + 12. */
+HS_ALWAYS_INLINE floats
+load_rows(const float *y, int64_t stride, const int32_t *number)
+{
+    __m512 rows = _mm512_castps128_ps512(_mm_loadu_ps(y + number[0] * stride));
+    rows = _mm512_insertf32x4(rows, _mm_loadu_ps(y + number[4] * stride), 1);
+    rows = _mm512_insertf32x4(rows, _mm_loadu_ps(y + number[8] * stride), 2);
+    return _mm512_insertf32x4(rows, _mm_loadu_ps(y + number[12] * stride), 3);
+}
+/* to[k], lane by lane: y[number * stride + k], for k = 0, 1, 2, 3. */
+HS_ALWAYS_INLINE void
+load_points(const float *y, int64_t stride, const int32_t *number, floats *to)
+{
+    const __m512 a = load_rows(y, stride, number), b = load_rows(y, stride, number + 1);
+    const __m512 c = load_rows(y, stride, number + 2), d = load_rows(y, stride, number + 3);
+    const __m512 ab = _mm512_unpacklo_ps(a, b), cd = _mm512_unpacklo_ps(c, d);
+    const __m512 high_ab = _mm512_unpackhi_ps(a, b), high_cd = _mm512_unpackhi_ps(c, d);
+    to[0] = _mm512_shuffle_ps(ab, cd, 0x44);
+    to[1] = _mm512_shuffle_ps(ab, cd, 0xee);
+    to[2] = _mm512_shuffle_ps(high_ab, high_cd, 0x44);
+    to[3] = _mm512_shuffle_ps(high_ab, high_cd, 0xee);
+}
 
 #endif

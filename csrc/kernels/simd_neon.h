@@ -76,6 +76,15 @@ append(int32_t *dst, integers a, mask m)
     return (int32_t)popcount(m);
 }
 
+/* The same for labels in a register. */
+HS_ALWAYS_INLINE int32_t
+append_integers(int32_t *dst, integers a, mask m)
+{
+    const uint8x16_t all = vreinterpretq_u8_s32(a);
+    vst1q_s32(dst, vreinterpretq_s32_u8(vqtbl1q_u8(all, vld1q_u8(packed_bytes[m]))));
+    return (int32_t)popcount(m);
+}
+
 /* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)
@@ -161,5 +170,19 @@ count_greater(integers counts, integers a, integers b)
     return vsubq_s32(counts, vreinterpretq_s32_u32(vcgtq_s32(a, b)));
 }
 HS_ALWAYS_INLINE int32_t largest_lane(integers a) { return vmaxvq_s32(a); }
+/* to[k], lane by lane: y[number * stride + k], for k = 0, 1, 2, 3. */
+HS_ALWAYS_INLINE void
+load_points(const float *y, int64_t stride, const int32_t *number, floats *to)
+{
+    const float32x4_t   a = vld1q_f32(y + number[0] * stride);
+    const float32x4_t   b = vld1q_f32(y + number[1] * stride);
+    const float32x4_t   c = vld1q_f32(y + number[2] * stride);
+    const float32x4_t   d = vld1q_f32(y + number[3] * stride);
+    const float32x4x2_t ab = vtrnq_f32(a, b), cd = vtrnq_f32(c, d);
+    to[0] = vcombine_f32(vget_low_f32(ab.val[0]), vget_low_f32(cd.val[0]));
+    to[1] = vcombine_f32(vget_low_f32(ab.val[1]), vget_low_f32(cd.val[1]));
+    to[2] = vcombine_f32(vget_high_f32(ab.val[0]), vget_high_f32(cd.val[0]));
+    to[3] = vcombine_f32(vget_high_f32(ab.val[1]), vget_high_f32(cd.val[1]));
+}
 
 #endif

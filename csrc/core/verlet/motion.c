@@ -1,214 +1,43 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * motion.c: the displacement of point i is u_i = r_i - r0_i F - k_i h - c: what is left when the
- * deformation of the box, whole box vectors and what all points share are taken away. Any F, k and
- * c are right; good ones make it small. c is `base`, taken away before box vectors are looked for,
- * and `drift`, taken away behind that.
+ * motion.c: the F, k and c of displacement.h, and what the longest displacement leaves of the skin.
+ * Any F, k and c are right; good ones make displacements small. c is `base`, taken away before box
+ * vectors are looked for, and `drift`, taken away behind that.
  */
 #include "motion.h"
 
 #include "../base/outcome.h"
 #include "../base/poll.h"
 #include "../exact/doubleword.h"
-#include "../box/strain.h"
-#include "../box/wrap.h"
 
 #include <math.h>
 #include <string.h>
 
 #define UNIT   0x1p-53
 #define GROW   (1.0 + 0x1p-40) /* more than the roundings of any bound here */
-#define TILE   64              /* points whose displacements are held at a time */
 #define SAMPLE 1024            /* points that the drift is guessed from */
 /* A drift is taken away where the sample gets this much shorter: small ones are not worth it. */
 #define WORTHWHILE 0.8
 /* A displacement of this share of the box's smallest height may be a jump. */
 #define JUMP 0.25
 
-typedef struct tracking {
-    const hs_motion *motion;
-    bool             deformed;
-    hs_strain        strain;
-    hs_lattice       lattice; /* of the box now */
-    int              m;
-    double           jump; /* longer displacements are looked at; infinity: none */
-    bool             has_base;
-    double           base[HS_MAX_DIM];
-    double           drift[HS_MAX_DIM];
-    hs_store        *jumps;
-    int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
-    double           square;    /* largest |u|^2 ... */
-    double           component; /* ... and |u_k| */
-    double           magnitude; /* of the terms of wrapping */
-} tracking;
-
-/* u of the points of one tile, one array for each axis, without drift. */
-typedef struct tile {
-    int64_t first;
-    int     n;
-    double  u[HS_MAX_DIM][TILE];
-} tile;
-
-HS_ALWAYS_INLINE void
-subtract(const tracking *track, tile *t, const hs_real real, const int d, const bool deformed)
-{
-    const void   *now = track->motion->now->rows, *built = track->motion->built->rows;
-    const int64_t first = t->first * d;
-    for (int p = 0; p < t->n; p++) {
-        for (int k = 0; k < d; k++) {
-            const int64_t e = first + p * d + k;
-            double        before = 0.0;
-            for (int c = 0; deformed && c < d; c++) {
-                before += hs_frame_entry(built, real, e - k + c) * track->strain.F[c][k];
-            }
-            before = deformed ? before : hs_frame_entry(built, real, e);
-            t->u[k][p] = hs_frame_entry(now, real, e) - before;
-        }
-    }
-}
-
-/* subtract, with constants where that pays. */
-static void
-find_displacements(const tracking *track, tile *t)
-{
-    const hs_real real = track->motion->now->points.real;
-    const int     d = track->motion->now->points.ndim;
-    switch (8 * (real == HS_FLOAT32) + 4 * track->deformed + (d == 2 || d == 3 ? d : 0)) {
-    case 2: subtract(track, t, HS_FLOAT64, 2, false); break;
-    case 3: subtract(track, t, HS_FLOAT64, 3, false); break;
-    case 7: subtract(track, t, HS_FLOAT64, 3, true); break;
-    case 10: subtract(track, t, HS_FLOAT32, 2, false); break;
-    case 11: subtract(track, t, HS_FLOAT32, 3, false); break;
-    case 15: subtract(track, t, HS_FLOAT32, 3, true); break;
-    default: subtract(track, t, real, d, track->deformed);
-    }
-    for (int k = 0; track->has_base && k < d; k++) {
-        for (int p = 0; p < t->n; p++) {
-            t->u[k][p] -= track->base[k];
-        }
-    }
-}
-
-/* Takes whole box vectors from u of point p. Returns whether that is known to have worked; sets
- * `given`, over the box vectors as given. */
-static bool
-take_jump(tracking *track, tile *t, int p, int64_t *given)
-{
-    double  u[HS_MAX_DIM], inside[HS_MAX_DIM];
-    int64_t turns[HS_MAX_DIM];
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        u[k] = t->u[k][p];
-    }
-    if (!hs_wrap_point(&track->lattice, u, inside, turns, &track->magnitude)) {
-        return false;
-    }
-    (void)hs_lattice_shift(&track->lattice, turns, given); /* these fit: hs_wrap_point found it */
-    for (int k = 0; k < track->lattice.ndim; k++) {
-        t->u[k][p] = inside[k];
-    }
-    return true;
-}
-
-/* No jumps yet. */
-static bool
-start_jumps(tracking *track)
-{
-    const int64_t n = track->motion->now->points.n * track->m;
-    track->jump_of = hs_store_reserve(track->jumps, HS_FOR_WRAPS, n, sizeof *track->jump_of);
-    if (track->jump_of != NULL) {
-        memset(track->jump_of, 0, (size_t)n * sizeof *track->jump_of);
-    }
-    return track->jump_of != NULL;
-}
-
-/* Looks for jumps among the points of a tile. HS_UNSERVED: some point went too far to tell. */
-static hs_status
-take_jumps(tracking *track, tile *t)
-{
-    const int d = track->lattice.ndim, m = track->m;
-    for (int p = 0; p < t->n; p++) {
-        int64_t  given[HS_MAX_DIM];
-        uint64_t any = 0;
-        double   longest = 0.0;
-        for (int k = 0; k < d; k++) {
-            longest = hs_larger(fabs(t->u[k][p]), longest);
-        }
-        if (longest < track->jump) {
-            continue;
-        }
-        if (!take_jump(track, t, p, given)) {
-            return HS_UNSERVED;
-        }
-        for (int r = 0; r < m; r++) {
-            any |= (uint64_t)given[r];
-        }
-        if (any != 0 && track->jump_of == NULL && !start_jumps(track)) {
-            return HS_ERR_MEMORY;
-        }
-        for (int r = 0; any != 0 && r < m; r++) {
-            track->jump_of[(t->first + p) * m + r] = given[r];
-        }
-    }
-    return HS_OK;
-}
-
-/* The longest of the tile, less drift, to *square and *component. */
-HS_ALWAYS_INLINE void
-find_longest(const tile *t, const int d, const double *drift, double *square, double *component)
-{
-    double most = *square, longest = *component;
-    for (int p = 0; p < t->n; p++) {
-        double sum = 0.0;
-        for (int k = 0; k < d; k++) {
-            const double u = t->u[k][p] - drift[k];
-            sum += u * u;
-            longest = hs_larger(fabs(u), longest);
-        }
-        most = hs_larger(sum, most);
-    }
-    *square = most;
-    *component = longest;
-}
-
-static void
-measure_tile(const tile *t, int d, const double *drift, double *square, double *component)
-{
-    switch (d) {
-    case 2: find_longest(t, 2, drift, square, component); break;
-    case 3: find_longest(t, 3, drift, square, component); break;
-    default: find_longest(t, d, drift, square, component);
-    }
-}
-
-/* Whether some point of the tile may have jumped. */
-static bool
-may_have_jumped(const tracking *track, const tile *t)
-{
-    const double none[HS_MAX_DIM] = {0.0};
-    double       square = 0.0, component = 0.0;
-    if (track->m == 0) {
-        return false;
-    }
-    measure_tile(t, track->lattice.ndim, none, &square, &component);
-    return !(component < track->jump);
-}
-
 /* Points that all went far share that, or most of it: the displacement of one of them. */
 static void
-find_base(tracking *track)
+find_base(hs_tracking *track)
 {
     const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     int64_t       count = 0, far = 0;
-    double        base[HS_MAX_DIM] = {0.0};
-    tile          t = {.n = 1};
-    for (int64_t i = 0; track->m > 0 && i < n; i += step, count++) {
-        t.first = i;
-        find_displacements(track, &t);
-        if (may_have_jumped(track, &t)) {
-            for (int k = 0; far == 0 && k < track->lattice.ndim; k++) {
-                base[k] = t.u[k][0];
+    double        base[HS_MAX_DIM] = {0.0}, square, component;
+    hs_tile       t;
+    for (int64_t i = 0; track->m > 0 && i < n; i += HS_TILE * step, count += t.n) {
+        const bool any = hs_look_at_tile(track, i, step, &t, &square, &component);
+        for (int p = 0; any && p < t.n; p++) {
+            if (hs_may_be_jump(track, &t, p)) {
+                for (int k = 0; far == 0 && k < track->lattice.ndim; k++) {
+                    base[k] = t.u[k][p];
+                }
+                far++;
             }
-            far++;
         }
     }
     if (2 * far > count) {
@@ -225,33 +54,36 @@ typedef struct sample {
 } sample;
 
 static void
-take_sample(tracking *track, const double *drift, sample *found)
+take_sample(hs_tracking *track, const double *drift, sample *found)
 {
     const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
     const int     d = track->motion->now->points.ndim;
-    tile          t = {.n = 1};
+    double        square, component;
+    hs_tile       t;
     *found = (sample){.count = 0.0};
-    for (int64_t i = 0; i < n; i += step) {
-        t.first = i;
-        find_displacements(track, &t);
-        if (may_have_jumped(track, &t)) {
-            int64_t given[HS_MAX_DIM];
-            (void)take_jump(track, &t, 0, given); /* a failure shows again in the full pass */
+    for (int64_t i = 0; i < n; i += HS_TILE * step) {
+        const bool any = hs_look_at_tile(track, i, step, &t, &square, &component);
+        for (int p = 0; p < t.n; p++) {
+            if (any && hs_may_be_jump(track, &t, p)) {
+                int64_t given[HS_MAX_DIM];
+                (void)hs_take_jump(track, &t, p,
+                                   given); /* a failure shows again in the full pass */
+            }
+            for (int k = 0; k < d; k++) {
+                const double u = t.u[k][p];
+                found->sum[k] += u;
+                found->lower[k] = i + p == 0 ? u : hs_smaller(u, found->lower[k]);
+                found->upper[k] = i + p == 0 ? u : hs_larger(u, found->upper[k]);
+            }
         }
-        for (int k = 0; k < d; k++) {
-            const double u = t.u[k][0];
-            found->sum[k] += u;
-            found->lower[k] = i == 0 ? u : hs_smaller(u, found->lower[k]);
-            found->upper[k] = i == 0 ? u : hs_larger(u, found->upper[k]);
-        }
-        found->count += 1.0;
-        measure_tile(&t, d, drift, &found->square, &found->component);
+        found->count += t.n;
+        hs_measure_tile(&t, d, drift, &found->square, &found->component);
     }
 }
 
 /* The drift of a sample: the mean, or where the sample is all there is the middle of the range. */
 static void
-guess_drift(tracking *track)
+guess_drift(hs_tracking *track)
 {
     sample    all, rest;
     double    drift[HS_MAX_DIM] = {0.0};
@@ -263,13 +95,14 @@ guess_drift(tracking *track)
     }
     take_sample(track, drift, &rest);
     if (rest.square < WORTHWHILE * WORTHWHILE * all.square) {
+        track->has_drift = true;
         memcpy(track->drift, drift, sizeof drift);
     }
 }
 
 /* At least the longest |u| as computed: 2^-47 is more than the roundings of square and root. */
 static double
-longest_computed(const tracking *track)
+longest_computed(const hs_tracking *track)
 {
     if (track->component == 0.0) {
         return 0.0;
@@ -282,7 +115,7 @@ longest_computed(const tracking *track)
 
 /* How far a computed u may be from the true one. Zero where nothing was rounded. */
 static double
-bound_rounding(const tracking *track)
+bound_rounding(const hs_tracking *track)
 {
     const hs_motion *motion = track->motion;
     const int        d = motion->now->points.ndim;
@@ -308,7 +141,7 @@ bound_rounding(const tracking *track)
 
 /* What is left of the skin. Each step is rounded to the safe side. */
 static double
-find_margin(const tracking *track)
+find_margin(const hs_tracking *track)
 {
     const hs_motion *motion = track->motion;
     double           reach = motion->radius;
@@ -326,7 +159,7 @@ find_margin(const tracking *track)
 }
 
 static hs_status
-start(const hs_motion *motion, hs_store *jumps, tracking *track)
+start(const hs_motion *motion, hs_store *jumps, hs_tracking *track)
 {
     int row[HS_MAX_DIM];
     memset(track, 0, sizeof *track);
@@ -352,18 +185,23 @@ start(const hs_motion *motion, hs_store *jumps, tracking *track)
 }
 
 static hs_status
-measure_all(tracking *track, const hs_options *options)
+measure_all(hs_tracking *track, const hs_options *options)
 {
     const int64_t n = track->motion->now->points.n;
-    tile          t;
-    for (t.first = 0; t.first < n; t.first += TILE) {
-        t.n = n - t.first < TILE ? (int)(n - t.first) : TILE;
-        find_displacements(track, &t);
-        hs_status status = may_have_jumped(track, &t) ? take_jumps(track, &t) : HS_OK;
-        if (status == HS_OK) {
-            measure_tile(&t, track->motion->now->points.ndim, track->drift, &track->square,
-                         &track->component);
-            status = (t.first + TILE) % HS_POLL_POINTS == 0 ? hs_poll(options, 0.0) : HS_OK;
+    hs_tile       t;
+    for (int64_t first = 0; first < n; first += HS_TILE) {
+        double     square, component;
+        const bool any = hs_look_at_tile(track, first, 1, &t, &square, &component);
+        hs_status  status = any ? hs_take_jumps(track, &t) : HS_OK;
+        if (status == HS_OK && (any || track->has_drift)) {
+            hs_measure_tile(&t, track->motion->now->points.ndim, track->drift, &track->square,
+                            &track->component);
+        } else {
+            track->square = hs_larger(square, track->square);
+            track->component = hs_larger(component, track->component);
+        }
+        if (status == HS_OK && (first + HS_TILE) % HS_POLL_POINTS == 0) {
+            status = hs_poll(options, 0.0);
         }
         if (status != HS_OK) {
             return status;
@@ -376,8 +214,8 @@ hs_status
 hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin, bool *jumped,
                  hs_store *jumps)
 {
-    tracking  track;
-    hs_status status = start(motion, jumps, &track);
+    hs_tracking track;
+    hs_status   status = start(motion, jumps, &track);
     *margin = -INFINITY;
     *jumped = false;
     if (status == HS_OK) {

@@ -6,15 +6,7 @@
 #ifndef HS_MOTION_H
 #define HS_MOTION_H
 
-#include "../scene/snapshot.h"
-
-/* What is compared; all borrowed. */
-typedef struct hs_motion {
-    const hs_frame *built;  /* the step that the list was built for */
-    const hs_frame *now;    /* hs_frames_match */
-    double          radius; /* the list has every pair up to here */
-    double          cutoff;
-} hs_motion;
+#include "displacement.h"
 
 /*
  * *margin: by how much pairs may still come closer, in the unit of points, rounded down. At least

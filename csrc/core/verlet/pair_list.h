@@ -4,28 +4,32 @@
 #define HS_PAIR_LIST_H
 
 #include "../scene/snapshot.h"
+#include "../../kernels/sift.h"
 #include "shift_table.h"
 
 /*
- * The pairs within `radius` of one step, as places of points in the cell order of that step, and
- * images:
+ * The pairs within `radius` of one step, in bundles: those of one point a with all that are in the
+ * same image of it. Points are told by their places in the cell order of that step. The shift from
+ * a to b is
  *
- *     S = image + count_i - count_j      over the box vectors that repeat, as given
+ *     S = image + count_a - count_b      over the box vectors that repeat, as given
  *
  * Points keep their image of each other while they move; their counts follow their jumps. The first
- * n_plain pairs have the image 0.
+ * n_plain pairs have the image 0. Which of a and b is i, the lower number of the caller's, is seen
+ * when the pair is written; where both are one point, image has it the right way round.
  */
 typedef struct hs_listing {
-    int64_t   n_pairs, n_plain;
-    int32_t  *i, *j; /* the caller's numbers of them are i < j, or equal */
-    int32_t  *code;  /* of pairs from n_plain on: the number of their image */
-    hs_images images;
-    int32_t  *order;  /* the caller's number of each place */
-    int64_t  *counts; /* m for each place, when it was built; NULL: all zero */
-    double    radius;
+    int64_t    n_pairs, n_plain;
+    int32_t   *j;       /* b of each pair, and HS_PADDING places more */
+    hs_bundle *bundles; /* first those without an image */
+    int64_t    n_bundles, n_plain_bundles;
+    hs_images  images;
+    int32_t   *order;  /* the caller's number of each place */
+    int64_t   *counts; /* m for each place, when it was built; NULL: all zero */
+    double     radius;
     /* Where the arrays above are. Pairs are written when nothing can fail any more; the others are
      * made beside those in use, and `turn` says which are in use. */
-    hs_store for_i, for_j, for_code, for_order[2], for_counts[2];
+    hs_store for_j, for_bundles, for_order[2], for_counts[2];
     int      turn;
 } hs_listing;
 

@@ -12,6 +12,7 @@
 #include "../search/search_open.h"
 
 #include <math.h>
+#include <string.h>
 
 /* A search, and what it has found in cell order. */
 typedef struct building {
@@ -24,9 +25,8 @@ typedef struct building {
 void
 hs_listing_free(hs_listing *listing)
 {
-    hs_store_free(&listing->for_i);
     hs_store_free(&listing->for_j);
-    hs_store_free(&listing->for_code);
+    hs_store_free(&listing->for_bundles);
     for (int turn = 0; turn < 2; turn++) {
         hs_store_free(&listing->for_order[turn]);
         hs_store_free(&listing->for_counts[turn]);
@@ -128,20 +128,28 @@ find(building *built, hs_failure *failure)
     return status;
 }
 
-/* Where a piece's pairs go, and its first pair with an image among all of these. */
+/* Where the parts of a piece go: its first pair and bundle of each kind. */
+typedef struct places {
+    int64_t plain_pair, shifted_pair, plain_bundle, shifted_bundle;
+} places;
+
 typedef struct placing {
     const building *built;
-    int64_t        *plain, *shifted; /* owned, one for each piece */
+    places         *of; /* owned, one for each piece */
 } placing;
 
-/* Writes a pair with i < j in the caller's numbers. Half of them must be turned, without any
- * pattern: a branch would be mispredicted. */
-HS_ALWAYS_INLINE void
-put_pair(const int32_t *order, int32_t a, int32_t b, hs_listing *listing, int64_t to)
+static void
+place_part(const hs_part *part, int64_t first_pair, int64_t first_bundle, hs_listing *listing)
 {
-    const int32_t change = (a ^ b) & -(int32_t)(order[a] > order[b]);
-    listing->i[to] = a ^ change;
-    listing->j[to] = b ^ change;
+    if (part->pairs.n_pairs == 0) {
+        return;
+    }
+    memcpy(listing->j + first_pair, hs_output_column(&part->pairs, HS_WANT_J),
+           (size_t)part->pairs.n_pairs * sizeof *listing->j);
+    for (int64_t b = 0; b < part->n_bundles; b++) {
+        listing->bundles[first_bundle + b] = part->bundles[b];
+        listing->bundles[first_bundle + b].end += first_pair;
+    }
 }
 
 /* A hs_task_fn: the pairs of one piece to the listing, those with an image behind all others. */
@@ -150,56 +158,37 @@ place_piece(void *context, int64_t p)
 {
     const placing  *place = context;
     const hs_piece *piece = &place->built->pieces.of[p];
+    const places   *to = &place->of[p];
     hs_listing     *listing = place->built->listing;
-    const int32_t  *i = hs_output_column(&piece->pairs, HS_WANT_I);
-    const int32_t  *j = hs_output_column(&piece->pairs, HS_WANT_J);
-    int64_t         plain = place->plain[p], e = 0;
-    for (int64_t s = 0; s <= piece->n_shifted; s++) {
-        const int64_t end = s < piece->n_shifted ? piece->at[s] : piece->pairs.n_pairs;
-        for (; e < end; e++) {
-            put_pair(listing->order, i[e], j[e], listing, plain++);
-        }
-        if (s < piece->n_shifted) {
-            const int64_t to = place->shifted[p] + s;
-            put_pair(listing->order, i[e], j[e], listing, listing->n_plain + to);
-            listing->code[to] = piece->shift[s];
-            e++;
-        }
-    }
+    place_part(&piece->plain, to->plain_pair, to->plain_bundle, listing);
+    place_part(&piece->shifted, listing->n_plain + to->shifted_pair,
+               listing->n_plain_bundles + to->shifted_bundle, listing);
 }
 
-/* Shifts of one piece, of m numbers each, to numbers of images, one each, in the same array. */
+/* Gives each bundle with a shift the number of its image. */
 static bool
-number_images(hs_piece *piece, hs_listing *listing)
+number_images(hs_part *part, hs_listing *listing)
 {
-    const int      m = listing->images.width;
-    const int32_t *i = hs_output_column(&piece->pairs, HS_WANT_I);
-    const int32_t *j = hs_output_column(&piece->pairs, HS_WANT_J);
-    for (int64_t s = 0; s < piece->n_shifted; s++) {
-        const int64_t e = piece->at[s];
-        const bool    turned = listing->order[i[e]] > listing->order[j[e]];
-        int32_t       image[HS_MAX_DIM];
-        for (int r = 0; r < m; r++) {
-            image[r] = turned ? -piece->shift[s * m + r] : piece->shift[s * m + r];
-        }
-        piece->shift[s] = hs_images_number(&listing->images, image);
-        if (piece->shift[s] < 0) {
+    const int m = listing->images.width;
+    for (int64_t b = 0; b < part->n_bundles; b++) {
+        part->bundles[b].image = hs_images_number(&listing->images, part->shift + b * m);
+        if (part->bundles[b].image < 0) {
             return false;
         }
     }
     return true;
 }
 
-/* A larger store in *renewed, if the present one is too small for n numbers. */
+/* A larger store in *renewed, if the present one is too small. */
 static bool
-renew(const hs_store *store, int64_t n, hs_store *renewed)
+renew(const hs_store *store, hs_purpose purpose, int64_t n, size_t size, hs_store *renewed)
 {
-    return (store->data != NULL && n * (int64_t)sizeof(int32_t) <= store->capacity) ||
-           hs_store_reserve(renewed, HS_FOR_INDICES, n, sizeof(int32_t)) != NULL;
+    return (store->data != NULL && n * (int64_t)size <= store->capacity) ||
+           hs_store_reserve(renewed, purpose, n, size) != NULL;
 }
 
 /* The renewed store in place of the other, if there is one. */
-static int32_t *
+static void *
 take(hs_store *store, hs_store *renewed)
 {
     if (renewed->data != NULL) {
@@ -209,31 +198,33 @@ take(hs_store *store, hs_store *renewed)
     return store->data;
 }
 
-/* Counts the pairs, and how many come before each piece. */
+/* Counts pairs and bundles, and how many come before each piece. */
 static bool
 count_pairs(building *built, placing *place)
 {
     hs_account *account = &built->call.account;
     hs_listing *listing = built->listing;
-    int64_t     n_shifted = 0;
-    place->plain = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof(int64_t));
-    place->shifted = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof(int64_t));
-    if (place->plain == NULL || place->shifted == NULL) {
+    places      sum = {0};
+    place->of = hs_alloc(account, HS_FOR_SORTING, built->pieces.n, sizeof *place->of);
+    if (place->of == NULL) {
         return false;
     }
     for (int64_t p = 0; p < built->pieces.n; p++) {
         const hs_piece *piece = &built->pieces.of[p];
-        place->plain[p] = listing->n_pairs - n_shifted;
-        place->shifted[p] = n_shifted;
-        listing->n_pairs += piece->pairs.n_pairs;
-        n_shifted += piece->n_shifted;
+        place->of[p] = sum;
+        sum.plain_pair += piece->plain.pairs.n_pairs;
+        sum.plain_bundle += piece->plain.n_bundles;
+        sum.shifted_pair += piece->shifted.pairs.n_pairs;
+        sum.shifted_bundle += piece->shifted.n_bundles;
     }
-    listing->n_plain = listing->n_pairs - n_shifted;
+    listing->n_plain = sum.plain_pair;
+    listing->n_pairs = sum.plain_pair + sum.shifted_pair;
+    listing->n_plain_bundles = sum.plain_bundle;
+    listing->n_bundles = sum.plain_bundle + sum.shifted_bundle;
     /* The pieces, which are on no account, and the listing. */
-    if (!hs_account_allows(account, 16.0 * (double)listing->n_pairs + 32.0 * (double)n_shifted)) {
-        return false;
-    }
-    return true;
+    return hs_account_allows(account, (double)(2 * sizeof *listing->j) * (double)listing->n_pairs +
+                                          (double)(3 * sizeof *listing->bundles) *
+                                              (double)listing->n_bundles);
 }
 
 /* Makes room for the pairs, which may be that of the list in use: so this is the last step that can
@@ -241,20 +232,18 @@ count_pairs(building *built, placing *place)
 static bool
 make_room(hs_listing *listing)
 {
-    const int64_t n = listing->n_pairs;
-    hs_store      i = {0}, j = {0}, code = {0};
+    hs_store j = {0}, bundles = {0};
     /* ... which must lose none of its arrays if another one cannot be had. */
-    bool complete = renew(&listing->for_i, n, &i);
-    complete = complete && renew(&listing->for_j, n, &j);
-    complete = complete && renew(&listing->for_code, n - listing->n_plain, &code);
-    if (!complete) {
-        hs_store_free(&i);
+    if (!renew(&listing->for_j, HS_FOR_INDICES, listing->n_pairs + HS_PADDING, sizeof(int32_t),
+               &j) ||
+        !renew(&listing->for_bundles, HS_FOR_INDICES, listing->n_bundles, sizeof(hs_bundle),
+               &bundles)) {
         hs_store_free(&j);
         return false;
     }
-    listing->i = take(&listing->for_i, &i);
     listing->j = take(&listing->for_j, &j);
-    listing->code = take(&listing->for_code, &code);
+    listing->bundles = take(&listing->for_bundles, &bundles);
+    memset(listing->j + listing->n_pairs, 0, HS_PADDING * sizeof *listing->j);
     return true;
 }
 
@@ -267,14 +256,13 @@ settle_pairs(building *built)
     hs_images_init(search->scene.lattice.n_periodic, &built->listing->images);
     bool complete = count_pairs(built, &place);
     for (int64_t p = 0; p < built->pieces.n && complete; p++) {
-        complete = number_images(&built->pieces.of[p], built->listing);
+        complete = number_images(&built->pieces.of[p].shifted, built->listing);
     }
     complete = complete && make_room(built->listing);
     if (complete) {
         hs_team_run(search->call->team, built->pieces.n, place_piece, &place);
     }
-    hs_free(&search->call->account, place.shifted);
-    hs_free(&search->call->account, place.plain);
+    hs_free(&search->call->account, place.of);
     return complete ? HS_OK : HS_ERR_MEMORY;
 }
 
@@ -313,7 +301,7 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     if (built == NULL) {
         return HS_ERR_MEMORY;
     }
-    next.n_pairs = next.n_plain = 0;
+    next.n_pairs = next.n_plain = next.n_bundles = next.n_plain_bundles = 0;
     next.radius = radius;
     next.counts = NULL;
     hs_images_init(0, &next.images);

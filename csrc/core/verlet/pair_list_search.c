@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define PIECES_A_THREAD 4 /* so that none waits long for the others */
-#define FIRST_SHIFTED   256
+#define FIRST_BUNDLES   256
 
 /* What one thread works with. */
 typedef struct worker {
@@ -18,7 +18,6 @@ typedef struct worker {
     hs_pieces   *pieces; /* borrowed */
     hs_walker    walker;
     hs_piece    *piece; /* that it is working on */
-    int32_t     *ids;   /* owned; places in cell order of hits */
     /* Of the block that was looked at last: */
     int64_t  block; /* candidates tested before it, which tells blocks apart; -1: none */
     bool     has_images;
@@ -57,42 +56,33 @@ has_shift(const hs_run *run, int m)
     return any != 0;
 }
 
-static bool
-make_room(hs_piece *piece, int m)
+/* A new bundle at the end of a part, of no pairs; NULL: out of memory. m: numbers of its shift, 0
+ * in a plain part. */
+static hs_bundle *
+add_bundle(hs_part *part, int32_t point, int m)
 {
-    if (piece->n_shifted < piece->capacity) {
-        return true;
+    if (part->n_bundles == part->capacity) {
+        const int64_t capacity = part->capacity > 0 ? 2 * part->capacity : FIRST_BUNDLES;
+        hs_bundle    *bundles = hs_alloc(NULL, HS_FOR_INDICES, capacity, sizeof *bundles);
+        int32_t      *shift = hs_alloc(NULL, HS_FOR_SHIFTS, capacity * m, sizeof *shift);
+        if (bundles == NULL || shift == NULL) {
+            hs_free(NULL, bundles);
+            hs_free(NULL, shift);
+            return NULL;
+        }
+        if (part->n_bundles > 0) {
+            memcpy(bundles, part->bundles, (size_t)part->n_bundles * sizeof *bundles);
+            memcpy(shift, part->shift, (size_t)(part->n_bundles * m) * sizeof *shift);
+        }
+        hs_free(NULL, part->bundles);
+        hs_free(NULL, part->shift);
+        part->bundles = bundles;
+        part->shift = shift;
+        part->capacity = capacity;
     }
-    const int64_t capacity = piece->capacity > 0 ? 2 * piece->capacity : FIRST_SHIFTED;
-    int64_t *at = hs_grow(NULL, HS_FOR_SHIFTS, piece->at, piece->n_shifted, capacity, sizeof *at);
-    if (at == NULL) {
-        return false;
-    }
-    piece->at = at;
-    int32_t *shift = hs_grow(NULL, HS_FOR_SHIFTS, piece->shift, piece->n_shifted * m, capacity * m,
-                             sizeof *shift);
-    if (shift == NULL) {
-        return false;
-    }
-    piece->shift = shift;
-    piece->capacity = capacity;
-    return true;
-}
-
-/* Pair `at` of the piece, of a point and a hit with this shift. The pair goes from the lower place
- * to the higher, or has a first shift that is positive. */
-static bool
-note_shift(hs_piece *piece, int m, int64_t at, bool turned, const int32_t *shift)
-{
-    if (!make_room(piece, m)) {
-        return false;
-    }
-    int32_t *to = piece->shift + piece->n_shifted * m;
-    for (int r = 0; r < m; r++) {
-        to[r] = turned ? -shift[r] : shift[r];
-    }
-    piece->at[piece->n_shifted++] = at;
-    return true;
+    hs_bundle *bundle = &part->bundles[part->n_bundles++];
+    *bundle = (hs_bundle){.end = part->pairs.n_pairs, .point = point};
+    return bundle;
 }
 
 static bool
@@ -128,43 +118,102 @@ look_at_block(worker *me)
     return true;
 }
 
-/* The hits of one point, whose places in the block ascend, as do its runs. */
-static bool
-note_row(worker *me, int32_t si, int32_t first, int32_t end, const hs_hits *hits)
+/* n hits of one run to a part: as many pairs of its last bundle. */
+static void
+add_pairs(worker *me, hs_part *part, const int32_t *labels, int32_t n)
 {
-    const int     m = me->walker.scanner.search->bins.n_periodic;
-    const hs_run *runs = me->walker.scanner.block.runs;
-    int32_t       r = 0;
-    for (int32_t h = first; h < end; h++) {
-        while (runs[r + 1].at <= hits->label[h]) {
-            r++;
+    const int32_t *id = me->walker.scanner.block.id;
+    int32_t       *to = hs_output_next(&part->pairs, HS_WANT_J);
+    for (int32_t h = 0; h < n; h++) {
+        to[h] = id[labels[h]];
+    }
+    part->pairs.n_pairs += n;
+    part->bundles[part->n_bundles - 1].end = part->pairs.n_pairs;
+}
+
+/* Hits of one run with this shift, or the opposite one; in the last bundle if that has it, too. */
+static bool
+add_shifted(worker *me, int32_t si, const int32_t *labels, int32_t n, const int32_t *shift,
+            bool turned)
+{
+    const int m = me->walker.scanner.search->bins.n_periodic;
+    hs_part  *part = &me->piece->shifted;
+    int32_t   own[HS_MAX_DIM];
+    for (int r = 0; r < m; r++) {
+        own[r] = turned ? -shift[r] : shift[r];
+    }
+    const int64_t last = part->n_bundles - 1;
+    const size_t  size = (size_t)m * sizeof *own;
+    if (last < 0 || part->bundles[last].point != si ||
+        memcmp(part->shift + last * m, own, size) != 0) {
+        if (add_bundle(part, si, m) == NULL) {
+            return false;
         }
-        if (!me->is_shifted[r]) {
-            continue;
+        memcpy(part->shift + (part->n_bundles - 1) * m, own, size);
+    }
+    add_pairs(me, part, labels, n);
+    return true;
+}
+
+/* Hits of one run that is in another image. A point that is its own neighbour has a first shift
+ * that is positive. */
+static bool
+add_run(worker *me, int32_t si, const int32_t *labels, int32_t n, const int32_t *shift)
+{
+    const int32_t *id = me->walker.scanner.block.id;
+    if (!is_negative(shift, me->walker.scanner.search->bins.n_periodic)) {
+        return add_shifted(me, si, labels, n, shift, false);
+    }
+    for (int32_t h = 0, next; h < n; h = next) {
+        const bool own = id[labels[h]] == si;
+        for (next = h + 1; next < n && (id[labels[next]] == si) == own; next++) {
         }
-        const int32_t *shift = me->shift + (int64_t)r * m;
-        const bool     turned = me->ids[h] < si || (me->ids[h] == si && is_negative(shift, m));
-        if (!note_shift(me->piece, m, me->piece->pairs.n_pairs + h, turned, shift)) {
+        if (!add_shifted(me, si, labels + h, next - h, shift, own)) {
             return false;
         }
     }
     return true;
 }
 
-static hs_status
-note_shifts(worker *me, int32_t first, const hs_hits *hits)
+/* The hits of one point, whose places in the block ascend, as do its runs. */
+static bool
+add_row(worker *me, int32_t si, const int32_t *labels, int32_t n)
 {
-    if (!look_at_block(me)) {
-        me->walker.scanner.failed_point = first;
-        return HS_ERR_SHIFT_RANGE;
-    }
-    for (int32_t row = 0; me->has_images && row < hits->n; row++) {
-        const int32_t begin = row > 0 ? hits->end[row - 1] : 0;
-        if (!note_row(me, first + row, begin, hits->end[row], hits)) {
-            return HS_ERR_MEMORY;
+    const int     m = me->walker.scanner.search->bins.n_periodic;
+    const hs_run *runs = me->walker.scanner.block.runs;
+    bool          is_open = false; /* its bundle without an image */
+    for (int32_t h = 0, next, r = 0; h < n; h = next) {
+        while (runs[r + 1].at <= labels[h]) {
+            r++;
         }
+        for (next = h + 1; next < n && labels[next] < runs[r + 1].at; next++) {
+        }
+        if (me->is_shifted[r]) {
+            if (!add_run(me, si, labels + h, next - h, me->shift + (int64_t)r * m)) {
+                return false;
+            }
+            continue;
+        }
+        if (!is_open && add_bundle(&me->piece->plain, si, 0) == NULL) {
+            return false;
+        }
+        is_open = true;
+        add_pairs(me, &me->piece->plain, labels + h, next - h);
     }
-    return HS_OK;
+    return true;
+}
+
+/* The hits of one point where the whole block is in its image. */
+static bool
+add_plain_row(worker *me, int32_t si, const int32_t *labels, int32_t n)
+{
+    if (n > 0) {
+        if (add_bundle(&me->piece->plain, si, 0) == NULL) {
+            return false;
+        }
+        add_pairs(me, &me->piece->plain, labels, n);
+    }
+    return true;
 }
 
 /* A hs_visit_fn. */
@@ -172,21 +221,23 @@ static hs_status
 take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     worker       *me = context;
-    hs_output    *pairs = &me->piece->pairs;
     const int32_t n = hits->end[hits->n - 1];
-    hs_hits       by_id = *hits;
-    hs_status     status = hs_output_reserve(pairs, n, 0.0);
-    if (status != HS_OK) {
-        return status;
+    if (!look_at_block(me)) {
+        scanner->failed_point = first;
+        return HS_ERR_SHIFT_RANGE;
     }
-    for (int32_t h = 0; h < n; h++) {
-        me->ids[h] = scanner->block.id[hits->label[h]];
+    hs_status status = hs_output_reserve(&me->piece->plain.pairs, n, 0.0);
+    if (status == HS_OK && me->has_images) {
+        status = hs_output_reserve(&me->piece->shifted.pairs, n, 0.0);
     }
-    by_id.label = me->ids;
-    scanner->search->call->kernel->emit_int32(&by_id, hs_output_next(pairs, HS_WANT_I),
-                                              hs_output_next(pairs, HS_WANT_J));
-    status = note_shifts(me, first, hits);
-    pairs->n_pairs += n;
+    for (int32_t row = 0, begin = 0; status == HS_OK && row < hits->n; row++) {
+        const int32_t *labels = hits->label + begin, of_row = hits->end[row] - begin;
+        if (!(me->has_images ? add_row(me, first + row, labels, of_row)
+                             : add_plain_row(me, first + row, labels, of_row))) {
+            status = HS_ERR_MEMORY;
+        }
+        begin = hits->end[row];
+    }
     return status;
 }
 
@@ -198,7 +249,7 @@ search_piece(void *context, int64_t piece)
     const hs_search *search = me->search;
     const int64_t    n = search->bins.n, n_pieces = me->pieces->n;
     me->piece = &me->pieces->of[piece];
-    hs_output_expect(&me->piece->pairs, search->grid.expected_pairs / (double)n_pieces);
+    hs_output_expect(&me->piece->plain.pairs, search->grid.expected_pairs / (double)n_pieces);
     return hs_walk_or_tell(&me->walker, (int32_t)(n * piece / n_pieces),
                            (int32_t)(n * (piece + 1) / n_pieces), &me->committer.failure);
 }
@@ -227,10 +278,9 @@ open_worker(void *context, void *place)
     hs_account     *account = &search->call->account;
     const hs_block *block = &me->walker.scanner.block;
     const int64_t   n_runs = block->most_runs + 1, m = search->bins.n_periodic;
-    me->ids = hs_alloc(account, HS_FOR_CANDIDATES, block->most_hits + HS_PADDING, sizeof *me->ids);
     me->is_shifted = hs_alloc(account, HS_FOR_CANDIDATES, n_runs, sizeof *me->is_shifted);
     me->shift = hs_alloc(account, HS_FOR_CANDIDATES, n_runs * m, sizeof *me->shift);
-    const bool complete = me->ids != NULL && me->is_shifted != NULL && me->shift != NULL;
+    const bool complete = me->is_shifted != NULL && me->shift != NULL;
     return complete ? HS_OK : HS_ERR_MEMORY;
 }
 
@@ -243,16 +293,22 @@ close_worker(void *context, void *place)
     hs_walker_close(job->search, &me->walker);
     hs_free(account, me->shift);
     hs_free(account, me->is_shifted);
-    hs_free(account, me->ids);
+}
+
+static void
+free_part(hs_part *part)
+{
+    hs_output_free(&part->pairs);
+    hs_free(NULL, part->bundles);
+    hs_free(NULL, part->shift);
 }
 
 void
 hs_pieces_free(hs_account *account, hs_pieces *pieces)
 {
     for (int64_t p = 0; pieces->of != NULL && p < pieces->n; p++) {
-        hs_output_free(&pieces->of[p].pairs);
-        hs_free(NULL, pieces->of[p].at);
-        hs_free(NULL, pieces->of[p].shift);
+        free_part(&pieces->of[p].plain);
+        free_part(&pieces->of[p].shifted);
     }
     hs_free(account, pieces->of);
     *pieces = (hs_pieces){0};
@@ -268,7 +324,8 @@ hs_pieces_find(hs_search *search, hs_pieces *pieces, hs_failure *failure)
     }
     memset(pieces->of, 0, (size_t)pieces->n * sizeof *pieces->of);
     for (int64_t p = 0; p < pieces->n; p++) {
-        hs_output_init(NULL, search->scene.ndim, HS_WANT_I | HS_WANT_J, 4, &pieces->of[p].pairs);
+        hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &pieces->of[p].plain.pairs);
+        hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &pieces->of[p].shifted.pairs);
     }
     piece_job       job = {.search = search, .pieces = pieces};
     hs_crew         crew = {.call = search->call,

@@ -2,8 +2,8 @@
 /*
  * pair_list_search.h: the pairs of a search in pieces, one for each range of its points, by several
  * threads. Which pieces there are depends on the number of threads, what follows from one to the
- * next does not. Points are told by their places in cell order, and few pairs have a shift: those
- * that are in different images once the points are wrapped.
+ * next does not. Points are told by their places in cell order. Few pairs have a shift, those that
+ * are in different images once the points are wrapped, and each piece keeps them apart.
  */
 #ifndef HS_PAIR_LIST_SEARCH_H
 #define HS_PAIR_LIST_SEARCH_H
@@ -11,12 +11,16 @@
 #include "../collect/columns.h"
 #include "../search/search.h"
 
+/* Some pairs of a piece, as in a hs_listing. */
+typedef struct hs_part {
+    hs_output  pairs;   /* b of each, in its column j; counted by no account */
+    hs_bundle *bundles; /* owned; ends are places in this part */
+    int32_t   *shift;   /* owned; m for each bundle, over the box vectors that repeat, as given */
+    int64_t    n_bundles, capacity;
+} hs_part;
+
 typedef struct hs_piece {
-    hs_output pairs;     /* int32 i and j, places in bins->order; counted by no account */
-    int64_t   n_shifted; /* pairs with a shift that is not zero: */
-    int64_t   capacity;
-    int64_t  *at;    /* owned; which they are, ascending */
-    int32_t  *shift; /* owned; m for each, over the box vectors that repeat, as given */
+    hs_part plain, shifted;
 } hs_piece;
 
 typedef struct hs_pieces {

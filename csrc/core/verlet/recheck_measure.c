@@ -59,12 +59,10 @@ allocate(hs_recheck *recheck)
     hs_account   *account = &recheck->call->account;
     const int64_t n = recheck->now->points.n, m = recheck->m;
     const int64_t n_images = recheck->list->listing.images.n;
-    recheck->x = hs_alloc(account, HS_FOR_POINTS, n * recheck->d, sizeof *recheck->x);
     recheck->image = hs_alloc(account, HS_FOR_WRAPS, n_images * m, sizeof *recheck->image);
     recheck->lag = hs_alloc(account, HS_FOR_WRAPS, n * m, sizeof *recheck->lag);
     recheck->lagging = hs_alloc(account, HS_FOR_WRAPS, n, sizeof *recheck->lagging);
-    return recheck->x != NULL && recheck->image != NULL && recheck->lag != NULL &&
-           recheck->lagging != NULL;
+    return recheck->image != NULL && recheck->lag != NULL && recheck->lagging != NULL;
 }
 
 /*
@@ -114,22 +112,30 @@ set_images(hs_recheck *recheck, bool over_given, const int64_t over[][HS_MAX_DIM
     }
 }
 
-static void
+static bool
 set_coordinates(hs_recheck *recheck)
 {
     const hs_scene *scene = &recheck->scene;
     double *const  *x = scene->keeps_originals ? scene->originals : scene->cloud.x;
-    const int       d = recheck->d;
+    const int       d = recheck->d, width = recheck->writes ? HS_RECORD : d;
     const int32_t  *order = recheck->list->listing.order;
     const int64_t   n = recheck->now->points.n;
-    for (int64_t a = 0; a < n; a++) {
+    recheck->width = width;
+    recheck->x = hs_alloc(&recheck->call->account, HS_FOR_POINTS, n * width, sizeof *recheck->x);
+    for (int64_t a = 0; recheck->x != NULL && a < n; a++) {
+        const int64_t number = order[a];
+        double       *to = recheck->x + a * width;
         for (int k = 0; k < d; k++) {
             if (a + AHEAD < n) {
                 HS_PREFETCH(x[k] + order[a + AHEAD]);
             }
-            recheck->x[a * d + k] = x[k][order[a]];
+            to[k] = x[k][number];
+        }
+        for (int k = d; k < width; k++) { /* the last one's bits are the number */
+            memcpy(to + k, &number, sizeof number);
         }
     }
+    return recheck->x != NULL;
 }
 
 hs_status
@@ -154,62 +160,101 @@ hs_recheck_open_scene(hs_recheck *recheck, hs_failure *failure)
     }
     set_lags(recheck, over_given, (const int64_t(*)[HS_MAX_DIM])over);
     set_images(recheck, over_given, (const int64_t(*)[HS_MAX_DIM])over);
-    set_coordinates(recheck);
+    if (hs_recheck_plan_write(recheck) != HS_OK || !set_coordinates(recheck)) {
+        return HS_ERR_MEMORY;
+    }
     return HS_OK;
+}
+
+/* A batch of hits, and which points they are of. */
+typedef struct hit_batch {
+    int32_t     bundle;                    /* of the slab: that of the next hit */
+    int32_t     next;                      /* hit */
+    int32_t     of[HS_BATCH], b[HS_BATCH]; /* bundle; place */
+    double      sign[HS_BATCH];            /* -1: the pair is from b to a */
+    unsigned    lagging;                   /* whether any point is */
+    hs_measured measured;
+} hit_batch;
+
+/* Takes hits [begin, end) of the batch, which are of the present bundle. */
+HS_ALWAYS_INLINE void
+take_of_bundle(const hs_recheck *recheck, const hs_sifted *slab, int32_t begin, int32_t end,
+               const int d, hit_batch *HS_RESTRICT batch)
+{
+    const int32_t *hits = slab->hits + batch->next;
+    const int32_t *order = recheck->list->listing.order;
+    const double  *x = recheck->x;
+    const int64_t  width = recheck->writes ? HS_RECORD : d;
+    const uint8_t *lagging = recheck->lagging;
+    const int32_t  bundle = batch->bundle;
+    const int64_t  a = slab->bundles[bundle].point;
+    const int32_t  number = order[a];
+    unsigned       any = lagging[a];
+    for (int32_t e = begin; e < end; e++) {
+        const int64_t b = hits[e];
+        for (int k = 0; k < d; k++) {
+            batch->measured.p[k][e] = x[a * width + k];
+            batch->measured.q[k][e] = x[b * width + k];
+        }
+        any |= lagging[b];
+        batch->of[e] = bundle;
+        batch->b[e] = (int32_t)b;
+        /* -1 where order[b] < number, else 1: a branch would be mispredicted. */
+        batch->sign[e] = 1 - 2 * (int)((uint32_t)(order[b] - number) >> 31);
+    }
+    batch->lagging |= any;
+}
+
+/* Takes the next hits of the slab into the batch. */
+HS_ALWAYS_INLINE void
+take_hits(const hs_recheck *recheck, const hs_sifted *slab, const int d, hit_batch *batch)
+{
+    const int32_t left = slab->n_hits - batch->next;
+    const int32_t n = left < HS_BATCH ? left : HS_BATCH;
+    batch->lagging = 0;
+    for (int32_t e = 0; e < n;) {
+        while (slab->hits_end[batch->bundle] <= batch->next + e) {
+            batch->bundle++;
+        }
+        const int32_t of_bundle = slab->hits_end[batch->bundle] - batch->next;
+        const int32_t end = of_bundle < n ? of_bundle : n;
+        take_of_bundle(recheck, slab, e, end, d, batch);
+        e = end;
+    }
+    batch->next += n;
+    batch->measured.n = n;
 }
 
 /* The shifts of the batch, for the scene's metric. */
 static void
-fill_shifts(const hs_recheck *recheck, const hs_sifted *slab, const uint16_t *hits,
-            hs_measured *batch)
+fill_shifts(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
 {
-    const hs_listing *listing = &recheck->list->listing;
-    const int         m = recheck->m;
-    const int32_t    *i = listing->i + slab->first, *j = listing->j + slab->first;
-    const int32_t    *code =
-        slab->first < listing->n_plain ? NULL : listing->code + (slab->first - listing->n_plain);
-    for (int32_t b = 0; b < batch->n; b++) {
-        const int32_t  e = hits[b];
-        const int64_t *lag_i = recheck->lag + (int64_t)i[e] * m;
-        const int64_t *lag_j = recheck->lag + (int64_t)j[e] * m;
+    const bool has_images = hs_sifted_has_images(recheck, slab);
+    const int  m = recheck->m;
+    for (int32_t e = 0; e < batch->measured.n; e++) {
+        const hs_bundle *bundle = &slab->bundles[batch->of[e]];
+        const int64_t   *lag_a = recheck->lag + (int64_t)bundle->point * m;
+        const int64_t   *lag_b = recheck->lag + (int64_t)batch->b[e] * m;
         for (int r = 0; r < m; r++) {
-            const int64_t image = code != NULL ? recheck->image[(int64_t)code[e] * m + r] : 0;
+            const int64_t image = has_images ? recheck->image[(int64_t)bundle->image * m + r] : 0;
             const int64_t shift =
-                (int64_t)((uint64_t)image + (uint64_t)lag_j[r] - (uint64_t)lag_i[r]);
-            hs_measured_shift(batch, b, r, shift);
+                (int64_t)((uint64_t)image + (uint64_t)lag_b[r] - (uint64_t)lag_a[r]);
+            hs_measured_shift(&batch->measured, e, r, shift);
         }
-    }
-}
-
-HS_ALWAYS_INLINE void
-fill_points(const hs_recheck *recheck, const hs_sifted *slab, const uint16_t *hits, const int d,
-            hs_measured *batch)
-{
-    const int32_t *i = recheck->list->listing.i + slab->first;
-    const int32_t *j = recheck->list->listing.j + slab->first;
-    unsigned       lagging = 0;
-    for (int32_t b = 0; b < batch->n; b++) {
-        const int64_t p = i[hits[b]], q = j[hits[b]];
-        for (int k = 0; k < d; k++) {
-            batch->p[k][b] = recheck->x[p * d + k];
-            batch->q[k][b] = recheck->x[q * d + k];
-        }
-        lagging |= recheck->m > 0 ? recheck->lagging[p] | recheck->lagging[q] : 0;
-    }
-    batch->is_shifted = batch->is_wide = false;
-    if (recheck->m > 0 && (lagging != 0 || slab->first >= recheck->list->listing.n_plain)) {
-        fill_shifts(recheck, slab, hits, batch);
     }
 }
 
 static void
-fill(const hs_recheck *recheck, const hs_sifted *slab, int32_t first, hs_measured *batch)
+fill(const hs_recheck *recheck, const hs_sifted *slab, hit_batch *batch)
 {
-    const uint16_t *hits = slab->hits + first;
     switch (recheck->d) {
-    case 2: fill_points(recheck, slab, hits, 2, batch); break;
-    case 3: fill_points(recheck, slab, hits, 3, batch); break;
-    default: fill_points(recheck, slab, hits, recheck->d, batch);
+    case 2: take_hits(recheck, slab, 2, batch); break;
+    case 3: take_hits(recheck, slab, 3, batch); break;
+    default: take_hits(recheck, slab, recheck->d, batch);
+    }
+    batch->measured.is_shifted = batch->measured.is_wide = false;
+    if (recheck->m > 0 && (batch->lagging != 0 || hs_sifted_has_images(recheck, slab))) {
+        fill_shifts(recheck, slab, batch);
     }
 }
 
@@ -222,27 +267,26 @@ hs_recheck_measure(const hs_recheck *recheck, const hs_sifted *slab)
     const int         d = recheck->d;
     double           *distance = hs_recheck_column(recheck, HS_WANT_DISTANCE, slab->at);
     double           *vectors = hs_recheck_column(recheck, HS_WANT_VECTOR, slab->at);
-    double           *vector[HS_MAX_DIM], sign[HS_BATCH];
-    hs_measured       batch;
+    double           *vector[HS_MAX_DIM];
+    hit_batch         batch;
+    hs_measured      *measured = &batch.measured;
     memset(&batch, 0, sizeof batch); /* kernels read a little beyond the last pair */
     for (int k = 0; k < d; k++) {
-        vector[k] = batch.vector[k];
+        vector[k] = measured->vector[k];
     }
-    for (int b = 0; b < HS_BATCH; b++) {
-        sign[b] = 1.0; /* listed pairs are the right way round */
-    }
-    for (int32_t first = 0; first < slab->n_hits; first += HS_BATCH) {
-        const int32_t left = slab->n_hits - first;
-        batch.n = left < HS_BATCH ? left : HS_BATCH;
-        fill(recheck, slab, first, &batch);
-        hs_measured_find(recheck->call->kernel, &scene->metric, vectors != NULL, &batch);
+    while (batch.next < slab->n_hits) {
+        const int32_t first = batch.next;
+        fill(recheck, slab, &batch);
+        hs_measured_find(recheck->call->kernel, &scene->metric, vectors != NULL, measured);
         if (distance != NULL) {
-            hs_restore_distances(batch.distance, batch.n, unscale);
-            hs_keep_all_within(batch.distance, batch.n, options->cutoff, options->inclusive);
-            memcpy(distance + first, batch.distance, (size_t)batch.n * sizeof *distance);
+            hs_restore_distances(measured->distance, measured->n, unscale);
+            hs_keep_all_within(measured->distance, measured->n, options->cutoff,
+                               options->inclusive);
+            memcpy(distance + first, measured->distance, (size_t)measured->n * sizeof *distance);
         }
         if (vectors != NULL) {
-            hs_restore_vectors(vectors + (int64_t)first * d, vector, sign, batch.n, d, unscale);
+            hs_restore_vectors(vectors + (int64_t)first * d, vector, batch.sign, measured->n, d,
+                               unscale);
         }
     }
 }

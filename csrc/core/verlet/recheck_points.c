@@ -4,12 +4,13 @@
 #include "recheck.h"
 
 #include <math.h>
+#include <string.h>
 
 #define UNIT 0x1p-53
 /* Points ahead whose numbers are fetched: they lie anywhere in memory. */
 #define AHEAD 16
 /* Points that the middle of all is guessed from. */
-#define SAMPLE 1024
+#define SAMPLE 128
 /* Cutoffs between 2^-20 and 2^20 are not scaled: float32 has room for their squares. */
 #define ORDINARY_EXPONENT 20
 
@@ -101,8 +102,14 @@ put_floats(const hs_recheck *recheck, hs_scale scale, const double *centre, cons
                         order[a + AHEAD] * recheck->now->points.row_stride);
         }
         place_of(recheck, real, a, d, m, z);
-        for (int k = 0; k < stride; k++) {
-            const float entry = k < d ? (float)hs_scale_apply(scale, z[k] - centre[k]) : 0.0f;
+        for (int k = d; k < stride; k++) {
+            y[k] = 0.0f;
+        }
+        if (hs_sift_has_numbers(d)) {
+            memcpy(y + stride - 1, order + a, sizeof *order);
+        }
+        for (int k = 0; k < d; k++) {
+            const float entry = (float)hs_scale_apply(scale, z[k] - centre[k]);
             y[k] = entry;
             largest[k] = hs_larger(fabs((double)entry), largest[k]);
             poison[k] += (double)(entry - entry);
@@ -178,9 +185,9 @@ bound_counts(const hs_recheck *recheck, hs_scale scale)
 }
 
 /*
- * Thresholds of filter.h, whose direct form has a candidate y = y_j + offset and a point q = y_i.
- * Beside what it knows of: y_j - y_i is rounded before the offset is added (u of twice the
- * largest), the offset is rounded to a float (u of it), and was summed in float64.
+ * Thresholds of filter.h, whose direct form has a candidate y_j and a point q = y_i - offset, which
+ * it knows to be rounded to a float. Before that, y_i and the offset were rounded, too (u of each),
+ * and the offset was summed in float64.
  */
 static void
 set_thresholds(hs_recheck *recheck, hs_scale scale, double largest, double error)
@@ -191,9 +198,9 @@ set_thresholds(hs_recheck *recheck, hs_scale scale, double largest, double error
     recheck->plain = hs_thresholds_of(recheck->d, cutoff, 2.0 * largest, error + tiny);
     put_offsets(recheck, scale, &offset, &size);
     const double more =
-        u * (2.0 * largest + offset) * (1.0 + 0x1p-20) + (2 * recheck->m + 2) * UNIT * size;
-    recheck->shifted =
-        hs_thresholds_of(recheck->d, cutoff, 2.0 * largest + offset, error + tiny + more);
+        u * (largest + offset) * (1.0 + 0x1p-20) + (2 * recheck->m + 2) * UNIT * size;
+    const double extent = (2.0 * largest + offset) * (1.0 + 0x1p-20);
+    recheck->shifted = hs_thresholds_of(recheck->d, cutoff, extent, error + tiny + more);
 }
 
 hs_status

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 import threading
 from contextlib import suppress
-from time import perf_counter
 from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
 
 import numpy as np
@@ -43,8 +42,9 @@ class VerletList:
     skin : float or "auto", default "auto"
         By how much the list reaches farther, in the same unit; finite, not negative. Two points
         may move towards each other by that much before it is built again. 0: it is built again
-        unless nothing has moved. "auto" measures what building and using take and how fast points
-        move, and settles after a few changes; the pairs never depend on it.
+        unless nothing has moved. "auto" looks at how fast points move and how many pairs are
+        listed, settles after a few changes, and searches in every step where that is faster. It
+        reads no clock; the pairs never depend on it.
     box, periodic : optional
         As in `pairs`; `update` may give others.
     inclusive : bool, default True
@@ -68,9 +68,8 @@ class VerletList:
     needed (other points, another number or type of them, a box that deformed too much), it is
     built; that is no error.
 
-    A search is so fast that a list saves less than elsewhere: nothing for the indices of many
-    neighbours in three dimensions, something where there are few, or more dimensions, or d and D
-    are wanted. ``docs/verlet.md`` has measurements.
+    A search is so fast that a list saves less than elsewhere, and only where it lasts for some
+    steps. ``docs/verlet.md`` has measurements.
 
     Several threads may use one list, one at a time: the others wait. It cannot be copied or
     pickled.
@@ -116,6 +115,7 @@ class VerletList:
         self._list = _core.verlet_new()
         self._lock = threading.RLock()
         self._is_busy = False
+        self._searched: tuple[Any, ...] | None = None  # the last step's scene, if it has no list
         self._n_builds = 0
         self._n_updates = 0
 
@@ -146,7 +146,8 @@ class VerletList:
         Returns
         -------
         bool
-            Whether the list was built again.
+            Whether the list was built again. True, too, where "auto" does without a list: then
+            pairs come in a new order in each step.
 
         Raises
         ------
@@ -173,23 +174,48 @@ class VerletList:
         periodic = self._periodic if periodic is None else periodic
         array, vectors, bits = as_scene(points, box, periodic)
         auto = self._auto
+        if auto is not None and auto.searches:
+            self._take(array, vectors, bits)
+            self._box, self._periodic = box, periodic
+            self._n_updates += 1
+            auto.searched()
+            return True
         change = auto is not None and auto.wants_change(array.shape[1])
         skin = auto.next_skin() if auto is not None else self._skin
-        start = perf_counter()
         with of_argument("cutoff + skin" if skin > 0.0 and auto is None else "cutoff"):
             rebuilt = _core.verlet_update(
                 self._list, array, self._cutoff, vectors, bits, self._inclusive, "exact",
                 self._kernel, self._memory_limit, None, self._threads, skin, change,
             )
-        taken = perf_counter() - start
+        self._searched = None
         self._box, self._periodic = box, periodic
         self._n_updates += 1
         self._n_builds += rebuilt
         if rebuilt:
             self._skin = skin
         if auto is not None:
-            auto.updated(rebuilt, taken, self._state()["tried"], array.shape[1])
+            state = _core.verlet_look(self._list)
+            auto.updated(
+                rebuilt, state["tried"], state["ndim"], state["n_points"], state["n_listed"]
+            )
         return rebuilt
+
+    def _take(self, array: Any, vectors: Any, bits: int) -> None:
+        """Keep the points of a step that has no list. What `pairs` refuses is refused here."""
+        points = np.array(array)
+        checked = points[:0] if np.isfinite(points).all() else points
+        self._search((checked, vectors, bits), "ij", False, 8, None)
+        self._searched = (points, vectors, bits)
+        self._list = _core.verlet_new()  # its memory may be large
+
+    def _search(
+        self, scene: tuple[Any, ...], quantities: str, sort: bool, index_bytes: int, out: Any
+    ) -> Any:
+        points, vectors, bits = scene
+        return _core.pairs(
+            points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
+            self._memory_limit, None, self._threads, quantities, sort, index_bytes, out,
+        )
 
     @overload
     def pairs(
@@ -223,7 +249,8 @@ class VerletList:
             that of the list: first those whose points were in one image when the list was built,
             then the others, each as found then. It stays the same until the list is built again,
             but for the pairs that come and go, and is the same for any kernel and number of
-            threads. With `sort` it is ascending (i, j, S).
+            threads. Where "auto" does without a list it is that of `halfshell.pairs`. With `sort`
+            it is ascending (i, j, S).
 
         Raises
         ------
@@ -243,16 +270,14 @@ class VerletList:
         ([0, 0], [1, 2], [[0, 0], [-1, 0]])
         """
         with _Alone(self):
-            state = self._state()
-            start = perf_counter()
-            arrays = _core.verlet_pairs(
-                self._list, np.empty((0, state["ndim"])), self._cutoff, None, 0, self._inclusive,
-                "exact", self._kernel, self._memory_limit, None, self._threads, quantities,
-                as_flag(sort, "sort"), as_index_bytes(index_dtype), out,
+            wanted = (quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out)
+            if self._searched is not None:
+                return self._search(self._searched, *wanted)
+            return _core.verlet_pairs(
+                self._list, np.empty((0, self._state()["ndim"])), self._cutoff, None, 0,
+                self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
+                *wanted,
             )
-            if self._auto is not None:
-                self._auto.used(perf_counter() - start)
-            return arrays
 
     @property
     def cutoff(self) -> float:
@@ -268,13 +293,18 @@ class VerletList:
     def margin(self) -> float:
         """By how much pairs may still come closer before the list is built again, rounded down.
 
-        In the unit of the points; never negative. RuntimeError before the first `update`.
+        In the unit of the points; never negative; 0 without a list. RuntimeError before the first
+        `update`.
         """
+        if self._searched is not None:
+            return 0.0
         return float(self._state()["margin"])
 
     @property
     def n_points(self) -> int:
         """Number of points of the last step; 0 before the first."""
+        if self._searched is not None:
+            return len(self._searched[0])
         return int(_core.verlet_look(self._list)["n_points"])
 
     @property

@@ -14,7 +14,7 @@ import pytest
 
 import halfshell as hs
 from checkout import ROOT
-from halfshell._objects.skin import MOST_CHANGES, AutoSkin
+from halfshell._objects.skin import MOST_CHANGES, SEARCHES, AutoSkin
 from oracles import BOX_KINDS, random_box, same_arrays
 
 
@@ -562,38 +562,88 @@ def test_lists_are_not_copied():
 # ---- the skin that is chosen ---------------------------------------------------------------
 
 
-def run_auto(auto, build, use, a_step, n_steps):
-    """A list whose times and movements are known; returns the skins it had."""
+def run_auto(auto, n_points, found, a_step, n_steps):
+    """A list of known pairs and movements; returns the skins it had, None without a list."""
     spent, skins = math.inf, []
     for _ in range(n_steps):
+        if auto.searches:
+            auto.searched()
+            skins.append(None)
+            spent = math.inf
+            continue
         change = auto.wants_change(3)
         spent += a_step
         rebuilt = change or spent > auto.skin
         skin = auto.next_skin() if rebuilt else auto.skin
-        volume = (auto.cutoff + skin) ** 3
-        margin = -math.inf if change else auto.skin - spent
+        margin = -math.inf if change or spent == math.inf else auto.skin - spent
         spent = 0.0 if rebuilt else spent
-        auto.updated(rebuilt, build * volume, margin, 3)
-        auto.used(use * volume)
+        listed = round(found * (1.0 + skin / auto.cutoff) ** 3)
+        auto.updated(rebuilt, margin, 3, n_points, listed)
         skins.append(auto.skin)
     return skins
 
 
-@pytest.mark.parametrize("build", [0.5, 3.0, 50.0])
-@pytest.mark.parametrize("a_step", [0.0, 1e-5, 1e-3, 0.02, 0.2, 3.0])
-def test_automatic_skins_settle_near_the_best(build, a_step):
+@pytest.mark.parametrize("found", [6, 26, 210])
+@pytest.mark.parametrize("a_step", [0.0, 1e-5, 1e-3, 0.01])
+def test_automatic_skins_settle_near_the_best(found, a_step):
     auto = AutoSkin(2.0)
-    skins = run_auto(auto, build, 1.0, a_step, 3000)
+    skins = run_auto(auto, 10_000, 10_000 * found, a_step, 3000)
     assert auto.is_settled
     assert len(list(itertools.groupby(skins))) <= MOST_CHANGES + 1
     assert len(set(skins[-1000:])) == 1
+    times = [auto.list_time(2.0 * 2.0 ** (k / 4.0), a_step, 3) for k in range(-40, 1)]
+    assert auto.list_time(skins[-1], a_step, 3) <= 1.25 * min(times)
+    assert min(times) < auto.search_time(3)
 
-    def cost(skin):
-        steps = max(1.0, skin / a_step) if a_step else math.inf
-        return (2.0 + skin) ** 3 * (build / steps + 1.0)
 
-    best = min(cost(2.0 * 2.0 ** (k / 4.0)) for k in range(-40, 1))
-    assert cost(skins[-1]) <= 1.25 * best
+def test_points_that_move_fast_are_searched():
+    """Until a list is tried again, which it is now and then."""
+    auto = AutoSkin(2.0)
+    skins = run_auto(auto, 10_000, 260_000, 0.2, 2 * SEARCHES + 100)
+    runs = [(skin, len(list(group))) for skin, group in itertools.groupby(skins)]
+    assert [count for skin, count in runs if skin is None][:2] == [SEARCHES, SEARCHES]
+    assert sum(count for skin, count in runs if skin is not None) < 60
+
+
+def test_pairs_without_a_list_are_those_of_a_search(rng):
+    """The same arrays, the same refusals, and the points of the step whatever happens to them."""
+    points = rng.random((20_000, 3))
+    pair_list = hs.VerletList(0.08, box=[1.0] * 3)
+    with_list = 0
+    for _ in range(12):
+        rebuilt = pair_list.update(points)
+        with_list += pair_list.margin > 0.0
+        check(pair_list, points, [1.0] * 3)
+        assert pair_list.n_points == len(points)
+        last = points.copy()
+        points += rng.normal(0.0, 0.01, points.shape)
+    assert rebuilt and pair_list.margin == 0.0 and 0 < with_list < 12
+    found = pair_list.pairs(quantities="ijdDS")
+    searched = hs.pairs(last, 0.08, box=[1.0] * 3, quantities="ijdDS")
+    for own, other in zip(found, searched, strict=True):
+        np.testing.assert_array_equal(own, other)
+    bad = last.copy()
+    bad[7, 1] = np.nan
+    with pytest.raises(ValueError, match="7"):
+        pair_list.update(bad)
+    with pytest.raises(ValueError, match="box"):
+        pair_list.update(last, box=[[1.0, 0, 0], [1.0, 0, 0], [0, 0, 1.0]])
+    np.testing.assert_array_equal(pair_list.pairs()[0], found[0])
+
+
+def test_automatic_lists_come_in_the_same_order_in_every_run():
+    def run():
+        rng = np.random.default_rng(5)
+        points = rng.random((500, 3))
+        pair_list = hs.VerletList(0.15, box=[1.0] * 3)
+        for _ in range(150):
+            pair_list.update(points)
+            points = points + rng.normal(0.0, 0.002, points.shape)
+        return pair_list.skin, pair_list.n_builds, np.stack(pair_list.pairs())
+
+    one, other = run(), run()
+    assert one[:2] == other[:2]
+    np.testing.assert_array_equal(one[2], other[2])
 
 
 def test_pairs_do_not_depend_on_the_automatic_skin(rng):
