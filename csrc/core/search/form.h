@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * form.h: how a block is scanned. Its extent decides the form of the scan and its thresholds; groups
+ * form.h: how a block is scanned. Its extent decides form and thresholds of the scan; groups
  * of a search have few extents, and what follows from each is kept.
  */
 #ifndef HS_FORM_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_reach.c: candidates that are left out because they are far from the box of a group are beyond
+ * test_reach.c: candidates left out because they are far from the box of a group are beyond
  * the cutoff of all its points, in floating-point systems so small that every number can be tried.
  */
 #include "../../../csrc/core/exact/filter.h"
