@@ -88,7 +88,7 @@ shifts_beyond_the_integers_are_told(void)
         failure.row = -1;
         CHECK(hs_pieces_find(search, &pieces, &failure) == (beyond ? HS_ERR_SHIFT_RANGE : HS_OK));
         CHECK(beyond ? failure.row >= 0 && failure.row < 40
-                     : pieces.n == 1 && pieces.of[0].n_shifted > 10);
+                     : pieces.n == 1 && pieces.of[0].shifted.pairs.n_pairs > 10);
         if (!beyond)
             hs_pieces_free(&search->call->account, &pieces);
         search_unit_close(&unit);

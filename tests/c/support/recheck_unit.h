@@ -14,6 +14,7 @@ typedef struct recheck_unit {
     hs_call    call;
     hs_verlet  list;
     hs_recheck recheck;
+    hs_output  output; /* fixed, so that batches are measured */
     int32_t    order[RECHECK_POINTS];
     int64_t    counts[RECHECK_POINTS * 3], jumps[RECHECK_POINTS * 3];
     int32_t    images[RECHECK_IMAGES * 3];
@@ -33,6 +34,7 @@ recheck_unit_open(const hs_points *points, const hs_box *box, double cutoff, uns
     options.want = want;
     options.threads = 1;
     hs_call_begin(&options, &unit->call);
+    unit->call.kernel = hs_kernel_select(NULL);
     CHECK(hs_frame_take(points, box, &options, &unit->list.frames[0], &failure) == HS_OK);
     for (int a = 0; a < points->n; a++)
         unit->order[a] = (int32_t)points->n - 1 - a;
@@ -41,6 +43,8 @@ recheck_unit_open(const hs_points *points, const hs_box *box, double cutoff, uns
     recheck->list = &unit->list;
     recheck->now = &unit->list.frames[0];
     recheck->call = &unit->call;
+    unit->output.fixed = true;
+    recheck->output = &unit->output;
     recheck->d = points->ndim;
     recheck->m = hs_frame_periodic(recheck->now, recheck->vector_of_row);
     for (int r = 0; r < recheck->m; r++)
@@ -65,6 +69,8 @@ recheck_unit_close(recheck_unit *unit)
     hs_free(account, recheck->image);
     hs_free(account, recheck->lag);
     hs_free(account, recheck->lagging);
+    hs_free(account, recheck->few);
+    hs_free(account, recheck->of_a);
     hs_frame_free(&unit->list.frames[0]);
     CHECK(account->held == 0);
     hs_account_close(account);

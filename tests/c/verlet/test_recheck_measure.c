@@ -45,7 +45,7 @@ check_vectors(const double *x, const hs_box *box)
                 double expected[3];
                 given_vector(x, box, i, j, image, expected);
                 for (int k = 0; k < d; k++) {
-                    double D = of->x[j * d + k] - of->x[i * d + k];
+                    double D = of->x[j * of->width + k] - of->x[i * of->width + k];
                     for (int r = 0; r < m; r++)
                         D += (double)(of->image[image * m + r] + of->lag[j * m + r] -
                                       of->lag[i * m + r]) *
@@ -106,18 +106,52 @@ open_points_have_no_lag(void)
     recheck_unit_open(&points, NULL, 1.0, HS_WANT_DISTANCE, &unit);
     CHECK(hs_recheck_open_scene(&unit.recheck, &failure) == HS_OK);
     for (int a = 0; a < N; a++)
-        CHECK(unit.recheck.x[a] == x[N - 1 - a]);
+        CHECK(unit.recheck.x[a * unit.recheck.width] == x[N - 1 - a]);
     recheck_unit_close(&unit);
 }
 
-/* More pairs than one batch holds, of which some are hits: distances and vectors of these, one
- * behind another, from the place that the slab has in the output. */
+/* Bundles of a slab that has more hits than a batch: each point with all others but the one that is
+ * left out, in each image. Returns their number. */
+static int32_t
+make_bundles(bool plain, hs_bundle *bundles, hs_sifted *slab)
+{
+    enum { ROUNDS = 2 };
+    int32_t n = 0;
+    memset(slab, 0, sizeof *slab);
+    for (; n < ROUNDS * N * IMAGES; n++) {
+        const int32_t a = n % N;
+        for (int32_t p = 1; p < N; p++) {
+            if (p != 1 + n % 4)
+                slab->hits[slab->n_hits++] = (a + p) % N;
+        }
+        bundles[n] = (hs_bundle){.end = (n + 1) * (N - 1), .point = a, .image = n / N % IMAGES};
+        bundles[n].image = plain ? 0 : bundles[n].image;
+        slab->hits_end[n] = slab->n_hits;
+    }
+    slab->n = n * (N - 1);
+    slab->bundles = bundles;
+    slab->n_bundles = n;
+    return n;
+}
+
+/* D of hit h of a bundle, from the lower number to the higher. */
+static void
+vector_of_hit(const double *x, const hs_box *box, const hs_bundle *bundle, int32_t b, double *D)
+{
+    const int32_t a = bundle->point;
+    given_vector(x, box, a, b, bundle->image, D);
+    for (int k = 0; k < unit.recheck.d && unit.order[b] < unit.order[a]; k++)
+        D[k] = -D[k];
+}
+
+/* Distances and vectors of hits, one behind another, from the place that the slab has in the
+ * output. */
 static void
 hits_are_measured_in_their_order(void)
 {
-    enum { PAIRS = 2 * HS_BATCH + 3, AT = 5 };
-    static int32_t   i[PAIRS], j[PAIRS], code[PAIRS];
+    enum { AT = 5 };
     static hs_sifted slab;
+    static hs_bundle bundles[2 * N * IMAGES];
     const hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{16.0}, {0.0, 16.0}}};
     const double     x[2 * N] = {0.0, 0.0, 1.0, 0.5, 2.0, 17.0, 3.0, 1.5, 20.0, 2.0, 5.0, -2.5};
     const hs_points  points = {x, N, 2, HS_FLOAT64, 16, 8};
@@ -129,32 +163,22 @@ hits_are_measured_in_their_order(void)
         unit.images[7] = -1;
         hs_output_init(&unit.call.account, 2, HS_WANT_DISTANCE | HS_WANT_VECTOR, 4, &output);
         unit.recheck.output = &output;
-        CHECK(hs_output_reserve(&output, PAIRS + AT, 0.0) == HS_OK);
-        memset(&slab, 0, sizeof slab);
-        for (int e = 0; e < PAIRS; e++) {
-            i[e] = e % N;
-            j[e] = (e / N + 1) % N;
-            code[e] = plain ? 0 : e % IMAGES;
-            if (e % 5 != 3)
-                slab.hits[slab.n_hits++] = (uint16_t)e;
-        }
-        unit.list.listing.i = i;
-        unit.list.listing.j = j;
-        unit.list.listing.code = code;
-        unit.list.listing.n_plain = plain ? PAIRS : 0;
-        slab.n = PAIRS;
+        const int32_t n = make_bundles(plain, bundles, &slab);
+        CHECK(hs_output_reserve(&output, slab.n_hits + AT, 0.0) == HS_OK);
+        unit.list.listing.n_plain = plain ? slab.n : 0;
         slab.at = AT;
         CHECK(hs_recheck_open_scene(&unit.recheck, &failure) == HS_OK);
         hs_recheck_measure(&unit.recheck, &slab);
         const double *distance = hs_recheck_column(&unit.recheck, HS_WANT_DISTANCE, AT);
         const double *vector = hs_recheck_column(&unit.recheck, HS_WANT_VECTOR, AT);
         int           wrong = 0;
-        for (int h = 0; h < slab.n_hits; h++) {
-            double    D[3];
-            const int e = slab.hits[h];
-            given_vector(x, &box, i[e], j[e], code[e], D);
-            wrong += vector[2 * h] != D[0] || vector[2 * h + 1] != D[1];
-            wrong += fabs(distance[h] - hypot(D[0], D[1])) > 1e-14 * distance[h];
+        for (int32_t of = 0, h = 0; of < n; of++) {
+            for (; h < slab.hits_end[of]; h++) {
+                double D[3];
+                vector_of_hit(x, &box, &bundles[of], slab.hits[h], D);
+                wrong += vector[2 * h] != D[0] || vector[2 * h + 1] != D[1];
+                wrong += fabs(distance[h] - hypot(D[0], D[1])) > 1e-14 * distance[h];
+            }
         }
         CHECK(wrong == 0 && slab.n_hits > HS_BATCH);
         hs_output_free(&output);

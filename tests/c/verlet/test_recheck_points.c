@@ -17,7 +17,8 @@ points_in(const double *x, int ndim)
     return (hs_points){x, N, ndim, HS_FLOAT64, ndim * 8, 8};
 }
 
-/* In the order of the list, from the middle of all, in steps of 4 and 8 floats. */
+/* In the order of the list, from the middle of all, in steps of 4 and 8 floats, of which the last
+ * has the bits of the number. */
 static void
 points_are_floats_around_their_middle(void)
 {
@@ -30,7 +31,11 @@ points_are_floats_around_their_middle(void)
         recheck_unit_open(&points, NULL, 1.0, HS_WANT_J, &unit);
         CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK && unit.recheck.counts == NULL);
         for (int a = 0; a < N; a++) {
-            for (int k = 0; k < stride; k++) {
+            const int32_t number = N - 1 - a;
+            const int     last = hs_sift_has_numbers(d) ? stride - 1 : stride;
+            CHECK(last == stride ||
+                  memcmp(&unit.recheck.y[a * stride + last], &number, sizeof number) == 0);
+            for (int k = 0; k < last; k++) {
                 const double centre = k < d ? 0.5 * (x[k] + x[(N - 1) * d + k]) : 0.0;
                 const double at = k < d ? x[(N - 1 - a) * d + k] : 0.0;
                 CHECK(unit.recheck.y[a * stride + k] == (float)(at - centre));
@@ -113,7 +118,7 @@ check_thresholds(double largest, double offset, double size, double error)
 {
     const hs_recheck *of = &unit.recheck;
     const double      cutoff = of->given.cutoff, roundings = (2 * of->m + 2) * 0x1p-53;
-    const double      more = 0x1p-24 * (2.0 * largest + offset) + roundings * size;
+    const double      more = 0x1p-24 * (largest + offset) + roundings * size;
     for (int slack = 0; slack < 2; slack++) { /* no narrower, and not much wider */
         const double        factor = slack ? 1.25 : 1.0;
         const hs_thresholds plain = hs_thresholds_of(of->d, cutoff, 2.0 * largest, factor * error);
