@@ -168,6 +168,73 @@ much_that_is_held_back_waits(void)
     }
 }
 
+/* Parts behind a range that another thread works on stay, in order, when those before it go. */
+static void
+parts_behind_a_gap_stay(void)
+{
+    enum { GAP = 3, END = 8 };
+    static collector first, gap, all;
+    hs_output        output;
+    hs_failure       failure;
+    hs_output_init(NULL, 3, HS_WANT_J, 4, &output);
+    hs_commits *commits = hs_commits_new(NULL, &output, END);
+    open_collector(commits, &first);
+    open_collector(commits, &gap);
+    open_collector(commits, &all);
+    for (int64_t range = 1; range < END - 1; range++) {
+        if (range == END - 2) {
+            CHECK(all.committer.n_parts == END - 4);
+            first.committer.range = 0;
+            CHECK(collect(&first, 0, 0, pairs_of(0), true) == HS_OK);
+        }
+        if (range != GAP) {
+            all.committer.range = range;
+            CHECK(collect(&all, range, 0, pairs_of(range), true) == HS_OK);
+        }
+    }
+    CHECK(hs_commits_written(commits) == GAP && all.committer.n_parts == END - 2 - GAP);
+    for (int p = 0; p < all.committer.n_parts; p++) {
+        CHECK(all.committer.parts[p].range == GAP + 1 + p);
+    }
+    gap.committer.range = GAP;
+    CHECK(collect(&gap, GAP, 0, pairs_of(GAP), true) == HS_OK);
+    CHECK(gap.committer.n_parts == 0 && hs_commits_written(commits) == GAP + 1);
+    all.committer.range = END - 1;
+    CHECK(collect(&all, END - 1, 0, pairs_of(END - 1), true) == HS_OK);
+    CHECK(all.committer.n_parts == 0 && is_in_order(&output, END));
+    CHECK(hs_commits_end(NULL, commits, &failure) == HS_OK);
+    hs_output_free(&first.pairs);
+    hs_output_free(&gap.pairs);
+    hs_output_free(&all.pairs);
+    hs_output_free(&output);
+}
+
+/* Exactly enough pairs are enough: no range is begun then. */
+static void
+enough_is_a_number_of_pairs(void)
+{
+    enum { LAST = 5 };
+    for (int more = 0; more < 2; more++) {
+        static collector one;
+        hs_output        output;
+        hs_failure       failure;
+        int64_t          n = more;
+        for (int64_t range = 0; range <= LAST; range++) {
+            n += pairs_of(range);
+        }
+        hs_output_init(NULL, 3, HS_WANT_J, 4, &output);
+        hs_commits *commits = hs_commits_new(NULL, &output, RANGES);
+        hs_commits_limit(commits, n, INT64_MAX);
+        open_collector(commits, &one);
+        hs_commits_work(&one.committer, collect_range, &one);
+        CHECK(hs_commits_written(commits) == LAST + 1 + more);
+        CHECK(is_in_order(&output, LAST + 1 + more));
+        CHECK(hs_commits_end(NULL, commits, &failure) == HS_OK);
+        hs_output_free(&one.pairs);
+        hs_output_free(&output);
+    }
+}
+
 /* Range 1 is begun before range 0 fails, and goes on until it hears of that. */
 static hs_mutex  mutex;
 static bool      later_is_begun;
@@ -226,5 +293,7 @@ test_in_turn(void)
 {
     RUN(ranges_come_in_order);
     RUN(much_that_is_held_back_waits);
+    RUN(parts_behind_a_gap_stay);
+    RUN(enough_is_a_number_of_pairs);
     RUN(the_earliest_failure_is_told);
 }

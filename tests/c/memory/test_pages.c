@@ -124,6 +124,20 @@ growing_blocks_move(void)
     }
 }
 
+/* Advice for a part makes two of one mapping, and the system moves only one. */
+static void
+blocks_of_two_kinds_of_pages_grow(void)
+{
+    void  *mapping;
+    size_t length;
+    char  *block = hs_pages_reserve(8 * MB, &mapping, &length);
+    fill(block, 8 * MB);
+    hs_pages_advise(block, block + 4 * MB, true);
+    char *grown = hs_pages_grow(16 * MB, &mapping, &length);
+    CHECK(grown != NULL && length >= 16 * MB && holds(grown != NULL ? grown : block, 8 * MB));
+    hs_pages_free(mapping, length);
+}
+
 /* What the system does not take back is empty at least. */
 static void
 cut_without_mappings(void)
@@ -218,6 +232,7 @@ test_pages(void)
     RUN(blocks_are_aligned_and_zero);
     RUN(what_cannot_be_had_is_refused);
     RUN(growing_blocks_move);
+    RUN(blocks_of_two_kinds_of_pages_grow);
     RUN(cuts_may_be_refused);
     RUN(chunks_that_cannot_grow_stay);
     RUN(chunks_in_parts_are_copied);

@@ -177,6 +177,8 @@ few_blocks_are_kept(void)
     for (int k = 0; k < MANY; k++)
         hs_buffer_free(results[k]);
     CHECK(hs_pool_held() == HS_POOL_CHUNKS * 2 * MB);
+    hs_pool_set_limit(HS_POOL_CHUNKS * 2 * MB); /* removes nothing that it allows */
+    CHECK(hs_pool_held() == HS_POOL_CHUNKS * 2 * MB);
     /* The oldest ones went. */
     for (int k = 0; k < HS_POOL_CHUNKS; k++) {
         hs_region region = {0};

@@ -132,6 +132,30 @@ there_may_be_no_image_in_reach(void)
     near_unit_close(&unit);
 }
 
+/* So far off, a quotient may err by more than the room that is left near the box. */
+static void
+room_grows_with_the_number_of_the_image(void)
+{
+    const double    x[2] = {0.0, 0.0};
+    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points points = points_in(x, 1, 2);
+    hs_near_images  images;
+    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_near_group group = near_unit_group(&unit, 0.375 - 0x1p-12);
+    unit.search.scene.lower[0] = unit.search.scene.upper[0] = 0.0;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        group.t_lower[0] = group.t_upper[0] = sign * (0x1p29 - 0.375);
+        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+        CHECK(images.count == 1.0 && images.low[0] == sign * (INT64_C(1) << 29));
+        group.t_lower[0] = group.t_upper[0] = sign * (0x1p29 + 0.375);
+        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+        CHECK(images.count == 1.0 && images.low[0] == sign * (INT64_C(1) << 29));
+        group.t_lower[0] = group.t_upper[0] = sign * 0.375;
+        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK && images.count == 0.0);
+    }
+    near_unit_close(&unit);
+}
+
 static void
 more_images_than_can_be_counted_are_refused(void)
 {
@@ -237,6 +261,7 @@ test_nearest_images(void)
     RUN(errors_of_box_vectors_add_up);
     RUN(images_in_reach_are_met_once);
     RUN(there_may_be_no_image_in_reach);
+    RUN(room_grows_with_the_number_of_the_image);
     RUN(more_images_than_can_be_counted_are_refused);
     RUN(images_that_drift_make_more_images);
     RUN(layers_are_upright);

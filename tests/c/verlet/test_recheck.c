@@ -247,9 +247,38 @@ what_is_counted_adds_up(void)
     CHECK(ambiguous > 1000);
 }
 
+/* x^2 + y^2 is beside (x + 1)^2 by less than the last place of any low word. */
+static void
+what_integers_decide_is_counted(void)
+{
+    harness_random random = {31};
+    int64_t        by_integers = 0;
+    for (int trial = 0; trial < 300; trial++) {
+        const double    x = floor(ldexp(1.0 + random_unit(&random), 52)) - 1.0;
+        const double    at[4] = {0.0, 0.0, x, sqrt(2.0 * x + 1.0)};
+        const hs_points points = {at, 2, 2, HS_FLOAT64, 16, 8};
+        hs_options      options = hs_options_default();
+        hs_counters     counters;
+        hs_verlet      *list = hs_verlet_new();
+        hs_pairs       *pairs = NULL;
+        bool            rebuilt;
+        options.cutoff = x + 1.0;
+        CHECK(hs_verlet_update(list, &points, NULL, &options, 0.25 * x, false, &rebuilt, NULL) ==
+              HS_OK);
+        options.counters = &counters;
+        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
+        CHECK(counters.ambiguous == 1 && counters.by_integers >= 0);
+        by_integers += counters.by_integers;
+        hs_pairs_free(pairs);
+        hs_verlet_free(list);
+    }
+    CHECK(by_integers > 0);
+}
+
 void
 test_recheck(void)
 {
+    RUN(what_integers_decide_is_counted);
     RUN(what_is_counted_adds_up);
     RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
     RUN(digits_that_scaling_would_lose_are_kept);
