@@ -210,7 +210,7 @@ class VerletList:
 
     def _search(
         self, scene: tuple[Any, ...], quantities: str, sort: bool, index_bytes: int, out: Any
-    ) -> Any:
+    ) -> Arrays:
         points, vectors, bits = scene
         return _core.pairs(
             points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
