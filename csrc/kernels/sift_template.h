@@ -80,8 +80,8 @@ sift_bundles(hs_sift *sift, const int ndim, const bool shifted, const bool numbe
             if (HS_UNLIKELY(maybe != 0)) {
                 note_open(sift, t, pair, near, maybe, at);
             }
-            at += append_integers(sift->hits + at,
-                                  numbers ? bits_of(last) : load_integers(sift->j + e), near);
+            at +=
+                append(sift->hits + at, numbers ? bits_of(last) : load_integers(sift->j + e), near);
         }
         e = end;
         sift->hits_end[t] = at;

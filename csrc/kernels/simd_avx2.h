@@ -71,16 +71,6 @@ append(int32_t *dst, integers a, mask m)
     return (int32_t)_mm_popcnt_u32(m);
 }
 
-/* The same for labels in a register. */
-HS_ALWAYS_INLINE int32_t
-append_integers(int32_t *dst, integers all, mask m)
-{
-    const __m128i bytes = _mm_loadl_epi64((const __m128i *)&packed_lanes[m]);
-    _mm256_storeu_si256((__m256i *)dst,
-                        _mm256_permutevar8x32_epi32(all, _mm256_cvtepu8_epi32(bytes)));
-    return (int32_t)_mm_popcnt_u32(m);
-}
-
 /* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)

@@ -49,14 +49,6 @@ append(int32_t *dst, integers a, mask m)
     _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(a, m, a));
     return (int32_t)_mm_popcnt_u32(m);
 }
-/* The same for labels in a register. */
-HS_ALWAYS_INLINE int32_t
-append_integers(int32_t *dst, integers all, mask m)
-{
-    _mm512_storeu_si512(dst, _mm512_mask_compress_epi32(all, m, all));
-    return (int32_t)_mm_popcnt_u32(m);
-}
-
 /* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)

@@ -76,15 +76,6 @@ append(int32_t *dst, integers a, mask m)
     return (int32_t)popcount(m);
 }
 
-/* The same for labels in a register. */
-HS_ALWAYS_INLINE int32_t
-append_integers(int32_t *dst, integers a, mask m)
-{
-    const uint8x16_t all = vreinterpretq_u8_s32(a);
-    vst1q_s32(dst, vreinterpretq_s32_u8(vqtbl1q_u8(all, vld1q_u8(packed_bytes[m]))));
-    return (int32_t)popcount(m);
-}
-
 /* Packs the floats of the lanes in m to dst, writing LANES entries. */
 HS_ALWAYS_INLINE void
 append_floats(float *dst, floats a, mask m)

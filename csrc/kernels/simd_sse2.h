@@ -47,7 +47,7 @@ popcount(mask m)
 }
 /* Packs the lanes in m to dst, writing up to LANES entries; returns how many count. */
 HS_ALWAYS_INLINE int32_t
-append_integers(int32_t *dst, integers a, mask m)
+append(int32_t *dst, integers a, mask m)
 {
     int32_t lane[LANES], n = 0;
     _mm_storeu_si128((__m128i *)lane, a);
