@@ -5,11 +5,6 @@
  * target region. Defines gather (hs_gather_fn), emit_int32 and emit_int64 (hs_emit_fn).
  */
 
-/* Bytes from a pair to where memory is prefetched for later ones, so that their stores find it in
- * the cache. */
-#define AHEAD 1024
-#define LINE  64 /* bytes that are fetched at once */
-
 /* Largest magnitude of n floats. */
 HS_ALWAYS_INLINE integers
 largest_of(const float *y, int32_t n, integers largest)
@@ -136,12 +131,9 @@ gather(hs_gather *gather, hs_run *runs, int32_t n)
 HS_ALWAYS_INLINE void
 put(void *column, int32_t at, integers entries, const bool wide)
 {
-    const size_t    width = wide ? sizeof(int64_t) : sizeof(int32_t);
-    char           *to = (char *)column + (size_t)at * width;
-    const uintptr_t ahead = (uintptr_t)to + AHEAD; /* may lie behind the column */
-    for (size_t line = 0; line < LANES * width; line += LINE) {
-        HS_PREFETCH_WRITE((void *)(ahead + line));
-    }
+    const size_t width = wide ? sizeof(int64_t) : sizeof(int32_t);
+    char        *to = (char *)column + (size_t)at * width;
+    hs_prefetch_later(to, LANES * width);
     if (wide) {
         store_wide((int64_t *)(void *)to, entries);
     } else {

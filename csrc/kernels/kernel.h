@@ -50,6 +50,22 @@ hs_pad_lanes(float *y, int32_t n)
     memset(y + n, 0, HS_PADDING * sizeof(float));
 }
 
+/* Bytes from a pair to where memory is prefetched for later ones, so that their stores find it in
+ * the cache; and bytes that are fetched at once. */
+#define HS_PREFETCH_AHEAD 1024
+#define HS_PREFETCH_LINE  64
+
+/* As many bytes are about to be written there: prefetches those of later pairs, which may lie
+ * behind the column. */
+HS_ALWAYS_INLINE void
+hs_prefetch_later(const void *to, size_t bytes)
+{
+    const uintptr_t ahead = (uintptr_t)to + HS_PREFETCH_AHEAD;
+    for (size_t line = 0; line < bytes; line += HS_PREFETCH_LINE) {
+        HS_PREFETCH_WRITE((void *)(ahead + line));
+    }
+}
+
 /* The thresholds of one point in the expanded form. */
 HS_ALWAYS_INLINE hs_thresholds
 hs_expanded_thresholds(hs_expanded expanded, const float *centre, const int ndim)

@@ -21,9 +21,6 @@
 #define ROOT_ERROR   0x1p-80 /* relative, of |D|; 2^-82.8 is proven */
 #define LEAST_SQUARE 0x1p-120
 
-/* Bytes from where pairs are written to where memory is prefetched. */
-enum { AHEAD = 1024 };
-
 /* Of LANES hits of one point. */
 typedef struct lanes {
     places number; /* of the candidate */
@@ -167,7 +164,7 @@ put_distances(const hs_write *write, int64_t e, reals distance)
     const reals d = multiply(multiply(distance, broadcast(write->first)), broadcast(write->second));
     const truth below = is_below(d, broadcast(write->cutoff));
     store(write->distance + e, choose(below, d, broadcast(write->largest)));
-    HS_PREFETCH_WRITE((char *)(write->distance + e) + AHEAD);
+    hs_prefetch_later(write->distance + e, LANES * sizeof(double));
 }
 
 /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
@@ -188,9 +185,7 @@ put_vectors(const hs_write *write, int64_t e, const lanes *of, const int ndim)
     } else {
         put_three_reals(to, restored(write, of, 0), restored(write, of, 1), restored(write, of, 2));
     }
-    for (size_t byte = 0; byte < LANES * sizeof *to * (size_t)ndim; byte += 64) {
-        HS_PREFETCH_WRITE((char *)to + AHEAD + byte);
-    }
+    hs_prefetch_later(to, LANES * sizeof *to * (size_t)ndim);
 }
 
 HS_ALWAYS_INLINE void
@@ -206,9 +201,7 @@ put_shifts(const hs_write *write, int64_t e, const lanes *of, const int ndim)
     } else {
         put_three_places(to, S[0], S[1], S[2]);
     }
-    for (size_t byte = 0; byte < LANES * sizeof *to * (size_t)ndim; byte += 64) {
-        HS_PREFETCH_WRITE((char *)to + AHEAD + byte);
-    }
+    hs_prefetch_later(to, LANES * sizeof *to * (size_t)ndim);
 }
 
 HS_ALWAYS_INLINE void
@@ -222,7 +215,7 @@ put_index(void *column, int index_bytes, int64_t e, places number)
     } else {
         put_places((int32_t *)column + e, number);
     }
-    HS_PREFETCH_WRITE((char *)column + e * index_bytes + AHEAD);
+    hs_prefetch_later((char *)column + e * index_bytes, LANES * (size_t)index_bytes);
 }
 
 HS_ALWAYS_INLINE bool
