@@ -66,6 +66,24 @@ hs_measures_unscale(const hs_scene *scene)
     return scene->extreme ? same : scene->unscale; /* then the metric has the caller's unit */
 }
 
+/* The largest distance that is within the cutoff. */
+static double
+largest_within(double cutoff, bool inclusive)
+{
+    return inclusive ? cutoff : nextafter(cutoff, 0.0);
+}
+
+void
+hs_measures_tell(const hs_scene *scene, const hs_options *options, hs_write *write)
+{
+    const hs_scale unscale = hs_measures_unscale(scene);
+    const bool     is_exact = options->precision == HS_EXACT;
+    write->first = unscale.first;
+    write->second = unscale.second;
+    write->cutoff = is_exact ? options->cutoff : INFINITY;
+    write->largest = is_exact ? largest_within(options->cutoff, options->inclusive) : INFINITY;
+}
+
 void
 hs_restore_distances(double *distance, int32_t n, hs_scale unscale)
 {
@@ -77,7 +95,7 @@ hs_restore_distances(double *distance, int32_t n, hs_scale unscale)
 void
 hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive)
 {
-    const double largest = inclusive ? cutoff : nextafter(cutoff, 0.0);
+    const double largest = largest_within(cutoff, inclusive);
     for (int32_t e = 0; e < n; e++) {
         distance[e] = distance[e] < cutoff ? distance[e] : largest;
     }

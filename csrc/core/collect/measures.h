@@ -49,6 +49,10 @@ void hs_measure_pairs(const hs_kernel *kernel, const hs_metric *metric, const hs
 /* From the unit of the scene's metric to the caller's. */
 hs_scale hs_measures_unscale(const hs_scene *scene);
 
+/* What a writer is told of the caller's unit, and of the limit that distances of an exact search do
+ * not pass. */
+void hs_measures_tell(const hs_scene *scene, const hs_options *options, hs_write *write);
+
 /* Each of n distances in the caller's unit, none beyond the cutoff: hs_keep_within. */
 void hs_restore_distances(double *distance, int32_t n, hs_scale unscale);
 void hs_keep_all_within(double *distance, int32_t n, double cutoff, bool inclusive);

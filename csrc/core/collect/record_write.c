@@ -6,7 +6,6 @@
 
 #include "measures.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Whether hits of this search can be written so, to these columns. */
@@ -21,33 +20,20 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
            !search->scene.extreme && search->scene.metric.floats_usable;
 }
 
-/* Whether any of n points was wrapped. */
-static bool
-are_turned(const hs_turns *turns, int n_rows, int32_t first, int32_t n)
-{
-    int32_t any = 0;
-    for (int r = 0; turns->known && r < n_rows; r++) {
-        for (int32_t t = first; t < first + n; t++) {
-            any |= turns->narrow[r][t];
-        }
-    }
-    return any != 0;
-}
-
-/* What candidates and points are, of the hits of n points from `first` on. */
+/* What candidates and points are, of the hits of points from `first` on. */
 static void
-describe(const hs_scanner *scanner, int32_t first, int32_t n, hs_write *write)
+describe(const hs_scanner *scanner, int32_t first, hs_write *write)
 {
     const hs_search  *search = scanner->search;
     const hs_trace   *trace = &scanner->trace;
     const hs_bins    *asking = hs_search_asking(search);
     const hs_lattice *lattice = &search->scene.lattice;
-    const bool        turned = are_turned(&asking->turns, lattice->n_periodic, first, n);
+    const bool        turned = asking->turns.known;
     write->by_S = search->bins.keeps_originals;
-    write->is_shifted = trace->of.has_images || (write->by_S && (trace->of.has_turns || turned));
+    write->is_shifted = trace->of.has_images || write->by_S;
     write->q = trace->of.q;
     write->image = trace->of.has_images ? trace->of.image : NULL;
-    write->few = trace->of.has_turns ? trace->of.few : NULL;
+    write->few = search->bins.turns.known ? trace->of.few : NULL;
     for (int k = 0; k < search->scene.ndim; k++) {
         write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
     }
@@ -74,9 +60,7 @@ hs_status
 hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits,
               bool *written)
 {
-    const hs_search  *search = scanner->search;
-    const hs_options *options = &search->call->options;
-    const hs_scale    unscale = hs_measures_unscale(&search->scene);
+    const hs_search *search = scanner->search;
     *written = false;
     if (!can_write(recorder, scanner)) {
         return HS_OK;
@@ -84,18 +68,10 @@ hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const h
     if (hs_records_load(&scanner->trace.of, true) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
-    hs_write write = {.ndim = search->scene.ndim,
-                      .is_half = !search->is_full,
-                      .metric = &search->scene.metric,
-                      .first = unscale.first,
-                      .second = unscale.second,
-                      .cutoff = INFINITY,
-                      .largest = INFINITY};
-    if (options->precision == HS_EXACT) {
-        write.cutoff = options->cutoff;
-        write.largest = options->inclusive ? options->cutoff : nextafter(options->cutoff, 0.0);
-    }
-    describe(scanner, first, hits->n, &write);
+    hs_write write = {
+        .ndim = search->scene.ndim, .is_half = !search->is_full, .metric = &search->scene.metric};
+    hs_measures_tell(&search->scene, &search->call->options, &write);
+    describe(scanner, first, &write);
     memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));
     direct(recorder, &write);
     *written = search->call->kernel->write(&write, hits);

@@ -159,9 +159,9 @@ look_up_narrow(hs_trace *trace)
     const bool      as_given = trace->search->bins.keeps_originals;
     const hs_turns *turns = &hs_search_asking(trace->search)->turns;
     const int32_t  *place = trace->place, *si = trace->si;
-    const int32_t  *few = trace->of.has_turns    ? trace->of.few
-                          : trace->of.has_images ? trace->of.image
-                                                 : NULL;
+    const int32_t  *few = trace->search->bins.turns.known ? trace->of.few
+                          : trace->of.has_images          ? trace->of.image
+                                                          : NULL;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
         int32_t *to = trace->shift[r];
         for (int32_t e = 0; e < trace->n; e++) {

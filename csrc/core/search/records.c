@@ -59,7 +59,6 @@ hs_records_init(hs_search *search, const hs_block *block, const hs_options *poll
     *records = (hs_records){.search = search, .block = block, .polls = polls, .width = width};
     records->needs_given = needs_given || search->bins.keeps_originals;
     records->is_narrow = is_narrow(search);
-    records->has_turns = search->bins.turns.known;
     const bool shifts = has_rows && records->needs_given;
     if (!new_array(account, true, n, sizeof(double), (void **)&records->q) ||
         !new_array(account, has_rows, n, sizeof(int32_t), (void **)&records->image) ||
@@ -205,7 +204,7 @@ hs_records_load(hs_records *records, bool metric)
     }
     records->has_images = has_images(records);
     const bool images = records->has_images;
-    given = given && (records->has_turns || !records->is_narrow);
+    given = given && (records->search->bins.turns.known || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;
         if (n == 0) { /* all of it was left out */

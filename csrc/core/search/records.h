@@ -20,12 +20,11 @@ typedef struct hs_records {
                                * bits of the candidate's number */
     int32_t          *image; /* shift over B, of X; not set without images */
     int64_t          *turned; /* `image` less the turns by which the candidate was wrapped; ... */
-    int32_t          *few;    /* ... as int32, when is_narrow; not set without turns */
+    int32_t          *few;    /* ... as int32, when is_narrow; not set where turns are not known */
     bool              needs_given; /* turned or few are set */
     bool              is_narrow;   /* all S of the scene are few */
     bool has_metric, has_given;    /* arrays are the block's: q and image; turned or few */
     bool has_images;               /* some candidate is in another image */
-    bool has_turns;                /* points may have been wrapped */
 } hs_records;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */

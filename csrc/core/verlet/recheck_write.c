@@ -114,31 +114,26 @@ describe_points(const hs_recheck *recheck, const hs_sifted *slab, bool shifted, 
 bool
 hs_recheck_write(const hs_recheck *recheck, hs_sifted *slab)
 {
-    const hs_options *options = &recheck->call->options;
-    const hs_scale    unscale = hs_measures_unscale(&recheck->scene);
-    const bool        shifted = hs_sifted_has_images(recheck, slab) || recheck->few != NULL;
-    hs_write          write = {
-                 .ndim = recheck->d,
-                 .is_half = true,
-                 .is_shifted = shifted,
-                 .by_S = true,
-                 .metric = &recheck->scene.metric,
-                 .q = recheck->x,
-                 .few = recheck->few,
-                 .first = unscale.first,
-                 .second = unscale.second,
-                 .cutoff = options->cutoff,
-                 .largest = options->inclusive ? options->cutoff : nextafter(options->cutoff, 0.0),
-                 .index_bytes = recheck->output->index_bytes,
-                 .i = hs_recheck_column(recheck, HS_WANT_I, slab->at),
-                 .j = hs_recheck_column(recheck, HS_WANT_J, slab->at),
-                 .distance = hs_recheck_column(recheck, HS_WANT_DISTANCE, slab->at),
-                 .vector = hs_recheck_column(recheck, HS_WANT_VECTOR, slab->at),
+    const bool shifted = hs_sifted_has_images(recheck, slab) || recheck->few != NULL;
+    hs_write   write = {
+          .ndim = recheck->d,
+          .is_half = true,
+          .is_shifted = shifted,
+          .by_S = true,
+          .metric = &recheck->scene.metric,
+          .q = recheck->x,
+          .few = recheck->few,
+          .index_bytes = recheck->output->index_bytes,
+          .i = hs_recheck_column(recheck, HS_WANT_I, slab->at),
+          .j = hs_recheck_column(recheck, HS_WANT_J, slab->at),
+          .distance = hs_recheck_column(recheck, HS_WANT_DISTANCE, slab->at),
+          .vector = hs_recheck_column(recheck, HS_WANT_VECTOR, slab->at),
     };
     const hs_hits hits = {.n = slab->n_bundles,
                           .point = recheck->of_a->number,
                           .end = slab->hits_end,
                           .label = slab->hits};
+    hs_measures_tell(&recheck->scene, &recheck->call->options, &write);
     describe_points(recheck, slab, shifted, &write);
     memset(slab->hits + slab->n_hits, 0, HS_PADDING * sizeof *slab->hits);
     return recheck->call->kernel->write(&write, &hits);
