@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* record.c: i and j by the kernel; what is measured follows in batches (record_measures.h). */
+/* record.c: all columns at once if the writer can; else i and j by the kernel, then what is
+ * measured in batches. */
 #include "record.h"
 
 #include "record_measures.h"
 #include "record_write.h"
+
+#define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 
 /* i and j side by side. */
 static void
@@ -38,8 +41,8 @@ put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits 
     }
 }
 
-static hs_status
-record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+hs_status
+hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     const int32_t   n = hits->end[hits->n - 1];
     const int32_t  *id = scanner->block.id;
@@ -49,11 +52,13 @@ record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const h
     if (status != HS_OK || written) {
         return status;
     }
-    for (int32_t h = 0; h < n; h++) {
-        recorder->ids[h] = id[hits->label[h]];
+    if (!scanner->search->is_full || (recorder->columns & INDICES)) {
+        for (int32_t h = 0; h < n; h++) {
+            recorder->ids[h] = id[hits->label[h]];
+        }
+        by_id.label = recorder->ids;
+        put_indices(recorder, scanner->search->call->kernel, &by_id);
     }
-    by_id.label = recorder->ids;
-    put_indices(recorder, scanner->search->call->kernel, &by_id);
     return hs_put_measures(recorder, scanner, first, hits);
 }
 
@@ -65,7 +70,7 @@ hs_record_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits 
     const int32_t n = hits->end[hits->n - 1];
     hs_status     status = hs_output_reserve(output, n, hs_scanner_fraction(scanner));
     if (status == HS_OK && scanner->use == HS_BLOCK_LISTS_PLACES) {
-        status = record_places(recorder, scanner, first, hits);
+        status = hs_record_places(recorder, scanner, first, hits);
     } else if (status == HS_OK) {
         put_indices(recorder, scanner->search->call->kernel, hits);
     }

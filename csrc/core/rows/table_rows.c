@@ -4,8 +4,7 @@
 #include "table_rows.h"
 
 #include "../base/outcome.h"
-#include "../collect/record_measures.h"
-#include "../collect/record_write.h"
+#include "../collect/record.h"
 
 #include <string.h>
 
@@ -104,14 +103,9 @@ own_place(const hs_scanner *scanner)
 static hs_status
 fill_part(hs_filler *fill, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    bool written = false;
     fill->part.n_pairs = 0;
-    hs_status status = hs_output_reserve(&fill->part, hits->end[hits->n - 1], 0.0);
-    if (status == HS_OK) {
-        status = hs_write_hits(&fill->recorder, scanner, first, hits, &written);
-    }
-    return status == HS_OK && !written ? hs_put_measures(&fill->recorder, scanner, first, hits)
-                                       : status;
+    const hs_status status = hs_output_reserve(&fill->part, hits->end[hits->n - 1], 0.0);
+    return status == HS_OK ? hs_record_places(&fill->recorder, scanner, first, hits) : status;
 }
 
 /* How many of n numbers are below this one. Not by halving, though they ascend: its branches cost
