@@ -5,46 +5,13 @@
 #include "../../../csrc/core/box/lattice.h"
 #include "../../../csrc/core/cells/sparse_grid.h"
 #include "../../../csrc/core/cells/stencil.h"
-#include "../support/harness.h"
 #include "../support/pair_checks.h"
 
 #include <math.h>
 
+#include "../support/grid_unit.h"
+
 void test_grid_ranges(void);
-
-enum { N = 3000 };
-
-static double     x[2 * N];
-static hs_account account;
-static hs_scene   scene;
-static hs_grid    grid;
-
-static void
-open_scene(int64_t n, const hs_box *box, double cutoff)
-{
-    const hs_points points = {x, n, 2, HS_FLOAT64, 16, 8};
-    hs_options      options = hs_options_default();
-    hs_failure      failure;
-    options.cutoff = cutoff;
-    hs_account_init(&account, &options);
-    CHECK(hs_scene_init(&account, NULL, &points, box, &options, &scene, &failure) == HS_OK);
-    CHECK(hs_grid_init(&scene, &grid, &failure) == HS_OK);
-}
-
-static void
-close_scene(void)
-{
-    hs_scene_free(&account, &scene);
-    CHECK(account.held == 0);
-}
-
-static void
-fill_square(double side)
-{
-    harness_random random = {88};
-    for (int e = 0; e < 2 * N; e++)
-        x[e] = side * random_unit(&random);
-}
 
 /* Normals that miss the periods by 0.3 of one: ranges grow with the number of images, which grows
  * with the ranges. */
