@@ -113,7 +113,7 @@ def verify(
         part of the scene is of the wrong kind.
     ValueError
         If `i`, `j` and `S` do not fit each other or the points, a table is of other points, or of
-        queries and these are not given, `full` is asked of two sets, or the scene is refused by
+        queries and these are not given, `full` is given for two sets, or the scene is refused by
         `pairs`.
     OverflowError, MemoryError
         As `pairs`, for the right list.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Points in cells as the methods of `CellList` share them: how the core is asked about them."""
+"""Points in cells as the methods of `CellList` share them, and what the core takes for them."""
 
 from __future__ import annotations
 

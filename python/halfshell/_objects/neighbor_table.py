@@ -183,7 +183,7 @@ class NeighborTable(TableRows):
         AttributeError
             If the table lacks a quantity that is needed.
         ValueError
-            If `quantities` has other letters, or `half` is asked of a table of queries.
+            If `quantities` has other letters, or `half` is set for a table of queries.
 
         Examples
         --------

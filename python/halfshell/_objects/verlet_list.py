@@ -342,7 +342,7 @@ class _Alone:
     def __enter__(self) -> None:
         owner = self._owner
         owner._lock.acquire()
-        if owner._is_busy:  # a signal handler, called while the core asks for signals
+        if owner._is_busy:  # a signal handler, called while the core looks for signals
             owner._lock.release()
             raise RuntimeError("this VerletList is in the middle of another call")
         owner._is_busy = True

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a library that lists pairs is asked, and what is known about it.
+"""What the adapter of a library that lists pairs is given, and what is known about the library.
 
 An adapter runs its library on one thread, in the cheapest mode that gives the same answer:
-half lists where there are any, indices alone where only indices are asked for, and input of
+half lists where there are any, indices alone where only indices are wanted, and input of
 the type that the library works on, converted beforehand. Whatever a caller has to do for each
 new set of points (building a tree or a grid) is part of the call.
 

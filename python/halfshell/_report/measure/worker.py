@@ -49,7 +49,7 @@ def receive(stream: IO[bytes]) -> Any:
 
 
 def _limit_memory() -> None:
-    """Make a library that asks for too much fail, before the system ends somebody."""
+    """Make a library that allocates too much fail, before the system ends a process."""
     try:
         import resource
 
