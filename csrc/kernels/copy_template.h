@@ -39,7 +39,7 @@ gather_lanes(const hs_gather *gather, const hs_run *run, int64_t si, const int n
 
 /* Those that are not surely far from the box. Never fused: every kernel leaves out the same. */
 HS_ALWAYS_INLINE mask
-near_lanes(const gathered *these, const hs_near_box *box, const int ndim)
+near_lanes(const gathered *these, const hs_nearest_box *box, const int ndim)
 {
     floats s = broadcast(0.0f);
     for (int k = 0; k < ndim; k++) {

@@ -127,10 +127,10 @@ typedef struct hs_run {
 } hs_run;
 
 /* A box that candidates must be near to. */
-typedef struct hs_near_box {
+typedef struct hs_nearest_box {
     float low[HS_MAX_DIM], high[HS_MAX_DIM];
     float out; /* largest square of the distance; with infinity all are near */
-} hs_near_box;
+} hs_nearest_box;
 
 /* Where gathered candidates come from and go to; all arrays borrowed. */
 typedef struct hs_gather {
@@ -141,7 +141,7 @@ typedef struct hs_gather {
     float         *norm;          /* room for all candidates and HS_PADDING more */
     int32_t       *id;            /* room for all candidates and HS_PADDING more */
     int32_t       *number;        /* in cell order; room as in id */
-    hs_near_box    near;          /* candidates that are not near it are left out */
+    hs_nearest_box near;          /* candidates that are not near it are left out */
     int32_t        n;             /* candidates so far */
     uint32_t       largest;       /* bits of the largest |y| so far; infinity and NaN are largest */
 } hs_gather;
@@ -156,35 +156,35 @@ typedef struct hs_gather {
 typedef void (*hs_gather_fn)(hs_gather *gather, hs_run *runs, int32_t n);
 
 /* Candidates that are consecutive points in tree order, in one image. */
-typedef struct hs_near_run {
+typedef struct hs_nearest_run {
     int32_t at, n; /* place of the first, and how many */
     int32_t si;    /* its number in tree order */
     int32_t image;
-} hs_near_run;
+} hs_nearest_run;
 
-typedef struct hs_near_image {
+typedef struct hs_nearest_image {
     int32_t shift[HS_MAX_DIM]; /* over the rows of B */
     double  moved[HS_MAX_DIM]; /* what it adds to X */
     bool    is_home;           /* no shift */
-} hs_near_image;
+} hs_nearest_image;
 
 /* Where candidates for the nearest come from and go to; all arrays borrowed. */
 typedef struct hs_relate {
-    int                  ndim;
-    const double        *x[HS_MAX_DIM]; /* points in tree order; HS_PADDING more may be read */
-    const hs_near_image *images;
-    double               centre[HS_MAX_DIM];
-    double               unit; /* a power of two: lengths times this */
-    double               extent;
-    float               *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
-    float               *norm;          /* room for all candidates and HS_PADDING more */
-    int32_t             *number;        /* room for all candidates and HS_PADDING more */
+    int                     ndim;
+    const double           *x[HS_MAX_DIM]; /* points in tree order; HS_PADDING more may be read */
+    const hs_nearest_image *images;
+    double                  centre[HS_MAX_DIM];
+    double                  unit; /* a power of two: lengths times this */
+    double                  extent;
+    float                  *y[HS_MAX_DIM]; /* room for all candidates and HS_PADDING more */
+    float                  *norm;          /* room for all candidates and HS_PADDING more */
+    int32_t                *number;        /* room for all candidates and HS_PADDING more */
 } hs_relate;
 
 /* Copies n runs, each of at least one point: y_k = (float)(((x_k + moved_k) - centre_k) * unit),
  * but no further from 0 than extent, each operation rounded once; norm = sum of y_k^2, fused or
  * not; number = that in tree order. Entries past the last may be overwritten. */
-typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_near_run *runs, int32_t n);
+typedef void (*hs_relate_fn)(const hs_relate *relate, const hs_nearest_run *runs, int32_t n);
 
 /* Boxes, and the one that they are near to; all arrays borrowed. */
 typedef struct hs_boxes {

@@ -11,7 +11,7 @@ HS_TARGET_BEGIN("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,popcnt")
 #include "simd_avx512.h"
 
 #include "copy_template.h"
-#include "near_template.h"
+#include "nearest_template.h"
 #include "scan_template.h"
 #include "sift_template.h"
 

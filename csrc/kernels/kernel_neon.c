@@ -9,7 +9,7 @@
 #include "simd_neon.h"
 
 #include "copy_template.h"
-#include "near_template.h"
+#include "nearest_template.h"
 #include "scan_template.h"
 #include "sift_template.h"
 

@@ -197,8 +197,8 @@ gather_points(const hs_gather *gather, const hs_run *run, int32_t at, int32_t n)
 static bool
 is_near(const hs_gather *gather, int32_t c)
 {
-    const hs_near_box *box = &gather->near;
-    float              s = 0.0f;
+    const hs_nearest_box *box = &gather->near;
+    float                 s = 0.0f;
     for (int k = 0; k < gather->ndim; k++) {
         const float below = box->low[k] - gather->y[k][c], above = gather->y[k][c] - box->high[k];
         const float most = below > above ? below : above;
@@ -289,10 +289,10 @@ emit_int64(const hs_hits *hits, void *i, void *j)
 }
 
 static void
-relate(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs)
+relate(const hs_relate *relate, const hs_nearest_run *runs, int32_t n_runs)
 {
     const float extent = (float)relate->extent;
-    for (const hs_near_run *run = runs; run < runs + n_runs; run++) {
+    for (const hs_nearest_run *run = runs; run < runs + n_runs; run++) {
         float *HS_RESTRICT   norm = relate->norm + run->at;
         int32_t *HS_RESTRICT number = relate->number + run->at;
         for (int k = 0; k < relate->ndim; k++) {

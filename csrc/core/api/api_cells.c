@@ -82,7 +82,7 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
         return hs_end_early(HS_ERR_MEMORY, options, failure);
     }
     cells->copy = NULL;
-    cells->trees = hs_near_kept_new();
+    cells->trees = hs_nearest_kept_new();
     cells->has_box = box != NULL;
     if (box != NULL) {
         cells->box = *box;
@@ -105,7 +105,7 @@ hs_cells_free(hs_cells *cells)
     hs_search_close(&cells->search);
     hs_free(&cells->call.account, cells->copy);
     hs_account_close(&cells->call.account);
-    hs_near_kept_free(cells->trees);
+    hs_nearest_kept_free(cells->trees);
     hs_free(NULL, cells);
 }
 

@@ -7,13 +7,13 @@
 #include "../search/search.h"
 
 struct hs_cells {
-    hs_call       call;   /* that built them; its account holds them */
-    hs_search     search; /* open, never walked itself: calls borrow from it */
-    hs_points     points; /* of `copy` */
-    hs_box        box;
-    bool          has_box;
-    double       *copy;  /* owned; points as given, for cutoffs and queries that need other cells */
-    hs_near_kept *trees; /* owned; a search for the nearest needs a tree, not cells */
+    hs_call   call;   /* that built them; its account holds them */
+    hs_search search; /* open, never walked itself: calls borrow from it */
+    hs_points points; /* of `copy` */
+    hs_box    box;
+    bool      has_box;
+    double   *copy; /* owned; points as given, for cutoffs and queries that need other cells */
+    hs_nearest_kept *trees; /* owned; a search for the nearest needs a tree, not cells */
 };
 
 #endif

@@ -6,7 +6,7 @@
 
 /* Room for k entries for each asking point. */
 static hs_status
-make_room(hs_near *near, int64_t n_asking, hs_failure *failure)
+make_room(hs_nearest *near, int64_t n_asking, hs_failure *failure)
 {
     const double n = (double)n_asking * (double)near->k;
     if (n < 0x1p62 && hs_output_reserve(near->rows, n_asking * near->k, 0.0) == HS_OK) {
@@ -20,25 +20,25 @@ make_room(hs_near *near, int64_t n_asking, hs_failure *failure)
 }
 
 static hs_status
-find_nearest(hs_near *near, const hs_sets *sets, const hs_box *box, hs_failure *failure)
+find_nearest(hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_failure *failure)
 {
     hs_search    *search = near->search;
     const int64_t n_asking = sets->queries != NULL ? sets->queries->n : sets->points->n;
     const double  limit = search->call->options.cutoff;
     hs_status     status = make_room(near, n_asking, failure);
     if (status == HS_OK) {
-        status = hs_near_prepare(near, sets, box, limit, failure);
+        status = hs_nearest_prepare(near, sets, box, limit, failure);
     }
     if (status == HS_OK) { /* rows are written in the order of the tree */
         status = hs_touch_output(search->call->team, &search->call->options, near->rows);
     }
     if (status == HS_OK) {
-        status = hs_near_search(near, failure);
+        status = hs_nearest_search(near, failure);
     }
     if (status == HS_ERR_MEMORY) {
         failure->limit_bytes = search->call->account.limit;
     }
-    hs_near_release(near);
+    hs_nearest_release(near);
     hs_search_close(search);
     return status;
 }
@@ -79,12 +79,12 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
         return HS_ERR_MEMORY;
     }
     hs_search_begin(&rows->call, &search);
-    hs_near   near = {.search = &search,
-                      .k = k,
-                      .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
-                      .omits_self = sets->queries == NULL,
-                      .rows = &rows->output};
-    hs_status status = check_nearest(sets, request.box, k, &of_rows, failure);
+    hs_nearest near = {.search = &search,
+                       .k = k,
+                       .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
+                       .omits_self = sets->queries == NULL,
+                       .rows = &rows->output};
+    hs_status  status = check_nearest(sets, request.box, k, &of_rows, failure);
     if (status == HS_OK) {
         hs_pairs_open(rows, sets->points->ndim);
         status = find_nearest(&near, sets, request.box, failure);

@@ -11,7 +11,7 @@
 #include "../memory/account_shared.h"
 #include "tree.h"
 
-typedef struct hs_near {
+typedef struct hs_nearest {
     hs_search     *search;      /* borrowed: scene, bins, call */
     hs_tree        tree;        /* of the points; owned unless the search is borrowed */
     hs_tree        asking_tree; /* owned; of the queries, if there are any */
@@ -29,10 +29,10 @@ typedef struct hs_near {
     double         layer_lower[HS_MAX_DIM], layer_upper[HS_MAX_DIM]; /* t_k of points along these */
     hs_output     *rows;                                             /* borrowed */
     hs_shared     *shared; /* owned; for what threads need more of */
-} hs_near;
+} hs_nearest;
 
 /* Asking points, or one of them, and how far they look. Lengths are the scene's. */
-typedef struct hs_near_group {
+typedef struct hs_nearest_group {
     int32_t first, last;       /* in the order of their tree */
     double  lower[HS_MAX_DIM]; /* range of X */
     double  upper[HS_MAX_DIM];
@@ -41,22 +41,22 @@ typedef struct hs_near_group {
     double  away;        /* no point is nearer than this, for the open axes alone */
     double  radius;      /* everything up to here is looked at */
     bool    is_complete; /* and beyond there is nothing that could be wanted */
-} hs_near_group;
+} hs_nearest_group;
 
 /* Images of all points, within `reach` of a group along each periodic axis. */
-typedef struct hs_near_images {
-    const hs_near *near;
-    int64_t        low[HS_MAX_DIM], high[HS_MAX_DIM]; /* shifts over each row of B */
-    int32_t        shift[HS_MAX_DIM];                 /* the present one */
-    double         moved[HS_MAX_DIM];                 /* and what it adds to X */
-    double         error; /* on each component of (X_j + moved) - X_i, but for the last rounding */
-    double         count; /* of images */
-    bool           is_first;
-} hs_near_images;
+typedef struct hs_nearest_images {
+    const hs_nearest *near;
+    int64_t           low[HS_MAX_DIM], high[HS_MAX_DIM]; /* shifts over each row of B */
+    int32_t           shift[HS_MAX_DIM];                 /* the present one */
+    double            moved[HS_MAX_DIM];                 /* and what it adds to X */
+    double error; /* on each component of (X_j + moved) - X_i, but for the last rounding */
+    double count; /* of images */
+    bool   is_first;
+} hs_nearest_images;
 
 /* Number x in units, from the centre, and no further than the extent, which nothing in reach is. */
 HS_ALWAYS_INLINE float
-hs_near_relative(double x, double centre, double unit, double extent)
+hs_nearest_relative(double x, double centre, double unit, double extent)
 {
     const double y = (x - centre) * unit;
     return (float)hs_larger(hs_smaller(y, extent), -extent);
@@ -64,75 +64,77 @@ hs_near_relative(double x, double centre, double unit, double extent)
 
 /* How many points of a leaf can be of use in one image. */
 HS_ALWAYS_INLINE int32_t
-hs_near_of_leaf(const hs_near *near, const hs_tree_node *node)
+hs_nearest_of_leaf(const hs_nearest *near, const hs_tree_node *node)
 {
     const int32_t n = node->end - node->first;
     return node->is_spot && n > near->of_spot ? near->of_spot : n;
 }
 
 /* Measures `drift`, of the rows of B. */
-void hs_near_measure_drift(hs_near *near);
+void hs_nearest_measure_drift(hs_nearest *near);
 
 /* Measures the range of points along open axes, once they are in tree order. */
-void hs_near_measure_layer(hs_near *near);
+void hs_nearest_measure_layer(hs_nearest *near);
 
 /* HS_ERR_MEMORY when there are more images than memory could hold points. */
-hs_status hs_near_images_start(const hs_near *near, const hs_near_group *group,
-                               hs_near_images *images);
+hs_status hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
+                                  hs_nearest_images *images);
 
 /* The next image, as shift and moved; false when there is none. */
-bool hs_near_images_next(hs_near_images *images);
+bool hs_nearest_images_next(hs_nearest_images *images);
 
 /* Sets the group to these points and the range of their X; must come first. */
-void hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_group *group);
+void hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last,
+                          hs_nearest_group *group);
 
 /* Sets the radius: one within which about as many points are expected as are wanted, and a few
  * more; in any case not more than can be of use. */
-void hs_near_guess(const hs_near *near, hs_near_group *group);
+void hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group);
 
 /* A distance beyond which nothing is of use: that of all points, or the largest distance. In
  * periodic boxes infinity, unless there is a largest distance. */
-double hs_near_farthest(const hs_near *near, const hs_near_group *group);
+double hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group);
 
 /* The present image, as a group keeps it. */
-void hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_near_image *image);
+void hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
+                          hs_nearest_image *image);
 
 /* Owned by a thread: the least squares found so far, and what is left to look at. */
-typedef struct hs_near_bounder {
+typedef struct hs_nearest_bounder {
     double  *least; /* a heap, the largest first */
     int64_t  n, capacity;
     int32_t *stack;
     double  *gaps;  /* of the nodes on the stack */
     int64_t  depth; /* room there */
     int64_t  work;  /* since the last poll */
-} hs_near_bounder;
+} hs_nearest_bounder;
 
-hs_status hs_near_bounder_init(const hs_near *near, hs_near_bounder *bounder);
-void      hs_near_bounder_free(const hs_near *near, hs_near_bounder *bounder);
+hs_status hs_nearest_bounder_init(const hs_nearest *near, hs_nearest_bounder *bounder);
+void      hs_nearest_bounder_free(const hs_nearest *near, hs_nearest_bounder *bounder);
 
 /* Sets the radius of a group of one point so that it surely suffices, and hardly more, from a first
  * guess in it. HS_ERR_MEMORY, HS_ERR_INTERRUPTED. */
-hs_status hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *bounder,
-                        hs_near_group *group);
+hs_status hs_nearest_bound(const hs_nearest *near, const hs_options *options,
+                           hs_nearest_bounder *bounder, hs_nearest_group *group);
 
 /* Smallest radius of a group, in the scene's unit: shorter distances get no finer unit. */
-#define HS_NEAR_LEAST_RADIUS 0x1p-1000
+#define HS_NEAREST_LEAST_RADIUS 0x1p-1000
 
 /* Exponent of the radius: 2^-exponent is the unit in which it is between 1 and 2. */
-int hs_near_exponent(double radius);
+int hs_nearest_exponent(double radius);
 
 /*
  * A scene and trees, made anew or borrowed from cells that keep them: everything of `near` but k,
  * of_spot, omits_self and rows, which are set already, as is its search but for scene, bins, kernel
  * and threads. sets->trees: NULL, or what keeps a tree of the points. `limit`: the largest
- * distance. hs_near_release in any case. In nearest_prepare.c.
+ * distance. hs_nearest_release in any case. In nearest_prepare.c.
  */
-hs_status hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
-                          hs_failure *failure);
-void      hs_near_release(hs_near *near);
+hs_status hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
+                             hs_failure *failure);
+void      hs_nearest_release(hs_nearest *near);
 
 /* Writes all rows, by all threads of the team. HS_ERR_MEMORY, HS_ERR_INTERRUPTED;
  * HS_ERR_SHIFT_RANGE sets failure->row. In nearest_search.c. */
-hs_status hs_near_search(hs_near *near, hs_failure *failure);
+hs_status hs_nearest_search(hs_nearest *near, hs_failure *failure);
 
 #endif

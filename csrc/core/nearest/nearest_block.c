@@ -24,14 +24,14 @@
 
 /* Polls after a pass over all candidates, if they are many. */
 static hs_status
-poll_if_large(const hs_options *options, const hs_near_block *block)
+poll_if_large(const hs_options *options, const hs_nearest_block *block)
 {
     return block->n > HS_POLL_POINTS ? hs_poll(options, 0.0) : HS_OK;
 }
 
 /* Makes room for n candidates, and for what kernels read and write beyond. */
 static bool
-reserve(const hs_near *near, hs_near_block *block, int64_t n)
+reserve(const hs_nearest *near, hs_nearest_block *block, int64_t n)
 {
     const int64_t capacity = n + n / 2 + FIRST_CAPACITY, room = capacity + HS_PADDING;
     hs_shared    *shared = near->shared;
@@ -60,9 +60,9 @@ reserve(const hs_near *near, hs_near_block *block, int64_t n)
 }
 
 hs_status
-hs_near_block_init(const hs_near *near, hs_near_block *block)
+hs_nearest_block_init(const hs_nearest *near, hs_nearest_block *block)
 {
-    *block = (hs_near_block){.depth = near->tree.depth + 2};
+    *block = (hs_nearest_block){.depth = near->tree.depth + 2};
     return hs_shared_resize(near->shared, (void **)&block->stack, 0, block->depth,
                             sizeof *block->stack) &&
                    reserve(near, block, 0)
@@ -71,7 +71,7 @@ hs_near_block_init(const hs_near *near, hs_near_block *block)
 }
 
 void
-hs_near_block_free(const hs_near *near, hs_near_block *block)
+hs_nearest_block_free(const hs_nearest *near, hs_nearest_block *block)
 {
     for (int k = 0; k < HS_MAX_DIM; k++) {
         hs_shared_release(near->shared, (void **)&block->y[k]);
@@ -91,22 +91,23 @@ hs_near_block_free(const hs_near *near, hs_near_block *block)
 /* Images in reach. A radius that is small beside the errors of shifted coordinates is raised to
  * some multiple of these: a smaller unit would be of no use. */
 static hs_status
-start_images(const hs_near *near, hs_near_group *group, hs_near_images *images)
+start_images(const hs_nearest *near, hs_nearest_group *group, hs_nearest_images *images)
 {
-    hs_status    status = hs_near_images_start(near, group, images);
+    hs_status    status = hs_nearest_images_start(near, group, images);
     const double least = LEAST_IN_ERRORS * images->error;
     if (status == HS_OK && group->radius < least) {
         group->radius = least;
-        status = hs_near_images_start(near, group, images);
+        status = hs_nearest_images_start(near, group, images);
     }
     return status;
 }
 
 /* Unit and errors, for the group's radius. */
 static void
-settle_unit(const hs_near *near, const hs_near_group *group, double error, hs_near_block *block)
+settle_unit(const hs_nearest *near, const hs_nearest_group *group, double error,
+            hs_nearest_block *block)
 {
-    block->unit = hs_power_of_two(-hs_near_exponent(group->radius));
+    block->unit = hs_power_of_two(-hs_nearest_exponent(group->radius));
     block->reach = group->radius * block->unit;
     block->error = error * block->unit;
     /* 2 e |D| + e^2, and what underflow may lose. */
@@ -115,7 +116,7 @@ settle_unit(const hs_near *near, const hs_near_group *group, double error, hs_ne
 }
 
 static void
-relate(const hs_near *near, const double *centre, hs_near_block *block)
+relate(const hs_nearest *near, const double *centre, hs_nearest_block *block)
 {
     hs_relate relate = {.ndim = near->tree.ndim,
                         .images = block->images,
@@ -142,16 +143,16 @@ relate(const hs_near *near, const double *centre, hs_near_block *block)
 }
 
 static hs_status
-gather(const hs_near *near, const hs_options *options, const hs_near_group *group,
-       hs_near_block *block)
+gather(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
+       hs_nearest_block *block)
 {
     const hs_bins *asking = hs_search_asking(near->search);
     double         centre[HS_MAX_DIM];
     for (int k = 0; k < near->tree.ndim; k++) {
         centre[k] = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
         for (int32_t t = 0; t < group->last - group->first; t++) {
-            block->q[k][t] = hs_near_relative(asking->x[k][group->first + t], centre[k],
-                                              block->unit, block->extent);
+            block->q[k][t] = hs_nearest_relative(asking->x[k][group->first + t], centre[k],
+                                                 block->unit, block->extent);
         }
     }
     relate(near, centre, block);
@@ -160,7 +161,7 @@ gather(const hs_near *near, const hs_options *options, const hs_near_group *grou
 
 /* Largest |y| and |q| together, as floats, which round up. */
 static double
-scan_extent(const hs_near_block *block)
+scan_extent(const hs_nearest_block *block)
 {
     return 2.0 * block->extent * (1.0 + 0x1p-20);
 }
@@ -168,7 +169,7 @@ scan_extent(const hs_near_block *block)
 /* Whether squares in float32 may do: where there are hits enough for all that are wanted, but not
  * more than a kernel puts in order. */
 static void
-choose_squares(const hs_near *near, const hs_near_group *group, hs_near_block *block)
+choose_squares(const hs_nearest *near, const hs_nearest_group *group, hs_nearest_block *block)
 {
     const double extent = scan_extent(block), limit = near->limit * block->unit;
     double       in, out;
@@ -187,7 +188,8 @@ choose_squares(const hs_near *near, const hs_near_group *group, hs_near_block *b
 
 /* Unit, errors and extent; HS_TOO_MUCH: the group is too wide. */
 static hs_status
-settle_frame(const hs_near *near, const hs_near_group *group, double error, hs_near_block *block)
+settle_frame(const hs_nearest *near, const hs_nearest_group *group, double error,
+             hs_nearest_block *block)
 {
     double widest = 0.0;
     settle_unit(near, group, error, block);
@@ -201,25 +203,26 @@ settle_frame(const hs_near *near, const hs_near_group *group, double error, hs_n
 
 /* Runs and images. */
 static hs_status
-find(const hs_near *near, const hs_options *options, hs_near_group *group, double most,
-     hs_near_leaves *leaves, hs_near_block *block)
+find(const hs_nearest *near, const hs_options *options, hs_nearest_group *group, double most,
+     hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
-    hs_near_images images;
+    hs_nearest_images images;
     if (leaves != NULL && group->radius <= leaves->radius &&
         group->radius >= LEAST_IN_ERRORS * leaves->error) {
         const hs_status status = settle_frame(near, group, leaves->error, block);
-        return status == HS_OK ? hs_near_runs_take(near, group, most, leaves, block) : status;
+        return status == HS_OK ? hs_nearest_runs_take(near, group, most, leaves, block) : status;
     }
     if (start_images(near, group, &images) != HS_OK || images.count > most) {
         return most < INFINITY ? HS_TOO_MUCH : HS_ERR_MEMORY;
     }
     const hs_status status = settle_frame(near, group, images.error, block);
-    return status == HS_OK ? hs_near_runs_find(near, options, group, most, &images, block) : status;
+    return status == HS_OK ? hs_nearest_runs_find(near, options, group, most, &images, block)
+                           : status;
 }
 
 hs_status
-hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group *group,
-                   double most, hs_near_leaves *leaves, hs_near_block *block)
+hs_nearest_block_fill(const hs_nearest *near, const hs_options *options, hs_nearest_group *group,
+                      double most, hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
     hs_status status = find(near, options, group, most, leaves, block);
     if (status == HS_OK) {
@@ -233,8 +236,8 @@ hs_near_block_fill(const hs_near *near, const hs_options *options, hs_near_group
 }
 
 int32_t
-hs_near_block_scan(const hs_near *near, const hs_near_group *group, hs_near_block *block,
-                   int32_t first, int32_t *end)
+hs_nearest_block_scan(const hs_nearest *near, const hs_nearest_group *group,
+                      hs_nearest_block *block, int32_t first, int32_t *end)
 {
     const hs_kernel *kernel = near->search->call->kernel;
     const int        d = near->tree.ndim;

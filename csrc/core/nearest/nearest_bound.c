@@ -18,18 +18,18 @@
 
 /* An asking point, in one image and unit. */
 typedef struct near_probe {
-    const hs_near   *near;
-    hs_near_bounder *bounder;
-    int32_t          self;           /* the point itself is left out; -1 in other images */
-    double           at[HS_MAX_DIM]; /* its X less the image's displacement */
-    double           unit;
+    const hs_nearest   *near;
+    hs_nearest_bounder *bounder;
+    int32_t             self;           /* the point itself is left out; -1 in other images */
+    double              at[HS_MAX_DIM]; /* its X less the image's displacement */
+    double              unit;
 } near_probe;
 
 /* Largest of the k least squares, infinity as long as there are fewer. */
 static double
 worst(const near_probe *probe)
 {
-    const hs_near_bounder *bounder = probe->bounder;
+    const hs_nearest_bounder *bounder = probe->bounder;
     return bounder->n < probe->near->k ? INFINITY : bounder->least[0];
 }
 
@@ -51,8 +51,8 @@ sink(double *heap, int64_t n, double value)
 static bool
 note_square(near_probe *probe, double square)
 {
-    hs_near_bounder *bounder = probe->bounder;
-    const int64_t    k = probe->near->k;
+    hs_nearest_bounder *bounder = probe->bounder;
+    const int64_t       k = probe->near->k;
     if (bounder->n == k) {
         if (square < bounder->least[0]) {
             sink(bounder->least, k, square);
@@ -80,7 +80,7 @@ static bool
 note_leaf(near_probe *probe, const hs_tree_node *node)
 {
     const hs_bins *bins = &probe->near->search->bins;
-    const int32_t  n = hs_near_of_leaf(probe->near, node);
+    const int32_t  n = hs_nearest_of_leaf(probe->near, node);
     for (int32_t si = node->first; si < node->first + n; si++) {
         double square = 0.0;
         for (int k = 0; k < bins->ndim; k++) {
@@ -98,9 +98,9 @@ note_leaf(near_probe *probe, const hs_tree_node *node)
 static hs_status
 walk_image(near_probe *probe)
 {
-    const hs_tree   *tree = &probe->near->tree;
-    hs_near_bounder *bounder = probe->bounder;
-    int64_t          n_waiting = 1;
+    const hs_tree      *tree = &probe->near->tree;
+    hs_nearest_bounder *bounder = probe->bounder;
+    int64_t             n_waiting = 1;
     bounder->stack[0] = 0;
     bounder->gaps[0] = hs_tree_gap(tree, probe->at, probe->at, probe->unit);
     while (n_waiting > 0) {
@@ -130,15 +130,15 @@ walk_image(near_probe *probe)
 
 /* The k least squares among all images within group->radius, or as many as there are. */
 static hs_status
-walk_images(const hs_near *near, const hs_options *options, const hs_near_group *group,
+walk_images(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
             near_probe *probe, double *error)
 {
-    const hs_bins *bins = hs_search_asking(near->search);
-    hs_near_images images;
-    hs_status      status = hs_near_images_start(near, group, &images);
+    const hs_bins    *bins = hs_search_asking(near->search);
+    hs_nearest_images images;
+    hs_status         status = hs_nearest_images_start(near, group, &images);
     *error = images.error;
     probe->bounder->n = 0;
-    while (status == HS_OK && hs_near_images_next(&images)) {
+    while (status == HS_OK && hs_nearest_images_next(&images)) {
         int32_t any = 0;
         for (int r = 0; r < bins->n_periodic; r++) {
             any |= images.shift[r];
@@ -158,10 +158,10 @@ walk_images(const hs_near *near, const hs_options *options, const hs_near_group 
 
 /* The k least squares, in a unit in which the largest of them is an ordinary number. */
 static hs_status
-walk_scaled(const hs_near *near, const hs_options *options, const hs_near_group *group,
+walk_scaled(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
             near_probe *probe, double *error)
 {
-    int exponent = -hs_near_exponent(group->radius);
+    int exponent = -hs_nearest_exponent(group->radius);
     for (;;) {
         probe->unit = hs_power_of_two(exponent);
         const hs_status status = walk_images(near, options, group, probe, error);
@@ -181,24 +181,24 @@ walk_scaled(const hs_near *near, const hs_options *options, const hs_near_group 
 
 /* Sets the radius to all that could be of use. */
 static void
-take_all(hs_near_group *group, double farthest)
+take_all(hs_nearest_group *group, double farthest)
 {
     group->is_complete = true;
-    group->radius = hs_larger(farthest, HS_NEAR_LEAST_RADIUS);
+    group->radius = hs_larger(farthest, HS_NEAREST_LEAST_RADIUS);
 }
 
 hs_status
-hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *bounder,
-              hs_near_group *group)
+hs_nearest_bound(const hs_nearest *near, const hs_options *options, hs_nearest_bounder *bounder,
+                 hs_nearest_group *group)
 {
     const bool   is_open = near->search->scene.lattice.n_periodic == 0;
-    const double farthest = hs_near_farthest(near, group);
+    const double farthest = hs_nearest_farthest(near, group);
     near_probe   probe = {.near = near, .bounder = bounder};
     double       error, along = hs_smaller(group->radius, near->smallest_period);
     for (;;) {
         /* The radius only says which images are looked at, as yet: `along` the axes that repeat. */
         group->radius = group->away > 0.0 ? hypot(group->away, along) : along;
-        group->radius = hs_smaller(group->radius, hs_larger(farthest, HS_NEAR_LEAST_RADIUS));
+        group->radius = hs_smaller(group->radius, hs_larger(farthest, HS_NEAREST_LEAST_RADIUS));
         const hs_status status = walk_scaled(near, options, group, &probe, &error);
         if (status != HS_OK) {
             return status;
@@ -212,7 +212,7 @@ hs_near_bound(const hs_near *near, const hs_options *options, hs_near_bounder *b
         }
         if (is_all || enough <= group->radius) {
             group->is_complete = false;
-            group->radius = hs_larger(enough, HS_NEAR_LEAST_RADIUS);
+            group->radius = hs_larger(enough, HS_NEAREST_LEAST_RADIUS);
             return HS_OK;
         }
         along = 2.0 * along;

@@ -21,7 +21,7 @@
 #define IMAGES_A_NEIGHBOUR 1024.0
 
 void
-hs_near_measure_drift(hs_near *near)
+hs_nearest_measure_drift(hs_nearest *near)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     const int         d = lattice->ndim;
@@ -67,7 +67,7 @@ is_upright(const hs_lattice *lattice)
 }
 
 void
-hs_near_measure_layer(hs_near *near)
+hs_nearest_measure_layer(hs_nearest *near)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     const hs_bins    *bins = &near->search->bins;
@@ -91,7 +91,7 @@ hs_near_measure_layer(hs_near *near)
 /* How far the group looks along axes that repeat: what the distance to the layer leaves of the
  * radius. */
 static double
-reach_along(const hs_near_group *group)
+reach_along(const hs_nearest_group *group)
 {
     const double ratio = hs_smaller(group->away / group->radius, 1.0); /* squares overflow */
     return group->radius * (sqrt((1.0 - ratio) * (1.0 + ratio) + LAYER_ROOM) + UPRIGHT);
@@ -99,8 +99,8 @@ reach_along(const hs_near_group *group)
 
 /* Shifts along the row of B of axis k, at most most[r] of them; false when too many. */
 static bool
-set_range(const hs_near *near, const hs_near_group *group, int k, const double *most,
-          hs_near_images *images)
+set_range(const hs_nearest *near, const hs_nearest_group *group, int k, const double *most,
+          hs_nearest_images *images)
 {
     const hs_scene   *scene = &near->search->scene;
     const hs_lattice *lattice = &scene->lattice;
@@ -144,11 +144,12 @@ bound_error(const hs_scene *scene, const double *most)
 }
 
 hs_status
-hs_near_images_start(const hs_near *near, const hs_near_group *group, hs_near_images *images)
+hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
+                        hs_nearest_images *images)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     double            most[HS_MAX_DIM] = {0.0};
-    *images = (hs_near_images){.near = near, .count = 1.0, .is_first = true};
+    *images = (hs_nearest_images){.near = near, .count = 1.0, .is_first = true};
     /* The drift depends on the largest shifts, and these a little on the drift. */
     for (int pass = 0; pass < 3; pass++) {
         for (int k = 0; k < lattice->ndim; k++) {
@@ -171,7 +172,7 @@ hs_near_images_start(const hs_near *near, const hs_near_group *group, hs_near_im
 }
 
 bool
-hs_near_images_next(hs_near_images *images)
+hs_nearest_images_next(hs_nearest_images *images)
 {
     const hs_lattice *lattice = &images->near->search->scene.lattice;
     const int         m = lattice->n_periodic;
@@ -202,7 +203,8 @@ hs_near_images_next(hs_near_images *images)
 }
 
 void
-hs_near_image_set(const hs_near *near, const hs_near_images *images, hs_near_image *image)
+hs_nearest_image_set(const hs_nearest *near, const hs_nearest_images *images,
+                     hs_nearest_image *image)
 {
     memcpy(image->shift, images->shift, sizeof image->shift);
     memcpy(image->moved, images->moved, sizeof image->moved);

@@ -8,19 +8,19 @@
 
 #include "../base/os_thread.h"
 
-struct hs_near_kept {
-    hs_mutex  mutex; /* guards the next two; what is built does not change any more */
-    bool      is_building;
-    bool      is_built;
-    hs_near   near;
-    hs_search search; /* its own, as is its call */
-    hs_call   call;
+struct hs_nearest_kept {
+    hs_mutex   mutex; /* guards the next two; what is built does not change any more */
+    bool       is_building;
+    bool       is_built;
+    hs_nearest near;
+    hs_search  search; /* its own, as is its call */
+    hs_call    call;
 };
 
-hs_near_kept *
-hs_near_kept_new(void)
+hs_nearest_kept *
+hs_nearest_kept_new(void)
 {
-    hs_near_kept *kept = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *kept);
+    hs_nearest_kept *kept = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *kept);
     if (kept != NULL) {
         kept->is_building = kept->is_built = false;
         hs_mutex_init(&kept->mutex);
@@ -29,7 +29,7 @@ hs_near_kept_new(void)
 }
 
 void
-hs_near_kept_free(hs_near_kept *kept)
+hs_nearest_kept_free(hs_nearest_kept *kept)
 {
     if (kept == NULL) {
         return;
@@ -43,8 +43,8 @@ hs_near_kept_free(hs_near_kept *kept)
     hs_free(NULL, kept);
 }
 
-const hs_near *
-hs_near_kept_get(hs_near_kept *kept, hs_near **room)
+const hs_nearest *
+hs_nearest_kept_get(hs_nearest_kept *kept, hs_nearest **room)
 {
     hs_mutex_lock(&kept->mutex);
     const bool is_built = kept->is_built, builds = !is_built && !kept->is_building;
@@ -53,14 +53,14 @@ hs_near_kept_get(hs_near_kept *kept, hs_near **room)
     *room = NULL;
     if (builds) {
         *room = &kept->near;
-        kept->near = (hs_near){.search = &kept->search};
+        kept->near = (hs_nearest){.search = &kept->search};
         kept->search.call = &kept->call;
     }
     return is_built ? &kept->near : NULL;
 }
 
 void
-hs_near_kept_end(hs_near_kept *kept, bool done)
+hs_nearest_kept_end(hs_nearest_kept *kept, bool done)
 {
     hs_mutex_lock(&kept->mutex);
     kept->is_building = false;

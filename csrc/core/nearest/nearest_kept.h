@@ -9,19 +9,20 @@
 
 #include "nearest.h"
 
-typedef struct hs_near_kept hs_near_kept;
+typedef struct hs_nearest_kept hs_nearest_kept;
 
 /* One without a tree as yet. NULL when memory is short. */
-hs_near_kept *hs_near_kept_new(void);
-void          hs_near_kept_free(hs_near_kept *kept); /* NULL-safe */
+hs_nearest_kept *hs_nearest_kept_new(void);
+void             hs_nearest_kept_free(hs_nearest_kept *kept); /* NULL-safe */
 
 /*
  * What has been built, or NULL. *room is then NULL too, or where the caller is to build it: a
- * hs_near of zeros but for its search, which is not begun. hs_near_kept_end says how that went.
+ * hs_nearest of zeros but for its search, which is not begun. hs_nearest_kept_end says how that
+ * went.
  */
-const hs_near *hs_near_kept_get(hs_near_kept *kept, hs_near **room);
+const hs_nearest *hs_nearest_kept_get(hs_nearest_kept *kept, hs_nearest **room);
 
 /* After a failure the room must hold nothing again. */
-void hs_near_kept_end(hs_near_kept *kept, bool done);
+void hs_nearest_kept_end(hs_nearest_kept *kept, bool done);
 
 #endif

@@ -4,7 +4,7 @@
 #include "nearest_keys.h"
 
 HS_ALWAYS_INLINE bool
-is_smaller(void *context, const hs_near_key *b, const hs_near_key *a)
+is_smaller(void *context, const hs_nearest_key *b, const hs_nearest_key *a)
 {
     (void)context;
     return b->square < a->square;
@@ -16,12 +16,13 @@ is_smaller(void *context, const hs_near_key *b, const hs_near_key *a)
  * puts in order what these cannot tell: on average less than one among thirty.
  */
 static void
-sort_by_counting(hs_near_key **keys, hs_near_key **spare, int64_t n, double largest)
+sort_by_counting(hs_nearest_key **keys, hs_nearest_key **spare, int64_t n, double largest)
 {
     const int32_t padded = ((int32_t)n + 7) / 8 * 8;
-    const int32_t numbers = n <= HS_NEAR_COUNTED / 2 ? HS_NEAR_COUNTED / 2 : HS_NEAR_COUNTED;
+    const int32_t numbers = n <= HS_NEAREST_COUNTED / 2 ? HS_NEAREST_COUNTED / 2
+                                                        : HS_NEAREST_COUNTED;
     const double  steps = (double)(INT16_MAX / numbers) / largest;
-    int16_t       rough[HS_NEAR_COUNTED];
+    int16_t       rough[HS_NEAREST_COUNTED];
     for (int32_t e = 0; e < n; e++) {
         rough[e] = (int16_t)((int32_t)((*keys)[e].square * steps) * numbers + e);
     }
@@ -36,24 +37,25 @@ sort_by_counting(hs_near_key **keys, hs_near_key **spare, int64_t n, double larg
         }
         (*spare)[smaller] = (*keys)[e];
     }
-    hs_near_key *sorted = *spare;
+    hs_nearest_key *sorted = *spare;
     *spare = *keys;
     *keys = sorted;
-    hs_near_insert(NULL, *keys, n, is_smaller);
+    hs_nearest_insert(NULL, *keys, n, is_smaller);
 }
 
 void
-hs_near_sort(hs_near_pace *pace, hs_near_key **keys, hs_near_key **spare, int64_t n, double largest)
+hs_nearest_sort(hs_nearest_pace *pace, hs_nearest_key **keys, hs_nearest_key **spare, int64_t n,
+                double largest)
 {
-    if (n <= HS_NEAR_COUNTED) {
+    if (n <= HS_NEAREST_COUNTED) {
         sort_by_counting(keys, spare, n, largest);
     } else {
-        hs_near_merge(pace, NULL, *keys, *spare, n, is_smaller);
+        hs_nearest_merge(pace, NULL, *keys, *spare, n, is_smaller);
     }
 }
 
 void
-hs_near_select(hs_near_key *keys, int64_t n, int64_t wanted)
+hs_nearest_select(hs_nearest_key *keys, int64_t n, int64_t wanted)
 {
     for (int64_t low = 0, high = n - 1; low < high;) {
         const double pivot = keys[low + (high - low) / 2].square;
@@ -66,7 +68,7 @@ hs_near_select(hs_near_key *keys, int64_t n, int64_t wanted)
                 j--;
             }
             if (i <= j) {
-                const hs_near_key key = keys[i];
+                const hs_nearest_key key = keys[i];
                 keys[i++] = keys[j];
                 keys[j--] = key;
             }

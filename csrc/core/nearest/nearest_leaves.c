@@ -19,12 +19,12 @@
 #define AXIS_ERROR 0x1p-21
 
 hs_status
-hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves)
+hs_nearest_leaves_init(const hs_nearest *near, hs_nearest_leaves *leaves)
 {
     const int64_t room = MOST_LEAVES + HS_PADDING;
     hs_shared    *shared = near->shared;
     bool          done = true;
-    *leaves = (hs_near_leaves){.n = 0};
+    *leaves = (hs_nearest_leaves){.n = 0};
     for (int k = 0; done && k < near->tree.ndim; k++) {
         done = hs_shared_resize(shared, (void **)&leaves->low[k], 0, room, sizeof(float)) &&
                hs_shared_resize(shared, (void **)&leaves->high[k], 0, room, sizeof(float));
@@ -43,7 +43,7 @@ hs_near_leaves_init(const hs_near *near, hs_near_leaves *leaves)
 }
 
 void
-hs_near_leaves_free(const hs_near *near, hs_near_leaves *leaves)
+hs_nearest_leaves_free(const hs_nearest *near, hs_nearest_leaves *leaves)
 {
     hs_shared *shared = near->shared;
     for (int k = 0; k < HS_MAX_DIM; k++) {
@@ -58,16 +58,16 @@ hs_near_leaves_free(const hs_near *near, hs_near_leaves *leaves)
 }
 
 /* One group around all that do not look much further than others. */
-static hs_near_group
-unite(const hs_near_group *groups, int32_t n, int ndim)
+static hs_nearest_group
+unite(const hs_nearest_group *groups, int32_t n, int ndim)
 {
     double least = INFINITY;
     for (int32_t g = 0; g < n; g++) {
         least = hs_smaller(groups[g].radius, least);
     }
-    hs_near_group all = {.first = INT32_MAX, .away = INFINITY};
+    hs_nearest_group all = {.first = INT32_MAX, .away = INFINITY};
     for (int32_t g = 0; g < n; g++) {
-        const hs_near_group *one = &groups[g];
+        const hs_nearest_group *one = &groups[g];
         if (one->radius > FARTHEST * least) {
             continue;
         }
@@ -90,13 +90,13 @@ unite(const hs_near_group *groups, int32_t n, int ndim)
 
 /* A coordinate in units, relative to the centre of all groups. */
 HS_ALWAYS_INLINE float
-relative(const hs_near_leaves *leaves, int k, double x)
+relative(const hs_nearest_leaves *leaves, int k, double x)
 {
-    return hs_near_relative(x, leaves->centre[k], leaves->unit, leaves->extent);
+    return hs_nearest_relative(x, leaves->centre[k], leaves->unit, leaves->extent);
 }
 
 static void
-add_leaf(const hs_near *near, int32_t number, hs_near_leaves *leaves)
+add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
 {
     const hs_tree_node *node = &near->tree.nodes[number];
     const int           d = near->tree.ndim, side = (number - 1) % 2;
@@ -107,14 +107,15 @@ add_leaf(const hs_near *near, int32_t number, hs_near_leaves *leaves)
         leaves->low[k][leaves->n] = relative(leaves, k, bounds[4 * k + side] + moved[k]);
         leaves->high[k][leaves->n] = relative(leaves, k, bounds[4 * k + 2 + side] + moved[k]);
     }
-    leaves->runs[leaves->n++] = (hs_near_run){0, hs_near_of_leaf(near, node), node->first, image};
+    leaves->runs[leaves->n++] =
+        (hs_nearest_run){0, hs_nearest_of_leaf(near, node), node->first, image};
 }
 
 /* Adds the leaves of the last image whose squared distance is within `limit`; false when there are
  * too many. */
 HS_ALWAYS_INLINE bool
-find_in_image(const hs_near *near, const hs_near_group *all, double limit, hs_near_leaves *leaves,
-              const int ndim)
+find_in_image(const hs_nearest *near, const hs_nearest_group *all, double limit,
+              hs_nearest_leaves *leaves, const int ndim)
 {
     const hs_tree *tree = &near->tree;
     const double  *moved = leaves->images[leaves->n_images - 1].moved;
@@ -146,8 +147,8 @@ find_in_image(const hs_near *near, const hs_near_group *all, double limit, hs_ne
 
 /* Finds the leaves of all images within reach; false when there are too many. */
 static bool
-find_leaves(const hs_near *near, const hs_near_group *all, hs_near_images *images,
-            hs_near_leaves *leaves)
+find_leaves(const hs_nearest *near, const hs_nearest_group *all, hs_nearest_images *images,
+            hs_nearest_leaves *leaves)
 {
     const int    d = near->tree.ndim;
     const double reach =
@@ -155,10 +156,10 @@ find_leaves(const hs_near *near, const hs_near_group *all, hs_near_images *image
     const double limit = reach * reach;
     bool         fit = true;
     leaves->n = leaves->n_images = 0;
-    while (fit && hs_near_images_next(images)) {
-        const int32_t  n = leaves->n;
-        hs_near_image *image = &leaves->images[leaves->n_images++];
-        hs_near_image_set(near, images, image);
+    while (fit && hs_nearest_images_next(images)) {
+        const int32_t     n = leaves->n;
+        hs_nearest_image *image = &leaves->images[leaves->n_images++];
+        hs_nearest_image_set(near, images, image);
         switch (d) {
         case 2: fit = find_in_image(near, all, limit, leaves, 2); break;
         case 3: fit = find_in_image(near, all, limit, leaves, 3); break;
@@ -170,25 +171,25 @@ find_leaves(const hs_near *near, const hs_near_group *all, hs_near_images *image
 }
 
 void
-hs_near_leaves_find(const hs_near *near, const hs_near_group *groups, int32_t n,
-                    hs_near_leaves *leaves)
+hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *groups, int32_t n,
+                       hs_nearest_leaves *leaves)
 {
-    hs_near_images images;
-    const int      d = near->tree.ndim;
-    double         widest = 0.0;
+    hs_nearest_images images;
+    const int         d = near->tree.ndim;
+    double            widest = 0.0;
     leaves->radius = 0.0;
     if (n < 2 || near->tree.n_nodes < 2) {
         return;
     }
-    const hs_near_group all = unite(groups, n, d);
-    leaves->unit = hs_power_of_two(-hs_near_exponent(all.radius));
+    const hs_nearest_group all = unite(groups, n, d);
+    leaves->unit = hs_power_of_two(-hs_nearest_exponent(all.radius));
     for (int k = 0; k < d; k++) {
         const double width = all.upper[k] - all.lower[k];
         leaves->centre[k] = all.lower[k] + 0.5 * width;
         widest = hs_larger(width * leaves->unit, widest);
     }
     leaves->extent = 0.5 * widest + 4.0;
-    if (!(widest < WIDEST) || hs_near_images_start(near, &all, &images) != HS_OK ||
+    if (!(widest < WIDEST) || hs_nearest_images_start(near, &all, &images) != HS_OK ||
         images.count > MOST_SHARED_IMAGES || images.error * leaves->unit > ROOM) {
         return;
     }
@@ -199,8 +200,8 @@ hs_near_leaves_find(const hs_near *near, const hs_near_group *groups, int32_t n,
 }
 
 int32_t
-hs_near_leaves_list(const hs_near *near, const hs_near_group *group, double radius,
-                    hs_near_leaves *leaves)
+hs_nearest_leaves_list(const hs_nearest *near, const hs_nearest_group *group, double radius,
+                       hs_nearest_leaves *leaves)
 {
     const int    d = near->tree.ndim;
     const double reach =

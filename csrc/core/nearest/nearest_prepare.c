@@ -40,7 +40,7 @@ scene_cutoff(const hs_box *box, double limit)
 
 /* Sets the largest distance, in the scene's unit and for the metric. */
 static void
-set_limit(hs_near *near, double limit)
+set_limit(hs_nearest *near, double limit)
 {
     const hs_scene  *scene = &near->search->scene;
     const hs_metric *metric = &scene->metric;
@@ -53,25 +53,25 @@ set_limit(hs_near *near, double limit)
 /* Builds the tree of the points and measures them: all that searches with other k and other queries
  * can share. */
 static hs_status
-build_tree(hs_near *near, int32_t leaf_points)
+build_tree(hs_nearest *near, int32_t leaf_points)
 {
     hs_search       *search = near->search;
     hs_scene        *scene = &search->scene;
     const hs_metric *metric = &scene->metric;
     hs_metric_init(&near->order, scene->ndim, metric->n_rows, metric->rows, 1.0, true);
-    hs_near_measure_drift(near);
+    hs_nearest_measure_drift(near);
     const hs_status status = hs_tree_build(&search->call->account, search->call->team,
                                            &search->call->options, scene, leaf_points,
                                            &search->bins, &near->tree);
     if (status == HS_OK) {
-        hs_near_measure_layer(near);
+        hs_nearest_measure_layer(near);
     }
     return status;
 }
 
 /* Builds the tree of the queries, and frees their scene. */
 static hs_status
-build_asking_tree(hs_near *near, hs_scene *asking)
+build_asking_tree(hs_nearest *near, hs_scene *asking)
 {
     hs_search *search = near->search;
     search->has_queries = true;
@@ -84,7 +84,7 @@ build_asking_tree(hs_near *near, hs_scene *asking)
 }
 
 static hs_status
-prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
+prepare_anew(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
              hs_failure *failure)
 {
     hs_search    *search = near->search;
@@ -112,7 +112,7 @@ prepare_anew(hs_near *near, const hs_sets *sets, const hs_box *box, double limit
 
 /* Builds a tree that any later call can use: for any k, largest distance and quantities. */
 static hs_status
-build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near *room,
+build_kept(const hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_nearest *room,
            hs_failure *failure)
 {
     hs_search    *search = room->search;
@@ -146,7 +146,7 @@ build_kept(const hs_near *near, const hs_sets *sets, const hs_box *box, hs_near 
 
 /* Takes what is shared as the new search's own, and marks as borrowed what it must not free. */
 static void
-borrow(const hs_near *kept, hs_near *near)
+borrow(const hs_nearest *kept, hs_nearest *near)
 {
     hs_search *search = near->search;
     search->scene = kept->search->scene;
@@ -165,20 +165,20 @@ borrow(const hs_near *kept, hs_near *near)
 /* HS_UNSERVED when what is kept does not serve: bounds that do not hold for the queries, a scale
  * that would lose digits of the largest distance; or another thread is building it. */
 static hs_status
-prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
+prepare_from_kept(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
                   hs_failure *failure)
 {
-    hs_search *search = near->search;
-    hs_near   *room;
-    hs_scene   asking;
-    hs_status  status = HS_OK;
+    hs_search  *search = near->search;
+    hs_nearest *room;
+    hs_scene    asking;
+    hs_status   status = HS_OK;
     if (limit_is_small(limit)) {
         return HS_UNSERVED;
     }
-    const hs_near *kept = hs_near_kept_get(sets->trees, &room);
+    const hs_nearest *kept = hs_nearest_kept_get(sets->trees, &room);
     if (room != NULL) {
         status = build_kept(near, sets, box, room, failure);
-        hs_near_kept_end(sets->trees, status == HS_OK);
+        hs_nearest_kept_end(sets->trees, status == HS_OK);
         kept = room;
     }
     if (kept == NULL || status != HS_OK) {
@@ -204,8 +204,8 @@ prepare_from_kept(hs_near *near, const hs_sets *sets, const hs_box *box, double 
 }
 
 hs_status
-hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double limit,
-                hs_failure *failure)
+hs_nearest_prepare(hs_nearest *near, const hs_sets *sets, const hs_box *box, double limit,
+                   hs_failure *failure)
 {
     hs_search    *search = near->search;
     const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
@@ -222,7 +222,7 @@ hs_near_prepare(hs_near *near, const hs_sets *sets, const hs_box *box, double li
 }
 
 void
-hs_near_release(hs_near *near)
+hs_nearest_release(hs_nearest *near)
 {
     hs_account *account = &near->search->call->account;
     if (!near->search->is_borrowed) {

@@ -14,17 +14,17 @@
 #define SPREAD 3.5
 
 int
-hs_near_exponent(double radius)
+hs_nearest_exponent(double radius)
 {
-    return ilogb(hs_larger(radius, HS_NEAR_LEAST_RADIUS));
+    return ilogb(hs_larger(radius, HS_NEAREST_LEAST_RADIUS));
 }
 
 void
-hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_group *group)
+hs_nearest_group_set(const hs_nearest *near, int32_t first, int32_t last, hs_nearest_group *group)
 {
     const hs_bins    *bins = hs_search_asking(near->search);
     const hs_lattice *lattice = &near->search->scene.lattice;
-    *group = (hs_near_group){.first = first, .last = last};
+    *group = (hs_nearest_group){.first = first, .last = last};
     for (int k = 0; k < bins->ndim; k++) {
         const double *x = bins->x[k];
         double        low = x[first], high = low;
@@ -60,7 +60,7 @@ hs_near_group_set(const hs_near *near, int32_t first, int32_t last, hs_near_grou
 }
 
 double
-hs_near_farthest(const hs_near *near, const hs_near_group *group)
+hs_nearest_farthest(const hs_nearest *near, const hs_nearest_group *group)
 {
     const hs_scene *scene = &near->search->scene;
     const double    limit = near->limit * (1.0 + ROOM);
@@ -132,7 +132,7 @@ radius_of(const near_region *region, double wanted)
 /* The node around the group with at least so many points, and its sides; *away: how far from it
  * the group is. */
 static int32_t
-find_node(const hs_tree *tree, const hs_near_group *group, double least, double *sides,
+find_node(const hs_tree *tree, const hs_nearest_group *group, double least, double *sides,
           double *away)
 {
     const int d = tree->ndim;
@@ -181,7 +181,7 @@ take_box(const hs_lattice *lattice, near_region *region)
 
 /* A ball that sticks out of all points along open axes holds fewer. */
 static double
-widen_at_edges(const hs_near *near, const hs_near_group *group, double radius)
+widen_at_edges(const hs_nearest *near, const hs_nearest_group *group, double radius)
 {
     const hs_tree *tree = &near->tree;
     double         part = 1.0;
@@ -197,7 +197,7 @@ widen_at_edges(const hs_near *near, const hs_near_group *group, double radius)
 }
 
 void
-hs_near_guess(const hs_near *near, hs_near_group *group)
+hs_nearest_guess(const hs_nearest *near, hs_nearest_group *group)
 {
     const hs_tree    *tree = &near->tree;
     const hs_lattice *lattice = &near->search->scene.lattice;
@@ -214,20 +214,20 @@ hs_near_guess(const hs_near *near, hs_near_group *group)
     if (lattice->n_periodic > 0 && number == 0) {
         take_box(lattice, &region);
     }
-    const double farthest = hs_near_farthest(near, group);
+    const double farthest = hs_nearest_farthest(near, group);
     const double inside = exp2(radius_of(&region, wanted));
-    group->radius = hs_larger(widen_at_edges(near, group, inside) + away, HS_NEAR_LEAST_RADIUS);
+    group->radius = hs_larger(widen_at_edges(near, group, inside) + away, HS_NEAREST_LEAST_RADIUS);
     group->is_complete = group->radius >= farthest ||
                          (lattice->n_periodic == 0 && (double)tree->nodes[0].end <= k);
     if (group->is_complete) {
-        group->radius = hs_larger(farthest, HS_NEAR_LEAST_RADIUS);
+        group->radius = hs_larger(farthest, HS_NEAREST_LEAST_RADIUS);
     }
 }
 
 hs_status
-hs_near_bounder_init(const hs_near *near, hs_near_bounder *bounder)
+hs_nearest_bounder_init(const hs_nearest *near, hs_nearest_bounder *bounder)
 {
-    *bounder = (hs_near_bounder){.depth = near->tree.depth + 2};
+    *bounder = (hs_nearest_bounder){.depth = near->tree.depth + 2};
     return hs_shared_resize(near->shared, (void **)&bounder->stack, 0, bounder->depth,
                             sizeof *bounder->stack) &&
                    hs_shared_resize(near->shared, (void **)&bounder->gaps, 0, bounder->depth,
@@ -237,7 +237,7 @@ hs_near_bounder_init(const hs_near *near, hs_near_bounder *bounder)
 }
 
 void
-hs_near_bounder_free(const hs_near *near, hs_near_bounder *bounder)
+hs_nearest_bounder_free(const hs_nearest *near, hs_nearest_bounder *bounder)
 {
     hs_shared_release(near->shared, (void **)&bounder->least);
     hs_shared_release(near->shared, (void **)&bounder->stack);

@@ -13,7 +13,7 @@
 #define POLL_IMAGES 4096
 
 static bool
-add_image(const hs_near *near, const hs_near_image *image, hs_near_block *block)
+add_image(const hs_nearest *near, const hs_nearest_image *image, hs_nearest_block *block)
 {
     if (block->n_images == block->image_capacity) {
         const int32_t capacity = 2 * block->image_capacity + 32;
@@ -29,9 +29,9 @@ add_image(const hs_near *near, const hs_near_image *image, hs_near_block *block)
 
 /* Adds points si, ..., si + n - 1 in that image. */
 static bool
-add_points(const hs_near *near, int32_t si, int32_t n, int32_t image, hs_near_block *block)
+add_points(const hs_nearest *near, int32_t si, int32_t n, int32_t image, hs_nearest_block *block)
 {
-    hs_near_run *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
+    hs_nearest_run *last = block->n_runs > 0 ? &block->runs[block->n_runs - 1] : NULL;
     if (last != NULL && last->image == image && last->si + last->n == si) {
         last->n += n;
         block->n += n;
@@ -45,23 +45,24 @@ add_points(const hs_near *near, int32_t si, int32_t n, int32_t image, hs_near_bl
         }
         block->run_capacity = capacity;
     }
-    block->runs[block->n_runs++] = (hs_near_run){block->n, n, si, image};
+    block->runs[block->n_runs++] = (hs_nearest_run){block->n, n, si, image};
     block->n += n;
     return true;
 }
 
 /* Adds the points of a leaf, in the last image. */
 static bool
-add_leaf(const hs_near *near, const hs_tree_node *node, hs_near_block *block)
+add_leaf(const hs_nearest *near, const hs_tree_node *node, hs_nearest_block *block)
 {
-    return add_points(near, node->first, hs_near_of_leaf(near, node), block->n_images - 1, block);
+    return add_points(near, node->first, hs_nearest_of_leaf(near, node), block->n_images - 1,
+                      block);
 }
 
 /* Adds the leaves of the last image that are in reach, as runs in ascending order. low, high: the
  * group, less the image's displacement. */
 HS_ALWAYS_INLINE hs_status
-find_runs(const hs_near *near, const double *low, const double *high, double most, double reach,
-          hs_near_block *block, const int ndim)
+find_runs(const hs_nearest *near, const double *low, const double *high, double most, double reach,
+          hs_nearest_block *block, const int ndim)
 {
     const hs_tree *tree = &near->tree;
     const double   limit = reach * reach * (1.0 + ROOM);
@@ -88,8 +89,8 @@ find_runs(const hs_near *near, const double *low, const double *high, double mos
 }
 
 static hs_status
-find_in_image(const hs_near *near, const hs_near_group *group, const double *moved, double most,
-              double reach, hs_near_block *block)
+find_in_image(const hs_nearest *near, const hs_nearest_group *group, const double *moved,
+              double most, double reach, hs_nearest_block *block)
 {
     double low[HS_MAX_DIM], high[HS_MAX_DIM];
     for (int k = 0; k < near->tree.ndim; k++) {
@@ -104,17 +105,18 @@ find_in_image(const hs_near *near, const hs_near_group *group, const double *mov
 }
 
 hs_status
-hs_near_runs_find(const hs_near *near, const hs_options *options, const hs_near_group *group,
-                  double most, hs_near_images *images, hs_near_block *block)
+hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
+                     const hs_nearest_group *group, double most, hs_nearest_images *images,
+                     hs_nearest_block *block)
 {
     const double reach = block->reach * (1.0 + ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
     int          since_poll = 0;
     hs_status    status = HS_OK;
     block->n = block->n_runs = block->n_images = 0;
-    while (status == HS_OK && hs_near_images_next(images)) {
-        const int32_t n = block->n;
-        hs_near_image image;
-        hs_near_image_set(near, images, &image);
+    while (status == HS_OK && hs_nearest_images_next(images)) {
+        const int32_t    n = block->n;
+        hs_nearest_image image;
+        hs_nearest_image_set(near, images, &image);
         if (!add_image(near, &image, block)) {
             return HS_ERR_MEMORY;
         }
@@ -129,15 +131,15 @@ hs_near_runs_find(const hs_near *near, const hs_options *options, const hs_near_
 }
 
 hs_status
-hs_near_runs_take(const hs_near *near, const hs_near_group *group, double most,
-                  hs_near_leaves *leaves, hs_near_block *block)
+hs_nearest_runs_take(const hs_nearest *near, const hs_nearest_group *group, double most,
+                     hs_nearest_leaves *leaves, hs_nearest_block *block)
 {
-    const int32_t n = hs_near_leaves_list(near, group, group->radius, leaves);
+    const int32_t n = hs_nearest_leaves_list(near, group, group->radius, leaves);
     int32_t       first = 0;
     bool          is_one = true;
     block->n = block->n_runs = block->n_images = 0;
     for (int32_t l = 0; l < n; l++) {
-        const hs_near_run *leaf = &leaves->runs[leaves->hits[l]];
+        const hs_nearest_run *leaf = &leaves->runs[leaves->hits[l]];
         first = l == 0 ? leaf->image : first;
         is_one = is_one && leaf->image == first;
         if (!add_points(near, leaf->si, leaf->n, leaf->image, block)) {

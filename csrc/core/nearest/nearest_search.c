@@ -38,30 +38,30 @@ typedef struct near_part {
 } near_part;
 
 /* What the threads share. */
-typedef struct near_job {
-    hs_near   *near;
-    near_part *parts;
-    int64_t    n_parts;
-    int64_t   *ranges; /* the first part of each, and behind the last one n_parts */
-    int64_t    n_ranges;
-} near_job;
+typedef struct nearest_job {
+    hs_nearest *near;
+    near_part  *parts;
+    int64_t     n_parts;
+    int64_t    *ranges; /* the first part of each, and behind the last one n_parts */
+    int64_t     n_ranges;
+} nearest_job;
 
 /* What one thread works with; rows are written where they belong, not committed. */
-typedef struct near_worker {
-    hs_committer    committer;
-    const near_job *job;
-    hs_options      options;
-    hs_near_group   groups[RANGE_GROUPS];
-    hs_near_leaves  leaves;
-    hs_near_block   block;
-    hs_near_bounder bounder;
-    hs_near_ranker  ranker;
-    hs_near_writer  writer;
-    int64_t         n_groups, n_candidates;
-} near_worker;
+typedef struct nearest_worker {
+    hs_committer       committer;
+    const nearest_job *job;
+    hs_options         options;
+    hs_nearest_group   groups[RANGE_GROUPS];
+    hs_nearest_leaves  leaves;
+    hs_nearest_block   block;
+    hs_nearest_bounder bounder;
+    hs_nearest_ranker  ranker;
+    hs_nearest_writer  writer;
+    int64_t            n_groups, n_candidates;
+} nearest_worker;
 
 static hs_status
-fail_shift(near_worker *worker)
+fail_shift(nearest_worker *worker)
 {
     worker->committer.failure.row = worker->writer.failed;
     worker->committer.failure.in_queries = worker->job->near->search->has_queries;
@@ -70,20 +70,20 @@ fail_shift(near_worker *worker)
 
 /* Ranks and writes one point's hits; *done: whether the group's radius sufficed. */
 static hs_status
-finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_t begin,
+finish_point(nearest_worker *worker, const hs_nearest_group *group, int32_t si, int32_t begin,
              int32_t end, bool *done)
 {
-    const hs_near_block *block = &worker->block;
-    const int32_t       *hits = block->hits + begin;
-    int64_t              count;
-    hs_status            status = HS_OK;
-    if (!block->has_squares || !hs_near_rank_fast(&worker->ranker, si, hits, block->squares + begin,
-                                                  end - begin, &count)) {
-        status = hs_near_rank(&worker->ranker, group, si, hits, end - begin, &count);
+    const hs_nearest_block *block = &worker->block;
+    const int32_t          *hits = block->hits + begin;
+    int64_t                 count;
+    hs_status               status = HS_OK;
+    if (!block->has_squares || !hs_nearest_rank_fast(&worker->ranker, si, hits,
+                                                     block->squares + begin, end - begin, &count)) {
+        status = hs_nearest_rank(&worker->ranker, group, si, hits, end - begin, &count);
     }
     *done = count >= 0;
     if (status == HS_OK && *done) {
-        status = hs_near_write(&worker->writer, &worker->ranker, count);
+        status = hs_nearest_write(&worker->writer, &worker->ranker, count);
         status = status == HS_ERR_SHIFT_RANGE ? fail_shift(worker) : status;
     }
     return status;
@@ -91,21 +91,21 @@ finish_point(near_worker *worker, const hs_near_group *group, int32_t si, int32_
 
 /* Does the points of a filled block; bit t of *left: point t of the group is not done. */
 static hs_status
-finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
+finish_block(nearest_worker *worker, const hs_nearest_group *group, uint64_t *left)
 {
-    const hs_near *near = worker->job->near;
-    const int32_t  n_points = group->last - group->first;
-    int32_t        end[HS_GROUP_POINTS];
-    hs_status      status = HS_OK;
+    const hs_nearest *near = worker->job->near;
+    const int32_t     n_points = group->last - group->first;
+    int32_t           end[HS_GROUP_POINTS];
+    hs_status         status = HS_OK;
     worker->n_groups++;
     worker->n_candidates += (int64_t)n_points * worker->block.n;
     *left = 0;
     for (int32_t first = 0, next; first < n_points && status == HS_OK; first = next) {
-        next = hs_near_block_scan(near, group, &worker->block, first, end);
+        next = hs_nearest_block_scan(near, group, &worker->block, first, end);
         for (int32_t t = first; t < next && status == HS_OK; t++) {
             const int32_t begin = t > first ? end[t - 1] : 0;
             if (t + AHEAD < n_points) {
-                hs_near_expect(&worker->writer, group->first + t + AHEAD);
+                hs_nearest_expect(&worker->writer, group->first + t + AHEAD);
             }
             bool done = false;
             status = finish_point(worker, group, group->first + t, begin, end[t], &done);
@@ -118,16 +118,17 @@ finish_block(near_worker *worker, const hs_near_group *group, uint64_t *left)
 /* Does one point within a radius that surely suffices; a larger one where rounding makes it fall
  * short. */
 static hs_status
-search_point(near_worker *worker, int32_t si, double guess)
+search_point(nearest_worker *worker, int32_t si, double guess)
 {
-    const hs_near *near = worker->job->near;
-    hs_near_group  alone;
-    uint64_t       left = 1;
-    hs_near_group_set(near, si, si + 1, &alone);
+    const hs_nearest *near = worker->job->near;
+    hs_nearest_group  alone;
+    uint64_t          left = 1;
+    hs_nearest_group_set(near, si, si + 1, &alone);
     alone.radius = guess;
-    hs_status status = hs_near_bound(near, &worker->options, &worker->bounder, &alone);
+    hs_status status = hs_nearest_bound(near, &worker->options, &worker->bounder, &alone);
     while (status == HS_OK && left != 0) {
-        status = hs_near_block_fill(near, &worker->options, &alone, INFINITY, NULL, &worker->block);
+        status =
+            hs_nearest_block_fill(near, &worker->options, &alone, INFINITY, NULL, &worker->block);
         if (status == HS_OK) {
             status = finish_block(worker, &alone, &left);
         }
@@ -137,16 +138,16 @@ search_point(near_worker *worker, int32_t si, double guess)
 }
 
 static hs_status
-search_group(near_worker *worker, hs_near_group *group)
+search_group(nearest_worker *worker, hs_nearest_group *group)
 {
-    const hs_near *near = worker->job->near;
-    const int32_t  n_points = group->last - group->first;
-    const double   more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
-    const double   most = more * MOST_CANDIDATES * ((double)near->k + n_points) + 64.0;
-    uint64_t       left = UINT64_MAX;
-    hs_status      status = hs_near_block_fill(near, &worker->options, group,
-                                          n_points == 1 && group->is_complete ? INFINITY : most,
-                                               &worker->leaves, &worker->block);
+    const hs_nearest *near = worker->job->near;
+    const int32_t     n_points = group->last - group->first;
+    const double      more = pow(MOST_PER_AXIS, fmax(near->tree.ndim - 3.0, 0.0));
+    const double      most = more * MOST_CANDIDATES * ((double)near->k + n_points) + 64.0;
+    uint64_t          left = UINT64_MAX;
+    hs_status         status = hs_nearest_block_fill(near, &worker->options, group,
+                                             n_points == 1 && group->is_complete ? INFINITY : most,
+                                                     &worker->leaves, &worker->block);
     if (status == HS_OK) {
         status = finish_block(worker, group, &left);
     } else if (status == HS_TOO_MUCH) {
@@ -164,17 +165,17 @@ search_group(near_worker *worker, hs_near_group *group)
 static hs_status
 search_range(void *context, int64_t range)
 {
-    near_worker    *worker = context;
-    const near_job *job = worker->job;
-    const int64_t   first = job->ranges[range];
-    const int32_t   n = (int32_t)(job->ranges[range + 1] - first);
-    hs_status       status = HS_OK;
+    nearest_worker    *worker = context;
+    const nearest_job *job = worker->job;
+    const int64_t      first = job->ranges[range];
+    const int32_t      n = (int32_t)(job->ranges[range + 1] - first);
+    hs_status          status = HS_OK;
     for (int32_t g = 0; g < n; g++) {
         const near_part *part = &job->parts[first + g];
-        hs_near_group_set(job->near, part->first, part->last, &worker->groups[g]);
-        hs_near_guess(job->near, &worker->groups[g]);
+        hs_nearest_group_set(job->near, part->first, part->last, &worker->groups[g]);
+        hs_nearest_guess(job->near, &worker->groups[g]);
     }
-    hs_near_leaves_find(job->near, worker->groups, n, &worker->leaves);
+    hs_nearest_leaves_find(job->near, worker->groups, n, &worker->leaves);
     for (int32_t g = 0; g < n && status == HS_OK; g++) {
         status = search_group(worker, &worker->groups[g]);
     }
@@ -187,45 +188,45 @@ search_range(void *context, int64_t range)
 static hs_status
 open_worker(void *context, void *place)
 {
-    const near_job *job = context;
-    const hs_near  *near = job->near;
-    near_worker    *worker = place;
+    const nearest_job *job = context;
+    const hs_nearest  *near = job->near;
+    nearest_worker    *worker = place;
     worker->job = job;
     worker->options = near->search->call->options;
     worker->committer.options = &worker->options;
-    worker->ranker = (hs_near_ranker){
+    worker->ranker = (hs_nearest_ranker){
         .near = near, .block = &worker->block, .pace = {.options = &worker->options}};
-    hs_near_writer_init(near, &worker->writer);
-    hs_status status = hs_near_bounder_init(near, &worker->bounder);
+    hs_nearest_writer_init(near, &worker->writer);
+    hs_status status = hs_nearest_bounder_init(near, &worker->bounder);
     if (status == HS_OK) {
-        status = hs_near_leaves_init(near, &worker->leaves);
+        status = hs_nearest_leaves_init(near, &worker->leaves);
     }
-    return status == HS_OK ? hs_near_block_init(near, &worker->block) : status;
+    return status == HS_OK ? hs_nearest_block_init(near, &worker->block) : status;
 }
 
 static void
 close_worker(void *context, void *place)
 {
-    const near_job   *job = context;
-    near_worker      *worker = place;
-    const hs_stages  *stages = &worker->ranker.stages;
-    const hs_counters walked = {.groups = worker->n_groups,
-                                .candidates = worker->n_candidates,
-                                .ambiguous = worker->ranker.n_compared,
-                                .by_float64 = stages->by_float64,
-                                .by_double_word = stages->by_double_word,
-                                .by_integers = stages->by_integers};
-    hs_near_flush(&worker->writer);
+    const nearest_job *job = context;
+    nearest_worker    *worker = place;
+    const hs_stages   *stages = &worker->ranker.stages;
+    const hs_counters  walked = {.groups = worker->n_groups,
+                                 .candidates = worker->n_candidates,
+                                 .ambiguous = worker->ranker.n_compared,
+                                 .by_float64 = stages->by_float64,
+                                 .by_double_word = stages->by_double_word,
+                                 .by_integers = stages->by_integers};
+    hs_nearest_flush(&worker->writer);
     hs_call_note(job->near->search->call, &walked);
-    hs_near_ranker_free(&worker->ranker);
-    hs_near_bounder_free(job->near, &worker->bounder);
-    hs_near_leaves_free(job->near, &worker->leaves);
-    hs_near_block_free(job->near, &worker->block);
+    hs_nearest_ranker_free(&worker->ranker);
+    hs_nearest_bounder_free(job->near, &worker->bounder);
+    hs_nearest_leaves_free(job->near, &worker->leaves);
+    hs_nearest_block_free(job->near, &worker->block);
 }
 
 /* Adds the points of a node, as one group or several, to the present range and new ones. */
 static void
-add_parts(near_job *job, const hs_tree_node *node)
+add_parts(nearest_job *job, const hs_tree_node *node)
 {
     for (int32_t first = node->first; first < node->end; first += GROUP_POINTS) {
         const int32_t last = node->end - first < GROUP_POINTS ? node->end : first + GROUP_POINTS;
@@ -239,7 +240,7 @@ add_parts(near_job *job, const hs_tree_node *node)
 /* Cuts the tree into groups, the largest subtrees of at most GROUP_POINTS, and these into ranges,
  * which are larger subtrees. A larger leaf becomes several groups. */
 static void
-list_parts(near_job *job, const hs_tree *tree, int32_t *stack)
+list_parts(nearest_job *job, const hs_tree *tree, int32_t *stack)
 {
     const int32_t n = tree->nodes[0].end;
     const int32_t part = n / RANGES < MOST_RANGE ? n / RANGES : MOST_RANGE;
@@ -267,11 +268,11 @@ list_parts(near_job *job, const hs_tree *tree, int32_t *stack)
 }
 
 static hs_status
-search_ranges(near_job *job, hs_failure *failure)
+search_ranges(nearest_job *job, hs_failure *failure)
 {
     hs_crew crew = {.call = job->near->search->call,
                     .job = job,
-                    .worker_size = sizeof(near_worker),
+                    .worker_size = sizeof(nearest_worker),
                     .open = open_worker,
                     .close = close_worker,
                     .n_ranges = job->n_ranges,
@@ -280,14 +281,14 @@ search_ranges(near_job *job, hs_failure *failure)
 }
 
 hs_status
-hs_near_search(hs_near *near, hs_failure *failure)
+hs_nearest_search(hs_nearest *near, hs_failure *failure)
 {
     hs_search    *search = near->search;
     hs_account   *account = &search->call->account;
-    near_job      job = {.near = near};
+    nearest_job   job = {.near = near};
     const int64_t n = hs_search_asking(search)->n;
     for (int64_t row = 0; near->tree.n_nodes == 0 && row < n; row++) {
-        hs_near_write_nothing(near, row, 0);
+        hs_nearest_write_nothing(near, row, 0);
     }
     if (near->tree.n_nodes == 0 || near->asking->n_nodes == 0) {
         return HS_OK;

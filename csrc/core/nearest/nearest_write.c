@@ -11,7 +11,7 @@
 #define MOST_SQUARE   0x1p1000
 
 void
-hs_near_writer_init(const hs_near *near, hs_near_writer *writer)
+hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer)
 {
     memset(writer, 0, sizeof *writer); /* kernels read a little beyond the last entry */
     writer->near = near;
@@ -22,10 +22,10 @@ hs_near_writer_init(const hs_near *near, hs_near_writer *writer)
 }
 
 void
-hs_near_expect(const hs_near_writer *writer, int32_t si)
+hs_nearest_expect(const hs_nearest_writer *writer, int32_t si)
 {
-    const hs_near *near = writer->near;
-    const int64_t  row = hs_search_asking(near->search)->order[si];
+    const hs_nearest *near = writer->near;
+    const int64_t     row = hs_search_asking(near->search)->order[si];
     const int64_t bytes[2] = {near->k * near->rows->index_bytes, near->k * (int64_t)sizeof(double)};
     char *const   column[2] = {writer->j, (char *)writer->d};
     for (int c = 0; c < 2; c++) {
@@ -47,7 +47,7 @@ put_number(void *j, int index_bytes, int64_t at, int32_t number)
 }
 
 void
-hs_near_write_nothing(const hs_near *near, int64_t row, int64_t from)
+hs_nearest_write_nothing(const hs_nearest *near, int64_t row, int64_t from)
 {
     const hs_output *rows = near->rows;
     const int        d = rows->ndim;
@@ -72,7 +72,7 @@ hs_near_write_nothing(const hs_near *near, int64_t row, int64_t from)
 /* Rows ascend in exact order; a distance, known to a unit in the last place, may be lifted to the
  * one before it, which is then no further from the true one than that. */
 static void
-put_distances(hs_near_writer *writer, double *to)
+put_distances(hs_nearest_writer *writer, double *to)
 {
     const hs_search *search = writer->near->search;
     hs_measured     *pairs = &writer->pairs;
@@ -88,7 +88,7 @@ put_distances(hs_near_writer *writer, double *to)
 }
 
 static void
-put_vectors(hs_near_writer *writer, double *to)
+put_vectors(hs_nearest_writer *writer, double *to)
 {
     const hs_search *search = writer->near->search;
     hs_measured     *pairs = &writer->pairs;
@@ -107,7 +107,7 @@ put_vectors(hs_near_writer *writer, double *to)
 }
 
 void
-hs_near_flush(hs_near_writer *writer)
+hs_nearest_flush(hs_nearest_writer *writer)
 {
     hs_measured *pairs = &writer->pairs;
     if (pairs->n > 0 && (writer->d != NULL || writer->D != NULL)) {
@@ -130,7 +130,7 @@ hs_near_flush(hs_near_writer *writer)
 
 /* S over all box vectors; false when it does not fit int32. */
 static bool
-put_shift(const hs_near *near, const int64_t *given, int32_t *to)
+put_shift(const hs_nearest *near, const int64_t *given, int32_t *to)
 {
     const hs_lattice *lattice = &near->search->scene.lattice;
     const int         d = lattice->ndim;
@@ -146,15 +146,15 @@ put_shift(const hs_near *near, const int64_t *given, int32_t *to)
 /* The metric's shifts, and S where that is wanted, of n entries from place `at` of the output and
  * from the batch's next entry on: where they follow from the points' turns. */
 static hs_status
-put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n,
-          int64_t at)
+put_given(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_nearest_key *keys,
+          int32_t n, int64_t at)
 {
-    const hs_near *near = writer->near;
-    const hs_bins *asking = hs_search_asking(near->search);
+    const hs_nearest *near = writer->near;
+    const hs_bins    *asking = hs_search_asking(near->search);
     for (int32_t e = 0; e < n; e++) {
         double  q[HS_MAX_DIM];
         int64_t shift[HS_MAX_DIM], given[HS_MAX_DIM];
-        if (!hs_near_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
+        if (!hs_nearest_pair(near, ranker->block, ranker->si, keys[e].place, q, shift, given) ||
             (writer->S != NULL && !put_shift(near, given, writer->S + (at + e) * asking->ndim))) {
             writer->failed = asking->order[ranker->si];
             return HS_ERR_SHIFT_RANGE;
@@ -169,14 +169,15 @@ put_given(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_ke
 /* The metric's shifts where they are those of the images: all are zero before, and few are not
  * after. */
 static void
-put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys, int32_t n)
+put_images(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_nearest_key *keys,
+           int32_t n)
 {
-    const hs_near_block *block = ranker->block;
+    const hs_nearest_block *block = ranker->block;
     if (block->n_images == 1 && block->images[0].is_home) {
         return;
     }
     for (int32_t e = 0; e < n; e++) {
-        const hs_near_image *image = hs_near_image_of(block, keys[e].place);
+        const hs_nearest_image *image = hs_nearest_image_of(block, keys[e].place);
         for (int r = 0; !image->is_home && r < writer->near->order.n_rows; r++) {
             hs_measured_shift(&writer->pairs, writer->pairs.n + e, r, image->shift[r]);
         }
@@ -185,14 +186,14 @@ put_images(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_k
 
 /* n entries of the ranker's row, from `at` on; the batch has room for them. */
 static hs_status
-put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_key *keys,
+put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs_nearest_key *keys,
             int32_t n, int64_t at, bool is_first)
 {
-    const hs_near *near = writer->near;
-    const hs_bins *bins = &near->search->bins, *asking = hs_search_asking(near->search);
-    const int32_t  begin = writer->pairs.n;
-    const int      index_bytes = near->rows->index_bytes;
-    int32_t        number[HS_BATCH];
+    const hs_nearest *near = writer->near;
+    const hs_bins    *bins = &near->search->bins, *asking = hs_search_asking(near->search);
+    const int32_t     begin = writer->pairs.n;
+    const int         index_bytes = near->rows->index_bytes;
+    int32_t           number[HS_BATCH];
     for (int32_t e = 0; e < n; e++) {
         number[e] = ranker->block->number[keys[e].place];
         put_number(writer->j, index_bytes, at + e, bins->order[number[e]]);
@@ -222,19 +223,19 @@ put_entries(hs_near_writer *writer, const hs_near_ranker *ranker, const hs_near_
 
 /* How many of the ranked are within the largest distance: all before the first that is not. */
 static int64_t
-count_within(hs_near_ranker *ranker, int64_t count)
+count_within(hs_nearest_ranker *ranker, int64_t count)
 {
-    const hs_near *near = ranker->near;
-    const hs_bins *asking = hs_search_asking(near->search);
-    const double   limit = near->limit * ranker->block->unit;
-    const double   square = limit * limit;
+    const hs_nearest *near = ranker->near;
+    const hs_bins    *asking = hs_search_asking(near->search);
+    const double      limit = near->limit * ranker->block->unit;
+    const double      square = limit * limit;
     if (!(square < MOST_SQUARE)) { /* beyond all that a block holds */
         return count;
     }
     while (count > 0) {
-        const hs_near_key *key = &ranker->keys[count - 1];
-        const double       error =
-            2.0 * hs_near_error(ranker->block, near->tree.ndim, hs_larger(square, key->square));
+        const hs_nearest_key *key = &ranker->keys[count - 1];
+        const double          error =
+            2.0 * hs_nearest_error(ranker->block, near->tree.ndim, hs_larger(square, key->square));
         double  p[HS_MAX_DIM], q[HS_MAX_DIM];
         int64_t shift[HS_MAX_DIM];
         if (key->square + error < square) {
@@ -245,7 +246,7 @@ count_within(hs_near_ranker *ranker, int64_t count)
                                            : asking->x[k][ranker->si];
         }
         if (key->square <= square + error &&
-            (!hs_near_pair(near, ranker->block, ranker->si, key->place, q, shift, NULL) ||
+            (!hs_nearest_pair(near, ranker->block, ranker->si, key->place, q, shift, NULL) ||
              hs_metric_within(&near->within, p, q, shift, &ranker->stages))) {
             break; /* shifts that pass their range are found when they are written */
         }
@@ -255,10 +256,10 @@ count_within(hs_near_ranker *ranker, int64_t count)
 }
 
 hs_status
-hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
+hs_nearest_write(hs_nearest_writer *writer, hs_nearest_ranker *ranker, int64_t count)
 {
-    const hs_near *near = writer->near;
-    const int64_t  row = hs_search_asking(near->search)->order[ranker->si];
+    const hs_nearest *near = writer->near;
+    const int64_t     row = hs_search_asking(near->search)->order[ranker->si];
     count = count_within(ranker, count);
     for (int64_t e = 0; e < count;) {
         const int64_t   room = HS_BATCH - writer->pairs.n;
@@ -270,11 +271,11 @@ hs_near_write(hs_near_writer *writer, hs_near_ranker *ranker, int64_t count)
         }
         e += n;
         if (writer->pairs.n == HS_BATCH) {
-            hs_near_flush(writer);
+            hs_nearest_flush(writer);
         }
     }
     if (count < near->k) {
-        hs_near_write_nothing(near, row, count);
+        hs_nearest_write_nothing(near, row, count);
     }
     return HS_OK;
 }

@@ -64,7 +64,7 @@ typedef struct hs_sets {
                                 * and gaps (close_gaps.h) are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
-    struct hs_near_kept    *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
+    struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */
     bool                    keeps_none;  /* pairs are handed on and not kept: any number will fit */
     bool   is_full;      /* each asking point meets all its neighbours, not the half list that

@@ -48,11 +48,11 @@ typedef enum hs_block_use {
 
 /* The points whose neighbourhood it is: [first, last) in cell order. */
 typedef struct hs_group {
-    int32_t     first, last;
-    double      centre[HS_MAX_DIM];
-    float       q[HS_MAX_DIM][HS_GROUP_POINTS]; /* relative to the centre */
-    hs_near_box near;    /* its own box, and how near candidates must be; infinity: not set yet */
-    uint32_t    largest; /* bits of the largest |q| or |y| gathered for it so far */
+    int32_t        first, last;
+    double         centre[HS_MAX_DIM];
+    float          q[HS_MAX_DIM][HS_GROUP_POINTS]; /* relative to the centre */
+    hs_nearest_box near; /* its own box, and how near candidates must be; infinity: not set yet */
+    uint32_t       largest; /* bits of the largest |q| or |y| gathered for it so far */
 } hs_group;
 
 /* Room for so many candidates and runs at a time. */

@@ -5,7 +5,7 @@
  */
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
-#include "../support/near_checks.h"
+#include "../support/nearest_checks.h"
 #include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"

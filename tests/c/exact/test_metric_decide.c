@@ -198,7 +198,7 @@ ties_hold_in_every_binade(void)
 
 /* Near ties with full significands, cutoffs from the smallest number to the largest. */
 static void
-near_ties_hold_in_every_binade(void)
+nearest_ties_hold_in_every_binade(void)
 {
     harness_random random = {4711};
     hs_stages      stages = {0, 0, 0};
@@ -430,7 +430,7 @@ test_metric_decide(void)
     RUN(integers_of_every_size_agree);
     RUN(largest_integers_fit);
     RUN(ties_hold_in_every_binade);
-    RUN(near_ties_hold_in_every_binade);
+    RUN(nearest_ties_hold_in_every_binade);
     RUN(float64_stage_survives_its_worst_case);
     RUN(ties_of_full_width_are_told_from_near_ties);
     RUN(what_is_lost_below_the_low_words_is_noticed);

@@ -245,7 +245,7 @@ batches_do_what_is_done_for_one_pair(void)
 
 /* Copies of one pair with every other axis moved by a unit in the last place here and there. */
 static void
-near_ties_are_judged_alike(void)
+nearest_ties_are_judged_alike(void)
 {
     harness_random random = {6022};
     static scene   s;
@@ -357,7 +357,7 @@ void
 test_batch(void)
 {
     RUN(batches_do_what_is_done_for_one_pair);
-    RUN(near_ties_are_judged_alike);
+    RUN(nearest_ties_are_judged_alike);
     RUN(what_sums_lose_is_noticed_in_every_lane);
     RUN(crystal_ties_need_no_integers);
     RUN(everyday_pairs_are_all_done);

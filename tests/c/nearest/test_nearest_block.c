@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest_block.c: what a group may be near to is gathered whole, whether it comes from leaves
  * that groups share or from a walk down the tree, and what cannot be gathered is told. */
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
@@ -9,10 +9,10 @@ void test_nearest_block(void);
 
 enum { N = 400, GROUP = 16 };
 
-static near_unit      unit;
-static hs_near_leaves leaves;
-static hs_near_block  block;
-static double         x[3 * N];
+static nearest_unit      unit;
+static hs_nearest_leaves leaves;
+static hs_nearest_block  block;
+static double            x[3 * N];
 
 static void
 open_scene(harness_random *random, int d, const hs_box *box)
@@ -20,32 +20,32 @@ open_scene(harness_random *random, int d, const hs_box *box)
     for (int e = 0; e < d * N; e++)
         x[e] = 4.0 * random_unit(random);
     const hs_points points = {x, N, d, HS_FLOAT64, d * 8, 8};
-    near_unit_open(&points, NULL, box, 4, HS_WANT_J, INFINITY, &unit);
-    CHECK(hs_near_leaves_init(&unit.near, &leaves) == HS_OK);
-    CHECK(hs_near_block_init(&unit.near, &block) == HS_OK);
+    nearest_unit_open(&points, NULL, box, 4, HS_WANT_J, INFINITY, &unit);
+    CHECK(hs_nearest_leaves_init(&unit.near, &leaves) == HS_OK);
+    CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
 }
 
 static void
 close_scene(void)
 {
-    hs_near_block_free(&unit.near, &block);
-    hs_near_leaves_free(&unit.near, &leaves);
-    near_unit_close(&unit);
+    hs_nearest_block_free(&unit.near, &block);
+    hs_nearest_leaves_free(&unit.near, &leaves);
+    nearest_unit_close(&unit);
 }
 
-static hs_near_group
+static hs_nearest_group
 group_from(int32_t first, double radius)
 {
-    hs_near_group group;
-    hs_near_group_set(&unit.near, first, first + GROUP, &group);
+    hs_nearest_group group;
+    hs_nearest_group_set(&unit.near, first, first + GROUP, &group);
     group.radius = radius;
     return group;
 }
 
 static hs_status
-fill(hs_near_group *group, double most, hs_near_leaves *from)
+fill(hs_nearest_group *group, double most, hs_nearest_leaves *from)
 {
-    return hs_near_block_fill(&unit.near, &unit.call.options, group, most, from, &block);
+    return hs_nearest_block_fill(&unit.near, &unit.call.options, group, most, from, &block);
 }
 
 /* Whether the block has point j in the image with this displacement. */
@@ -56,7 +56,7 @@ block_has(int32_t sj, const double *moved)
     for (int32_t c = 0; c < block.n; c++) {
         bool same = block.number[c] == sj;
         for (int k = 0; k < d; k++)
-            same = same && hs_near_image_of(&block, c)->moved[k] == moved[k];
+            same = same && hs_nearest_image_of(&block, c)->moved[k] == moved[k];
         if (same)
             return true;
     }
@@ -65,7 +65,7 @@ block_has(int32_t sj, const double *moved)
 
 /* Candidates are where they say, in units from the centre. */
 static bool
-places_are_right(const hs_near_group *group)
+places_are_right(const hs_nearest_group *group)
 {
     const hs_bins *bins = &unit.search.bins;
     bool           right = true;
@@ -74,7 +74,7 @@ places_are_right(const hs_near_group *group)
         for (int k = 0; k < bins->ndim; k++) {
             const double centre = group->lower[k] + 0.5 * (group->upper[k] - group->lower[k]);
             const double y =
-                (bins->x[k][block.number[c]] + hs_near_image_of(&block, c)->moved[k] - centre) *
+                (bins->x[k][block.number[c]] + hs_nearest_image_of(&block, c)->moved[k] - centre) *
                 block.unit;
             right = right && fabs(fmax(fmin(y, block.extent), -block.extent) -
                                   (double)block.y[k][c]) <= 1e-5;
@@ -87,7 +87,7 @@ places_are_right(const hs_near_group *group)
 
 /* All within the radius of a point of the group, in the nearest images along each axis. */
 static int64_t
-check_block(const hs_near_group *group)
+check_block(const hs_nearest_group *group)
 {
     const hs_lattice *lattice = &unit.search.scene.lattice;
     const hs_bins    *bins = &unit.search.bins;
@@ -125,9 +125,9 @@ leaves_that_are_shared_hold_all_that_is_near(void)
     harness_random random = {577};
     int64_t        n_near = 0, n_shared = 0, n_candidates = 0;
     for (int trial = 0; trial < 24; trial++) {
-        const int     d = 1 + trial % 3;
-        hs_near_group groups[3];
-        hs_box        box = {.ndim = d};
+        const int        d = 1 + trial % 3;
+        hs_nearest_group groups[3];
+        hs_box           box = {.ndim = d};
         for (int l = 0; l < d; l++) {
             box.periodic[l] = trial % 4 == 0 || l == trial % d;
             for (int k = 0; k < d; k++)
@@ -138,7 +138,7 @@ leaves_that_are_shared_hold_all_that_is_near(void)
         const double  radius = d == 1 ? 0.05 : d == 2 ? 0.3 : 0.8;
         for (int g = 0; g < 3; g++)
             groups[g] = group_from(first + g * GROUP, radius * (1.0 + 0.6 * g));
-        hs_near_leaves_find(&unit.near, groups, 3, &leaves);
+        hs_nearest_leaves_find(&unit.near, groups, 3, &leaves);
         CHECK(leaves.radius == 0.0 || leaves.radius == groups[1].radius);
         for (int g = 0; g < 3; g++) {
             n_shared += groups[g].radius <= leaves.radius;
@@ -163,8 +163,8 @@ uncertain_leaves_are_not_taken(void)
 {
     harness_random random = {31};
     open_scene(&random, 2, NULL);
-    hs_near_group groups[2] = {group_from(0, 0.5), group_from(GROUP, 0.5)};
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_group groups[2] = {group_from(0, 0.5), group_from(GROUP, 0.5)};
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.5 && leaves.n > 0);
     const int32_t n_leaves = leaves.n, n_images = leaves.n_images;
     leaves.n = leaves.n_images = 0; /* whoever takes them finds nothing */
@@ -177,10 +177,10 @@ uncertain_leaves_are_not_taken(void)
     leaves.n = n_leaves;
     leaves.n_images = n_images;
     unit.search.scene.x_error = 0x1p-20; /* 2^-19 of a difference, 2^-18 in units of 1/2 */
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.5 && leaves.error == 0x1p-19);
     unit.search.scene.x_error = 0x1.001p-20;
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.0);
     close_scene();
 }
@@ -191,7 +191,7 @@ groups_far_wider_than_their_radius_are_refused(void)
 {
     harness_random random = {32};
     open_scene(&random, 2, NULL);
-    hs_near_group group = group_from(0, 0x1p-8);
+    hs_nearest_group group = group_from(0, 0x1p-8);
     group.upper[0] = group.lower[0] + 2.0; /* 512 radii */
     group.upper[1] = group.lower[1];
     CHECK(fill(&group, 1e9, NULL) == HS_OK);
@@ -210,7 +210,7 @@ too_many_images_are_refused(void)
     const hs_box   box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
     harness_random random = {33};
     open_scene(&random, 2, &box);
-    hs_near_group group = group_from(0, 0x1p40);
+    hs_nearest_group group = group_from(0, 0x1p40);
     CHECK(fill(&group, 1e9, NULL) == HS_TOO_MUCH);
     CHECK(fill(&group, INFINITY, NULL) == HS_ERR_MEMORY);
     group = group_from(0, 40.0);
@@ -237,7 +237,8 @@ many_images_are_polled_between(void)
     open_scene(&random, 2, &box);
     unit.call.options.poll = count_polls;
     unit.call.options.poll_context = &polls;
-    hs_near_group group = group_from(0, 190.0); /* some 97^2 images, a fifth of them in a corner */
+    hs_nearest_group group =
+        group_from(0, 190.0); /* some 97^2 images, a fifth of them in a corner */
     CHECK(fill(&group, INFINITY, NULL) == HS_OK);
     CHECK(block.n_images > 6 * 1024 && block.n_images < 97 * 97);
     CHECK(polls == 2 + 2); /* and after steps with all candidates */
@@ -251,7 +252,7 @@ radii_below_the_errors_are_raised(void)
     harness_random random = {34};
     open_scene(&random, 2, NULL);
     unit.search.scene.x_error = 0x1p-12;
-    hs_near_group group = group_from(0, 0.125);
+    hs_nearest_group group = group_from(0, 0.125);
     CHECK(fill(&group, 1e9, NULL) == HS_OK && group.radius == 1024.0 * 0x1p-11);
     CHECK(block.error == 0x1p-11 * block.unit && block.unit == 2.0);
     CHECK(block.flat_error > 2.0 * sqrt(2.0) * block.error * block.reach);

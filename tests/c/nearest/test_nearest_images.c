@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest_images.c: each image that can be near a group is met once, and whatever is within
  * the radius lies in one of them. */
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
@@ -9,7 +9,7 @@ void test_nearest_images(void);
 
 enum { N = 12, WIDE = 9 };
 
-static near_unit unit;
+static nearest_unit unit;
 
 static hs_points
 points_in(const double *x, int64_t n, int ndim)
@@ -36,7 +36,7 @@ least_distance(const double *moved, int32_t sj)
 
 /* Every shift of up to WIDE rows, against those that were met. Returns how many are near. */
 static int
-compare_with_all(const hs_near_group *group, const uint8_t *met)
+compare_with_all(const hs_nearest_group *group, const uint8_t *met)
 {
     const hs_lattice *lattice = &unit.search.scene.lattice;
     const int         m = lattice->n_periodic;
@@ -69,11 +69,11 @@ images_in_reach_are_met_once(void)
     harness_random random = {2718};
     int64_t        n_near = 0, n_met = 0;
     for (int trial = 0; trial < 60; trial++) {
-        const int      d = 1 + trial % 3;
-        double         x[3 * N];
-        hs_box         box = {.ndim = d};
-        hs_near_images images;
-        double         moved[HS_MAX_DIM];
+        const int         d = 1 + trial % 3;
+        double            x[3 * N];
+        hs_box            box = {.ndim = d};
+        hs_nearest_images images;
+        double            moved[HS_MAX_DIM];
         for (int l = 0; l < d; l++) {
             box.periodic[l] = l == trial / 3 % d || trial % 4 < 2;
             for (int k = 0; k < d; k++)
@@ -84,13 +84,13 @@ images_in_reach_are_met_once(void)
         for (int e = 0; e < d * N; e++)
             x[e] = 3.0 * random_unit(&random) - 1.5;
         const hs_points points = points_in(x, N, d);
-        near_unit_open(&points, NULL, &box, 3, HS_WANT_J, INFINITY, &unit);
-        const hs_near_group group = near_unit_group(&unit, 0.02 + 0.7 * random_unit(&random));
+        nearest_unit_open(&points, NULL, &box, 3, HS_WANT_J, INFINITY, &unit);
+        const hs_nearest_group group = nearest_unit_group(&unit, 0.02 + 0.7 * random_unit(&random));
         memset(met, 0, sizeof met);
-        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+        CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
         CHECK(images.error >= 0.0 && images.error < 1e-12);
         int64_t n = 0;
-        for (; hs_near_images_next(&images); n++) {
+        for (; hs_nearest_images_next(&images); n++) {
             int at = 0;
             memset(moved, 0, sizeof moved);
             for (int r = 0; r < unit.search.scene.lattice.n_periodic; r++) {
@@ -105,7 +105,7 @@ images_in_reach_are_met_once(void)
         CHECK((double)n == images.count);
         n_near += compare_with_all(&group, met);
         n_met += n;
-        near_unit_close(&unit);
+        nearest_unit_close(&unit);
     }
     CHECK(n_near > 200 && n_met < 4 * n_near);
 }
@@ -114,92 +114,92 @@ images_in_reach_are_met_once(void)
 static void
 there_may_be_no_image_in_reach(void)
 {
-    const double    x[2] = {0.0, 0.0};
-    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
-    const hs_points points = points_in(x, 1, 2);
-    hs_near_images  images;
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-    hs_near_group group = near_unit_group(&unit, 0.25);
+    const double      x[2] = {0.0, 0.0};
+    const hs_box      box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points   points = points_in(x, 1, 2);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group group = nearest_unit_group(&unit, 0.25);
     unit.search.scene.lower[0] = unit.search.scene.upper[0] = 0.0;
     group.t_lower[0] = group.t_upper[0] = 0.375;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
-    CHECK(images.count == 0.0 && !hs_near_images_next(&images));
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.count == 0.0 && !hs_nearest_images_next(&images));
     group.radius = 0.375;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
-    CHECK(images.count == 1.0 && hs_near_images_next(&images) && images.shift[0] == 0);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(images.count == 1.0 && hs_nearest_images_next(&images) && images.shift[0] == 0);
     group.radius = 0.625;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK && images.count == 2.0);
-    near_unit_close(&unit);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK && images.count == 2.0);
+    nearest_unit_close(&unit);
 }
 
 /* So far off, a quotient may err by more than the room that is left near the box. */
 static void
 room_grows_with_the_number_of_the_image(void)
 {
-    const double    x[2] = {0.0, 0.0};
-    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
-    const hs_points points = points_in(x, 1, 2);
-    hs_near_images  images;
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-    hs_near_group group = near_unit_group(&unit, 0.375 - 0x1p-12);
+    const double      x[2] = {0.0, 0.0};
+    const hs_box      box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points   points = points_in(x, 1, 2);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group group = nearest_unit_group(&unit, 0.375 - 0x1p-12);
     unit.search.scene.lower[0] = unit.search.scene.upper[0] = 0.0;
     for (int sign = -1; sign <= 1; sign += 2) {
         group.t_lower[0] = group.t_upper[0] = sign * (0x1p29 - 0.375);
-        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+        CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
         CHECK(images.count == 1.0 && images.low[0] == sign * (INT64_C(1) << 29));
         group.t_lower[0] = group.t_upper[0] = sign * (0x1p29 + 0.375);
-        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+        CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
         CHECK(images.count == 1.0 && images.low[0] == sign * (INT64_C(1) << 29));
         group.t_lower[0] = group.t_upper[0] = sign * 0.375;
-        CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK && images.count == 0.0);
+        CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK && images.count == 0.0);
     }
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 static void
 more_images_than_can_be_counted_are_refused(void)
 {
-    const double    x[2] = {0.0, 0.0};
-    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
-    const hs_points points = points_in(x, 1, 2);
-    hs_near_images  images;
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-    hs_near_group group = near_unit_group(&unit, 1.0);
+    const double      x[2] = {0.0, 0.0};
+    const hs_box      box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points   points = points_in(x, 1, 2);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group group = nearest_unit_group(&unit, 1.0);
     group.t_upper[0] = 0x1p30; /* the first image can be counted to, the last one not */
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
     group.t_upper[0] = 0.0;
     group.t_lower[0] = -0x1p30;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
     group.t_lower[0] = group.t_upper[0] = 0x1p30 - 4.0;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK && images.count <= 4.0);
-    group = near_unit_group(&unit, 0x1p23 - 2.0); /* 2^24 are too many */
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK && images.count <= 4.0);
+    group = nearest_unit_group(&unit, 0x1p23 - 2.0); /* 2^24 are too many */
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
     group.radius = 0x1p23;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
     unit.near.k = 1 << 15; /* but for so many neighbours */
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
     group.radius = 0x1p24;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
-    near_unit_close(&unit);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_ERR_MEMORY);
+    nearest_unit_close(&unit);
 }
 
 /* Each image may be 0.3 of a period off, so that there are more of them, which are further off. */
 static void
 images_that_drift_make_more_images(void)
 {
-    const double    x[1] = {0.0};
-    const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
-    const hs_points points = points_in(x, 1, 1);
-    hs_near_images  images;
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-    const hs_near_group group = near_unit_group(&unit, 100.0);
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK && images.high[0] == 100);
+    const double      x[1] = {0.0};
+    const hs_box      box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    const hs_points   points = points_in(x, 1, 1);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    const hs_nearest_group group = nearest_unit_group(&unit, 100.0);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK && images.high[0] == 100);
     unit.search.scene.lattice.aligned = false;
     unit.near.drift[0][0] = 0.3;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
     CHECK(images.high[0] >= 100 + 0.3 * 130 && images.high[0] <= 100 + 0.3 * 145);
     CHECK(images.low[0] == -images.high[0]);
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 /* Only where the open axes are at right angles to what repeats does the way to the points along
@@ -210,7 +210,7 @@ layers_are_upright(void)
     const double    x[6] = {0.25, -1.0, 0.5, 2.0, 0.75, 0.5};
     const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
     const hs_points points = points_in(x, 3, 2);
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
     hs_lattice *lattice = &unit.search.scene.lattice;
     CHECK(unit.near.has_layer);
     CHECK(unit.near.layer_lower[1] == -1.0 && unit.near.layer_upper[1] == 2.0);
@@ -218,41 +218,41 @@ layers_are_upright(void)
     lattice->aligned = false;
     memcpy(lattice->normal[0], normals[0], sizeof normals[0]);
     memcpy(lattice->normal[1], normals[1], sizeof normals[1]);
-    hs_near_measure_layer(&unit.near);
+    hs_nearest_measure_layer(&unit.near);
     CHECK(unit.near.has_layer);
     CHECK(unit.near.layer_lower[1] == -1.0 && unit.near.layer_upper[1] == 2.0);
     lattice->normal[1][0] = 0x1p-39;
-    hs_near_measure_layer(&unit.near);
+    hs_nearest_measure_layer(&unit.near);
     CHECK(!unit.near.has_layer);
     lattice->normal[1][0] = 0x1p-41;
-    hs_near_measure_layer(&unit.near);
+    hs_nearest_measure_layer(&unit.near);
     CHECK(unit.near.has_layer);
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 /* Box vectors that are rounded err by as much for each image. */
 static void
 errors_of_box_vectors_add_up(void)
 {
-    const double    x[4] = {0.0, 0.0, 0.5, 0.5};
-    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
-    const hs_points points = points_in(x, 2, 2);
-    hs_near_images  images;
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-    const hs_near_group group = near_unit_group(&unit, 3.0);
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    const double      x[4] = {0.0, 0.0, 0.5, 0.5};
+    const hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points   points = points_in(x, 2, 2);
+    hs_nearest_images images;
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    const hs_nearest_group group = nearest_unit_group(&unit, 3.0);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
     const double most[2] = {fmax(-(double)images.low[0], (double)images.high[0]),
                             fmax(-(double)images.low[1], (double)images.high[1])};
     const double exact = images.error;
     CHECK(most[0] >= 3.0 && most[1] >= 3.0 && exact > 0.0 && exact < 0x1p-40);
     unit.search.scene.lattice.row_error[0] = 0x1p-20;
     unit.search.scene.lattice.row_error[1] = 0x1p-22;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
     CHECK(images.error == exact + (most[0] * 0x1p-20 + most[1] * 0x1p-22));
     unit.search.scene.x_error = 0x1p-10;
-    CHECK(hs_near_images_start(&unit.near, &group, &images) == HS_OK);
+    CHECK(hs_nearest_images_start(&unit.near, &group, &images) == HS_OK);
     CHECK(images.error >= 0x1p-9 + exact && images.error < 0x1.1p-9);
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 void

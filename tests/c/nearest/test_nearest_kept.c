@@ -4,13 +4,13 @@
 #include "../../../csrc/core/nearest/nearest_kept.h"
 #include "../../../csrc/core/nearest/nearest_write.h"
 #include "../../../csrc/core/memory/account.h"
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
 void test_nearest_kept(void);
 
-static near_unit unit;
+static nearest_unit unit;
 
 /* The four numbers 0, 0.5, 1 and 1.2, or so many others. */
 static const double line[4] = {0.0, 0.5, 1.0, 1.2};
@@ -23,7 +23,7 @@ points_on_line(const double *x, int64_t n)
 
 /* Prepares a search that may use what is kept; whether it does. */
 static bool
-borrows(hs_near_kept *kept, double limit)
+borrows(hs_nearest_kept *kept, double limit)
 {
     const hs_points points = points_on_line(line, 4);
     const hs_sets   sets = {
@@ -34,11 +34,11 @@ borrows(hs_near_kept *kept, double limit)
     options.want = HS_WANT_J;
     hs_call_begin(&options, &unit.call);
     hs_search_begin(&unit.call, &unit.search);
-    unit.near = (hs_near){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
-    CHECK(hs_near_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
+    unit.near = (hs_nearest){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
+    CHECK(hs_nearest_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
     CHECK(unit.near.tree.n_nodes == 1 && unit.near.limit > 0.0);
     const bool borrowed = unit.search.is_borrowed;
-    hs_near_release(&unit.near);
+    hs_nearest_release(&unit.near);
     hs_search_close(&unit.search);
     hs_call_dismiss(&unit.call);
     hs_account_close(&unit.call.account);
@@ -48,23 +48,23 @@ borrows(hs_near_kept *kept, double limit)
 static void
 whoever_comes_while_it_is_built_does_without(void)
 {
-    const int64_t blocks = hs_test_live_blocks();
-    hs_near_kept *kept = hs_near_kept_new();
-    hs_near      *room = NULL, *other = NULL;
-    CHECK(hs_near_kept_get(kept, &room) == NULL && room != NULL);
-    CHECK(hs_near_kept_get(kept, &other) == NULL && other == NULL);
+    const int64_t    blocks = hs_test_live_blocks();
+    hs_nearest_kept *kept = hs_nearest_kept_new();
+    hs_nearest      *room = NULL, *other = NULL;
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
     CHECK(!borrows(kept, INFINITY));
-    hs_near_kept_end(kept, false); /* it could not be built: the next one tries */
-    CHECK(hs_near_kept_get(kept, &room) == NULL && room != NULL);
-    hs_near_kept_end(kept, false);
+    hs_nearest_kept_end(kept, false); /* it could not be built: the next one tries */
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    hs_nearest_kept_end(kept, false);
     CHECK(borrows(kept, INFINITY));
     CHECK(borrows(kept, 1.0));
     CHECK(!borrows(kept, 0x1p-900)); /* has a scale of its own */
-    const hs_near *built = hs_near_kept_get(kept, &room);
+    const hs_nearest *built = hs_nearest_kept_get(kept, &room);
     CHECK(built != NULL && room == NULL && built->tree.n_nodes == 1);
-    CHECK(hs_near_kept_get(kept, &other) == built && other == NULL);
-    hs_near_kept_free(kept);
-    hs_near_kept_free(NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == built && other == NULL);
+    hs_nearest_kept_free(kept);
+    hs_nearest_kept_free(NULL);
     CHECK(hs_test_live_blocks() == blocks);
 }
 
@@ -72,39 +72,39 @@ whoever_comes_while_it_is_built_does_without(void)
 static void
 rows_end_at_the_largest_distance(void)
 {
-    const hs_points       points = points_on_line(line, 4);
-    static hs_near_block  block;
-    static hs_near_writer writer;
-    static const double   limits[] = {0.25, 0.5, 0.75, 1.0, 1.125, 1.25};
-    static const int      within[] = {0, 1, 1, 2, 2, 3};
-    hs_options            options = hs_options_default();
+    const hs_points          points = points_on_line(line, 4);
+    static hs_nearest_block  block;
+    static hs_nearest_writer writer;
+    static const double      limits[] = {0.25, 0.5, 0.75, 1.0, 1.125, 1.25};
+    static const int         within[] = {0, 1, 1, 2, 2, 3};
+    hs_options               options = hs_options_default();
     for (int l = 0; l < 6; l++) {
-        near_unit_open(&points, NULL, NULL, 3, HS_WANT_J | HS_WANT_DISTANCE, limits[l], &unit);
-        hs_near_ranker ranker = {
+        nearest_unit_open(&points, NULL, NULL, 3, HS_WANT_J | HS_WANT_DISTANCE, limits[l], &unit);
+        hs_nearest_ranker ranker = {
             .near = &unit.near, .block = &block, .pace = {.options = &options}};
-        hs_near_group group = near_unit_group(&unit, 1.5);
-        int32_t       hits[4] = {0, 1, 2, 3}, si = 0;
-        int64_t       count;
+        hs_nearest_group group = nearest_unit_group(&unit, 1.5);
+        int32_t          hits[4] = {0, 1, 2, 3}, si = 0;
+        int64_t          count;
         CHECK(hs_output_reserve(&unit.rows, 12, 0.0) == HS_OK);
         unit.rows.n_pairs = 12;
-        CHECK(hs_near_block_init(&unit.near, &block) == HS_OK);
-        CHECK(hs_near_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
+        CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
+        CHECK(hs_nearest_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
               HS_OK);
         while (unit.search.bins.order[si] != 0)
             si++;
-        CHECK(hs_near_rank(&ranker, &group, si, hits, 4, &count) == HS_OK && count == 3);
-        hs_near_writer_init(&unit.near, &writer);
-        CHECK(hs_near_write(&writer, &ranker, count) == HS_OK);
-        hs_near_flush(&writer);
+        CHECK(hs_nearest_rank(&ranker, &group, si, hits, 4, &count) == HS_OK && count == 3);
+        hs_nearest_writer_init(&unit.near, &writer);
+        CHECK(hs_nearest_write(&writer, &ranker, count) == HS_OK);
+        hs_nearest_flush(&writer);
         const int64_t *j = hs_output_column(&unit.rows, HS_WANT_J);
         const double  *d = hs_output_column(&unit.rows, HS_WANT_DISTANCE);
         for (int e = 0; e < 3; e++) {
             CHECK(j[e] == (e < within[l] ? e + 1 : -1));
             CHECK(d[e] == (e < within[l] ? line[e + 1] : INFINITY));
         }
-        hs_near_ranker_free(&ranker);
-        hs_near_block_free(&unit.near, &block);
-        near_unit_close(&unit);
+        hs_nearest_ranker_free(&ranker);
+        hs_nearest_block_free(&unit.near, &block);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -117,18 +117,18 @@ check_radii(const double *x)
     const hs_options options = hs_options_default();
     static const int exponents[] = {-1000, -300, 0, 300, 600, 601, 602, 900};
     for (int e = 0; e < 8; e++) {
-        hs_near_bounder bounder;
-        near_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
+        hs_nearest_bounder bounder;
+        nearest_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
         const double apart = fabs(unit.search.bins.x[0][0] - unit.search.bins.x[0][1]);
         CHECK(apart > 0.0 && apart < INFINITY);
-        CHECK(hs_near_bounder_init(&unit.near, &bounder) == HS_OK);
-        hs_near_group group;
-        hs_near_group_set(&unit.near, 0, 1, &group);
+        CHECK(hs_nearest_bounder_init(&unit.near, &bounder) == HS_OK);
+        hs_nearest_group group;
+        hs_nearest_group_set(&unit.near, 0, 1, &group);
         group.radius = ldexp(1.0, exponents[e]);
-        CHECK(hs_near_bound(&unit.near, &options, &bounder, &group) == HS_OK);
+        CHECK(hs_nearest_bound(&unit.near, &options, &bounder, &group) == HS_OK);
         CHECK(group.radius >= apart && group.radius <= 1.001 * apart);
-        hs_near_bounder_free(&unit.near, &bounder);
-        near_unit_close(&unit);
+        hs_nearest_bounder_free(&unit.near, &bounder);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -150,17 +150,18 @@ images_without_end_are_refused(void)
     const hs_points  points = {x, 1, 2, HS_FLOAT64, 16, 8};
     const hs_options options = hs_options_default();
     for (int e = 0; e < 2; e++) {
-        hs_near_bounder bounder;
-        near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-        CHECK(hs_near_bounder_init(&unit.near, &bounder) == HS_OK);
-        hs_near_group group;
-        hs_near_group_set(&unit.near, 0, 1, &group);
+        hs_nearest_bounder bounder;
+        nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+        CHECK(hs_nearest_bounder_init(&unit.near, &bounder) == HS_OK);
+        hs_nearest_group group;
+        hs_nearest_group_set(&unit.near, 0, 1, &group);
         group.radius = 0.5;
         group.away = e ? 0x1p60 : 0.0;
-        CHECK(hs_near_bound(&unit.near, &options, &bounder, &group) == (e ? HS_ERR_MEMORY : HS_OK));
+        CHECK(hs_nearest_bound(&unit.near, &options, &bounder, &group) ==
+              (e ? HS_ERR_MEMORY : HS_OK));
         CHECK(e || (group.radius >= 1.0 && group.radius < 1.001));
-        hs_near_bounder_free(&unit.near, &bounder);
-        near_unit_close(&unit);
+        hs_nearest_bounder_free(&unit.near, &bounder);
+        nearest_unit_close(&unit);
     }
 }
 

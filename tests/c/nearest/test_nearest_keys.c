@@ -9,7 +9,7 @@ void test_nearest_keys(void);
 
 enum { MOST = 700 };
 
-static hs_near_key keys[MOST], spare[MOST], given[MOST];
+static hs_nearest_key keys[MOST], spare[MOST], given[MOST];
 
 /* Squares up to 1, of so many different values; the place is the number. */
 static void
@@ -19,16 +19,16 @@ fill_keys(harness_random *random, int64_t n, int values)
         const double square = values == 0 ? random_unit(random)
                                           : (double)(random_bits(random) % (uint64_t)values) /
                                                 (values > 1 ? values - 1 : 1);
-        given[e] = keys[e] = (hs_near_key){square, (int32_t)e};
+        given[e] = keys[e] = (hs_nearest_key){square, (int32_t)e};
     }
 }
 
 static bool
-are_sorted(const hs_near_key *sorted, int64_t n)
+are_sorted(const hs_nearest_key *sorted, int64_t n)
 {
     bool right = true;
     for (int64_t e = 0; e < n; e++) {
-        const hs_near_key *key = &sorted[e];
+        const hs_nearest_key *key = &sorted[e];
         right = right && key->place >= 0 && key->place < n;
         right = right && key->square == given[key->place].square;
         if (e > 0)
@@ -46,10 +46,10 @@ equal_keys_keep_their_order(void)
     int              wrong = 0;
     for (int64_t n = 0; n < 300; n++) {
         for (int values = 0; values < 6; values++) {
-            hs_near_pace pace = {.options = &options};
-            hs_near_key *sorted = keys, *other = spare;
+            hs_nearest_pace pace = {.options = &options};
+            hs_nearest_key *sorted = keys, *other = spare;
             fill_keys(&random, n, values);
-            hs_near_sort(&pace, &sorted, &other, n, values == 5 ? 1e6 : 1.0);
+            hs_nearest_sort(&pace, &sorted, &other, n, values == 5 ? 1e6 : 1.0);
             wrong += !are_sorted(sorted, n);
             wrong += !(sorted == keys && other == spare) && !(sorted == spare && other == keys);
             wrong += pace.status != HS_OK;
@@ -64,16 +64,16 @@ few_keys_are_counted_and_many_merged(void)
 {
     const hs_options options = hs_options_default();
     harness_random   random = {92};
-    hs_near_pace     pace = {.options = &options};
-    hs_near_key     *sorted = keys, *other = spare;
-    fill_keys(&random, HS_NEAR_COUNTED + 1, 0);
-    hs_near_sort(&pace, &sorted, &other, HS_NEAR_COUNTED, 1.0);
-    CHECK(sorted == spare && pace.steps == 0 && are_sorted(sorted, HS_NEAR_COUNTED));
+    hs_nearest_pace  pace = {.options = &options};
+    hs_nearest_key  *sorted = keys, *other = spare;
+    fill_keys(&random, HS_NEAREST_COUNTED + 1, 0);
+    hs_nearest_sort(&pace, &sorted, &other, HS_NEAREST_COUNTED, 1.0);
+    CHECK(sorted == spare && pace.steps == 0 && are_sorted(sorted, HS_NEAREST_COUNTED));
     sorted = keys;
     other = spare;
-    fill_keys(&random, HS_NEAR_COUNTED + 1, 0);
-    hs_near_sort(&pace, &sorted, &other, HS_NEAR_COUNTED + 1, 1.0);
-    CHECK(sorted == keys && pace.steps > 0 && are_sorted(sorted, HS_NEAR_COUNTED + 1));
+    fill_keys(&random, HS_NEAREST_COUNTED + 1, 0);
+    hs_nearest_sort(&pace, &sorted, &other, HS_NEAREST_COUNTED + 1, 1.0);
+    CHECK(sorted == keys && pace.steps > 0 && are_sorted(sorted, HS_NEAREST_COUNTED + 1));
 }
 
 /* The least come first, in no order. */
@@ -88,7 +88,7 @@ the_least_are_selected(void)
                 uint8_t met[MOST] = {0};
                 double  largest = -1.0, least = INFINITY;
                 fill_keys(&random, n, values);
-                hs_near_select(keys, n, wanted);
+                hs_nearest_select(keys, n, wanted);
                 for (int64_t e = 0; e < n; e++) {
                     wrong += met[keys[e].place]++ || keys[e].square != given[keys[e].place].square;
                     largest = e < wanted ? fmax(largest, keys[e].square) : largest;
@@ -113,16 +113,17 @@ refuse(void *context, double fraction)
 static void
 steps_are_polled_between(void)
 {
-    int          polls = 0;
-    hs_options   options = hs_options_default();
-    hs_near_pace pace = {.options = &options};
-    CHECK(hs_near_goes_on(&pace, HS_NEAR_POLL_STEPS - 1) && pace.steps == HS_NEAR_POLL_STEPS - 1);
-    CHECK(hs_near_goes_on(&pace, 1) && pace.steps == 0);
+    int             polls = 0;
+    hs_options      options = hs_options_default();
+    hs_nearest_pace pace = {.options = &options};
+    CHECK(hs_nearest_goes_on(&pace, HS_NEAREST_POLL_STEPS - 1) &&
+          pace.steps == HS_NEAREST_POLL_STEPS - 1);
+    CHECK(hs_nearest_goes_on(&pace, 1) && pace.steps == 0);
     options.poll = refuse;
     options.poll_context = &polls;
-    CHECK(hs_near_goes_on(&pace, HS_NEAR_POLL_STEPS - 1) && polls == 0);
-    CHECK(!hs_near_goes_on(&pace, 1) && polls == 1 && pace.status == HS_ERR_INTERRUPTED);
-    CHECK(!hs_near_goes_on(&pace, 2 * HS_NEAR_POLL_STEPS) && polls == 1);
+    CHECK(hs_nearest_goes_on(&pace, HS_NEAREST_POLL_STEPS - 1) && polls == 0);
+    CHECK(!hs_nearest_goes_on(&pace, 1) && polls == 1 && pace.status == HS_ERR_INTERRUPTED);
+    CHECK(!hs_nearest_goes_on(&pace, 2 * HS_NEAREST_POLL_STEPS) && polls == 1);
 }
 
 /* A merge stops wherever it is told to. */
@@ -131,14 +132,14 @@ merging_can_be_stopped(void)
 {
     harness_random random = {94};
     for (int64_t left = 0; left < 3000; left += 97) {
-        int          polls = 0;
-        hs_options   options = hs_options_default();
-        hs_near_pace pace = {.options = &options, .steps = HS_NEAR_POLL_STEPS - left};
-        hs_near_key *sorted = keys, *other = spare;
+        int             polls = 0;
+        hs_options      options = hs_options_default();
+        hs_nearest_pace pace = {.options = &options, .steps = HS_NEAREST_POLL_STEPS - left};
+        hs_nearest_key *sorted = keys, *other = spare;
         options.poll = refuse;
         options.poll_context = &polls;
         fill_keys(&random, MOST, 0);
-        hs_near_sort(&pace, &sorted, &other, MOST, 1.0);
+        hs_nearest_sort(&pace, &sorted, &other, MOST, 1.0);
         CHECK(polls == 1 && pace.status == HS_ERR_INTERRUPTED);
     }
 }

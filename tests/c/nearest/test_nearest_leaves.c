@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest_leaves.c: leaves that groups share are all that any of them may need, each group is
  * given those within its radius, and where a list would save nothing there is none. */
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
@@ -9,9 +9,9 @@ void test_nearest_leaves(void);
 
 enum { MOST = 24000, GROUP = 16 };
 
-static near_unit      unit;
-static hs_near_leaves leaves;
-static double         x[3 * MOST];
+static nearest_unit      unit;
+static hs_nearest_leaves leaves;
+static double            x[3 * MOST];
 
 static void
 open_points(int64_t n, int d, double side, const hs_box *box, int64_t k)
@@ -20,29 +20,29 @@ open_points(int64_t n, int d, double side, const hs_box *box, int64_t k)
     for (int64_t e = 0; e < n * d; e++)
         x[e] = side * random_unit(&random);
     const hs_points points = {x, n, d, HS_FLOAT64, d * 8, 8};
-    near_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
-    CHECK(hs_near_leaves_init(&unit.near, &leaves) == HS_OK);
+    nearest_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
+    CHECK(hs_nearest_leaves_init(&unit.near, &leaves) == HS_OK);
 }
 
 static void
 close_points(void)
 {
-    hs_near_leaves_free(&unit.near, &leaves);
-    near_unit_close(&unit);
+    hs_nearest_leaves_free(&unit.near, &leaves);
+    nearest_unit_close(&unit);
 }
 
-static hs_near_group
+static hs_nearest_group
 group_from(int32_t first, int32_t n, double radius)
 {
-    hs_near_group group;
-    hs_near_group_set(&unit.near, first, first + n, &group);
+    hs_nearest_group group;
+    hs_nearest_group_set(&unit.near, first, first + n, &group);
     group.radius = radius;
     return group;
 }
 
 /* Distance between the group and the range of a leaf's points. */
 static double
-distance_to(const hs_near_group *group, const hs_tree_node *leaf)
+distance_to(const hs_nearest_group *group, const hs_tree_node *leaf)
 {
     const hs_bins *bins = &unit.search.bins;
     double         square = 0.0;
@@ -67,14 +67,14 @@ lists_hold_what_is_within_the_radius(void)
         open_points(2000, d, 4.0, NULL, 4);
         const double radius = d == 1 ? 0.03 : d == 2 ? 0.2 : 0.7;
         for (int32_t first = 0; first + 4 * GROUP <= 2000; first += 4 * GROUP) {
-            hs_near_group groups[4];
+            hs_nearest_group groups[4];
             for (int g = 0; g < 4; g++)
                 groups[g] = group_from(first + g * GROUP, GROUP, radius * (1.0 + 0.25 * g));
-            hs_near_leaves_find(&unit.near, groups, 4, &leaves);
+            hs_nearest_leaves_find(&unit.near, groups, 4, &leaves);
             CHECK(leaves.radius == groups[3].radius && leaves.n_images == 1);
             for (int g = 0; g < 4; g++) {
                 const int32_t n =
-                    hs_near_leaves_list(&unit.near, &groups[g], groups[g].radius, &leaves);
+                    hs_nearest_leaves_list(&unit.near, &groups[g], groups[g].radius, &leaves);
                 int32_t at = 0;
                 for (int32_t node = 0; node < unit.near.tree.n_nodes; node++)
                     n_near += unit.near.tree.nodes[node].left == 0 &&
@@ -109,9 +109,9 @@ leaves_lie_in_images(void)
     int          n_several = 0;
     open_points(500, 2, 4.0, &box, 4);
     for (int32_t first = 0; first + 2 * GROUP <= 500; first += GROUP) {
-        hs_near_group groups[2] = {group_from(first, GROUP, 0.25),
-                                   group_from(first + GROUP, GROUP, 0.25)};
-        hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+        hs_nearest_group groups[2] = {group_from(first, GROUP, 0.25),
+                                      group_from(first + GROUP, GROUP, 0.25)};
+        hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
         CHECK(leaves.radius == 0.25 && leaves.n_images >= 1 && leaves.error > 0.0);
         for (int32_t image = 0; image < leaves.n_images; image++) {
             int32_t l = 0;
@@ -130,15 +130,15 @@ static void
 groups_that_look_far_are_left_out(void)
 {
     open_points(2000, 2, 4.0, NULL, 4);
-    hs_near_group groups[3] = {group_from(0, GROUP, 0.2), group_from(GROUP, GROUP, 0.4),
-                               group_from(2 * GROUP, GROUP, 0.40001)};
-    hs_near_leaves_find(&unit.near, groups, 3, &leaves);
+    hs_nearest_group groups[3] = {group_from(0, GROUP, 0.2), group_from(GROUP, GROUP, 0.4),
+                                  group_from(2 * GROUP, GROUP, 0.40001)};
+    hs_nearest_leaves_find(&unit.near, groups, 3, &leaves);
     CHECK(leaves.radius == 0.4);
     groups[0].radius = 0.3;
-    hs_near_leaves_find(&unit.near, groups, 3, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 3, &leaves);
     CHECK(leaves.radius == 0.40001);
     groups[1].radius = groups[2].radius = 50.0;
-    hs_near_leaves_find(&unit.near, groups, 3, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 3, &leaves);
     CHECK(leaves.radius == 0.3);
     const double far = 0.3 + 0.01 * 4.0; /* and their ranges, too */
     for (int32_t l = 0; l < leaves.n; l++) {
@@ -153,42 +153,42 @@ groups_that_look_far_are_left_out(void)
 static void
 where_nothing_is_saved_there_is_no_list(void)
 {
-    const hs_box  box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
-    hs_near_group groups[2];
+    const hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
+    hs_nearest_group groups[2];
     open_points(100, 2, 4.0, NULL, 4);
     groups[0] = group_from(0, GROUP, 1.0);
     groups[1] = group_from(GROUP, GROUP, 1.0);
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 1.0);
-    hs_near_leaves_find(&unit.near, groups, 1, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 1, &leaves);
     CHECK(leaves.radius == 0.0);
     groups[0].radius = groups[1].radius = 1.0;
     groups[1].upper[0] = groups[0].lower[0] + 255.0;
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 1.0);
     groups[1].upper[0] = groups[0].lower[0] + 256.0;
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.0);
     close_points();
     open_points(8, 2, 4.0, NULL, 4); /* all in one leaf */
     groups[0] = group_from(0, 4, 1.0);
     groups[1] = group_from(4, 4, 1.0);
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.0);
     close_points();
     open_points(MOST, 2, 4.0, NULL, 4);
     groups[0] = group_from(0, GROUP, 8.0);
     groups[1] = group_from(GROUP, GROUP, 8.0);
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.0);
     close_points();
     open_points(10, 2, 4.0, &box, 4);
     groups[0] = group_from(0, 1, 14.0);
     groups[1] = group_from(1, 1, 14.0);
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 0.0);
     groups[0].radius = groups[1].radius = 6.0;
-    hs_near_leaves_find(&unit.near, groups, 2, &leaves);
+    hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
     CHECK(leaves.radius == 6.0);
     close_points();
 }
@@ -197,20 +197,20 @@ static void
 any_allocation_may_be_refused(void)
 {
     open_points(10, 2, 4.0, NULL, 4);
-    hs_near_leaves_free(&unit.near, &leaves);
+    hs_nearest_leaves_free(&unit.near, &leaves);
     const int64_t held = unit.call.account.held;
     hs_status     status = HS_ERR_MEMORY;
     int           nth;
     for (nth = 1; status != HS_OK && nth < 20; nth++) {
         hs_test_fail_allocation(nth);
-        status = hs_near_leaves_init(&unit.near, &leaves);
+        status = hs_nearest_leaves_init(&unit.near, &leaves);
         CHECK((status == HS_OK) == hs_test_failure_is_due());
         hs_test_fail_allocation(0);
-        hs_near_leaves_free(&unit.near, &leaves);
+        hs_nearest_leaves_free(&unit.near, &leaves);
         CHECK(unit.call.account.held == held);
     }
     CHECK(nth == 11); /* four ranges, five others, and none */
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 void

@@ -3,7 +3,7 @@
  * with trees of points and queries, made anew or borrowed. */
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/nearest/nearest_kept.h"
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 #include "../support/poll_checks.h"
 
 #include <math.h>
@@ -12,8 +12,8 @@ void test_nearest_prepare(void);
 
 enum { N = 40 };
 
-static near_unit unit;
-static double    x[2 * N], q[2 * N];
+static nearest_unit unit;
+static double       x[2 * N], q[2 * N];
 
 static hs_points
 points_in(const double *data, int64_t n)
@@ -50,15 +50,15 @@ scenes_are_scaled_by_what_is_small(void)
                                .rows = {{cases[c].period}, {0.0, 4.0 * cases[c].period}}};
         const hs_points points = points_in(x, N);
         fill(5, cases[c].side, x);
-        near_unit_open(&points, NULL, cases[c].period > 0.0 ? &box : NULL, 1, HS_WANT_J,
-                       cases[c].limit, &unit);
+        nearest_unit_open(&points, NULL, cases[c].period > 0.0 ? &box : NULL, 1, HS_WANT_J,
+                          cases[c].limit, &unit);
         CHECK(unit.search.scene.scale.exponent == cases[c].exponent);
         CHECK(!unit.search.scene.extreme);
         CHECK(unit.near.limit ==
               (cases[c].limit == INFINITY ? INFINITY : ldexp(cases[c].limit, -cases[c].exponent)));
         CHECK(unit.near.within.inclusive && unit.near.order.inclusive);
         CHECK(unit.near.within.cutoff == (cases[c].limit == INFINITY ? 1.0 : unit.near.limit));
-        near_unit_close(&unit);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -70,14 +70,14 @@ leaves_are_larger_where_many_are_wanted(void)
     fill(6, 1.0, x);
     for (int64_t k = 31; k <= 32; k++) {
         int32_t largest = 0;
-        near_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
+        nearest_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
         for (int32_t number = 0; number < unit.near.tree.n_nodes; number++) {
             const hs_tree_node *node = &unit.near.tree.nodes[number];
             const int32_t       n = node->left == 0 ? node->end - node->first : 0;
             largest = n > largest ? n : largest;
         }
         CHECK(k == 31 ? largest <= 8 : largest > 8 && largest <= 16);
-        near_unit_close(&unit);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -88,15 +88,15 @@ queries_have_a_tree_of_their_own(void)
     const hs_points points = points_in(x, N), queries = points_in(q, N / 2);
     fill(7, 1.0, x);
     fill(8, 1.0, q);
-    near_unit_open(&points, &queries, NULL, 2, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_open(&points, &queries, NULL, 2, HS_WANT_J, INFINITY, &unit);
     CHECK(unit.search.has_queries && unit.near.asking == &unit.near.asking_tree);
     CHECK(unit.near.tree.nodes[0].end == N && unit.near.asking_tree.nodes[0].end == N / 2);
     CHECK(unit.search.query_bins.n == N / 2 && unit.search.bins.n == N);
-    near_unit_close(&unit);
-    near_unit_open(&points, NULL, NULL, 2, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_close(&unit);
+    nearest_unit_open(&points, NULL, NULL, 2, HS_WANT_J, INFINITY, &unit);
     CHECK(!unit.search.has_queries && unit.near.asking == &unit.near.tree);
     CHECK(unit.near.asking_tree.nodes == NULL && unit.search.is_full);
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 /* A search that prepares by itself, and ends. */
@@ -113,14 +113,14 @@ prepare(const hs_sets *sets, const hs_box *box, double limit, const char *kernel
     memset(&unit, 0, sizeof unit);
     hs_call_begin(&options, &unit.call);
     hs_search_begin(&unit.call, &unit.search);
-    unit.near = (hs_near){.search = &unit.search, .k = 1, .of_spot = 2};
-    return hs_near_prepare(&unit.near, sets, box, limit, failure);
+    unit.near = (hs_nearest){.search = &unit.search, .k = 1, .of_spot = 2};
+    return hs_nearest_prepare(&unit.near, sets, box, limit, failure);
 }
 
 static void
 release(void)
 {
-    hs_near_release(&unit.near);
+    hs_nearest_release(&unit.near);
     hs_search_close(&unit.search);
     hs_call_dismiss(&unit.call);
     CHECK(unit.call.account.held == 0);
@@ -171,10 +171,10 @@ prepare_and_release(void *context)
 static hs_status
 prepare_with_kept(void *context)
 {
-    hs_near_kept *kept = hs_near_kept_new();
+    hs_nearest_kept *kept = hs_nearest_kept_new();
     (void)context;
     const hs_status status = kept != NULL ? prepare_and_release(kept) : HS_ERR_MEMORY;
-    hs_near_kept_free(kept);
+    hs_nearest_kept_free(kept);
     return status;
 }
 
@@ -191,15 +191,15 @@ any_allocation_may_be_refused(void)
 static void
 what_is_borrowed_is_what_would_be_made(void)
 {
-    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
-    const hs_points points = points_in(x, N), queries = points_in(q, N);
-    hs_sets         sets = {.points = &points, .is_full = true, .is_plain = true, .is_wide = true};
-    hs_near_kept   *kept = hs_near_kept_new();
-    hs_failure      failure;
+    const hs_box     box = {.ndim = 2, .periodic = {true, false}, .rows = {{1.0}, {0.0, 1.0}}};
+    const hs_points  points = points_in(x, N), queries = points_in(q, N);
+    hs_sets          sets = {.points = &points, .is_full = true, .is_plain = true, .is_wide = true};
+    hs_nearest_kept *kept = hs_nearest_kept_new();
+    hs_failure       failure;
     fill(13, 1.0, x);
     fill(14, 1.0, q);
     CHECK(prepare(&sets, &box, 0.5, NULL, &failure) == HS_OK);
-    const hs_near anew = unit.near;
+    const hs_nearest anew = unit.near;
     release();
     CHECK(anew.has_layer);
     for (int asks = 0; asks < 2; asks++) {
@@ -233,7 +233,7 @@ what_is_borrowed_is_what_would_be_made(void)
     q[1] = NAN;
     CHECK(prepare(&sets, &box, 0.5, NULL, &failure) == HS_ERR_NOT_FINITE && failure.in_queries);
     release();
-    hs_near_kept_free(kept);
+    hs_nearest_kept_free(kept);
 }
 
 void

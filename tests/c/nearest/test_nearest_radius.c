@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest_radius.c: a first radius holds about as many points as are wanted, by the density of
  * what is around a group, of its line or plane, or of the box. */
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
@@ -9,8 +9,8 @@ void test_nearest_radius(void);
 
 enum { MOST = 4000 };
 
-static near_unit unit;
-static double    x[3 * MOST];
+static nearest_unit unit;
+static double       x[3 * MOST];
 
 static hs_points
 points_in(int64_t n, int ndim)
@@ -21,9 +21,9 @@ points_in(int64_t n, int ndim)
 static void
 exponents_end_at_the_least_radius(void)
 {
-    CHECK(hs_near_exponent(1.0) == 0 && hs_near_exponent(1.99) == 0);
-    CHECK(hs_near_exponent(0.75) == -1 && hs_near_exponent(HS_NEAR_LEAST_RADIUS) == -1000);
-    CHECK(hs_near_exponent(0.0) == -1000 && hs_near_exponent(0x1p-1070) == -1000);
+    CHECK(hs_nearest_exponent(1.0) == 0 && hs_nearest_exponent(1.99) == 0);
+    CHECK(hs_nearest_exponent(0.75) == -1 && hs_nearest_exponent(HS_NEAREST_LEAST_RADIUS) == -1000);
+    CHECK(hs_nearest_exponent(0.0) == -1000 && hs_nearest_exponent(0x1p-1070) == -1000);
 }
 
 /* Ranges of X, and of t_k in a box of any shape. */
@@ -36,12 +36,12 @@ groups_have_the_range_of_their_points(void)
         x[e] = 6.0 * random_unit(&random);
     for (int tilted = 0; tilted < 2; tilted++) {
         const hs_points points = points_in(200, 2);
-        near_unit_open(&points, NULL, tilted ? &box : NULL, 3, HS_WANT_J, INFINITY, &unit);
+        nearest_unit_open(&points, NULL, tilted ? &box : NULL, 3, HS_WANT_J, INFINITY, &unit);
         const hs_bins    *bins = &unit.search.bins;
         const hs_lattice *lattice = &unit.search.scene.lattice;
         for (int32_t first = 0; first < 190; first += 17) {
-            hs_near_group group;
-            hs_near_group_set(&unit.near, first, first + 9, &group);
+            hs_nearest_group group;
+            hs_nearest_group_set(&unit.near, first, first + 9, &group);
             CHECK(group.first == first && group.last == first + 9 && group.away == 0.0);
             for (int k = 0; k < 2; k++) {
                 double low = INFINITY, high = -INFINITY, t_low = INFINITY, t_high = -INFINITY;
@@ -57,7 +57,7 @@ groups_have_the_range_of_their_points(void)
                 CHECK(group.t_lower[k] == t_low && group.t_upper[k] == t_high);
             }
         }
-        near_unit_close(&unit);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -71,42 +71,42 @@ groups_beside_a_layer_are_away(void)
     x[0] = x[2] = 0.0;
     x[1] = 0.0;
     x[3] = 2.0;
-    near_unit_open(&points, &queries, &box, 1, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_open(&points, &queries, &box, 1, HS_WANT_J, INFINITY, &unit);
     CHECK(unit.near.has_layer);
     for (int32_t si = 0; si < 3; si++) {
-        hs_near_group group;
-        const double  y = q[2 * unit.search.query_bins.order[si] + 1];
-        const double  away = y > 2.0 ? y - 2.0 : y < 0.0 ? -y : 0.0;
-        hs_near_group_set(&unit.near, si, si + 1, &group);
+        hs_nearest_group group;
+        const double     y = q[2 * unit.search.query_bins.order[si] + 1];
+        const double     away = y > 2.0 ? y - 2.0 : y < 0.0 ? -y : 0.0;
+        hs_nearest_group_set(&unit.near, si, si + 1, &group);
         CHECK(group.away <= away && group.away >= away * (1.0 - 0x1p-30));
     }
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 static void
 nothing_is_farther_than_all_points_or_the_largest_distance(void)
 {
-    const hs_box    box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 1.0}}};
-    const hs_points points = points_in(3, 2);
-    const double    line[6] = {0.0, 0.0, 3.0, 0.0, 3.0, 4.0};
-    hs_near_group   group;
+    const hs_box     box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 1.0}}};
+    const hs_points  points = points_in(3, 2);
+    const double     line[6] = {0.0, 0.0, 3.0, 0.0, 3.0, 4.0};
+    hs_nearest_group group;
     memcpy(x, line, sizeof line);
-    near_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
-    hs_near_group_set(&unit.near, 0, 1, &group); /* one of the corners: 3 and 4 along the axes */
-    double farthest = hs_near_farthest(&unit.near, &group);
+    nearest_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group_set(&unit.near, 0, 1, &group); /* one of the corners: 3 and 4 along the axes */
+    double farthest = hs_nearest_farthest(&unit.near, &group);
     CHECK(farthest >= 5.0 && farthest <= 7.001);
-    near_unit_close(&unit);
-    near_unit_open(&points, NULL, NULL, 1, HS_WANT_J, 2.0, &unit);
-    farthest = hs_near_farthest(&unit.near, &group);
+    nearest_unit_close(&unit);
+    nearest_unit_open(&points, NULL, NULL, 1, HS_WANT_J, 2.0, &unit);
+    farthest = hs_nearest_farthest(&unit.near, &group);
     CHECK(farthest >= 2.0 && farthest < 2.001);
-    near_unit_close(&unit);
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
-    CHECK(hs_near_farthest(&unit.near, &group) == INFINITY);
-    near_unit_close(&unit);
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, 2000.0, &unit);
-    farthest = hs_near_farthest(&unit.near, &group);
+    nearest_unit_close(&unit);
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    CHECK(hs_nearest_farthest(&unit.near, &group) == INFINITY);
+    nearest_unit_close(&unit);
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, 2000.0, &unit);
+    farthest = hs_nearest_farthest(&unit.near, &group);
     CHECK(farthest >= 2000.0 && farthest < 2000.1);
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 /* Of a first radius for each point, or for every tenth: the mean number of points within it, in
@@ -116,12 +116,12 @@ mean_within(int64_t n, int ndim, int64_t k)
 {
     const hs_points points = points_in(n, ndim);
     int64_t         sum = 0, asked = 0;
-    near_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
     const hs_bins *bins = &unit.search.bins;
     for (int32_t si = 0; si < n; si += 10, asked++) {
-        hs_near_group group;
-        hs_near_group_set(&unit.near, si, si + 1, &group);
-        hs_near_guess(&unit.near, &group);
+        hs_nearest_group group;
+        hs_nearest_group_set(&unit.near, si, si + 1, &group);
+        hs_nearest_guess(&unit.near, &group);
         for (int64_t sj = 0; sj < n; sj++) {
             double square = 0.0;
             for (int c = 0; c < ndim; c++) {
@@ -132,7 +132,7 @@ mean_within(int64_t n, int ndim, int64_t k)
         }
         CHECK(!group.is_complete);
     }
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
     return (double)sum / (double)asked;
 }
 
@@ -175,20 +175,20 @@ few_points_have_the_density_of_their_box(void)
     for (int e = 0; e < 3 * 30; e++)
         x[e] = 0.001 * random_unit(&random);
     for (int tilted = 0; tilted < 2; tilted++) {
-        const hs_box    box = {.ndim = 3,
-                               .periodic = {true, true, true},
-                               .rows = {{10.0}, {tilted * 3.0, 20.0}, {0.0, 0.0, 5.0}}};
-        const hs_points points = points_in(30, 3);
-        hs_near_group   group;
-        near_unit_open(&points, NULL, &box, 4, HS_WANT_J, INFINITY, &unit);
-        hs_near_group_set(&unit.near, 0, 1, &group);
-        hs_near_guess(&unit.near, &group);
+        const hs_box     box = {.ndim = 3,
+                                .periodic = {true, true, true},
+                                .rows = {{10.0}, {tilted * 3.0, 20.0}, {0.0, 0.0, 5.0}}};
+        const hs_points  points = points_in(30, 3);
+        hs_nearest_group group;
+        nearest_unit_open(&points, NULL, &box, 4, HS_WANT_J, INFINITY, &unit);
+        hs_nearest_group_set(&unit.near, 0, 1, &group);
+        hs_nearest_guess(&unit.near, &group);
         const double wanted = 5.0 + 3.5 * sqrt(5.0) + 1.0;
         const double radius = cbrt(wanted / 30.0 * 1000.0 / 4.1888);
         CHECK(group.radius >= 0.999 * radius && !group.is_complete);
         /* Skewed boxes make room for edges, up to half of the ball along each axis. */
         CHECK(group.radius <= (tilted ? 2.001 : 1.001) * radius);
-        near_unit_close(&unit);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -205,33 +205,33 @@ layers_are_as_thick_as_their_points(void)
     x[1] = 0.0;
     x[3] = 500.0;
     const hs_points points = points_in(30, 2);
-    near_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_open(&points, NULL, &box, 1, HS_WANT_J, INFINITY, &unit);
     for (int32_t si = 0; si < 30; si++) {
-        hs_near_group group;
-        hs_near_group_set(&unit.near, si, si + 1, &group);
-        hs_near_guess(&unit.near, &group);
+        hs_nearest_group group;
+        hs_nearest_group_set(&unit.near, si, si + 1, &group);
+        hs_nearest_guess(&unit.near, &group);
         const double wanted = 2.0 + 3.5 * sqrt(2.0) + 1.0;
         const double radius = sqrt(wanted / 30.0 * 100.0 * 500.0 / 3.1416);
         CHECK(group.radius > 0.999 * radius && group.radius < 1.42 * radius);
     }
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 /* A query far from all points looks as far as they are, and a little farther. */
 static void
 queries_outside_look_as_far_as_the_points_are(void)
 {
-    const double    q[2] = {1000.5, 0.5};
-    harness_random  random = {343};
-    const hs_points points = points_in(MOST, 2), query = {q, 1, 2, HS_FLOAT64, 16, 8};
-    hs_near_group   group;
+    const double     q[2] = {1000.5, 0.5};
+    harness_random   random = {343};
+    const hs_points  points = points_in(MOST, 2), query = {q, 1, 2, HS_FLOAT64, 16, 8};
+    hs_nearest_group group;
     for (int e = 0; e < 2 * MOST; e++)
         x[e] = random_unit(&random);
-    near_unit_open(&points, &query, NULL, 1, HS_WANT_J, INFINITY, &unit);
-    hs_near_group_set(&unit.near, 0, 1, &group);
-    hs_near_guess(&unit.near, &group);
+    nearest_unit_open(&points, &query, NULL, 1, HS_WANT_J, INFINITY, &unit);
+    hs_nearest_group_set(&unit.near, 0, 1, &group);
+    hs_nearest_guess(&unit.near, &group);
     CHECK(group.radius > 999.5 && group.radius < 1001.5);
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 /* Where all points are wanted, or the radius passes the largest distance, nothing is beyond. */
@@ -243,21 +243,21 @@ radii_that_hold_everything_are_complete(void)
     for (int e = 0; e < 2 * 100; e++)
         x[e] = random_unit(&random);
     for (int64_t k = 99; k <= 100; k++) {
-        hs_near_group group;
-        near_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
-        hs_near_group_set(&unit.near, 0, 100, &group);
-        hs_near_guess(&unit.near, &group);
-        CHECK(group.is_complete && group.radius == hs_near_farthest(&unit.near, &group));
-        near_unit_close(&unit);
+        hs_nearest_group group;
+        nearest_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
+        hs_nearest_group_set(&unit.near, 0, 100, &group);
+        hs_nearest_guess(&unit.near, &group);
+        CHECK(group.is_complete && group.radius == hs_nearest_farthest(&unit.near, &group));
+        nearest_unit_close(&unit);
     }
     for (int e = 0; e < 2; e++) {
-        hs_near_group group;
-        near_unit_open(&points, NULL, NULL, 2, HS_WANT_J, e ? 0.01 : 0.0, &unit);
-        hs_near_group_set(&unit.near, 0, 1, &group);
-        hs_near_guess(&unit.near, &group);
+        hs_nearest_group group;
+        nearest_unit_open(&points, NULL, NULL, 2, HS_WANT_J, e ? 0.01 : 0.0, &unit);
+        hs_nearest_group_set(&unit.near, 0, 1, &group);
+        hs_nearest_guess(&unit.near, &group);
         CHECK(group.is_complete && group.radius < 0.0101);
-        CHECK(e ? group.radius >= 0.01 : group.radius == HS_NEAR_LEAST_RADIUS);
-        near_unit_close(&unit);
+        CHECK(e ? group.radius >= 0.01 : group.radius == HS_NEAREST_LEAST_RADIUS);
+        nearest_unit_close(&unit);
     }
 }
 

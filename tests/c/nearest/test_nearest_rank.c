@@ -2,7 +2,7 @@
 /* test_nearest_rank.c: hits are put in exact order however much their squares err, as long as the
  * block tells how much, and nothing is called the nearest that a radius may have left out. */
 #include "../../../csrc/core/nearest/nearest_rank.h"
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
@@ -10,23 +10,25 @@ void test_nearest_rank(void);
 
 enum { N = 300 };
 
-static near_unit      unit;
-static hs_near_block  block;
-static hs_near_ranker ranker;
-static hs_near_group  group;
-static hs_options     options;
-static int32_t        hits[2 * N];
+static nearest_unit      unit;
+static hs_nearest_block  block;
+static hs_nearest_ranker ranker;
+static hs_nearest_group  group;
+static hs_options        options;
+static int32_t           hits[2 * N];
 
 static void
 open_scene(const double *x, int64_t n, int d, const hs_box *box, int64_t k, double radius)
 {
     const hs_points points = {x, n, d, HS_FLOAT64, d * 8, 8};
-    near_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
-    CHECK(hs_near_block_init(&unit.near, &block) == HS_OK);
-    group = near_unit_group(&unit, radius);
-    CHECK(hs_near_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) == HS_OK);
+    nearest_unit_open(&points, NULL, box, k, HS_WANT_J, INFINITY, &unit);
+    CHECK(hs_nearest_block_init(&unit.near, &block) == HS_OK);
+    group = nearest_unit_group(&unit, radius);
+    CHECK(hs_nearest_block_fill(&unit.near, &unit.call.options, &group, 1e9, NULL, &block) ==
+          HS_OK);
     options = hs_options_default();
-    ranker = (hs_near_ranker){.near = &unit.near, .block = &block, .pace = {.options = &options}};
+    ranker =
+        (hs_nearest_ranker){.near = &unit.near, .block = &block, .pace = {.options = &options}};
     for (int32_t h = 0; h < block.n && h < 2 * N; h++)
         hits[h] = h;
 }
@@ -34,9 +36,9 @@ open_scene(const double *x, int64_t n, int d, const hs_box *box, int64_t k, doub
 static void
 close_scene(void)
 {
-    hs_near_ranker_free(&ranker);
-    hs_near_block_free(&unit.near, &block);
-    near_unit_close(&unit);
+    hs_nearest_ranker_free(&ranker);
+    hs_nearest_block_free(&unit.near, &block);
+    nearest_unit_close(&unit);
 }
 
 /* Point number i in tree order. */
@@ -104,7 +106,7 @@ order_is_exact_whatever_the_squares_err(void)
         block.flat_error = along * (2.0 * block.reach + along);
         for (int32_t i = trial; i < N; i += 97) {
             int64_t count;
-            CHECK(hs_near_rank(&ranker, &group, place_of(i), hits, N, &count) == HS_OK);
+            CHECK(hs_nearest_rank(&ranker, &group, place_of(i), hits, N, &count) == HS_OK);
             CHECK(count == (off < 0x1p-3 ? k : count));
             for (int e = 0; e < count; e++) {
                 const int32_t sj = block.number[ranker.keys[e].place];
@@ -127,19 +129,19 @@ what_the_radius_may_have_left_out_is_told(void)
     const int32_t si = place_of(0), n = block.n;
     const double  reach = block.reach * block.reach;
     CHECK(n == 4 && block.unit == 1.0);
-    CHECK(hs_near_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
     block.flat_error = 0.4999 * (reach - 1.44);
-    CHECK(hs_near_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
     block.flat_error = 0.5001 * (reach - 1.44);
-    CHECK(hs_near_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == -1);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == -1);
     group.is_complete = true;
-    CHECK(hs_near_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
     block.flat_error = 0.0;
     unit.near.k = 4; /* there are no more */
-    CHECK(hs_near_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == 3);
     group.is_complete = false;
-    CHECK(hs_near_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == -1);
-    CHECK(hs_near_rank(&ranker, &group, si, hits, 0, &count) == HS_OK && count == -1);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, n, &count) == HS_OK && count == -1);
+    CHECK(hs_nearest_rank(&ranker, &group, si, hits, 0, &count) == HS_OK && count == -1);
     close_scene();
 }
 
@@ -159,24 +161,25 @@ float32_tells_only_what_it_can(void)
     const double errors[] = {1e-7, 0.1, 0.124, 0.126, 0.4};
     for (int e = 0; e < 5; e++) {
         block.square_error = errors[e];
-        CHECK(hs_near_rank_fast(&ranker, si, hits, squares, 4, &count) == (e < 3));
+        CHECK(hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count) == (e < 3));
         CHECK(count == (e < 3 ? 2 : -1));
         CHECK(e >= 3 || (unit.search.bins.order[block.number[ranker.keys[0].place]] == 1 &&
                          unit.search.bins.order[block.number[ranker.keys[1].place]] == 2));
     }
     block.square_error = 1e-7;
-    CHECK(!hs_near_rank_fast(&ranker, place_of(1), hits, squares, 4, &count)); /* not the first */
-    CHECK(hs_near_rank_fast(&ranker, si, hits, squares, 2, &count) && count == -1);
+    CHECK(
+        !hs_nearest_rank_fast(&ranker, place_of(1), hits, squares, 4, &count)); /* not the first */
+    CHECK(hs_nearest_rank_fast(&ranker, si, hits, squares, 2, &count) && count == -1);
     block.images[0].is_home = false; /* an image of itself is a neighbour */
-    CHECK(!hs_near_rank_fast(&ranker, si, hits, squares, 4, &count));
+    CHECK(!hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count));
     block.images[0].is_home = true;
     /* The last one wanted must be that far from the radius, too. */
     for (int32_t h = 0; h < 4; h++)
         squares[h] = squares[h] == 1.0f ? 2.2f : squares[h] > 1.0f ? 2.249f : squares[h];
     block.square_error = 0.02;
-    CHECK(hs_near_rank_fast(&ranker, si, hits, squares, 4, &count));
+    CHECK(hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count));
     block.square_error = 0.0249;
-    CHECK(!hs_near_rank_fast(&ranker, si, hits, squares, 4, &count));
+    CHECK(!hs_nearest_rank_fast(&ranker, si, hits, squares, 4, &count));
     close_scene();
 }
 
@@ -190,12 +193,12 @@ only_the_point_itself_is_left_out(void)
     open_scene(x, 1, 2, &box, 4, 0.75);
     CHECK(block.n_images >= 5 && block.n == block.n_images);
     block.flat_error = 0.3; /* the next images are at 0.27 */
-    CHECK(hs_near_rank(&ranker, &group, 0, hits, block.n, &count) == HS_OK && count == 4);
+    CHECK(hs_nearest_rank(&ranker, &group, 0, hits, block.n, &count) == HS_OK && count == 4);
     for (int e = 0; e < 4; e++) { /* -1 and 1, -2 and 2 */
-        const hs_near_image *image = hs_near_image_of(&block, ranker.keys[e].place);
+        const hs_nearest_image *image = hs_nearest_image_of(&block, ranker.keys[e].place);
         CHECK(!image->is_home && abs(image->shift[0]) == 1 + e / 2);
     }
-    CHECK(hs_near_image_of(&block, ranker.keys[0].place)->shift[0] *
+    CHECK(hs_nearest_image_of(&block, ranker.keys[0].place)->shift[0] *
               unit.search.scene.lattice.U[0][0] <
           0); /* the smaller S first */
     close_scene();
@@ -221,15 +224,16 @@ ranking_can_be_stopped_anywhere(void)
         x[2 * e + 1] = ldexp(e, -44);
     }
     open_scene(x, N, 2, NULL, 1, 1.5);
-    CHECK(hs_near_rank(&ranker, &group, place_of(0), hits, N, &count) == HS_OK && count == 1);
+    CHECK(hs_nearest_rank(&ranker, &group, place_of(0), hits, N, &count) == HS_OK && count == 1);
     CHECK(unit.search.bins.order[block.number[ranker.keys[0].place]] == 1);
     const int64_t n_steps = ranker.pace.steps;
     CHECK(n_steps > 3 * N && ranker.n_compared >= N - 2);
     options.poll = stop;
     options.poll_context = &asked;
     for (int64_t ahead = 1; ahead <= n_steps + 20; ahead += 20) {
-        ranker.pace = (hs_near_pace){.options = &options, .steps = HS_NEAR_POLL_STEPS - ahead};
-        const hs_status status = hs_near_rank(&ranker, &group, place_of(0), hits, N, &count);
+        ranker.pace =
+            (hs_nearest_pace){.options = &options, .steps = HS_NEAREST_POLL_STEPS - ahead};
+        const hs_status status = hs_nearest_rank(&ranker, &group, place_of(0), hits, N, &count);
         CHECK(status == (ahead <= n_steps ? HS_ERR_INTERRUPTED : HS_OK));
         n_stopped += status != HS_OK;
     }
@@ -251,7 +255,7 @@ points_at_one_spot_are_in_order_of_number(void)
                 int64_t count;
                 open_scene(x, n, 1, NULL, k, 1.0);
                 for (int32_t i = n - at_spot; i < n; i++) {
-                    CHECK(hs_near_rank(&ranker, &group, place_of(i), hits, block.n, &count) ==
+                    CHECK(hs_nearest_rank(&ranker, &group, place_of(i), hits, block.n, &count) ==
                           HS_OK);
                     CHECK(count == k);
                     for (int32_t e = 0; e < count; e++) {

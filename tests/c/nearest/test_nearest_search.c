@@ -4,7 +4,7 @@
  * ties are at their limits, and refused beyond these.
  */
 #include "../support/harness.h"
-#include "../support/near_checks.h"
+#include "../support/nearest_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
 

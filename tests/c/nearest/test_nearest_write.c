@@ -5,7 +5,7 @@
  * and shifts that are too large for one column or for all.
  */
 #include "../support/harness.h"
-#include "../support/near_checks.h"
+#include "../support/nearest_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
 

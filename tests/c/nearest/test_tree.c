@@ -4,7 +4,7 @@
  * nodes are many; and for points a last place apart.
  */
 #include "../support/harness.h"
-#include "../support/near_checks.h"
+#include "../support/nearest_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_tree_nodes.c: nodes of a tree part their points, within exact bounds, and it is not much
  * deeper than need be. */
-#include "../support/near_unit.h"
+#include "../support/nearest_unit.h"
 
 #include <math.h>
 
@@ -9,8 +9,8 @@ void test_tree_nodes(void);
 
 enum { N = 3000 };
 
-static near_unit unit;
-static double    x[3 * N];
+static nearest_unit unit;
+static double       x[3 * N];
 
 /* Whether [low, high] is the exact range of the node's points along axis k. */
 static bool
@@ -80,11 +80,11 @@ nodes_part_their_points(void)
         for (int e = 0; e < d * n; e++)
             x[e] = floor(random_unit(&random) * cells) / cells;
         const hs_points points = {x, n, d, HS_FLOAT64, d * 8, 8};
-        near_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
+        nearest_unit_open(&points, NULL, NULL, k, HS_WANT_J, INFINITY, &unit);
         CHECK(check_nodes(k < 32 ? 8 : 16, &deepest) == n);
         CHECK(unit.near.tree.depth == deepest);
         CHECK(deepest <= 4 + (int)(1.6 * log2(n)));
-        near_unit_close(&unit);
+        nearest_unit_close(&unit);
     }
 }
 
@@ -97,18 +97,18 @@ leaves_of_one_spot_say_so(void)
         x[2 * i + 1] = i == 77 ? 0.5 : 0.0;
     }
     const hs_points points = {x, 100, 2, HS_FLOAT64, 16, 8};
-    near_unit_open(&points, NULL, NULL, 3, HS_WANT_J, INFINITY, &unit);
+    nearest_unit_open(&points, NULL, NULL, 3, HS_WANT_J, INFINITY, &unit);
     const hs_tree *tree = &unit.near.tree;
     CHECK(tree->n_nodes == 5 && check_nodes(8, &deepest) == 100 && deepest == 2);
     int spots = 0;
     for (int32_t number = 0; number < tree->n_nodes; number++) {
         const hs_tree_node *node = &tree->nodes[number];
         const int32_t       n = node->end - node->first;
-        CHECK(hs_near_of_leaf(&unit.near, node) == (node->is_spot ? 4 : n)); /* k + 1 */
+        CHECK(hs_nearest_of_leaf(&unit.near, node) == (node->is_spot ? 4 : n)); /* k + 1 */
         spots += node->is_spot;
     }
     CHECK(spots == 2); /* the third leaf is one point */
-    near_unit_close(&unit);
+    nearest_unit_close(&unit);
 }
 
 void

@@ -1,25 +1,25 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* near_unit.h: a search for the nearest that is ready, so that a test can take its steps one by
+/* nearest_unit.h: a search for the nearest that is ready, so that a test can take its steps one by
  * one. */
-#ifndef HS_NEAR_UNIT_H
-#define HS_NEAR_UNIT_H
+#ifndef HS_NEAREST_UNIT_H
+#define HS_NEAREST_UNIT_H
 
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/nearest/nearest_block.h"
 #include "../../../csrc/core/nearest/nearest.h"
 #include "harness.h"
 
-typedef struct near_unit {
-    hs_call   call;
-    hs_search search;
-    hs_near   near;
-    hs_output rows;
-} near_unit;
+typedef struct nearest_unit {
+    hs_call    call;
+    hs_search  search;
+    hs_nearest near;
+    hs_output  rows;
+} nearest_unit;
 
 /* want: quantities of the rows. limit: the largest distance. */
 static inline void
-near_unit_open(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
-               unsigned want, double limit, near_unit *unit)
+nearest_unit_open(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
+                  unsigned want, double limit, nearest_unit *unit)
 {
     const hs_sets sets = {
         .points = points, .queries = queries, .is_full = true, .is_plain = true, .is_wide = true};
@@ -30,22 +30,22 @@ near_unit_open(const hs_points *points, const hs_points *queries, const hs_box *
     options.threads = 1;
     hs_call_begin(&options, &unit->call);
     hs_search_begin(&unit->call, &unit->search);
-    unit->near = (hs_near){.search = &unit->search,
-                           .k = k,
-                           .of_spot = (int32_t)k + 1,
-                           .omits_self = queries == NULL,
-                           .rows = &unit->rows};
+    unit->near = (hs_nearest){.search = &unit->search,
+                              .k = k,
+                              .of_spot = (int32_t)k + 1,
+                              .omits_self = queries == NULL,
+                              .rows = &unit->rows};
     hs_output_init(&unit->call.account, points->ndim, want, 8, &unit->rows);
-    CHECK(hs_near_prepare(&unit->near, &sets, box, limit, &failure) == HS_OK);
+    CHECK(hs_nearest_prepare(&unit->near, &sets, box, limit, &failure) == HS_OK);
     unit->near.shared = hs_shared_new(&unit->call.account);
     CHECK(unit->near.shared != NULL);
 }
 
 static inline void
-near_unit_close(near_unit *unit)
+nearest_unit_close(nearest_unit *unit)
 {
     hs_shared_free(unit->near.shared);
-    hs_near_release(&unit->near);
+    hs_nearest_release(&unit->near);
     hs_output_free(&unit->rows);
     hs_search_close(&unit->search);
     hs_call_dismiss(&unit->call);
@@ -54,11 +54,11 @@ near_unit_close(near_unit *unit)
 
 /* All asking points as one group, with this radius. A block holds the coordinates of the first of
  * them only, as many as groups have. */
-static inline hs_near_group
-near_unit_group(const near_unit *unit, double radius)
+static inline hs_nearest_group
+nearest_unit_group(const nearest_unit *unit, double radius)
 {
-    hs_near_group group;
-    hs_near_group_set(&unit->near, 0, (int32_t)hs_search_asking(&unit->search)->n, &group);
+    hs_nearest_group group;
+    hs_nearest_group_set(&unit->near, 0, (int32_t)hs_search_asking(&unit->search)->n, &group);
     group.last = group.last < HS_GROUP_POINTS ? group.last : HS_GROUP_POINTS;
     group.radius = radius;
     return group;

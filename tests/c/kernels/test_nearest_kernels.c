@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_near_kernels.c: what every kernel of this CPU does for the nearest points, between guard
+ * test_nearest_kernels.c: what every kernel of this CPU does for the nearest points, between guard
  * pages: gathering candidates, putting squares in order, listing boxes.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS */
@@ -8,7 +8,7 @@
 
 #include "../support/kernel_checks.h"
 
-void test_near_kernels(void);
+void test_nearest_kernels(void);
 
 enum { N_POINTS = 300, MOST_RUNS = 60, ROOM = 4096 };
 
@@ -37,7 +37,7 @@ below(harness_random *random, int32_t n)
 
 /* Runs of one of two images; returns how many, *n: candidates. */
 static int32_t
-make_runs(harness_random *random, int32_t n_points, hs_near_run *runs, int32_t *n)
+make_runs(harness_random *random, int32_t n_points, hs_nearest_run *runs, int32_t *n)
 {
     const int32_t wanted = 1 + below(random, MOST_RUNS);
     int32_t       r = 0;
@@ -48,14 +48,14 @@ make_runs(harness_random *random, int32_t n_points, hs_near_run *runs, int32_t *
         if (*n + points > ROOM) {
             break;
         }
-        runs[r] = (hs_near_run){*n, points, si, below(random, 2)};
+        runs[r] = (hs_nearest_run){*n, points, si, below(random, 2)};
         *n += points;
     }
     return r;
 }
 
 static void
-check_run(const hs_relate *g, const hs_near_run *run)
+check_run(const hs_relate *g, const hs_nearest_run *run)
 {
     bool same = true;
     for (int32_t c = 0; c < run->n; c++) {
@@ -79,19 +79,19 @@ check_run(const hs_relate *g, const hs_near_run *run)
 static void
 relating_rounds_each_step(void)
 {
-    hs_near_run      runs[MOST_RUNS];
+    hs_nearest_run   runs[MOST_RUNS];
     harness_random   random = {271828};
     const hs_kernel *kernel;
     for (int kn = 0; (kernel = kernel_number(kn)) != NULL; kn++) {
         for (int trial = 0; trial < 200; trial++) {
-            const int32_t n_points = 1 + below(&random, trial % 3 ? 20 : N_POINTS);
-            int32_t       n;
-            const int32_t n_runs = make_runs(&random, n_points, runs, &n);
-            hs_near_image images[2] = {{.is_home = true}, {.is_home = false}};
-            hs_relate     g = {.ndim = 1 + trial % HS_MAX_DIM,
-                               .images = images,
-                               .unit = ldexp(1.0, below(&random, 40) - 20),
-                               .extent = 1.0 + random_unit(&random)};
+            const int32_t    n_points = 1 + below(&random, trial % 3 ? 20 : N_POINTS);
+            int32_t          n;
+            const int32_t    n_runs = make_runs(&random, n_points, runs, &n);
+            hs_nearest_image images[2] = {{.is_home = true}, {.is_home = false}};
+            hs_relate        g = {.ndim = 1 + trial % HS_MAX_DIM,
+                                  .images = images,
+                                  .unit = ldexp(1.0, below(&random, 40) - 20),
+                                  .extent = 1.0 + random_unit(&random)};
             g.extent = ldexp(g.extent, below(&random, 40) - 20);
             for (int k = 0; k < g.ndim; k++) {
                 double *x =
@@ -203,7 +203,7 @@ near_boxes_are_listed(void)
 }
 
 void
-test_near_kernels(void)
+test_nearest_kernels(void)
 {
     guard_all();
     RUN(relating_rounds_each_step);

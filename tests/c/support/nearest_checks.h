@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* near_checks.h: rows of the nearest, against all neighbours within a cutoff, put in order by big
+/* nearest_checks.h: rows of the nearest, against all neighbours within a cutoff, put in order by big
  * integers. */
-#ifndef HS_NEAR_CHECKS_H
-#define HS_NEAR_CHECKS_H
+#ifndef HS_NEAREST_CHECKS_H
+#define HS_NEAREST_CHECKS_H
 
 #include "harness.h"
 #include "pair_checks.h"

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * near_template.h: the vector loops of a search for the nearest, once for each instruction set.
+ * nearest_template.h: the vector loops of a search for the nearest, once for each instruction set.
  * Include it after a vocabulary (simd_<isa>.h), inside that instruction set's target region.
  * Defines relate (hs_relate_fn), order (hs_order_fn) and near_boxes (hs_boxes_fn).
  */
 
 HS_ALWAYS_INLINE void
-relate_runs(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs, const int ndim)
+relate_runs(const hs_relate *relate, const hs_nearest_run *runs, int32_t n_runs, const int ndim)
 {
     const float    extent = (float)relate->extent;
     const integers lanes = lane_numbers();
     const double   unit = relate->unit;
     for (int32_t r = 0; r < n_runs; r++) {
-        const hs_near_run *run = &runs[r];
-        const double      *moved = relate->images[run->image].moved;
+        const hs_nearest_run *run = &runs[r];
+        const double         *moved = relate->images[run->image].moved;
         for (int32_t c = 0; c < run->n; c += LANES) {
             const int32_t to = run->at + c, si = run->si + c;
             floats        sum = broadcast(0.0f);
@@ -31,7 +31,7 @@ relate_runs(const hs_relate *relate, const hs_near_run *runs, int32_t n_runs, co
 }
 
 static void
-relate(const hs_relate *relate, const hs_near_run *runs, int32_t n)
+relate(const hs_relate *relate, const hs_nearest_run *runs, int32_t n)
 {
     switch (relate->ndim) {
     case 2: relate_runs(relate, runs, n, 2); break;
