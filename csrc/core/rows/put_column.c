@@ -3,14 +3,9 @@
  * stores. */
 #include "put_column.h"
 
-#include <string.h>
+#include "../memory/bypass.h"
 
-#if defined(__SSE2__) || defined(_M_X64)
-#include <emmintrin.h>
-#define HAS_STREAM 1
-#else
-#define HAS_STREAM 0
-#endif
+#include <string.h>
 
 void
 hs_put_open(void *column, int index_bytes, hs_put_column *out)
@@ -25,14 +20,7 @@ static void
 write_lines(hs_put_column *out)
 {
     const size_t n_bytes = out->n / HS_ALIGNMENT * HS_ALIGNMENT;
-#if HAS_STREAM
-    for (size_t at = 0; at < n_bytes; at += sizeof(__m128i)) {
-        _mm_stream_si128((void *)(out->to + at),
-                         _mm_loadu_si128((const void *)(out->part.bytes + at)));
-    }
-#else
-    memcpy(out->to, out->part.bytes, n_bytes);
-#endif
+    hs_bypass_lines(out->to, out->part.bytes, n_bytes);
     memcpy(out->part.bytes, out->part.bytes + n_bytes, HS_ALIGNMENT);
     out->to += n_bytes;
     out->n -= n_bytes;
@@ -94,7 +82,5 @@ hs_put_close(hs_put_column *out)
 {
     write_lines(out);
     memcpy(out->to, out->part.bytes, out->n);
-#if HAS_STREAM
-    _mm_sfence(); /* other threads must not see later writes before these */
-#endif
+    hs_bypass_end();
 }
