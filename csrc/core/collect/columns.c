@@ -6,6 +6,8 @@
 #include <string.h>
 
 #include "../base/poll.h"
+#include "../memory/bypass.h"
+#include "../memory/pages.h"
 
 /* Pairs that the first columns hold: they come from the pool and are soon warm. */
 #define FIRST_CAPACITY 1024
@@ -15,6 +17,8 @@
 #define MOST_GROWTH  8.0
 /* Pairs that the account is charged for at a time. */
 #define CHARGE_STEP (INT64_C(1) << 20)
+/* Bytes of a column that does not stay in the caches until the caller reads it. */
+#define LEAST_BYPASSED 0x1p24
 /* Most bytes of one column: half the address space. */
 #define MOST_BYTES (0.5 * (double)SIZE_MAX)
 
@@ -186,18 +190,52 @@ hs_output_has_room(const hs_output *output, int64_t n)
                              (output->account == NULL || needed <= output->charged));
 }
 
+/* Of n pairs from `at` on, those that there is room for. */
+static int64_t
+fitting(const hs_output *output, int64_t at, int64_t n)
+{
+    return output->fixed && n > output->capacity - at ? output->capacity - at : n;
+}
+
+void
+hs_output_touch(hs_output *output, int64_t at, int64_t n)
+{
+    n = fitting(output, at, n);
+    for (int k = 0; n > 0 && k < HS_QUANTITIES; k++) {
+        if (output->columns >> k & 1u) {
+            const size_t width = hs_output_width(output, 1u << k), n_bytes = (size_t)n * width;
+            char        *from = output->column[k].data + (size_t)at * width;
+            size_t       page = (size_t)(-(uintptr_t)from & (HS_PAGES_FROM - 1));
+            for (; page < n_bytes; page += HS_PAGES_FROM) {
+                *(volatile char *)(from + page) = 0;
+            }
+        }
+    }
+}
+
+/* Whether bytes of a column up to `end` are better written past the caches: they will not stay
+ * there, and are not there because the system has just cleared new pages. */
+static bool
+bypasses(const hs_output *output, int k, size_t width, size_t end)
+{
+    return (double)output->capacity * (double)width >= LEAST_BYPASSED &&
+           (output->fixed || end <= hs_region_resident(&output->column[k]));
+}
+
 void
 hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t first, int64_t end)
 {
-    int64_t n = end - first;
-    if (output->fixed && n > output->capacity - at) {
-        n = output->capacity - at;
-    }
+    const int64_t n = fitting(output, at, end - first);
     for (int k = 0; n > 0 && k < HS_QUANTITIES; k++) {
         if (output->columns >> k & 1u) {
-            const size_t width = hs_output_width(output, 1u << k);
-            memcpy(output->column[k].data + (size_t)at * width,
-                   part->column[k].data + (size_t)first * width, (size_t)n * width);
+            const size_t width = hs_output_width(output, 1u << k), n_bytes = (size_t)n * width;
+            char        *to = output->column[k].data + (size_t)at * width;
+            const char  *from = part->column[k].data + (size_t)first * width;
+            if (bypasses(output, k, width, (size_t)(at + n) * width)) {
+                hs_bypass_copy(to, from, n_bytes);
+            } else {
+                memcpy(to, from, n_bytes);
+            }
         }
     }
 }

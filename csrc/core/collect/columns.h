@@ -50,6 +50,11 @@ hs_status hs_output_reserve(hs_output *output, int64_t n, double fraction);
 /* Whether n more pairs fit as it is; a fixed output always takes what fits. */
 bool hs_output_has_room(const hs_output *output, int64_t n);
 
+/* Writes to each huge page that begins in the room of pairs [at, at + n), before several threads
+ * write there: the system clears a new page for each thread that finds it missing, and keeps one.
+ */
+void hs_output_touch(hs_output *output, int64_t at, int64_t n);
+
 /* Writes pairs [first, end) of `part`, which has the same columns, to place `at` on; a fixed output
  * takes what fits. */
 void hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t first,

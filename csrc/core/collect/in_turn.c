@@ -189,6 +189,7 @@ claim(hs_commits *commits, int64_t n, double fraction, int64_t *at)
     }
     *at = output->n_pairs;
     output->n_pairs += n;
+    hs_output_touch(output, *at, n);
     return HS_OK;
 }
 

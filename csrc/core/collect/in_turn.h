@@ -16,10 +16,12 @@
 
 typedef struct hs_commits hs_commits;
 
-/* What a thread may hold back at a time: so many parts, and about so many bytes, a share of the
- * second-level cache. */
+/* What a thread may hold back at a time: so many parts, and about so many bytes, a second-level
+ * cache of them: threads that sleep cost more than pairs that come from the third. */
 #define HS_COMMIT_PARTS 32
-#define HS_COMMIT_BYTES (256 * 1024)
+#define HS_COMMIT_BYTES (1024 * 1024)
+/* A range should have no more: a thread whose range is not due yet can go on with others. */
+#define HS_RANGE_BYTES (HS_COMMIT_BYTES / 8)
 
 /* Pairs of one range that are ready: of those collected, the ones before `end` that are in no
  * earlier part. */

@@ -6,17 +6,19 @@
 #include "crew.h"
 #include "record.h"
 
-/* Points of a range: some groups at least, and so few that their pairs, with all quantities, fit
- * what a thread can hold back: it seldom waits for others. */
-#define RANGE_POINTS 256
+/* Points of a range: a group at least, and so few that their pairs are a part of what a thread can
+ * hold back: it seldom waits for others. */
+#define LEAST_POINTS 32
+#define MOST_POINTS  256
 
 /* What the threads share. */
 typedef struct walk_job {
     hs_search         *search;
-    hs_output         *output; /* NULL: nothing is recorded */
-    int64_t            enough; /* pairs in it; 0: all */
-    hs_bookmark        start;  /* where the first range begins */
-    hs_bookmark        left;   /* set by the worker that has left its range */
+    hs_output         *output;   /* NULL: nothing is recorded */
+    int64_t            in_range; /* points of a range */
+    int64_t            enough;   /* pairs in it; 0: all */
+    hs_bookmark        start;    /* where the first range begins */
+    hs_bookmark        left;     /* set by the worker that has left its range */
     bool               is_left;
     const hs_visitors *visitors; /* NULL: hits are recorded, or only counted */
     int                n_opened; /* workers */
@@ -54,8 +56,8 @@ search_range(void *context, int64_t range)
     worker         *me = context;
     const walk_job *job = me->job;
     const int64_t   n = hs_search_asking(job->search)->n;
-    const int64_t   first = job->start.point + range * RANGE_POINTS;
-    const int64_t   end = first + (n - first < RANGE_POINTS ? n - first : RANGE_POINTS);
+    const int64_t   first = job->start.point + range * job->in_range;
+    const int64_t   end = first + (n - first < job->in_range ? n - first : job->in_range);
     me->walker.scanner.blocks_to_skip = range == 0 ? job->start.blocks : 0;
     hs_status status =
         hs_walk_or_tell(&me->walker, (int32_t)first, (int32_t)end, &me->committer.failure);
@@ -150,24 +152,36 @@ most_pairs(const walk_job *job)
     return job->enough <= INT64_MAX - slack ? job->enough + slack : INT64_MAX;
 }
 
+/* Points of which HS_RANGE_BYTES are expected, in an even scene. */
+static int64_t
+points_in_range(const walk_job *job)
+{
+    const hs_search *search = job->search;
+    const double     pairs = search->grid.expected_pairs * search->pairs_per_half;
+    const double     each = (double)hs_output_bytes_per_pair(job->output) * pairs;
+    const double     n = HS_RANGE_BYTES * (double)hs_search_asking(search)->n / each;
+    return n > MOST_POINTS ? MOST_POINTS : n > LEAST_POINTS ? (int64_t)n : LEAST_POINTS;
+}
+
 /* Runs all workers. */
 static hs_status
 walk_together(walk_job *job, hs_failure *failure)
 {
-    const int64_t   n_left = hs_search_asking(job->search)->n - job->start.point;
+    const int64_t n_left = hs_search_asking(job->search)->n - job->start.point;
+    job->in_range = job->output != NULL ? points_in_range(job) : MOST_POINTS;
     hs_crew         crew = {.call = job->search->call,
                             .job = job,
                             .worker_size = sizeof(worker),
                             .open = open_worker,
                             .close = close_worker,
-                            .n_ranges = (n_left + RANGE_POINTS - 1) / RANGE_POINTS,
+                            .n_ranges = (n_left + job->in_range - 1) / job->in_range,
                             .search = search_range,
                             .output = job->output,
                             .enough = job->enough,
                             .most = job->enough > 0 ? most_pairs(job) : 0};
     const hs_status status = hs_crew_run(&crew, failure);
     if (!job->is_left) {
-        const int64_t done = crew.n_written * RANGE_POINTS;
+        const int64_t done = crew.n_written * job->in_range;
         job->left = (hs_bookmark){.point = job->start.point + (done < n_left ? done : n_left)};
     }
     return status;

@@ -126,6 +126,12 @@ hs_region_expect(hs_region *region, size_t bytes)
     }
 }
 
+size_t
+hs_region_resident(const hs_region *region)
+{
+    return region->data != NULL ? hs_chunk_of(region->data)->touched : 0;
+}
+
 void
 hs_region_shrink(hs_region *region, size_t bytes)
 {

@@ -40,6 +40,9 @@ bool hs_region_grow(hs_region *region, size_t bytes);
  * It holds for pages that have not been written yet. */
 void hs_region_expect(hs_region *region, size_t bytes);
 
+/* Bytes from the front that are taken to be resident: what was recycled, or is known to be used. */
+size_t hs_region_resident(const hs_region *region);
+
 /* Gives room beyond the first `bytes` bytes, at least the used ones, back to the system where it
  * takes it. May move. */
 void hs_region_shrink(hs_region *region, size_t bytes);

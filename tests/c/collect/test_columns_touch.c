@@ -95,9 +95,38 @@ the_caller_may_stop_it(void)
     (void)hs_test_touch_parts(before);
 }
 
+/* Of each huge page that begins in the room of some pairs the first byte is written to, and no
+ * other; what the caller's array has no room for is left alone. */
+static void
+huge_pages_are_written_to_where_they_begin(void)
+{
+    enum { HUGE_PAGE = 2 << 20, IN_PAGE = HUGE_PAGE / 4, FIRST = 100, END = 2 * IN_PAGE + 5 };
+    static _Alignas(64) int32_t column[4 * IN_PAGE];
+    const uintptr_t             begin = (uintptr_t)column;
+    for (int has_room = 0; has_room < 2; has_room++) {
+        hs_output            output;
+        const int            end = has_room ? END : END - IN_PAGE;
+        int64_t              wrong = 0;
+        const size_t         n_bytes = sizeof column;
+        const hs_pair_arrays arrays = {.capacity = end, .index_bytes = 4, .j = column};
+        hs_output_init(NULL, 3, HS_WANT_J, 4, &output);
+        hs_output_fix(&output, &arrays);
+        memset(column, 0x5a, n_bytes);
+        hs_output_touch(&output, FIRST, END - FIRST);
+        for (size_t at = 0; at < n_bytes; at++) {
+            const bool is_first = (begin + at) % HUGE_PAGE == 0 && at >= 4 * (size_t)FIRST &&
+                                  at < 4 * (size_t)end;
+            wrong += ((const char *)column)[at] != (is_first ? 0 : 0x5a);
+        }
+        CHECK(wrong == 0);
+        hs_output_free(&output);
+    }
+}
+
 void
 test_columns_touch(void)
 {
     RUN(each_page_is_written_to_once);
     RUN(the_caller_may_stop_it);
+    RUN(huge_pages_are_written_to_where_they_begin);
 }

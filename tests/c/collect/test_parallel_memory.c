@@ -8,7 +8,7 @@
 
 void test_parallel_memory(void);
 
-enum { N = 700, ENOUGH = 20000 };
+enum { N = 2000, ENOUGH = 200000 };
 
 static search_unit unit;
 

@@ -189,6 +189,26 @@ chunks_stay_aligned(void)
 }
 
 /* Whichever request is refused, the region stays as it was. */
+/* New memory is not, recycled memory is. */
+static void
+what_was_written_is_resident(void)
+{
+    enum { BYTES = 5 << 20 };
+    hs_region region = {0};
+    hs_pool_clear();
+    CHECK(hs_region_resident(&region) == 0);
+    CHECK(hs_region_reserve(&region, BYTES));
+    CHECK(HS_WATCHED_MALLOC || hs_region_resident(&region) == 0); /* malloc may have used it */
+    memset(region.data, 1, BYTES);
+    region.used = BYTES;
+    hs_region_expect(&region, BYTES);
+    CHECK(hs_region_resident(&region) >= BYTES);
+    hs_region_release(&region);
+    CHECK(hs_region_reserve(&region, BYTES));
+    CHECK(HS_WATCHED_MALLOC || hs_region_resident(&region) >= BYTES);
+    hs_region_release(&region);
+}
+
 static void
 failures_lose_nothing(void)
 {
@@ -375,6 +395,7 @@ test_region(void)
     RUN(shrinking_keeps_what_is_used);
     RUN(detach_keeps_the_front);
     RUN(chunks_stay_aligned);
+    RUN(what_was_written_is_resident);
     RUN(failures_lose_nothing);
 #if CAN_LIMIT_ADDRESSES
     RUN(only_what_is_written_costs);
