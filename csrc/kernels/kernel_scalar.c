@@ -165,32 +165,33 @@ square_points(hs_scan *scan, int32_t first, const int ndim)
 
 #include "scan_forms.h"
 
+/* One axis of n points: y, and its part of norm. */
+HS_ALWAYS_INLINE void
+gather_axis(const double *HS_RESTRICT x, double moved, int32_t n, const bool is_first,
+            float *HS_RESTRICT y, float *HS_RESTRICT norm)
+{
+    for (int32_t c = 0; c < n; c++) {
+        const float place = (float)(x[c] + moved);
+        y[c] = place;
+        norm[c] = is_first ? place * place : norm[c] + place * place;
+    }
+}
+
 /* Appends n points from number si on, all of them. */
 static void
 gather_points(const hs_gather *gather, const hs_run *run, int32_t at, int32_t n)
 {
-    float *HS_RESTRICT norm = gather->norm + at;
-    for (int k = 0; k < gather->ndim; k++) {
-        const double *HS_RESTRICT x = gather->x[k] + run->si;
-        float *HS_RESTRICT        y = gather->y[k] + at;
-        const double              moved = run->moved[k];
-        for (int32_t c = 0; c < n; c++) {
-            y[c] = (float)(x[c] + moved);
-        }
-    }
-    for (int32_t c = 0; c < n; c++) {
-        const float place = gather->y[0][at + c];
-        norm[c] = place * place;
-    }
+    const int32_t *HS_RESTRICT order = gather->order + run->si;
+    int32_t *HS_RESTRICT       id = gather->id + at;
+    int32_t *HS_RESTRICT       number = gather->number + at;
+    float                     *norm = gather->norm + at;
+    gather_axis(gather->x[0] + run->si, run->moved[0], n, true, gather->y[0] + at, norm);
     for (int k = 1; k < gather->ndim; k++) {
-        const float *HS_RESTRICT y = gather->y[k] + at;
-        for (int32_t c = 0; c < n; c++) {
-            norm[c] += y[c] * y[c];
-        }
+        gather_axis(gather->x[k] + run->si, run->moved[k], n, false, gather->y[k] + at, norm);
     }
-    memcpy(gather->id + at, gather->order + run->si, (size_t)n * sizeof(int32_t));
     for (int32_t c = 0; c < n; c++) {
-        gather->number[at + c] = run->si + c;
+        id[c] = order[c];
+        number[c] = run->si + c;
     }
 }
 
