@@ -232,7 +232,7 @@ static void
 gather(hs_gather *gather, hs_run *runs, int32_t n_runs)
 {
     const int32_t first = gather->n;
-    uint32_t      largest = gather->largest;
+    int32_t       largest = (int32_t)gather->largest; /* signed: SSE2 compares no others */
     for (int32_t r = 0, from = runs[0].at; r < n_runs; r++) {
         const int32_t n = runs[r + 1].at - from;
         from = runs[r + 1].at;
@@ -242,11 +242,12 @@ gather(hs_gather *gather, hs_run *runs, int32_t n_runs)
     }
     for (int k = 0; k < gather->ndim; k++) {
         for (int32_t c = first; c < gather->n; c++) {
-            const uint32_t bits = hs_bits_of_float(gather->y[k][c]) & UINT32_C(0x7fffffff);
+            const int32_t bits =
+                (int32_t)(hs_bits_of_float(gather->y[k][c]) & UINT32_C(0x7fffffff));
             largest = bits > largest ? bits : largest;
         }
     }
-    gather->largest = largest;
+    gather->largest = (uint32_t)largest;
 }
 
 /* Entry h of an array of int64_t or int32_t. */
