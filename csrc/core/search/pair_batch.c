@@ -97,20 +97,17 @@ hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n)
     return n;
 }
 
-/* The run that a place is in. */
+/* The run that a place is in. The number of steps depends on that of runs alone: branches on where
+ * the place is would be guessed, half of them wrongly. */
 static const hs_run *
 run_of(const hs_block *block, int32_t place)
 {
-    int32_t low = 0, high = block->n_runs; /* runs[low].at <= place < runs[high].at */
-    while (high - low > 1) {
-        const int32_t middle = low + (high - low) / 2;
-        if (block->runs[middle].at <= place) {
-            low = middle;
-        } else {
-            high = middle;
-        }
+    const hs_run *run = block->runs;
+    for (int32_t n = block->n_runs, half; n > 1; n -= half) { /* it is one of run[0] to run[n - 1] */
+        half = n / 2;
+        run += run[half].at <= place ? half : 0;
     }
-    return &block->runs[low];
+    return run;
 }
 
 /* What the metric measures between, and shifts over B, without records. */
