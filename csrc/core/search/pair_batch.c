@@ -103,14 +103,15 @@ static const hs_run *
 run_of(const hs_block *block, int32_t place)
 {
     const hs_run *run = block->runs;
-    for (int32_t n = block->n_runs, half; n > 1; n -= half) { /* it is one of run[0] to run[n - 1] */
+    for (int32_t n = block->n_runs, half; n > 1;
+         n -= half) { /* it is one of run[0] to run[n - 1] */
         half = n / 2;
         run += run[half].at <= place ? half : 0;
     }
     return run;
 }
 
-/* What the metric measures between, and shifts over B, without records. */
+/* What the metric measures between, and its shifts, without records: they are of X, over B. */
 static void
 look_up_few(hs_trace *trace)
 {
@@ -122,14 +123,17 @@ look_up_few(hs_trace *trace)
             trace->q[k][e] = bins->x[k][block->number[trace->place[e]]];
         }
     }
-    trace->of.has_images = trace->has_zeros = false;
+    int32_t any = 0;
     for (int32_t e = 0; bins->n_periodic > 0 && e < trace->n; e++) {
         const hs_run *run = run_of(block, trace->place[e]);
         for (int r = 0; r < bins->n_periodic; r++) {
             trace->image[r][e] = run->image[r];
-            trace->of.has_images = trace->of.has_images || run->image[r] != 0;
+            trace->times[r][e] = (double)run->image[r];
+            any |= run->image[r];
         }
     }
+    trace->is_shifted = any != 0;
+    trace->has_zeros = false;
 }
 
 static void
@@ -254,9 +258,12 @@ hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
     if (!trace->of.needs_given && !trace->of.has_metric &&
         trace->n <= trace->of.block->n / FEW_OF_BLOCK) {
         look_up_few(trace);
-    } else if (hs_records_load(&trace->of, metric) != HS_OK) {
+        return HS_OK;
+    }
+    if (hs_records_load(&trace->of, metric) != HS_OK) {
         return HS_ERR_INTERRUPTED;
-    } else if (metric) {
+    }
+    if (metric) {
         look_up_points(trace);
         look_up_images(trace);
     }
