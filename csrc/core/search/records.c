@@ -89,28 +89,37 @@ are_consecutive(const int32_t *number, int32_t n)
     return number[n - 1] - number[0] == n - 1;
 }
 
+/* The image less the turns of each of n candidates. */
+HS_ALWAYS_INLINE void
+subtract_turns(const hs_bins *bins, const int32_t *image, const int32_t *number, int32_t n,
+               const int m, const int width, int32_t *few)
+{
+    for (int32_t c = 0; c < n; c++) {
+        for (int r = 0; r < m; r++) {
+            few[(int64_t)c * width + r] = image[r] - bins->turns.narrow[r][number[c]];
+        }
+    }
+}
+
 /* Looks up the shifts of the candidates of one run, less their turns. */
 static void
 load_few(hs_records *records, const hs_run *run, int32_t n)
 {
-    const hs_search *search = records->search;
-    const hs_kernel *kernel = search->call->kernel;
-    const int        m = search->bins.n_periodic, width = records->width;
+    const hs_bins   *bins = &records->search->bins;
+    const hs_kernel *kernel = records->search->call->kernel;
+    const int        m = bins->n_periodic, width = records->width;
     int32_t         *few = records->few + (int64_t)run->at * width;
     const int32_t   *number = records->block->number + run->at;
-    const int32_t   *turns[HS_MAX_DIM];
-    for (int r = 0; r < m; r++) {
-        turns[r] = search->bins.turns.narrow[r] + number[0];
-    }
-    if (m == 3 && width == HS_RECORD && kernel->shift_records != NULL &&
-        are_consecutive(number, n)) {
-        kernel->shift_records(run->image, turns, n, few);
-        return;
-    }
-    for (int32_t c = 0; c < n; c++) {
+    if (m != 3 || width != HS_RECORD) {
+        subtract_turns(bins, run->image, number, n, m, width, few);
+    } else if (kernel->shift_records == NULL || !are_consecutive(number, n)) {
+        subtract_turns(bins, run->image, number, n, 3, HS_RECORD, few);
+    } else {
+        const int32_t *turns[HS_MAX_DIM];
         for (int r = 0; r < m; r++) {
-            few[c * width + r] = run->image[r] - turns[r][number[c] - number[0]];
+            turns[r] = bins->turns.narrow[r] + number[0];
         }
+        kernel->shift_records(run->image, turns, n, few);
     }
 }
 
@@ -133,31 +142,42 @@ load_given(hs_records *records, const hs_run *run, int32_t n)
     }
 }
 
+/* Coordinates and number of each of n candidates. */
+HS_ALWAYS_INLINE void
+copy_points(double *const *x, const int32_t *order, const int32_t *number, int32_t n, const int d,
+            const int width, double *to)
+{
+    for (int32_t c = 0; c < n; c++, to += width) {
+        for (int k = 0; k < d; k++) {
+            to[k] = x[k][number[c]];
+        }
+        if (d < HS_RECORD) {
+            const int64_t id = order[number[c]];
+            memcpy(to + HS_RECORD - 1, &id, sizeof id);
+        }
+    }
+}
+
 /* Looks up what the metric needs of the candidates of one run. */
 static void
 load_points(hs_records *records, const hs_run *run, int32_t n)
 {
     const hs_bins   *bins = &records->search->bins;
     const hs_kernel *kernel = records->search->call->kernel;
-    const int        d = bins->ndim, width = records->width;
+    const int        d = bins->ndim;
     const int32_t   *number = records->block->number + run->at;
-    double          *to = records->q + (int64_t)run->at * width;
-    const double    *from[HS_MAX_DIM];
-    for (int k = 0; k < d; k++) {
-        from[k] = (bins->keeps_originals ? bins->originals[k] : bins->x[k]) + number[0];
-    }
-    if (d == 3 && kernel->point_records != NULL && are_consecutive(number, n)) {
-        kernel->point_records(from, bins->order + number[0], n, to);
-        return;
-    }
-    for (int32_t c = 0; c < n; c++, to += width) {
+    double          *to = records->q + (int64_t)run->at * records->width;
+    double *const   *x = bins->keeps_originals ? bins->originals : bins->x;
+    if (d != 3) {
+        copy_points(x, bins->order, number, n, d, records->width, to);
+    } else if (kernel->point_records == NULL || !are_consecutive(number, n)) {
+        copy_points(x, bins->order, number, n, 3, HS_RECORD, to);
+    } else {
+        const double *from[HS_MAX_DIM];
         for (int k = 0; k < d; k++) {
-            to[k] = from[k][number[c] - number[0]];
+            from[k] = x[k] + number[0];
         }
-        if (d < HS_RECORD) {
-            const int64_t id = bins->order[number[c]];
-            memcpy(to + HS_RECORD - 1, &id, sizeof id);
-        }
+        kernel->point_records(from, bins->order + number[0], n, to);
     }
 }
 
