@@ -153,7 +153,7 @@ look_up_points(hs_trace *trace)
     }
 }
 
-/* S = image + turns_i - turns_j. */
+/* S = image + turns_i - turns_j; of points as given also the metric's shift. */
 static void
 look_up_narrow(hs_trace *trace)
 {
@@ -163,6 +163,7 @@ look_up_narrow(hs_trace *trace)
     const int32_t  *few = trace->search->bins.turns.known ? trace->of.few
                           : trace->of.has_images          ? trace->of.image
                                                           : NULL;
+    int32_t         any = 0;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
         int32_t *to = trace->shift[r];
         for (int32_t e = 0; e < trace->n; e++) {
@@ -173,8 +174,11 @@ look_up_narrow(hs_trace *trace)
         }
         for (int32_t e = 0; as_given && e < trace->n; e++) {
             trace->given[r][e] = to[e];
+            trace->times[r][e] = (double)to[e];
+            any |= to[e];
         }
     }
+    trace->is_shifted = trace->is_shifted || any != 0;
 }
 
 /* S = image + turns_i - turns_j over B, then over the box vectors as given. Without turns they are
@@ -208,45 +212,48 @@ look_up_given(hs_trace *trace)
     return trace->n;
 }
 
-/* Shifts over B. Where the block has none, the arrays are zeroed once and left alone. */
+/* Shifts over B, the metric's where it measures between X. Where the block has none, the arrays are
+ * zeroed once and left alone. */
 static void
 look_up_images(hs_trace *trace)
 {
     const bool zero = !trace->of.has_images;
+    int32_t    any = 0;
     if (zero && trace->has_zeros) {
         return;
     }
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
         const int32_t *from = trace->of.image + r;
-        int64_t       *to = trace->image[r];
         if (zero) {
-            memset(trace->image[r], 0, HS_BATCH * sizeof *to);
+            memset(trace->image[r], 0, HS_BATCH * sizeof(int64_t));
             memset(trace->times[r], 0, HS_BATCH * sizeof(double));
         }
         for (int32_t e = 0; e < trace->n && !zero; e++) {
-            to[e] = from[(int64_t)trace->place[e] * trace->of.width];
+            const int32_t image = from[(int64_t)trace->place[e] * trace->of.width];
+            trace->image[r][e] = image;
+            trace->times[r][e] = (double)image;
+            any |= image;
         }
     }
     trace->has_zeros = zero;
+    trace->is_shifted = any != 0 && !trace->search->bins.keeps_originals;
 }
 
-/* The metric's shift: of X over B, or of the points as given over the box vectors as given. */
+/* The metric's shift of points as given, over the box vectors as given. */
 static void
 look_up_times(hs_trace *trace)
 {
-    const bool as_given = trace->search->bins.keeps_originals;
+    int64_t any = 0, wide = 0;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
-        const int64_t *from = as_given ? trace->given[r] : trace->image[r];
-        double        *times = trace->times[r];
-        int64_t        any = 0, wide = 0;
+        const int64_t *from = trace->given[r];
         for (int32_t e = 0; e < trace->n; e++) {
-            times[e] = (double)from[e];
+            trace->times[r][e] = (double)from[e];
             any |= from[e];
             wide |= from[e] > WIDEST_SHIFT || from[e] < -WIDEST_SHIFT;
         }
-        trace->is_shifted = trace->is_shifted || any != 0;
-        trace->is_wide = trace->is_wide || wide != 0;
     }
+    trace->is_shifted = any != 0;
+    trace->is_wide = wide != 0;
 }
 
 hs_status
@@ -276,7 +283,7 @@ hs_trace_look_up(hs_trace *trace, bool metric, int64_t *failed_point)
             return HS_ERR_SHIFT_RANGE;
         }
     }
-    if (metric && (trace->of.has_images || bins->keeps_originals)) {
+    if (bins->keeps_originals && !trace->of.is_narrow) {
         look_up_times(trace);
     }
     return HS_OK;
