@@ -142,11 +142,12 @@ look_up_points(hs_trace *trace)
     const hs_bins *bins = hs_search_asking(trace->search);
     const int32_t *place = trace->place, *si = trace->si;
     const int      width = trace->of.width;
+    const int32_t  n = trace->n;
     for (int k = 0; k < bins->ndim; k++) {
         const double *of_p = bins->keeps_originals ? bins->originals[k] : bins->x[k];
         const double *of_q = trace->of.q + k;
         double       *p = trace->p[k], *q = trace->q[k];
-        for (int32_t e = 0; e < trace->n; e++) {
+        for (int32_t e = 0; e < n; e++) {
             p[e] = of_p[si[e]];
             q[e] = of_q[(int64_t)place[e] * width];
         }
@@ -163,16 +164,17 @@ look_up_narrow(hs_trace *trace)
     const int32_t  *few = trace->search->bins.turns.known ? trace->of.few
                           : trace->of.has_images          ? trace->of.image
                                                           : NULL;
+    const int32_t   n = trace->n, width = trace->of.width;
     int32_t         any = 0;
     for (int r = 0; r < trace->search->bins.n_periodic; r++) {
         int32_t *to = trace->shift[r];
-        for (int32_t e = 0; e < trace->n; e++) {
-            to[e] = few != NULL ? few[(int64_t)place[e] * trace->of.width + r] : 0;
+        for (int32_t e = 0; e < n; e++) {
+            to[e] = few != NULL ? few[(int64_t)place[e] * width + r] : 0;
         }
-        for (int32_t e = 0; turns->known && e < trace->n; e++) {
+        for (int32_t e = 0; turns->known && e < n; e++) {
             to[e] += (int32_t)hs_turns_get(turns, r, si[e]);
         }
-        for (int32_t e = 0; as_given && e < trace->n; e++) {
+        for (int32_t e = 0; as_given && e < n; e++) {
             trace->given[r][e] = to[e];
             trace->times[r][e] = (double)to[e];
             any |= to[e];

@@ -94,9 +94,15 @@ HS_ALWAYS_INLINE void
 subtract_turns(const hs_bins *bins, const int32_t *image, const int32_t *number, int32_t n,
                const int m, const int width, int32_t *few)
 {
+    const int32_t *turns[HS_MAX_DIM];
+    int32_t        moved[HS_MAX_DIM];
+    for (int r = 0; r < m; r++) { /* `few` does not overlap these */
+        turns[r] = bins->turns.narrow[r];
+        moved[r] = image[r];
+    }
     for (int32_t c = 0; c < n; c++) {
         for (int r = 0; r < m; r++) {
-            few[(int64_t)c * width + r] = image[r] - bins->turns.narrow[r][number[c]];
+            few[(int64_t)c * width + r] = moved[r] - turns[r][number[c]];
         }
     }
 }
@@ -147,9 +153,13 @@ HS_ALWAYS_INLINE void
 copy_points(double *const *x, const int32_t *order, const int32_t *number, int32_t n, const int d,
             const int width, double *to)
 {
+    const double *from[HS_MAX_DIM];
+    for (int k = 0; k < d; k++) { /* `to` does not overlap this */
+        from[k] = x[k];
+    }
     for (int32_t c = 0; c < n; c++, to += width) {
         for (int k = 0; k < d; k++) {
-            to[k] = x[k][number[c]];
+            to[k] = from[k][number[c]];
         }
         if (d < HS_RECORD) {
             const int64_t id = order[number[c]];
