@@ -2,6 +2,7 @@
 /* account.c: each block has a header in front of it, which remembers its size. */
 #include "account.h"
 
+#include "guard.h"
 #include "pages.h"
 
 #include <math.h>
@@ -178,12 +179,13 @@ take_block(hs_account *account, size_t bytes)
             return block;
         }
     }
-    raw = malloc(bytes + sizeof(block_header) + HS_ALIGNMENT);
+    raw = malloc(bytes + sizeof(block_header) + HS_ALIGNMENT + HS_GUARD_BYTES);
     if (raw == NULL) {
         return NULL;
     }
     void *block = align((char *)raw + sizeof(block_header));
     ((block_header *)block)[-1] = (block_header){.raw = raw};
+    hs_guard_new(block, bytes);
     return block;
 }
 
@@ -277,6 +279,7 @@ hs_free(hs_account *account, void *block)
     } else if (header.length > 0) {
         hs_pages_free(header.raw, header.length);
     } else {
+        hs_guard_check(block, (size_t)header.bytes);
         free(header.raw);
     }
 }
