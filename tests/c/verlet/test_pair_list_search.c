@@ -165,27 +165,103 @@ bundles_grow(void)
     CHECK(n_pairs[0] == n_pairs[1] && n_pairs[0] > 300000);
 }
 
-/* Whichever allocation fails: nothing is held. */
+/* Whichever allocation fails: nothing is held, and no pair is left out. */
 static void
 refused_pieces_hold_nothing(void)
 {
     const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.25}}};
     open_search(&box, 300, 1.0, 0.3, 1);
     const int64_t held = unit.call.account.held, blocks = hs_test_live_blocks();
-    hs_status     status = HS_ERR_MEMORY;
+    bool          ended = false;
+    int64_t       n_pairs = -1; /* of the last that were found */
     int           nth = 0;
-    while (status == HS_ERR_MEMORY && nth < 200) {
+    while (!ended && nth < 200) {
         hs_pieces  pieces = {0};
         hs_failure failure = HS_NO_FAILURE;
         hs_test_fail_allocation(++nth);
-        status = hs_pieces_find(&unit.search, &pieces, &failure);
+        const hs_status status = hs_pieces_find(&unit.search, &pieces, &failure);
+        ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
-        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && pieces.of == NULL));
+        CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended && pieces.of == NULL));
+        if (status == HS_OK) { /* also without room that is taken ahead */
+            const int64_t found =
+                pieces.of[0].plain.pairs.n_pairs + pieces.of[0].shifted.pairs.n_pairs;
+            CHECK(wrong_pieces(&pieces) == 0 && (n_pairs < 0 || found == n_pairs));
+            n_pairs = found;
+        }
         hs_pieces_free(&unit.call.account, &pieces);
         CHECK(unit.call.account.held == held && hs_test_live_blocks() == blocks);
     }
-    CHECK(status == HS_OK && nth > 15);
+    CHECK(ended && nth > 15);
     search_unit_close(&unit);
+}
+
+/* What a part that gets no pair takes: nothing. */
+static void
+open_space_has_no_shifts(void)
+{
+    hs_pieces  pieces;
+    hs_failure failure = HS_NO_FAILURE;
+    open_search(NULL, 400, 2.0, 0.2, 1);
+    CHECK(hs_pieces_find(&unit.search, &pieces, &failure) == HS_OK && wrong_pieces(&pieces) == 0);
+    CHECK(pieces.of[0].plain.n_bundles > 100 && pieces.of[0].shifted.n_bundles == 0);
+    CHECK(pieces.of[0].shifted.pairs.capacity == 0 && pieces.of[0].shifted.bundles == NULL);
+    hs_pieces_free(&unit.call.account, &pieces);
+    search_unit_close(&unit);
+}
+
+/* In a basis that turns axes round, a point and its image in negative direction are listed the
+ * other way round. */
+static void
+own_images_are_in_positive_direction(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    for (int signs = 0; signs < 4; signs++) {
+        hs_pieces  pieces;
+        hs_failure failure = HS_NO_FAILURE;
+        open_search(&box, 10, 1.0, 1.5, 1);
+        for (int r = 0; r < 2; r++)
+            unit.search.scene.lattice.U[r][r] = signs >> r & 1 ? -1 : 1;
+        CHECK(hs_pieces_find(&unit.search, &pieces, &failure) == HS_OK);
+        memset(met, 0, sizeof met);
+        CHECK(wrong_pieces(&pieces) == 0 && meet(&pieces.of[0].shifted, true) == 0);
+        CHECK(met[0][0][MOST][MOST + 1] == 1 && met[0][0][MOST + 1][MOST] == 1);
+        CHECK(met[0][0][MOST + 1][MOST + 1] == 1 && met[0][0][MOST + 1][MOST - 1] == 1);
+        hs_pieces_free(&unit.call.account, &pieces);
+        search_unit_close(&unit);
+    }
+}
+
+/* Shifts are int32, and so are those in the opposite direction. */
+static void
+shifts_are_int32_either_way(void)
+{
+    static const int64_t most[] = {INT32_MAX, -INT32_MAX, INT64_C(1) << 31, -(INT64_C(1) << 31)};
+    const hs_box         box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    for (int trial = 0; trial < 8; trial++) {
+        const int  r = trial % 2;
+        hs_pieces  pieces;
+        hs_failure failure = HS_NO_FAILURE;
+        unit.x[r] = 0.375;
+        unit.x[2 + r] = 0.625; /* wrapped to -0.375 */
+        unit.x[1 - r] = unit.x[3 - r] = 0.25;
+        unit.points = (hs_points){unit.x, 2, 2, HS_FLOAT64, 16, 8};
+        search_unit_open(&box, 0.3, false, HS_WANT_SHIFT, &unit);
+        unit.search.bins.order[0] = 0;
+        unit.search.bins.order[1] = 1;
+        unit.search.scene.lattice.U[r][r] = most[trial / 2];
+        const hs_status status = hs_pieces_find(&unit.search, &pieces, &failure);
+        CHECK(status == (trial < 4 ? HS_OK : HS_ERR_SHIFT_RANGE));
+        if (status == HS_OK) {
+            const hs_part *part = &pieces.of[0].shifted;
+            CHECK(part->pairs.n_pairs == 1 && part->n_bundles == 1);
+            CHECK(llabs(part->shift[r]) == INT32_MAX && part->shift[1 - r] == 0);
+            hs_pieces_free(&unit.call.account, &pieces);
+        } else {
+            CHECK(pieces.of == NULL && (failure.row == 0 || failure.row == 1));
+        }
+        search_unit_close(&unit);
+    }
 }
 
 void
@@ -194,4 +270,7 @@ test_pair_list_search(void)
     RUN(each_pair_is_in_one_piece);
     RUN(bundles_grow);
     RUN(refused_pieces_hold_nothing);
+    RUN(open_space_has_no_shifts);
+    RUN(own_images_are_in_positive_direction);
+    RUN(shifts_are_int32_either_way);
 }
