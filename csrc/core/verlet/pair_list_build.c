@@ -301,7 +301,7 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     if (built == NULL) {
         return HS_ERR_MEMORY;
     }
-    next.n_pairs = next.n_plain = next.n_bundles = next.n_plain_bundles = 0;
+    next.n_pairs = 0; /* not known */
     next.radius = radius;
     next.counts = NULL;
     hs_images_init(0, &next.images);

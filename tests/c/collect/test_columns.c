@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_columns.c: options.out, pairs written into arrays of the caller, and nothing beyond them. */
 #include "../../../csrc/core/collect/columns.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/memory/pool.h"
 #include "../support/output_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
@@ -258,6 +260,39 @@ a_result_that_is_freed_is_held_with_all_it_wrote(void)
     hs_pool_set_limit(before);
 }
 
+/* Where one column cannot grow, the others give back what they got, and have what they had. */
+static void
+columns_grow_together_or_not_at_all(void)
+{
+    for (int had = 0; had < 2; had++) {
+        enum { MANY = 4000000, LITTLE = 1 << 20 }; /* more than what is there at first, in bytes */
+        hs_output output;
+        hs_pool_clear();
+        hs_output_init(NULL, 2, HS_WANT_I | HS_WANT_J | HS_WANT_VECTOR, 8, &output);
+        CHECK(!had || hs_output_reserve(&output, 3000, 0.0) == HS_OK);
+        const int64_t capacity = output.capacity;
+        for (int64_t e = 0; e < 100 * had; e++) {
+            ((int64_t *)hs_output_column(&output, HS_WANT_I))[e] = e;
+        }
+        output.n_pairs = 100 * had;
+        hs_test_fail_allocation(-3); /* the third and all behind it */
+        CHECK(hs_output_reserve(&output, MANY, 0.0) == HS_ERR_MEMORY);
+        hs_test_fail_allocation(0);
+        CHECK(output.capacity == capacity && output.n_pairs == 100 * had);
+        for (int k = 0; k < HS_QUANTITIES; k++) {
+            const hs_region *column = &output.column[k];
+            CHECK((column->data != NULL) == (had && (output.columns >> k & 1u)));
+            CHECK(column->capacity <= LITTLE);
+        }
+        for (int64_t e = 0; e < 100 * had; e++) {
+            CHECK(((int64_t *)hs_output_column(&output, HS_WANT_I))[e] == e);
+        }
+        CHECK(hs_output_reserve(&output, MANY, 0.0) == HS_OK);
+        output.n_pairs = 0;
+        hs_output_free(&output);
+    }
+}
+
 void
 test_columns(void)
 {
@@ -269,4 +304,5 @@ test_columns(void)
     RUN(outputs_grow_to_their_limit);
     RUN(endless_outputs_are_refused);
     RUN(a_result_that_is_freed_is_held_with_all_it_wrote);
+    RUN(columns_grow_together_or_not_at_all);
 }

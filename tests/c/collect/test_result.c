@@ -434,6 +434,9 @@ searches_conclude_with_arrays_that_hold_all(void)
     CHECK(hs_output_column(&output, HS_WANT_I) == NULL);
     CHECK(hs_pairs_conclude(&output, HS_OK, &failure) == HS_OK);
     CHECK(hs_output_column(&output, HS_WANT_I) != NULL);
+    const int64_t capacity = output.n_pairs = output.capacity; /* what is full need not grow */
+    CHECK(hs_pairs_conclude(&output, HS_OK, &failure) == HS_OK && output.capacity == capacity);
+    output.n_pairs = 0;
     hs_output_free(&output);
     hs_output_init(&account, 2, HS_WANT_I | HS_WANT_J, 8, &output);
     hs_output_fix(&output, &arrays);

@@ -34,6 +34,7 @@ borrows(hs_nearest_kept *kept, double limit)
     options.want = HS_WANT_J;
     hs_call_begin(&options, &unit.call);
     hs_search_begin(&unit.call, &unit.search);
+    unit.call.team = hs_team_create(2);
     unit.near = (hs_nearest){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
     CHECK(hs_nearest_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
     CHECK(unit.near.tree.n_nodes == 1 && unit.near.limit > 0.0);
@@ -62,6 +63,7 @@ whoever_comes_while_it_is_built_does_without(void)
     CHECK(!borrows(kept, 0x1p-900)); /* has a scale of its own */
     const hs_nearest *built = hs_nearest_kept_get(kept, &room);
     CHECK(built != NULL && room == NULL && built->tree.n_nodes == 1);
+    CHECK(built->search->call->team == NULL); /* it was the call's that built it */
     CHECK(hs_nearest_kept_get(kept, &other) == built && other == NULL);
     hs_nearest_kept_free(kept);
     hs_nearest_kept_free(NULL);

@@ -146,6 +146,7 @@ small_scenes_are_known_exactly(void)
     CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_ERR_MEMORY);
     CHECK(failure.expected_pairs == FEW * FEW && failure.expected_bytes == FEW * FEW * BYTES);
     CHECK(failure.limit_bytes == account->limit);
+    CHECK(unit.call.done.groups == FEW && unit.call.done.candidates == FEW * FEW);
     unit.search.keeps_none = true; /* pairs that are handed on take nothing */
     CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_OK);
     search_unit_close(&unit);

@@ -3,6 +3,7 @@
  * fails. */
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/base/poll.h"
+#include "../../../csrc/core/verlet/pair_list.h"
 #include "../support/list_checks.h"
 #include "../support/random_scenes.h"
 
@@ -120,12 +121,18 @@ a_list_that_cannot_grow_stays(void)
             many.cutoff = 1.6;
             CHECK(update(list, &few, 0.1, &rebuilt, NULL) == HS_OK);
             hs_test_fail_allocation(nth);
-            const hs_status status = update(list, &many, 0.3, &rebuilt, NULL);
+            hs_failure      failure;
+            const hs_status status = update(list, &many, 0.3, &rebuilt, &failure);
             ended = hs_test_failure_is_due();
             hs_test_fail_allocation(0);
             CHECK(status == HS_OK || status == HS_ERR_MEMORY);
             CHECK(hs_verlet_look(list).cutoff == (status == HS_OK ? 1.6 : 0.7));
             CHECK(has_pairs_of(list, status == HS_OK ? &many : &few));
+            if (status != HS_OK) { /* as many as there are, if it is known */
+                const double said = failure.expected_pairs;
+                CHECK(update(list, &many, 0.3, &rebuilt, NULL) == HS_OK);
+                CHECK(said == 0.0 || said == (double)list->listing.n_pairs);
+            }
             n_failed += status != HS_OK;
             hs_verlet_free(list);
             CHECK(hs_test_live_blocks() == before);
@@ -225,6 +232,23 @@ interrupts_leave_the_list_as_it_was(void)
     hs_verlet_free(list);
 }
 
+/* Two points at exactly cutoff and skin from each other, or a little more: the first come within
+ * the cutoff just when the list is built anew. */
+static void
+pairs_at_the_radius_are_listed(void)
+{
+    double      x[2] = {0.0, 1.25};
+    brute_scene scene = {.ndim = 1, .n = 2, .x = x, .cutoff = 1.0}; /* not inclusive */
+    for (int beyond = 0; beyond < 2; beyond++) {
+        hs_verlet *list = hs_verlet_new();
+        bool       rebuilt;
+        x[1] = beyond ? 1.25 + 0x1p-30 : 1.25;
+        CHECK(update(list, &scene, 0.25, &rebuilt, NULL) == HS_OK && rebuilt);
+        CHECK(list->listing.radius == 1.25 && list->listing.n_pairs == !beyond);
+        hs_verlet_free(list);
+    }
+}
+
 void
 test_pair_list_build(void)
 {
@@ -234,4 +258,5 @@ test_pair_list_build(void)
     RUN(limits_leave_the_list_as_it_was);
     RUN(shifts_that_do_not_fit_name_a_point);
     RUN(interrupts_leave_the_list_as_it_was);
+    RUN(pairs_at_the_radius_are_listed);
 }
