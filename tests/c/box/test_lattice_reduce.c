@@ -355,6 +355,39 @@ extreme_rows_are_survived(void)
     CHECK(!r.changed && r.U[0][0] == 1 && r.U[1][1] == 1 && r.U[0][1] == 0 && r.U[1][0] == 0);
 }
 
+/* Four rows of a unit box, the second with so much of the first. */
+static hs_reduction
+reduce_leaning(double much)
+{
+    matrix a = {{0.0}};
+    for (int k = 0; k < 4; k++)
+        a[k][k] = 1.0;
+    a[1][0] = much;
+    return reduce_and_check(4, 4, a);
+}
+
+/* A little more than half is left, so that rounding undoes nothing; and the largest coefficient
+ * that there may be is taken off. */
+static void
+coefficients_are_taken_off_from_half_to_the_largest(void)
+{
+    static const double left[] = {0.5, 0.5 + 0x1p-21, 0.5 + 0x1p-20};
+    static const double taken[] = {0.5 + 0x1p-20 + 0x1p-43, 0.5 + 0x1p-19, 1.0, 0x1p61};
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int e = 0; e < 3; e++) {
+            const hs_reduction r = reduce_leaning(sign * left[e]);
+            CHECK(!r.changed);
+        }
+        for (int e = 0; e < 4; e++) {
+            const hs_reduction r = reduce_leaning(sign * taken[e]);
+            const double       whole = fmax(1.0, floor(taken[e]));
+            CHECK(r.changed && r.rows[1][0] == sign * (taken[e] - whole) && r.rows[1][1] == 1.0);
+            CHECK(r.U[1][0] == -sign * (int64_t)whole);
+        }
+        CHECK(!reduce_leaning(sign * 0x1.0000000000001p61).changed);
+    }
+}
+
 void
 test_lattice_reduce(void)
 {
@@ -370,4 +403,5 @@ test_lattice_reduce(void)
     RUN(scaling_changes_nothing);
     RUN(mixed_lengths_stay_exact);
     RUN(extreme_rows_are_survived);
+    RUN(coefficients_are_taken_off_from_half_to_the_largest);
 }
