@@ -198,6 +198,32 @@ nothing_is_said_of_no_cells(void)
     hs_cells_free(cells);
 }
 
+/* Whichever allocation fails, and for points too far away: nothing is held. */
+static void
+points_that_cannot_be_found_leave_nothing_behind(void)
+{
+    const hs_box    box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.5, 4.0}}};
+    const double    far[2] = {0.25, 0x1p900};
+    const hs_points points = {x, N, 2, HS_FLOAT64, 16, 8};
+    const hs_points beyond = {far, 1, 2, HS_FLOAT64, 16, 8};
+    hs_layout       layout;
+    hs_cells       *cells = cells_of(2, 4.0, 0.0, &box, &layout);
+    hs_failure      failure;
+    const int64_t   before = hs_test_live_blocks();
+    hs_status       status = HS_ERR_MEMORY;
+    int             nth = 0;
+    while (status == HS_ERR_MEMORY && nth < 20) {
+        hs_test_fail_allocation(++nth);
+        status = hs_cells_find(cells, &points, cell, &failure);
+        hs_test_fail_allocation(0);
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(status == HS_OK && nth > 1);
+    CHECK(hs_cells_find(cells, &beyond, cell, &failure) != HS_OK);
+    CHECK(failure.row == 0 && hs_test_live_blocks() == before);
+    hs_cells_free(cells);
+}
+
 void
 test_api_layout(void)
 {
@@ -205,4 +231,5 @@ test_api_layout(void)
     RUN(points_are_found_wrapped);
     RUN(only_occupied_cells_are_found_where_no_others_are_stored);
     RUN(nothing_is_said_of_no_cells);
+    RUN(points_that_cannot_be_found_leave_nothing_behind);
 }

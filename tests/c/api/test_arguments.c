@@ -4,6 +4,7 @@
 #include "../support/harness.h"
 #include "../support/among.h"
 
+#include "../../../csrc/core/api/arguments.h"
 #include "../../../csrc/core/base/want.h"
 
 #include <limits.h>
@@ -253,11 +254,48 @@ nothing_at_all_is_refused(void)
     CHECK(hs_systems_count(&points, NULL, &options, NULL, NULL) == HS_ERR_ARGUMENT);
 }
 
+/* Strides that lead to no entry may be any; others reach no further than addresses. */
+static void
+entries_are_within_the_addresses(void)
+{
+    static double   x[4];
+    hs_failure      failure;
+    const ptrdiff_t far = (ptrdiff_t)(0.985 * (double)PTRDIFF_MAX); /* 0.99 of it are allowed */
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const struct {
+            int64_t   n;
+            int       ndim;
+            ptrdiff_t rows, columns;
+            bool      fits;
+        } cases[] = {
+            {1, 1, PTRDIFF_MAX, PTRDIFF_MAX, true},
+            {2, 1, far, PTRDIFF_MAX, true},
+            {1, 2, PTRDIFF_MAX, far, true},
+            {2, 1, PTRDIFF_MAX, 8, false},
+            {1, 2, 8, PTRDIFF_MAX, false},
+            {3, 1, far / 2, 8, true},
+            {3, 1, far, 8, false},
+            {1, 3, 8, far / 2, true},
+            {1, 3, 8, far, false},
+            {2, 2, far / 2, far / 2, true},
+            {2, 2, far, far / 50, false},
+            {2, 2, far / 50, far, false},
+            {0, 3, PTRDIFF_MAX, PTRDIFF_MAX, true},
+        };
+        for (int c = 0; c < 13; c++) {
+            const hs_points points = {x,          cases[c].n,           cases[c].ndim,
+                                      HS_FLOAT64, sign * cases[c].rows, cases[c].columns};
+            CHECK(hs_check_points(&points, &failure) == (cases[c].fits ? HS_OK : HS_ERR_ARGUMENT));
+        }
+    }
+}
+
 void
 test_arguments(void)
 {
     RUN(each_array_that_is_wanted_must_be_there);
     RUN(nothing_at_all_is_refused);
+    RUN(entries_are_within_the_addresses);
     bad_points_and_queries_are_refused();
     boxes_of_another_dimension_are_refused();
     bad_options_are_refused();

@@ -2,6 +2,7 @@
 /* test_sort_pairs.c: pairs are sorted by i, j and S, a few and a crowd of each i, and those that
  * are there twice stay. */
 #include "../../../csrc/core/collect/sort_pairs.h"
+#include "../support/poll_checks.h"
 #include "../support/search_unit.h"
 
 void test_sort_pairs(void);
@@ -85,8 +86,47 @@ all_pairs_are_there_in_order(void)
     search_unit_close(&unit);
 }
 
+/* Two passes over the pairs, the rows once they are many, and what is written: each is polled for,
+ * and any poll ends it. */
+static void
+each_pass_is_polled(void)
+{
+    enum { POLL_PAIRS = 1 << 18 };
+    static const struct {
+        int64_t n, polls;
+    } cases[] = {{POLL_PAIRS - 1, 0}, {POLL_PAIRS, 3}, {2 * POLL_PAIRS + 5, 2 + 2 + 1 + 2}};
+    search_unit_points(6, POINTS, 2, 1.0, &unit);
+    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+    for (int c = 0; c < 3; c++) {
+        hs_output found, sorted;
+        hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J, 4, &found);
+        CHECK(hs_output_reserve(&found, cases[c].n, 0.0) == HS_OK);
+        int32_t *i = hs_output_column(&found, HS_WANT_I), *j = hs_output_column(&found, HS_WANT_J);
+        for (int64_t p = 0; p < cases[c].n; p++) {
+            i[p] = (int32_t)(p % POINTS);
+            j[p] = (int32_t)p;
+        }
+        found.n_pairs = cases[c].n;
+        for (int64_t nth = 0; nth <= cases[c].polls; nth++) {
+            refusal       once = {.nth = nth};
+            const int64_t held = unit.call.account.held;
+            hs_call_set_poll(refuse_once, &once, &unit.call);
+            hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J, 4, &sorted);
+            CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, &sorted) ==
+                  (nth > 0 ? HS_ERR_INTERRUPTED : HS_OK));
+            CHECK(once.n == (nth > 0 ? nth : cases[c].polls));
+            hs_output_free(&sorted);
+            CHECK(unit.call.account.held == held);
+        }
+        hs_output_free(&found);
+    }
+    hs_call_set_poll(NULL, NULL, &unit.call);
+    search_unit_close(&unit);
+}
+
 void
 test_sort_pairs(void)
 {
     RUN(all_pairs_are_there_in_order);
+    RUN(each_pass_is_polled);
 }

@@ -70,14 +70,16 @@ check_edges(harness_random *random, const hs_edges *edges, double extent)
     enum { N = 200 };
     hs_edge_table table = {0};
     float         squares[N];
-    int32_t       slots[N];
+    int32_t       slots[N + 1];
     bool          odd = false;
     int           n_sure = 0;
     CHECK(hs_edge_table_build(edges, extent, &table) == HS_OK && table.extent == extent);
     for (int s = 0; s < N; s++) {
         squares[s] = some_square(random, edges, extent);
     }
+    slots[N] = -77;
     const bool said = hs_edge_slots(&table, squares, N, slots);
+    CHECK(slots[N] == -77);
     for (int s = 0; s < N; s++) {
         int32_t sure, perhaps, low = -1, high = -1;
         count_edges(edges, extent, squares[s], &sure, &perhaps);
