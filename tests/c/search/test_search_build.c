@@ -138,6 +138,37 @@ any_allocation_may_be_refused(void)
     CHECK(fail_each_allocation(build_and_close, &queries, 100) > 6);
 }
 
+/* Cells cost what sorting and visiting rows of them take: a few points are in one. Half as many
+ * again or less decide, the more of them the more rows there are. */
+static void
+a_few_points_are_in_one_cell(void)
+{
+    static const struct {
+        int     d, repeats;
+        double  cutoff;
+        int64_t one, several; /* points that are in one cell, and in several */
+    } cases[] = {{1, 0, 0.05, 80, 120},  {1, 0, 0.15, 135, 190}, {1, 1, 0.05, 27, 40},
+                 {1, 1, 0.3, 33, 50},    {2, 0, 0.05, 100, 150}, {2, 0, 0.15, 100, 150},
+                 {2, 0, 0.3, 300, 450},  {2, 1, 0.15, 11, 17},   {3, 0, 0.05, 150, 220},
+                 {3, 0, 0.15, 155, 230}, {3, 0, 0.3, 440, 660},  {3, 1, 0.15, 4, 8}};
+    for (int c = 0; c < 12; c++) {
+        const int d = cases[c].d;
+        hs_box    box = {.ndim = d};
+        for (int k = 0; k < d; k++) {
+            box.periodic[k] = true;
+            box.rows[k][k] = 1.0;
+        }
+        for (int several = 0; several < 2; several++) {
+            const int64_t n = several ? cases[c].several : cases[c].one;
+            search_unit_points(7, n, d, 1.0, &unit);
+            search_unit_open(cases[c].repeats ? &box : NULL, cases[c].cutoff, false, HS_WANT_I,
+                             &unit);
+            CHECK((unit.search.grid.n_cells > 1) == several);
+            search_unit_close(&unit);
+        }
+    }
+}
+
 void
 test_search_build(void)
 {
@@ -146,4 +177,5 @@ test_search_build(void)
     RUN(queries_are_in_the_cells_of_the_points);
     RUN(what_cannot_be_built_is_told);
     RUN(any_allocation_may_be_refused);
+    RUN(a_few_points_are_in_one_cell);
 }
