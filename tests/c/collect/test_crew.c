@@ -82,6 +82,7 @@ search_all(counting *job, int n_threads, hs_range_fn search, hs_failure *failure
                             .open = open_worker,
                             .close = close_worker,
                             .n_ranges = RANGES,
+                            .n_open = 7, /* of no meaning */
                             .search = search};
     const hs_status status = hs_crew_run(&crew, failure);
     CHECK(status != HS_OK || job->n_opened == hs_team_size(call.team));
