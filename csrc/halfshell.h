@@ -65,6 +65,7 @@ typedef enum hs_status {
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
     HS_ERR_TYPES,         /* a type is negative or too large: failure.row */
     HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
+    HS_ERR_RADII,         /* a radius is negative, NaN, infinite or out of range: failure.row */
     HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or a pointer is
                              NULL; failure.system: where first descends */
     HS_STATUS_END         /* number of codes, not a code; it grows with them */
@@ -210,6 +211,33 @@ hs_options hs_options_default(void);
 /* Points that are sorted into cells once and searched many times; see hs_cells_build. */
 typedef struct hs_cells hs_cells;
 
+/* How the radii of i and j make the largest distance of a pair; what is compared is the real
+ * number, never a rounded one. */
+typedef enum hs_rule {
+    HS_RULE_SUM,  /* r_i + r_j */
+    HS_RULE_MEAN, /* half of that */
+    HS_RULE_MAX,
+    HS_RULE_MIN,
+    HS_RULE_GATHER,  /* that of i, which must be an asking point: not for half lists */
+    HS_RULE_SCATTER, /* that of j, likewise */
+    HS_RULE_END      /* number of rules */
+} hs_rule;
+
+/*
+ * A reach for each pair, by the radii of its points or by their types; everything is borrowed. With
+ * it options->cutoff is a further limit, which may be infinite for radii, and failure->row may be
+ * that of a radius or type.
+ */
+typedef struct hs_reach {
+    hs_rule        rule;
+    const double  *radii;         /* n, from 0 to 2^1022; NULL where the rule needs none */
+    const double  *query_radii;   /* of queries, if there are any; NULL where the rule needs none */
+    int32_t        n_types;       /* in place of radii, if not 0: */
+    const int32_t *types;         /* n, from 0 to n_types - 1 */
+    const int32_t *query_types;   /* of queries, if there are any */
+    const double  *cutoffs;       /* n_types * n_types, finite and symmetric; negative: no pairs */
+} hs_reach;
+
 /*
  * What a search looks among: points in a box, or cells, which have both. All borrowed: points must
  * not move during the call (a concurrent write may change the answer, it cannot corrupt memory:
@@ -222,6 +250,8 @@ typedef struct hs_among {
     const hs_box    *box;     /* NULL: open space */
     const hs_points *queries; /* where neighbours are looked for; NULL: at each of the points */
     const hs_cells  *cells;   /* in place of points and box, which are NULL then; or NULL */
+    const hs_reach  *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
+                               * hs_pairs_count, hs_neighbors_*, hs_stream_open, hs_pairs_visit */
 } hs_among;
 
 /* A finished search: opaque, owned by the caller. */

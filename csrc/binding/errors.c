@@ -224,6 +224,15 @@ raise_types(const hs_failure *failure)
 }
 
 static PyObject *
+raise_radii(const hs_failure *failure)
+{
+    const char *name = failure->in_queries ? "query_radii" : "radii";
+    return raise_number(PyExc_ValueError, failure->value,
+                        "%s must be finite, not negative, and of ordinary size, got %s[%lld] = ",
+                        name, name, (long long)failure->row);
+}
+
+static PyObject *
 raise_weights(const hs_failure *failure)
 {
     const char *name = failure->in_queries ? "query_weights" : "weights";
@@ -307,6 +316,7 @@ static PyObject *(*const RAISE[])(const hs_failure *) = {
     [HS_ERR_EDGES] = raise_edges,
     [HS_ERR_TYPES] = raise_types,
     [HS_ERR_WEIGHTS] = raise_weights,
+    [HS_ERR_RADII] = raise_radii,
     [HS_ERR_ARGUMENT] = raise_argument,
 };
 

@@ -9,6 +9,7 @@
 #include "foreign.h"
 #include "outputs.h"
 #include "plain.h"
+#include "reach.h"
 #include "threads.h"
 
 #include <math.h>
@@ -174,11 +175,21 @@ take_out(PyObject *object, hs_py_call *call)
     return hs_out_of(object, call->letters, call->points.ndim, options->index_bytes, &call->arrays);
 }
 
-/* What else is a view: queries, and `out`, which comes last and is compared with the others. */
 static bool
-take_more_views(PyObject *queries, PyObject *out, PyObject *const *arguments, hs_py_call *call)
+take_reach(PyObject *object, hs_py_call *call)
 {
-    if (queries != NULL && !take_queries(queries, call)) {
+    const int64_t n_queries = call->among.queries != NULL ? call->queries.n : 0;
+    call->among.reach = &call->reach;
+    return hs_reach_of(object, call->points.n, n_queries, &call->reach);
+}
+
+/* What else is a view: queries, reach, and `out`, which comes last and is compared with others. */
+static bool
+take_more_views(PyObject *queries, PyObject *out, PyObject *reach, PyObject *const *arguments,
+                hs_py_call *call)
+{
+    if ((queries != NULL && !take_queries(queries, call)) ||
+        (reach != NULL && !take_reach(reach, call))) {
         return false;
     }
     if (out == NULL) {
@@ -210,9 +221,12 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
                 Py_ssize_t n_arguments)
 {
     const bool       is_plain = (n_arguments & HS_PLAIN) != 0;
-    const int        n_more = (int)strlen(more);
+    const int        n_given = (int)((n_arguments & ~HS_PLAIN) - HS_CALL_ARGUMENTS);
+    const int        n_letters = (int)strlen(more);
+    const bool       may_reach = n_letters > 0 && more[n_letters - 1] == 'h';
+    const int        n_more = n_letters - (may_reach && n_given == n_letters - 1);
     PyObject *const *own = arguments + HS_CALL_ARGUMENTS;
-    PyObject        *queries = NULL, *out = NULL;
+    PyObject        *queries = NULL, *out = NULL, *reach = NULL;
     hs_options      *options = &call->options;
     unsigned long    repeats;
     if (!hs_expect_arguments(name, n_arguments & ~HS_PLAIN, HS_CALL_ARGUMENTS + n_more) ||
@@ -234,9 +248,10 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
         }
         queries = more[k] == 'R' || (more[k] == 'Q' && own[k] != Py_None) ? own[k] : queries;
         out = more[k] == 'o' && own[k] != Py_None ? own[k] : out;
+        reach = more[k] == 'h' && own[k] != Py_None ? own[k] : reach;
     }
     if (!take_scene(arguments[0], arguments[2], repeats, call) ||
-        !take_more_views(queries, out, arguments, call)) {
+        !take_more_views(queries, out, reach, arguments, call)) {
         return false;
     }
     if (options->threads == 0) {

@@ -19,6 +19,7 @@ typedef struct hs_py_call {
     hs_among       among; /* what is searched; `points` is NULL where there are cells */
     hs_points      points, queries;
     hs_box         box;
+    hs_reach       reach;
     hs_options     options;
     hs_failure     failure;
     const char    *letters; /* borrowed: the quantities */
@@ -45,6 +46,7 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  *   Q  queries, or None                      o  out, or None
  *   R  queries                               f, i, x  `flag`, `integer`, `real` of the call
  *   a  anything: left to the function, which runs no Python code for it
+ *   h  reach (reach.h), or None: the last one, which may be left out
  *
  * Returns false with an exception set, or without one where HS_PLAIN is set: see plain.h.
  */

@@ -84,6 +84,33 @@ typedef struct hs_unsure {
     int32_t at;    /* its entry of hits; of no meaning when counting */
 } hs_unsure;
 
+/* What a scan compares: s of either form, or of the direct one with a limit for each pair. */
+typedef enum scan_form { DIRECT, EXPANDED, LIMITS } scan_form;
+
+/* How the radii of a pair make its limit, for the scans that compare each pair with its own. */
+typedef struct hs_limit_scan {
+    hs_rule       rule;
+    float         bound;     /* limits are no larger; infinity: none is bounded */
+    hs_limit_form form;
+    const float  *of_point;  /* radii, not negative: of the group; NULL: zeros */
+    const float  *of_block;  /* of the candidates, n + HS_PADDING; NULL: zeros */
+} hs_limit_scan;
+
+/* The thresholds of a pair of these radii. */
+HS_ALWAYS_INLINE hs_thresholds
+hs_limit_thresholds(const hs_limit_scan *limits, float of_point, float of_other)
+{
+    const hs_limit_form form = limits->form;
+    const bool          is_max = limits->rule == HS_RULE_MAX, is_min = limits->rule == HS_RULE_MIN;
+    const bool          takes_point = is_max ? of_point > of_other : of_point < of_other;
+    const float         sum = of_point + of_other, one = takes_point ? of_point : of_other;
+    const float         made = is_max || is_min ? one : sum;
+    const float         limit = made < limits->bound ? made : limits->bound;
+    const float         in = limit * form.in_factor - form.in_less;
+    const float         out = limit * form.out_factor + form.out_more;
+    return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out * out};
+}
+
 /* Points of a group against a block of candidates; all arrays borrowed. */
 typedef struct hs_scan {
     int            ndim;
@@ -96,6 +123,7 @@ typedef struct hs_scan {
     bool           triangular;    /* point t meets only the candidates after place t */
     hs_thresholds  direct;        /* thresholds of the direct form */
     hs_expanded    expanded;      /* and of the expanded one */
+    hs_limit_scan  limits;        /* for list_limits and count_limits only */
     int32_t       *hits;          /* receives labels; most_hits + HS_PADDING */
     int32_t       *end;           /* receives, for each point, where its hits end; n_points */
     float         *squares;       /* receives s of each hit, by `squares` alone; as hits */
@@ -112,6 +140,9 @@ typedef struct hs_scan {
  * label[c] for every candidate c with !(s > out), ascending. hits begin at entry 0 with those
  * of point `first`; unsure ones, with !(s < in), are ascending too. NaN counts as a hit and unsure.
  * Counting leaves hits alone; end is as in listing.
+ *
+ * list_limits and count_limits take the thresholds of each pair from scan->limits, and are of the
+ * direct form.
  *
  * `squares` lists as the direct form does, and writes s of each hit, fused or not. It does not look
  * at `in`, notes none as unsure and leaves unsure and n_unsure alone.
@@ -232,6 +263,8 @@ typedef struct hs_kernel {
     hs_scan_fn    count;
     hs_scan_fn    list_direct;
     hs_scan_fn    count_direct;
+    hs_scan_fn    list_limits;
+    hs_scan_fn    count_limits;
     hs_scan_fn    squares;
     hs_emit_fn    emit_int32;
     hs_emit_fn    emit_int64;
@@ -250,7 +283,8 @@ typedef struct hs_kernel {
 /* The fields that each kernel's file fills with its own functions of these names. */
 #define HS_KERNEL_LOOPS                                                         \
     .gather = gather, .list = list, .count = count, .list_direct = list_direct, \
-    .count_direct = count_direct, .squares = squares, .emit_int32 = emit_int32, \
+    .count_direct = count_direct, .list_limits = list_limits,                   \
+    .count_limits = count_limits, .squares = squares, .emit_int32 = emit_int32, \
     .emit_int64 = emit_int64, .relate = relate, .order = order, .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */

@@ -17,18 +17,22 @@
 typedef struct scalar_scan {
     float         centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
     hs_thresholds thresholds;
+    float         radius; /* for LIMITS, of the point */
 } scalar_scan;
 
 HS_ALWAYS_INLINE scalar_scan
-set_point(const hs_scan *scan, int32_t t, const int ndim, const bool expanded)
+set_point(const hs_scan *scan, int32_t t, const int ndim, const scan_form form)
 {
     scalar_scan v = {.centre = {0.0f}};
     for (int k = 0; k < ndim; k++) {
         v.centre[k] = scan->q[k][t];
     }
-    v.thresholds = expanded ? hs_expanded_thresholds(scan->expanded, v.centre, ndim) : scan->direct;
+    v.thresholds = form == EXPANDED ? hs_expanded_thresholds(scan->expanded, v.centre, ndim) : scan->direct;
     for (int k = 0; k < ndim; k++) {
-        v.centre[k] *= expanded ? -2.0f : 1.0f;
+        v.centre[k] *= form == EXPANDED ? -2.0f : 1.0f;
+    }
+    if (form == LIMITS && scan->limits.of_point != NULL) {
+        v.radius = scan->limits.of_point[t];
     }
     return v;
 }
@@ -36,11 +40,11 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const bool expanded)
 /* s of candidate c. */
 HS_ALWAYS_INLINE float
 square(const float *const *y, const float *norm, const float *centre, int32_t c, const int ndim,
-       const bool expanded)
+       const scan_form form)
 {
-    float s = expanded ? norm[c] : 0.0f;
+    float s = form == EXPANDED ? norm[c] : 0.0f;
     for (int k = 0; k < ndim; k++) {
-        if (expanded) {
+        if (form == EXPANDED) {
             s = s + centre[k] * y[k][c];
         } else {
             const float along = y[k][c] - centre[k];
@@ -50,13 +54,21 @@ square(const float *const *y, const float *norm, const float *centre, int32_t c,
     return s;
 }
 
+/* The thresholds of candidate c, for LIMITS. */
+HS_ALWAYS_INLINE hs_thresholds
+thresholds_of(const hs_scan *scan, const scalar_scan *v, int32_t c)
+{
+    const float *radii = scan->limits.of_block;
+    return hs_limit_thresholds(&scan->limits, v->radius, radii != NULL ? radii[c] : 0.0f);
+}
+
 /* Tests n candidates from `begin` on: near[c] is 1 for hits, else 0. Returns whether any is
  * unsure. */
 HS_ALWAYS_INLINE bool
 test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, const int ndim,
-           const bool expanded, int32_t *HS_RESTRICT near)
+           const scan_form form, int32_t *HS_RESTRICT near)
 {
-    const float  in = v->thresholds.in, out = v->thresholds.out;
+    float        in = v->thresholds.in, out = v->thresholds.out;
     const float *norm = scan->norm + begin;
     const float *y[HS_MAX_DIM];
     float        centre[HS_MAX_DIM];
@@ -66,7 +78,12 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
         centre[k] = v->centre[k];
     }
     for (int32_t c = 0; c < n; c++) {
-        const float s = square(y, norm, centre, c, ndim, expanded);
+        const float s = square(y, norm, centre, c, ndim, form);
+        if (form == LIMITS) {
+            const hs_thresholds own = thresholds_of(scan, v, begin + c);
+            in = own.in;
+            out = own.out;
+        }
         near[c] = !(s > out);
         unsure |= near[c] & !(s < in);
     }
@@ -76,11 +93,12 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
 /* Notes the unsure ones of a tile, by computing its sums again. */
 HS_ALWAYS_INLINE void
 note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32_t n,
-            const int ndim, const bool expanded, const int32_t *near, int32_t at)
+            const int ndim, const scan_form form, const int32_t *near, int32_t at)
 {
     for (int32_t c = begin; c < begin + n; c++) {
-        const float s = square(scan->y, scan->norm, v->centre, c, ndim, expanded);
-        if (near[c - begin] && !(s < v->thresholds.in)) {
+        const float s = square(scan->y, scan->norm, v->centre, c, ndim, form);
+        const float in = form == LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in;
+        if (near[c - begin] && !(s < in)) {
             scan->unsure[scan->n_unsure++] = (hs_unsure){t, c, at};
         }
         at += near[c - begin];
@@ -88,7 +106,7 @@ note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32
 }
 
 HS_ALWAYS_INLINE int32_t
-scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, const bool lists)
+scan_points(hs_scan *scan, int32_t first, const int ndim, const scan_form form, const bool lists)
 {
     int32_t near[TILE];
     int32_t t = first, n_listed = 0;
@@ -99,11 +117,11 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
             scan->n_unsure + scan->n > scan->most_unsure) {
             break;
         }
-        const scalar_scan v = set_point(scan, t, ndim, expanded);
+        const scalar_scan v = set_point(scan, t, ndim, form);
         for (int32_t begin = scan->triangular ? t + 1 : 0; begin < scan->n; begin += TILE) {
             const int32_t left = scan->n - begin, n = left < TILE ? left : TILE;
-            if (test_chunk(scan, &v, begin, n, ndim, expanded, near)) {
-                note_unsure(scan, &v, t, begin, n, ndim, expanded, near, n_listed);
+            if (test_chunk(scan, &v, begin, n, ndim, form, near)) {
+                note_unsure(scan, &v, t, begin, n, ndim, form, near, n_listed);
             }
             for (int32_t c = 0; lists && c < n; c++) {
                 scan->hits[n_listed] = scan->label[begin + c];
@@ -132,7 +150,7 @@ square_chunk(const hs_scan *scan, const float *point, int32_t begin, int32_t n, 
         centre[k] = point[k];
     }
     for (int32_t c = 0; c < n; c++) {
-        s[c] = square(y, NULL, centre, c, ndim, false);
+        s[c] = square(y, NULL, centre, c, ndim, DIRECT);
         near[c] = !(s[c] > out);
     }
 }

@@ -1,43 +1,55 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * scan_forms.h: the five scans of a kernel, from its scan_points and square_points. Include it
- * after these functions. Defines list, count, list_direct, count_direct and squares (hs_scan_fn),
- * each with one loop for 1, 2, 3 and any number of axes, made by inlining with constants.
+ * scan_forms.h: the seven scans of a kernel, from its scan_points and square_points. Include it
+ * after these functions. Defines list, count, list_direct, count_direct, list_limits,
+ * count_limits and squares (hs_scan_fn), each with one loop for 1, 2, 3 and any number of axes, made by inlining with constants.
  */
 
 HS_ALWAYS_INLINE int32_t
-scan_dimensions(hs_scan *scan, int32_t first, const bool expanded, const bool lists)
+scan_dimensions(hs_scan *scan, int32_t first, const scan_form form, const bool lists)
 {
     switch (scan->ndim) {
-    case 1: return scan_points(scan, first, 1, expanded, lists);
-    case 2: return scan_points(scan, first, 2, expanded, lists);
-    case 3: return scan_points(scan, first, 3, expanded, lists);
-    default: return scan_points(scan, first, scan->ndim, expanded, lists);
+    case 1: return scan_points(scan, first, 1, form, lists);
+    case 2: return scan_points(scan, first, 2, form, lists);
+    case 3: return scan_points(scan, first, 3, form, lists);
+    default: return scan_points(scan, first, scan->ndim, form, lists);
     }
 }
 
 static int32_t
 list(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, true, true);
+    return scan_dimensions(scan, first, EXPANDED, true);
 }
 
 static int32_t
 count(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, true, false);
+    return scan_dimensions(scan, first, EXPANDED, false);
 }
 
 static int32_t
 list_direct(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, false, true);
+    return scan_dimensions(scan, first, DIRECT, true);
 }
 
 static int32_t
 count_direct(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, false, false);
+    return scan_dimensions(scan, first, DIRECT, false);
+}
+
+static int32_t
+list_limits(hs_scan *scan, int32_t first)
+{
+    return scan_dimensions(scan, first, LIMITS, true);
+}
+
+static int32_t
+count_limits(hs_scan *scan, int32_t first)
+{
+    return scan_dimensions(scan, first, LIMITS, false);
 }
 
 static int32_t

@@ -27,30 +27,60 @@ typedef struct vector_scan {
     const float *norm;
     floats       centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
     floats       in, out;
+    floats       radius; /* and, for limits: of the point */
 } vector_scan;
 
 /* Sets what depends on the point. */
 HS_ALWAYS_INLINE void
-set_point(const hs_scan *scan, int32_t t, const int ndim, const bool expanded, vector_scan *v)
+set_point(const hs_scan *scan, int32_t t, const int ndim, const scan_form form, vector_scan *v)
 {
     float         centre[HS_MAX_DIM];
     hs_thresholds thresholds = scan->direct;
     for (int k = 0; k < ndim; k++) {
         centre[k] = scan->q[k][t];
-        v->centre[k] = broadcast(expanded ? -2.0f * centre[k] : centre[k]);
+        v->centre[k] = broadcast(form == EXPANDED ? -2.0f * centre[k] : centre[k]);
     }
-    if (expanded) {
+    if (form == EXPANDED) {
         thresholds = hs_expanded_thresholds(scan->expanded, centre, ndim);
     }
     v->in = broadcast(thresholds.in);
     v->out = broadcast(thresholds.out);
+    if (form == LIMITS) {
+        const float *radii = scan->limits.of_point;
+        v->radius = broadcast(radii != NULL ? radii[t] : 0.0f);
+    }
+}
+
+/* The limits of LANES candidates from c on, as floats. */
+HS_ALWAYS_INLINE floats
+limits_of(const hs_limit_scan *limits, floats radius, int32_t c)
+{
+    const floats other = limits->of_block != NULL ? load(limits->of_block + c) : broadcast(0.0f);
+    const floats limit = limits->rule == HS_RULE_MAX   ? larger_of(radius, other)
+                         : limits->rule == HS_RULE_MIN ? smaller_of(radius, other)
+                                                       : add(radius, other);
+    return smaller_of(limit, broadcast(limits->bound));
+}
+
+/* Thresholds of these candidates, for LIMITS. */
+HS_ALWAYS_INLINE void
+set_limits(const hs_scan *scan, int32_t c, vector_scan *v)
+{
+    const hs_limit_form form = scan->limits.form;
+    const floats        limit = limits_of(&scan->limits, v->radius, c);
+    const floats less = broadcast(-form.in_less), more = broadcast(form.out_more);
+    const floats in = larger_of(multiply_add(limit, broadcast(form.in_factor), less),
+                                broadcast(0.0f));
+    const floats out = multiply_add(limit, broadcast(form.out_factor), more);
+    v->in = multiply(in, in);
+    v->out = multiply(out, out);
 }
 
 /* s of LANES candidates from c on. */
 HS_ALWAYS_INLINE floats
-sums_of(const vector_scan *v, int32_t c, const int ndim, const bool expanded)
+sums_of(const vector_scan *v, int32_t c, const int ndim, const scan_form form)
 {
-    if (expanded) {
+    if (form == EXPANDED) {
         floats s = load(v->norm + c);
         for (int k = 0; k < ndim; k++) {
             s = multiply_add(v->centre[k], load(v->y[k] + c), s);
@@ -67,7 +97,7 @@ sums_of(const vector_scan *v, int32_t c, const int ndim, const bool expanded)
 }
 
 HS_ALWAYS_INLINE int32_t
-scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, const bool lists)
+scan_points(hs_scan *scan, int32_t first, const int ndim, const scan_form form, const bool lists)
 {
     const int32_t *label = scan->label;
     const int32_t  n = scan->n;
@@ -85,12 +115,15 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const bool expanded, c
             scan->n_unsure + n > scan->most_unsure) {
             break;
         }
-        set_point(scan, t, ndim, expanded, &v);
+        set_point(scan, t, ndim, form, &v);
         const int32_t from = scan->triangular ? t + 1 : 0;
         mask          keep = (mask)(~0u << from % LANES);
         for (int32_t c = FILLS_LINE ? from & ~(LANES - 1) : from; c < n; c += LANES) {
-            const floats s = sums_of(&v, c, ndim, expanded);
-            mask         near = not_greater(s, v.out);
+            const floats s = sums_of(&v, c, ndim, form);
+            if (form == LIMITS) {
+                set_limits(scan, c, &v);
+            }
+            mask near = not_greater(s, v.out);
             if (FILLS_LINE) {
                 near = (mask)(near & keep);
                 keep = (mask)~0u;

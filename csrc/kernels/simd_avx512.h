@@ -115,6 +115,7 @@ within(floats a, float most)
 }
 /* b where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return _mm512_max_ps(a, b); }
+HS_ALWAYS_INLINE floats smaller_of(floats a, floats b) { return _mm512_min_ps(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)
 {

@@ -140,6 +140,7 @@ within(floats a, float most)
 }
 /* NaN where one is NaN. */
 HS_ALWAYS_INLINE floats larger_of(floats a, floats b) { return vmaxq_f32(a, b); }
+HS_ALWAYS_INLINE floats smaller_of(floats a, floats b) { return vminq_f32(a, b); }
 HS_ALWAYS_INLINE integers
 lane_numbers(void)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_neighbors.c: the public searches for all neighbours of each point, or of each query. */
+#include "by_reach.h"
 #include "request.h"
 #include "../base/outcome.h"
 #include "../search/estimate.h"
@@ -90,7 +91,8 @@ hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **r
     }
     const hs_options of_rows = options_of_rows(options);
     const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
-    return hs_request_fill(&request, find_rows, result, failure);
+    return request.reach != NULL ? hs_by_reach_rows(&request, result, failure)
+                                 : hs_request_fill(&request, find_rows, result, failure);
 }
 
 /* A hs_use_fn. */
@@ -118,5 +120,6 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
     }
     const hs_options counting = hs_options_of_count(options);
     request.options = &counting;
-    return hs_request_use(&request, count_rows, counts, failure);
+    return request.reach != NULL ? hs_by_reach_count_rows(&request, counts, failure)
+                                 : hs_request_use(&request, count_rows, counts, failure);
 }

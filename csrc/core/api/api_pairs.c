@@ -2,6 +2,7 @@
 /* api_pairs.c: the public searches: find and count. */
 #include "../../halfshell.h"
 
+#include "by_reach.h"
 #include "request.h"
 #include "../search/estimate.h"
 #include "../collect/parallel.h"
@@ -19,18 +20,6 @@ hs_options_default(void)
                         .memory_limit = INFINITY};
 }
 
-/* Records all pairs, unsorted. */
-static hs_status
-record_pairs(hs_search *search, hs_output *output, hs_failure *failure)
-{
-    if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
-        return hs_parallel_record(search, output, failure);
-    }
-    hs_output_expect(output, search->grid.expected_pairs);
-    return search->call->team != NULL ? hs_parallel_record(search, output, failure)
-                                      : hs_record_alone(search, output, failure);
-}
-
 /* Writes all pairs sorted. They are found in an output of their own, with the columns that sorting
  * needs besides. */
 static hs_status
@@ -38,7 +27,7 @@ sort_pairs(hs_search *search, hs_output *output, hs_failure *failure)
 {
     hs_output found;
     hs_output_init(&search->call->account, search->scene.ndim, hs_sort_columns(search), 4, &found);
-    hs_status status = record_pairs(search, &found, failure);
+    hs_status status = hs_record_all(search, &found, failure);
     if (status == HS_OK) {
         status = hs_sort_pairs(search->call, search->first_point, search->scene.n, &found, output);
     }
@@ -61,7 +50,7 @@ fill_pairs(hs_search *search, hs_pairs *pairs, hs_failure *failure)
     if (search->call->options.sorted) {
         status = sort_pairs(search, output, failure);
     } else {
-        status = record_pairs(search, output, failure);
+        status = hs_record_all(search, output, failure);
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
@@ -77,16 +66,17 @@ hs_pairs_find(const hs_among *among, const hs_options *options, hs_pairs **resul
     if (!hs_can_return(result, options)) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
-    return hs_request_fill(&request, fill_pairs, result, failure);
+    return request.reach != NULL ? hs_by_reach_pairs(&request, result, failure)
+                                 : hs_request_fill(&request, fill_pairs, result, failure);
 }
 
-/* A hs_use_fn: counts pairs, each once; with queries, all neighbours of each. */
+/* A hs_use_fn: adds the number of pairs, each once; with queries, of all neighbours of each. */
 static hs_status
 count_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
     const hs_status status = hs_parallel_count(search, n_pairs, failure);
     if (status == HS_OK) {
-        *(int64_t *)context = *n_pairs;
+        *(int64_t *)context += *n_pairs;
     }
     return status;
 }
@@ -100,5 +90,8 @@ hs_pairs_count(const hs_among *among, const hs_options *options, int64_t *count,
     }
     const hs_options counting = hs_options_of_count(options);
     const hs_request request = hs_request_among(among, HS_HALF_OR_QUERIES, &counting);
-    return hs_request_use(&request, count_pairs, count, failure);
+    int64_t          n_pairs = 0;
+    const hs_status  status = hs_by_reach_use(&request, count_pairs, &n_pairs, failure);
+    *count = status == HS_OK ? n_pairs : *count;
+    return status;
 }

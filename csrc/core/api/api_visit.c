@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_visit.c: pairs handed to a function as they are found, stored nowhere. */
-#include "request.h"
+#include "by_reach.h"
 
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
@@ -93,7 +93,7 @@ close_visitor(void *job, void *place)
     hs_output_free(&doing->part);
 }
 
-/* A hs_use_fn: each thread visits the pairs that it finds. */
+/* A hs_use_fn: each thread visits the pairs that it finds. HS_ENOUGH: a function wants no more. */
 static hs_status
 visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
@@ -103,6 +103,7 @@ visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
                       .worker_size = sizeof(visitor),
                       .open = open_visitor,
                       .close = close_visitor};
+    const int64_t before = *shared->n_visited;
     shared->search = search;
     if (!shared->visit->thread_safe) { /* other threads only make the search ready */
         hs_call_dismiss(search->call);
@@ -116,8 +117,8 @@ visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
         status = hs_parallel_visit(search, &all, NULL, failure);
     }
     hs_crew_close(&crew);
-    *n_pairs = *shared->n_visited;
-    return status == HS_ENOUGH ? HS_OK : status;
+    *n_pairs = *shared->n_visited - before;
+    return status;
 }
 
 hs_status
@@ -139,5 +140,6 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
     of_visit.index_bytes = 8;
     of_visit.out = NULL;
     request.sets.keeps_none = true;
-    return hs_request_use(&request, visit_pairs, &shared, failure);
+    const hs_status status = hs_by_reach_use(&request, visit_pairs, &shared, failure);
+    return status == HS_ENOUGH ? HS_OK : status;
 }

@@ -26,6 +26,7 @@ hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *opt
     if (among == NULL || (kind == HS_HALF_LIST && among->queries != NULL)) {
         return request;
     }
+    request.reach = among->reach;
     request.sets.queries = among->queries;
     request.sets.is_full = kind == HS_FULL_LIST || among->queries != NULL;
     if (among->cells == NULL) {
@@ -44,9 +45,12 @@ hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *opt
 hs_status
 hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_failure *failure)
 {
-    const hs_sets  *sets = &request->sets;
-    const hs_status sound =
+    const hs_sets *sets = &request->sets;
+    hs_status      sound =
         hs_check_arguments(sets->points, sets->queries, request->box, request->options, failure);
+    if (request->reach != NULL) { /* which this search does not know */
+        sound = HS_ERR_ARGUMENT;
+    }
     return sound == HS_OK ? hs_search_open(sets, request->box, call, search, failure) : sound;
 }
 

@@ -15,6 +15,7 @@ typedef struct hs_request {
     hs_sets           sets;
     const hs_box     *box;
     const hs_options *options;
+    const hs_reach   *reach; /* NULL: the cutoff holds for all pairs */
 } hs_request;
 
 /* Which pairs a search is for: each once, among the points alone; every neighbour of each point or

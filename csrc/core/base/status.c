@@ -29,6 +29,7 @@ hs_status_text(hs_status status)
     case HS_ERR_TYPES: return "types must be from 0 on and below the number of types";
     case HS_ERR_WEIGHTS: return "weights must be finite";
     case HS_ERR_INTERRUPTED: return "interrupted";
+    case HS_ERR_RADII: return "a radius is negative, not finite, or out of range";
     case HS_ERR_ARGUMENT: return "an argument is out of its range, or an array is missing";
     case HS_STATUS_END: break;
     }

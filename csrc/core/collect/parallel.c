@@ -65,7 +65,7 @@ search_range(void *context, int64_t range)
         return leave_range(me);
     }
     if (status == HS_OK && job->output != NULL) {
-        status = hs_commit(&me->committer, (double)end / (double)n, true);
+        status = hs_commit(&me->committer, hs_search_fraction(job->search, end), true);
     }
     return status;
 }
@@ -272,4 +272,15 @@ hs_status
 hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_failure *failure)
 {
     return record_by(search, &backlog->pairs, &backlog->recorder, backlog_hits, backlog, failure);
+}
+
+hs_status
+hs_record_all(hs_search *search, hs_output *output, hs_failure *failure)
+{
+    if (output->fixed) { /* a backlog keeps what is written ahead out of the caller's arrays */
+        return hs_parallel_record(search, output, failure);
+    }
+    hs_output_expect(output, (double)output->n_pairs + search->grid.expected_pairs);
+    return search->call->team != NULL ? hs_parallel_record(search, output, failure)
+                                      : hs_record_alone(search, output, failure);
 }

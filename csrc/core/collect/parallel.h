@@ -35,6 +35,9 @@ hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *f
 hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough,
                                 hs_bookmark *bookmark, hs_failure *failure);
 
+/* Records all pairs behind those that the output has, by the threads of the call or alone. */
+hs_status hs_record_all(hs_search *search, hs_output *output, hs_failure *failure);
+
 /* Visits all groups, in no order. *most, if not NULL: the largest neighbourhood. */
 hs_status hs_parallel_visit(hs_search *search, const hs_visitors *visitors, hs_neighbourhood *most,
                             hs_failure *failure);

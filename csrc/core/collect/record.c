@@ -29,9 +29,42 @@ put_both(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hi
 }
 
 static void
-put_indices(const hs_recorder *recorder, const hs_kernel *kernel, const hs_hits *hits)
+put_index(void *column, int bytes, int64_t at, int32_t number)
+{
+    if (column != NULL && bytes == 8) {
+        ((int64_t *)column)[at] = number;
+    } else if (column != NULL) {
+        ((int32_t *)column)[at] = number;
+    }
+}
+
+/* The asking point to i and what it met to j, whatever their numbers are. */
+static void
+put_directed(const hs_recorder *recorder, const hs_hits *hits)
 {
     const hs_output *output = recorder->output;
+    const int        bytes = output->index_bytes;
+    void            *i = hs_output_next(output, HS_WANT_I), *j = hs_output_next(output, HS_WANT_J);
+    void            *both = hs_output_next(output, HS_WANT_BOTH);
+    for (int32_t t = 0, h = 0; t < hits->n; t++) {
+        for (; h < hits->end[t]; h++) {
+            put_index(i, bytes, h, hits->point[t]);
+            put_index(j, bytes, h, hits->label[h]);
+            put_index(both, bytes, 2 * (int64_t)h, hits->point[t]);
+            put_index(both, bytes, 2 * (int64_t)h + 1, hits->label[h]);
+        }
+    }
+}
+
+static void
+put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits *hits)
+{
+    const hs_kernel *kernel = search->call->kernel;
+    const hs_output *output = recorder->output;
+    if (!search->is_half) {
+        put_directed(recorder, hits);
+        return;
+    }
     const hs_emit_fn emit = output->index_bytes == 8 ? kernel->emit_int64 : kernel->emit_int32;
     if (recorder->columns & (HS_WANT_I | HS_WANT_J)) {
         emit(hits, hs_output_next(output, HS_WANT_I), hs_output_next(output, HS_WANT_J));
@@ -52,12 +85,12 @@ hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, cons
     if (status != HS_OK || written) {
         return status;
     }
-    if (!scanner->search->is_full || (recorder->columns & INDICES)) {
+    if (scanner->search->is_half || (recorder->columns & INDICES)) {
         for (int32_t h = 0; h < n; h++) {
             recorder->ids[h] = id[hits->label[h]];
         }
         by_id.label = recorder->ids;
-        put_indices(recorder, scanner->search->call->kernel, &by_id);
+        put_indices(recorder, scanner->search, &by_id);
     }
     return hs_put_measures(recorder, scanner, first, hits);
 }
@@ -72,7 +105,7 @@ hs_record_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits 
     if (status == HS_OK && scanner->use == HS_BLOCK_LISTS_PLACES) {
         status = hs_record_places(recorder, scanner, first, hits);
     } else if (status == HS_OK) {
-        put_indices(recorder, scanner->search->call->kernel, hits);
+        put_indices(recorder, scanner->search, hits);
     }
     output->n_pairs += status == HS_OK ? n : 0;
     return status;

@@ -4,6 +4,7 @@
 #include "record_measures.h"
 
 #include "measures.h"
+#include "../search/limits.h"
 
 #include <string.h>
 
@@ -55,13 +56,29 @@ measure(hs_recorder *recorder, hs_trace *trace)
                      trace->is_shifted ? shift : NULL, trace->is_wide, recorder->distance, vector);
 }
 
+/* Distances of the batch, none beyond the limit of its pair, or what that is rounded to. */
 static void
-put_distances(hs_recorder *recorder, const hs_search *search, int32_t first, int32_t n)
+keep_within_limits(const hs_scanner *scanner, double *distance, hs_scale unscale)
 {
+    for (int32_t e = 0; e < scanner->trace.n; e++) {
+        const hs_dw limit = hs_limit_of_pair(scanner, e);
+        distance[e] = hs_keep_within(distance[e], hs_scale_apply(unscale, limit.hi),
+                                     scanner->options.inclusive || limit.lo > 0.0);
+    }
+}
+
+static void
+put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
+{
+    const hs_search  *search = scanner->search;
     const hs_options *options = &search->call->options;
+    const int32_t     n = scanner->trace.n;
+    const hs_scale    unscale = hs_measures_unscale(&search->scene);
     double           *to = hs_output_next(recorder->output, HS_WANT_DISTANCE);
-    hs_restore_distances(recorder->distance, n, hs_measures_unscale(&search->scene));
-    if (options->precision == HS_EXACT) {
+    hs_restore_distances(recorder->distance, n, unscale);
+    if (options->precision == HS_EXACT && search->limits != NULL) {
+        keep_within_limits(scanner, recorder->distance, unscale);
+    } else if (options->precision == HS_EXACT) {
         hs_keep_all_within(recorder->distance, n, options->cutoff, options->inclusive);
     }
     memcpy(to + first, recorder->distance, (size_t)n * sizeof *to);
@@ -174,7 +191,7 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
     if (status != HS_OK) {
         return status;
     }
-    if (search->is_full) {
+    if (!search->is_half) {
         for (int32_t e = 0; e < trace->n; e++) {
             sign[e] = 1.0;
         }
@@ -185,7 +202,7 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
         measure(recorder, trace);
     }
     if (recorder->columns & HS_WANT_DISTANCE) {
-        put_distances(recorder, search, part->first, trace->n);
+        put_distances(recorder, scanner, part->first);
     }
     if (recorder->columns & HS_WANT_VECTOR) {
         put_vectors(recorder, search, sign, part->first, trace->n);

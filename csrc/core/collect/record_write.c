@@ -14,7 +14,8 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
 {
     const hs_search *search = scanner->search;
     const int        d = search->scene.ndim;
-    return search->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
+    return search->call->kernel->write != NULL && search->limits == NULL &&
+           (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 && d <= HS_WRITE_MOST_DIM &&
            (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) &&
            !(recorder->columns & HS_WANT_BOTH) && scanner->trace.of.is_narrow &&
            !search->scene.extreme && search->scene.metric.floats_usable;
@@ -69,7 +70,7 @@ hs_write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const h
         return HS_ERR_INTERRUPTED;
     }
     hs_write write = {
-        .ndim = search->scene.ndim, .is_half = !search->is_full, .metric = &search->scene.metric};
+        .ndim = search->scene.ndim, .is_half = search->is_half, .metric = &search->scene.metric};
     hs_measures_tell(&search->scene, &search->call->options, &write);
     describe(scanner, first, &write);
     memset(scanner->block.hits + hits->end[hits->n - 1], 0, HS_PADDING * sizeof(int32_t));

@@ -66,6 +66,13 @@
 #define HS_FILTER_SQUARE_FLUSHES 1.0
 #endif
 
+/* Roundings of a threshold that a kernel computes from two radii, as those of its root: each radius
+ * once, their sum, the product or the sum that makes the root, and half of the square's. The .01
+ * pays for the products of roundings. */
+#ifndef HS_FILTER_LIMIT_ROUNDINGS
+#define HS_FILTER_LIMIT_ROUNDINGS 4.51
+#endif
+
 /* The expanded form. All its roundings together, per square of the number of axes, in units of
  * u m^2 where m bounds every component: d squares, d products of up to 2 m^2, and the partial sums
  * of both, up to (3 d - 2) m^2, but for the last. */

@@ -40,6 +40,18 @@ hs_thresholds hs_thresholds_of(int ndim, double cutoff, double extent, double er
 void hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double unit,
                          double tiny, double *in, double *out);
 
+/*
+ * Thresholds of the direct form for a cutoff R that kernels have as a float r, the sum of two radii
+ * or one of them: in = (r * in_factor - in_less)^2, 0 where that would be negative, and
+ * out = (r * out_factor + out_more)^2, fused or not.
+ */
+typedef struct hs_limit_form {
+    float in_factor, in_less, out_factor, out_more;
+} hs_limit_form;
+
+/* For radii that are each rounded to float32 once, and flushed to zero perhaps. */
+hs_limit_form hs_limit_form_of(int ndim, double extent, double error);
+
 /* For points of which no |q_k| passes `largest`: no |y_k| plus |q_k| of a pair within the cutoff
  * passes this. It is an extent for the pairs of candidates that are not known yet. */
 double hs_reach_extent(double cutoff, double largest, double error);

@@ -13,8 +13,11 @@
  */
 #define MAX_LIMBS 34
 
-/* One axis has two points and up to eight rows; the cutoff stands alone. */
+/* One axis has two points and up to eight rows. */
 #define MAX_TERMS (2 + HS_MAX_DIM)
+
+/* The cutoff, or a sum that it is in place of. */
+#define CUTOFF_TERMS 2
 
 /* A float64 times an integer: +-(high * 2^64 + low) * 2^exponent. */
 typedef struct exact_term {
@@ -28,7 +31,7 @@ typedef struct exact_sums {
     exact_term terms[HS_MAX_DIM][MAX_TERMS];
     int        n_terms[HS_MAX_DIM];
     int        most_terms; /* of any axis */
-    exact_term cutoff;
+    exact_term cutoff[CUTOFF_TERMS]; /* zeros where there is less */
     int        lowest;  /* everything is a multiple of 2^lowest */
     int        highest; /* and every term is below 2^highest */
 } exact_sums;
@@ -60,17 +63,19 @@ include_term(exact_sums *sums, const exact_term *term)
 }
 
 HS_ALWAYS_INLINE void
-set_sums(exact_sums *sums, const hs_metric *metric, double cutoff, const hs_span *span)
+set_sums(exact_sums *sums, const hs_metric *metric, hs_dw cutoff, const hs_span *span)
 {
-    const double  *p = span->p, *q = span->q;
+    const double  *p = span->p, *q = span->q, parts[CUTOFF_TERMS] = {cutoff.hi, cutoff.lo};
     const int64_t *shift = span->shift;
     sums->lowest = INT32_MAX;
     sums->highest = INT32_MIN;
-    sums->most_terms = 1;
-    sums->cutoff.low = sums->cutoff.high = 0;
-    if (cutoff != 0.0) {
-        sums->cutoff = decompose(cutoff);
-        include_term(sums, &sums->cutoff);
+    sums->most_terms = cutoff.lo != 0.0 ? CUTOFF_TERMS : 1;
+    for (int t = 0; t < CUTOFF_TERMS; t++) {
+        sums->cutoff[t].low = sums->cutoff[t].high = 0;
+        if (parts[t] != 0.0) {
+            sums->cutoff[t] = decompose(parts[t]);
+            include_term(sums, &sums->cutoff[t]);
+        }
     }
     for (int k = 0; k < metric->ndim; k++) {
         exact_term *next = sums->terms[k];
@@ -199,8 +204,8 @@ compare_squares(const exact_sums *sums, int ndim, int n, uint64_t *total, uint64
     for (int i = 0; i < n; i++) {
         value[i] = 0;
     }
-    if (sums->cutoff.low != 0) {
-        add_term(value, &sums->cutoff, sums->lowest, n);
+    for (int t = 0; t < CUTOFF_TERMS && sums->cutoff[t].low != 0; t++) {
+        add_term(value, &sums->cutoff[t], sums->lowest, n);
     }
     add_square(limit, value, n);
     return compare_limbs(total, limit, 2 * n);
@@ -224,10 +229,13 @@ compare_small(const exact_sums *sums, int ndim)
         total[0] = hs_add_carry(total[0], low, &carry);
         total[1] += high + carry;
     }
-    if (sums->cutoff.low != 0) {
-        const uint64_t size = sums->cutoff.low << (sums->cutoff.exponent - sums->lowest);
-        limit[0] = hs_multiply_add(size, size, 0, &limit[1]);
+    uint64_t cutoff = 0;
+    for (int t = 0; t < CUTOFF_TERMS && sums->cutoff[t].low != 0; t++) {
+        const exact_term *term = &sums->cutoff[t];
+        const uint64_t    size = term->low << (term->exponent - sums->lowest);
+        cutoff += term->negative ? ~size + 1 : size;
     }
+    limit[0] = hs_multiply_add(cutoff, cutoff, 0, &limit[1]);
     return compare_limbs(total, limit, 2);
 }
 
@@ -246,11 +254,11 @@ compare_large(const exact_sums *sums, int ndim, int n)
     return compare_squares(sums, ndim, n, total, limit, value);
 }
 
-int
-hs_integer_compare(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
+HS_ALWAYS_INLINE int
+compare(const hs_metric *metric, hs_dw cutoff, const hs_span *span)
 {
     exact_sums sums;
-    set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
+    set_sums(&sums, metric, cutoff, span);
     const int n = count_limbs(&sums);
     switch (n) {
     case 0: return 0;
@@ -258,6 +266,19 @@ hs_integer_compare(const hs_metric *metric, const double *p, const double *q, co
     case 2: return compare_medium(&sums, metric->ndim);
     default: return compare_large(&sums, metric->ndim, n);
     }
+}
+
+int
+hs_integer_compare(const hs_metric *metric, const double *p, const double *q, const int64_t *shift)
+{
+    return compare(metric, (hs_dw){metric->cutoff, 0.0}, &(hs_span){p, q, shift});
+}
+
+int
+hs_integer_compare_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
+                       const int64_t *shift)
+{
+    return compare(metric, limit, &(hs_span){p, q, shift});
 }
 
 /* Compares both squares, in 2 n limbs and one unit. */
@@ -307,8 +328,8 @@ int
 hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other)
 {
     exact_sums a, b;
-    set_sums(&a, metric, 0.0, one);
-    set_sums(&b, metric, 0.0, other);
+    set_sums(&a, metric, (hs_dw){0.0, 0.0}, one);
+    set_sums(&b, metric, (hs_dw){0.0, 0.0}, other);
     join_units(&a, &b);
     const int n = count_limbs(&a);
     return n == 0   ? 0
@@ -339,7 +360,7 @@ hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
     uint64_t   component[HS_MAX_DIM][MAX_LIMBS];
     bool       negative[HS_MAX_DIM];
     int        top = -1; /* highest limb in use */
-    set_sums(&sums, metric, metric->cutoff, &(hs_span){p, q, shift});
+    set_sums(&sums, metric, (hs_dw){metric->cutoff, 0.0}, &(hs_span){p, q, shift});
     const int n = count_limbs(&sums);
     for (int k = 0; k < metric->ndim; k++) {
         value[k] = (hs_dw){0.0, 0.0};

@@ -14,6 +14,10 @@
 int hs_integer_compare(const hs_metric *metric, const double *p, const double *q,
                        const int64_t *shift);
 
+/* Sign of |D|^2 - limit^2, for the sum of both words, which must not be negative. */
+int hs_integer_compare_sum(const hs_metric *metric, hs_dw limit, const double *p, const double *q,
+                           const int64_t *shift);
+
 /* Sign of |D1|^2 - |D2|^2. */
 int hs_integer_compare_two(const hs_metric *metric, const hs_span *one, const hs_span *other);
 

@@ -3,6 +3,7 @@
 #include "decide.h"
 
 #include "../exact/metric_float.h"
+#include "limits.h"
 
 #include <math.h>
 #include <string.h>
@@ -106,6 +107,47 @@ hs_decide_traced(hs_scanner *scanner, const hs_metric *metric, uint8_t *within)
     }
 }
 
+/* Decides one pair of the batch, whose limit is its own. */
+static bool
+decide_by_limit(hs_scanner *scanner, int32_t e, hs_dw limit)
+{
+    double         p[HS_MAX_DIM], q[HS_MAX_DIM];
+    int64_t        of_pair[HS_MAX_DIM];
+    hs_metric      metric = scanner->search->scene.metric;
+    const int64_t *shift = hs_trace_pair(&scanner->trace, e, p, q, of_pair);
+    if (scanner->options.precision == HS_SINGLE) {
+        return scanner->options.inclusive; /* its square is that of the limit */
+    }
+    if (scanner->options.precision == HS_DOUBLE) {
+        hs_metric_set_cutoff(limit.hi, &metric);
+        return hs_metric_within_double(&metric, p, q, shift);
+    }
+    return hs_metric_within_sum(&metric, limit, p, q, shift, &scanner->stages);
+}
+
+/* Whether each pair of the batch is within its own limit. Where that is one number, as for points
+ * of one size in a crystal, they are decided together. */
+static void
+decide_by_limits(hs_scanner *scanner, uint8_t *within)
+{
+    const int32_t n = scanner->trace.n;
+    hs_dw         limits[HS_BATCH];
+    bool          is_one = true;
+    for (int32_t e = 0; e < n; e++) {
+        limits[e] = hs_limit_of_pair(scanner, e);
+        is_one = is_one && limits[e].hi == limits[0].hi && limits[e].lo == 0.0;
+    }
+    if (is_one && scanner->options.precision != HS_SINGLE) {
+        hs_metric metric = scanner->search->scene.metric;
+        hs_metric_set_cutoff(limits[0].hi, &metric);
+        hs_decide_traced(scanner, &metric, within);
+        return;
+    }
+    for (int32_t e = 0; e < n; e++) {
+        within[e] = decide_by_limit(scanner, e, limits[e]);
+    }
+}
+
 /* Traces unsure hits from `u` on, as many as fit a batch; *next: the first that did not. */
 static hs_status
 trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
@@ -135,7 +177,11 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         if (status != HS_OK) {
             return status;
         }
-        hs_decide_traced(scanner, &scanner->search->scene.metric, within);
+        if (scanner->search->limits != NULL) {
+            decide_by_limits(scanner, within);
+        } else {
+            hs_decide_traced(scanner, &scanner->search->scene.metric, within);
+        }
         for (int32_t e = 0; e < end - u; e++) {
             scan->unsure[n_beyond] = scan->unsure[u + e]; /* those beyond gather in front */
             n_beyond += !within[e];

@@ -12,6 +12,7 @@ set_single(const hs_scanner *scanner, hs_form *form)
     const float  square = (float)(cutoff * cutoff);
     form->direct.out = scanner->options.inclusive ? square : nextafterf(square, -1.0f);
     form->direct.in = INFINITY;
+    form->limits = (hs_limit_form){1.0f, 0.0f, 1.0f, 0.0f};
 }
 
 /* A scaled cutoff may be known between bounds only. */
@@ -36,12 +37,18 @@ set_form(const hs_scanner *scanner, hs_form *form)
     const hs_kernel *kernel = scanner->search->call->kernel;
     const bool       counts = scanner->use == HS_BLOCK_COUNTS;
     form->scan = counts ? kernel->count_direct : kernel->list_direct;
+    if (scanner->search->limits != NULL) {
+        form->scan = counts ? kernel->count_limits : kernel->list_limits;
+    }
     if (scanner->options.precision == HS_SINGLE) {
         set_single(scanner, form);
         return;
     }
     set_thresholds(scanner, form);
-    if (scanner->use == HS_BLOCK_LISTS_SQUARES) {
+    if (scanner->search->limits != NULL) {
+        form->limits = hs_limit_form_of(scanner->search->scene.ndim, form->extent,
+                                        scanner->search->filter_error);
+    } else if (scanner->use == HS_BLOCK_LISTS_SQUARES) {
         form->scan = kernel->squares;
     } else if (hs_expanded_pays(scanner->search->scene.cutoff, form->extent)) {
         form->scan = counts ? kernel->count : kernel->list;

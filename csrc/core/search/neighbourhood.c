@@ -61,6 +61,14 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
     return HS_OK;
 }
 
+hs_status
+hs_block_add_radii(hs_account *account, hs_block *block)
+{
+    block->radius = hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)block->capacity + HS_PADDING,
+                             sizeof(float));
+    return block->radius != NULL ? HS_OK : HS_ERR_MEMORY;
+}
+
 void
 hs_block_free(hs_account *account, hs_block *block)
 {
@@ -69,6 +77,7 @@ hs_block_free(hs_account *account, hs_block *block)
     hs_free(account, block->place);
     hs_free(account, block->hits);
     hs_free(account, block->squares);
+    hs_free(account, block->radius);
     hs_free(account, block->unsure);
     hs_free(account, block->runs);
     *block = (hs_block){0};

@@ -4,6 +4,7 @@
 
 #include "decide.h"
 #include "form.h"
+#include "limits.h"
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
@@ -35,6 +36,24 @@
  */
 #define BURST 256
 
+/* The radii of the group and of the block. */
+static void
+set_limits(const hs_scanner *scanner, hs_limit_scan *scan)
+{
+    const hs_limits *limits = scanner->search->limits;
+    const float     *of_asking = limits->of_asking.near, *of_points = limits->of_points.near;
+    const hs_block  *block = &scanner->block;
+    scan->rule = limits->rule;
+    scan->bound = limits->near_bound;
+    scan->form = scanner->form->limits;
+    scan->of_point = of_asking != NULL ? of_asking + scanner->group.first : NULL;
+    scan->of_block = of_points != NULL ? block->radius : NULL;
+    for (int32_t c = 0; of_points != NULL && c < block->n; c++) {
+        block->radius[c] = of_points[block->number[c]];
+    }
+    hs_pad_lanes(block->radius, block->n);
+}
+
 /* The present block and group as a kernel sees them. */
 static void
 set_scan(const hs_scanner *scanner, hs_scan *scan)
@@ -56,6 +75,9 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->direct = scanner->form->direct;
     scan->expanded = scanner->form->expanded;
     scan->hits = block->hits;
+    if (scanner->search->limits != NULL) {
+        set_limits(scanner, &scan->limits);
+    }
     scan->squares = block->squares;
     scan->unsure = block->unsure;
     scan->n_unsure = 0;
@@ -222,7 +244,8 @@ hs_scan_block(hs_scanner *scanner)
     scan.end = end;
     for (int32_t first = 0, next; status == HS_OK && first < scan.n_points; first = next) {
         next = run_scan(scanner, &scan, first);
-        if (scan.n_unsure > 0 && scanner->options.precision != HS_SINGLE) {
+        if (scan.n_unsure > 0 &&
+            (scanner->options.precision != HS_SINGLE || scanner->search->limits != NULL)) {
             status = hs_decide(scanner, &scan, first, next);
         }
         scanner->n_found += scan.n_hits;
@@ -300,6 +323,9 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     scanner->candidate_limit = INT64_MAX;
     hs_status status =
         hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);
+    if (status == HS_OK && search->limits != NULL) {
+        status = hs_block_add_radii(account, &scanner->block);
+    }
     if (status == HS_OK) {
         status = hs_trace_init(search, &scanner->block, &scanner->options,
                                use == HS_BLOCK_LISTS_PLACES, &scanner->trace);

@@ -33,6 +33,7 @@ typedef struct hs_form {
     hs_scan_fn    scan;
     hs_thresholds direct;
     hs_expanded   expanded;
+    hs_limit_form limits; /* for pairs with limits of their own */
 } hs_form;
 
 /* Forms that a scanner keeps: those of half a binary order (hs_extent_bits). */
@@ -67,13 +68,11 @@ struct hs_scanner {
     int64_t          work_since_poll;
 };
 
-/* How much of all points lies behind, those before the search's own included: for progress and
- * guesses. */
+/* hs_search_fraction where the scanner is. */
 HS_ALWAYS_INLINE double
 hs_scanner_fraction(const hs_scanner *scanner)
 {
-    const hs_search *search = scanner->search;
-    return ((double)search->first_point + scanner->group.first) / (double)search->n_in_all;
+    return hs_search_fraction(scanner->search, scanner->group.first);
 }
 
 #endif

@@ -13,6 +13,7 @@ hs_search_set_asking(const hs_sets *sets, hs_search *search)
     search->keeps_none = sets->keeps_none;
     HS_ASSERT(sets->is_full || !search->has_queries);
     search->is_full = sets->is_full;
+    search->is_half = !sets->is_full;
     search->n_in_all = search->has_queries ? sets->queries->n : n;
     search->pairs_per_half = !search->is_full ? 1.0
                              : n == 0         ? 0.0
@@ -29,7 +30,7 @@ hs_search_settle(hs_search *search)
 void
 hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search)
 {
-    search->first_point = (int32_t)first_point;
+    search->first_point = first_point;
     search->n_in_all = n_points_in_all;
     for (int64_t si = 0; si < search->bins.n; si++) {
         search->bins.order[si] += (int32_t)first_point;

@@ -20,13 +20,15 @@ typedef struct hs_search {
     hs_bins    bins;
     hs_sparse  sparse;      /* when is_sparse: the rows and cells that bins follows */
     bool       is_full;     /* every asking point meets all its neighbours, not the half list */
+    bool       is_half;     /* each pair is listed once, the lower number first */
     bool       keeps_none;  /* pairs are handed on and not kept: any number will fit */
     bool       is_borrowed; /* the cells and all of the scene belong to another search */
     bool       has_queries; /* the asking points are queries, in the cells of this grid: */
     hs_bins    query_bins;
     hs_sparse  query_sparse;
     bool       is_sparse;
-    int32_t    first_point;    /* number of the first point */
+    const struct hs_limits *limits; /* borrowed; NULL: the cutoff is that of all pairs */
+    int64_t    first_point;         /* number of the first point */
     int64_t    n_in_all;       /* asking points, of which these may be a part: for fractions done */
     double     pairs_per_half; /* pairs to be found for each pair of the half list */
     double     filter_error;   /* bound on each component before rounding to float32 */
@@ -37,6 +39,14 @@ void hs_search_begin(hs_call *call, hs_search *search);
 
 /* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
 void hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
+
+/* How much of all points lies behind when so many of the asking points do, those before the search's
+ * own included: for progress and guesses. */
+HS_ALWAYS_INLINE double
+hs_search_fraction(const hs_search *search, int64_t n)
+{
+    return (double)(search->first_point + n) / (double)search->n_in_all;
+}
 
 /* The asking points, in cell order. */
 HS_ALWAYS_INLINE const hs_bins *

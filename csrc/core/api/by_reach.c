@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* by_reach.c: arguments, the division into levels, and one search after the other. */
+#include "by_reach.h"
+
+#include <math.h>
+
+/* Whether a set of points has what the rule goes by. */
+static bool
+has_marks(const hs_reach *reach, const hs_points *points, const double *radii, const int32_t *types,
+          bool needs_radii)
+{
+    if (reach->n_types > 0) {
+        return types != NULL || points->n == 0;
+    }
+    return radii != NULL || points->n == 0 || !needs_radii;
+}
+
+static hs_status
+check_reach(const hs_request *request, hs_failure *failure)
+{
+    const hs_sets  *sets = &request->sets;
+    const hs_reach *reach = request->reach;
+    const bool      asks = reach->rule != HS_RULE_SCATTER, meets = reach->rule != HS_RULE_GATHER;
+    const double    cutoff = request->options->cutoff;
+    if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 ||
+        (reach->n_types > 0 && reach->cutoffs == NULL) ||
+        (!sets->is_full && !(asks && meets) && reach->n_types == 0)) {
+        return HS_ERR_ARGUMENT;
+    }
+    if (!(cutoff >= 0.0) || (reach->n_types > 0 && !isfinite(cutoff))) {
+        failure->value = cutoff;
+        return HS_ERR_CUTOFF;
+    }
+    if (sets->queries == NULL) {
+        return has_marks(reach, sets->points, reach->radii, reach->types, true) ? HS_OK
+                                                                                : HS_ERR_ARGUMENT;
+    }
+    return has_marks(reach, sets->points, reach->radii, reach->types, meets) &&
+                   has_marks(reach, sets->queries, reach->query_radii, reach->query_types, asks)
+               ? HS_OK
+               : HS_ERR_ARGUMENT;
+}
+
+/* The caller's reach, without what its rule does not look at. */
+static hs_reach
+needed_of(const hs_request *request)
+{
+    hs_reach reach = *request->reach;
+    if (request->sets.queries != NULL && reach.rule == HS_RULE_GATHER) {
+        reach.radii = NULL;
+    } else if (reach.rule == HS_RULE_SCATTER) {
+        reach.query_radii = NULL;
+    }
+    return reach;
+}
+
+hs_status
+hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_failure *failure)
+{
+    const hs_sets *sets = &request->sets;
+    *by = (hs_by_reach){.box = request->box};
+    hs_status status =
+        hs_check_arguments(sets->points, sets->queries, request->box, request->options, failure);
+    if (status == HS_OK) {
+        status = check_reach(request, failure);
+    }
+    if (status == HS_OK) {
+        status = call->kernel == NULL ? HS_ERR_KERNEL : hs_box_check(request->box, failure);
+    }
+    if (status != HS_OK) {
+        return status;
+    }
+    const hs_reach reach = needed_of(request);
+    hs_call_gather(call, sets->points->n + (sets->queries != NULL ? sets->queries->n : 0));
+    status = hs_levels_divide(&call->account, sets->points, sets->queries, &reach, &by->levels,
+                              failure);
+    if (status == HS_OK) {
+        status = hs_level_plan_make(&call->account, &by->levels, request->options->cutoff,
+                                    &by->plan);
+    }
+    if (status != HS_OK) {
+        hs_by_reach_close(&call->account, by);
+    }
+    return status;
+}
+
+void
+hs_by_reach_close(hs_account *account, hs_by_reach *by)
+{
+    hs_level_plan_free(account, &by->plan);
+    hs_levels_free(account, &by->levels);
+}
+
+hs_status
+hs_by_reach_each(const hs_request *request, hs_call *call, hs_use_fn use, void *context,
+                 int64_t *n_pairs, hs_failure *failure)
+{
+    hs_by_reach by;
+    hs_status   status = hs_by_reach_open(request, call, &by, failure);
+    for (int64_t s = 0; status == HS_OK && s < by.plan.n; s++) {
+        hs_level_search open;
+        int64_t         n = 0;
+        status = hs_level_open(&by.levels, &by.plan, s, by.box, request->sets.keeps_none, call,
+                               &open, failure);
+        if (status == HS_OK) {
+            status = use(context, &open.search, &n, failure);
+            hs_level_close(&open);
+            *n_pairs += n;
+            failure->in_queries = failure->in_queries && by.levels.has_queries;
+        }
+    }
+    hs_by_reach_close(&call->account, &by);
+    return status;
+}
+
+hs_status
+hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context, hs_failure *failure)
+{
+    hs_call call;
+    int64_t n_pairs = 0;
+    if (request->reach == NULL) {
+        return hs_request_use(request, use, context, failure);
+    }
+    failure = hs_call_enter(request->options, failure, &call);
+    const hs_status status = hs_by_reach_each(request, &call, use, context, &n_pairs, failure);
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = call.account.limit;
+    }
+    hs_call_leave(&call, n_pairs);
+    hs_account_close(&call.account);
+    return status;
+}

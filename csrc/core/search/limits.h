@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * limits.h: pairs that are compared with a length of their own, the sum of two radii for example,
+ * and not with the cutoff of the search, which is the largest of these lengths. Scans compare
+ * float32 squares with thresholds for each pair; what they cannot tell is decided for the real
+ * numbers. A search without limits pays for none of it.
+ */
+#ifndef HS_LIMITS_H
+#define HS_LIMITS_H
+
+#include "../exact/metric_sum.h"
+
+#include "scanner.h"
+
+/* The radii of a set in the order of its cells; borrowed. */
+typedef struct hs_radii {
+    const double *exact; /* in the unit of the scene's metric; NULL where the rule needs none */
+    const float  *near;  /* in the unit that is scanned in, rounded; HS_PADDING more can be read */
+} hs_radii;
+
+typedef struct hs_limits {
+    hs_rule  rule;
+    double   bound;      /* no pair is further apart than this; infinity: there is no bound */
+    float    near_bound; /* in the unit that is scanned in */
+    hs_radii of_asking, of_points;
+} hs_limits;
+
+/* The length that a pair is compared with, for the radii of the asking point and of the other one:
+ * exactly, hi being the nearest float64. With HS_RULE_MEAN radii are halved already. */
+HS_ALWAYS_INLINE hs_dw
+hs_limit_by(hs_rule rule, double asking, double other, double bound)
+{
+    hs_dw limit = {0.0, 0.0};
+    switch (rule) {
+    case HS_RULE_MAX: limit.hi = hs_larger(asking, other); break;
+    case HS_RULE_MIN: limit.hi = hs_smaller(asking, other); break;
+    case HS_RULE_GATHER: limit.hi = asking; break;
+    case HS_RULE_SCATTER: limit.hi = other; break;
+    default: limit = hs_two_sum(asking, other);
+    }
+    return limit.hi > bound || (limit.hi == bound && limit.lo > 0.0) ? (hs_dw){bound, 0.0} : limit;
+}
+
+/* That of asking point si and point sj, in cell order. */
+HS_ALWAYS_INLINE hs_dw
+hs_limit_of(const hs_limits *limits, int32_t si, int32_t sj)
+{
+    const double *asking = limits->of_asking.exact, *points = limits->of_points.exact;
+    return hs_limit_by(limits->rule, asking != NULL ? asking[si] : 0.0,
+                       points != NULL ? points[sj] : 0.0, limits->bound);
+}
+
+/* The limit of pair e of the scanner's batch. */
+HS_ALWAYS_INLINE hs_dw
+hs_limit_of_pair(const hs_scanner *scanner, int32_t e)
+{
+    const hs_trace *trace = &scanner->trace;
+    return hs_limit_of(scanner->search->limits, trace->si[e],
+                       scanner->block.number[trace->place[e]]);
+}
+
+#endif
