@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_stream.c: pairs in blocks. A stream holds a search that is ready to be walked, a bookmark of
  * how far that has come, and the pairs that were found and not yet handed out. */
-#include "request.h"
+#include "by_reach.h"
 
 #include "../collect/result.h"
 #include "../collect/parallel.h"
@@ -18,7 +18,13 @@
 
 struct hs_stream {
     hs_call     call;   /* that opened it; it has threads only while it looks for pairs */
-    hs_search   search; /* open */
+    hs_search  *search; /* one of the next two, open; or NULL between two steps */
+    hs_search   alone;
+    hs_by_reach by;   /* where pairs have a reach of their own: several searches, in steps, */
+    hs_level_search step;    /* one after the other, */
+    int64_t         n_steps; /* of which so many have been opened, */
+    hs_box          box;     /* in this box */
+    int             ndim;
     hs_output   held;   /* pairs from `begin` on wait to be handed out */
     int64_t     begin;
     int64_t     max_pairs;
@@ -34,10 +40,17 @@ waiting(const hs_stream *stream)
     return stream->held.n_pairs - stream->begin;
 }
 
+/* Whether the present search has found all that it can. */
 static bool
 is_over(const hs_stream *stream)
 {
-    return stream->next.point == hs_search_asking(&stream->search)->n;
+    return stream->search == NULL || stream->next.point == hs_search_asking(stream->search)->n;
+}
+
+static bool
+is_all_found(const hs_stream *stream)
+{
+    return is_over(stream) && stream->n_steps == stream->by.plan.n;
 }
 
 /* An empty output, columns as the options say. */
@@ -45,7 +58,7 @@ static void
 open_output(const hs_stream *stream, hs_account *account, hs_output *output)
 {
     const hs_options *options = &stream->call.options;
-    hs_output_init(account, stream->search.scene.ndim, options->want, options->index_bytes, output);
+    hs_output_init(account, stream->ndim, options->want, options->index_bytes, output);
 }
 
 /* Appends the first n pairs that wait. */
@@ -70,7 +83,7 @@ fill_of(const hs_stream *stream)
 static hs_status
 move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 {
-    const double expected = fmin((double)fill_of(stream), stream->search.grid.expected_pairs);
+    const double expected = fmin((double)fill_of(stream), stream->search->grid.expected_pairs);
     open_output(stream, &stream->call.account, moved);
     hs_output_expect(moved, fmin(expected, MOST_EXPECTED));
     const hs_status status = copy_waiting(stream, first, stream->held.n_pairs - first, moved);
@@ -84,7 +97,7 @@ move_waiting(hs_stream *stream, int64_t first, hs_output *moved)
 static hs_status
 fill(hs_stream *stream, hs_failure *failure)
 {
-    hs_search *search = &stream->search;
+    hs_search *search = stream->search;
     hs_output  moved;
     if (stream->begin > 0 || stream->held.capacity == 0) {
         const hs_status status = move_waiting(stream, stream->begin, &moved);
@@ -104,8 +117,34 @@ fill(hs_stream *stream, hs_failure *failure)
         stream->held.n_pairs = before;
         return status;
     }
-    return hs_poll(&search->call->options,
-                   (double)stream->next.point / (double)hs_search_asking(search)->n);
+    return hs_poll(&search->call->options, hs_search_fraction(search, stream->next.point));
+}
+
+static void
+close_search(hs_stream *stream)
+{
+    if (stream->search == &stream->alone) {
+        hs_search_close(stream->search);
+    } else if (stream->search != NULL) {
+        hs_level_close(&stream->step);
+    }
+    stream->search = NULL;
+}
+
+/* The next search, once the one before is over. */
+static hs_status
+open_step(hs_stream *stream, hs_failure *failure)
+{
+    close_search(stream);
+    const hs_status status =
+        hs_level_open(&stream->by.levels, &stream->by.plan, stream->n_steps, stream->by.box, true,
+                      &stream->call, &stream->step, failure);
+    if (status == HS_OK) {
+        stream->search = &stream->step.search;
+        stream->next = (hs_bookmark){.point = 0};
+        stream->n_steps++;
+    }
+    return status;
 }
 
 /* Hands out the first n pairs that wait: the held columns become theirs, the rest is copied. */
@@ -186,8 +225,8 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     stream->poll = poll;
     stream->context = context;
     hs_call_set_poll(poll != NULL ? tell : NULL, stream, &stream->call);
-    while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_over(stream)) {
-        status = fill(stream, failure);
+    while (status == HS_OK && waiting(stream) < stream->max_pairs && !is_all_found(stream)) {
+        status = is_over(stream) ? open_step(stream, failure) : fill(stream, failure);
     }
     if (status == HS_OK && waiting(stream) > 0) {
         status = take_block(stream, block);
@@ -211,6 +250,27 @@ options_of_stream(const hs_options *options)
     return of_stream;
 }
 
+/* The search of a request, or the steps of one with a reach. */
+static hs_status
+open_search(const hs_request *request, hs_stream *stream, hs_failure *failure)
+{
+    hs_call *call = &stream->call;
+    stream->search = NULL;
+    stream->n_steps = 0;
+    stream->by = (hs_by_reach){.box = NULL};
+    if (request->reach == NULL) {
+        const hs_status status = hs_request_open(request, call, &stream->alone, failure);
+        stream->search = status == HS_OK ? &stream->alone : NULL;
+        return status;
+    }
+    const hs_status status = hs_by_reach_open(request, call, &stream->by, failure);
+    if (status == HS_OK && request->box != NULL) {
+        stream->box = *request->box;
+        stream->by.box = &stream->box;
+    }
+    return status;
+}
+
 hs_status
 hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pairs,
                hs_stream **result, hs_failure *failure)
@@ -230,7 +290,7 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     }
     hs_call *call = &stream->call;
     failure = hs_call_enter(&of_stream, failure, call);
-    const hs_status status = hs_request_open(&request, call, &stream->search, failure);
+    const hs_status status = open_search(&request, stream, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
     if (status != HS_OK) {
@@ -238,6 +298,7 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
         hs_free(NULL, stream);
         return status;
     }
+    stream->ndim = request.sets.points->ndim;
     open_output(stream, &call->account, &stream->held);
     stream->begin = 0;
     stream->max_pairs = max_pairs;
@@ -254,7 +315,8 @@ hs_stream_free(hs_stream *stream)
         return;
     }
     hs_output_free(&stream->held);
-    hs_search_close(&stream->search);
+    close_search(stream);
+    hs_by_reach_close(&stream->call.account, &stream->by);
     hs_account_close(&stream->call.account);
     hs_free(NULL, stream);
 }
