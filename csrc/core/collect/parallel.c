@@ -254,7 +254,7 @@ record_by(hs_search *search, hs_output *output, hs_recorder *recorder, hs_visit_
                                   recorder);
     }
     if (status == HS_OK) {
-        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, failure);
+        status = hs_walk_or_tell(&walker, 0, (int32_t)hs_search_asking(search)->n, failure);
     }
     hs_recorder_free(&search->call->account, recorder);
     hs_walker_close(search, &walker);
