@@ -230,12 +230,12 @@ typedef enum hs_rule {
  */
 typedef struct hs_reach {
     hs_rule        rule;
-    const double  *radii;         /* n, from 0 to 2^1022; NULL where the rule needs none */
-    const double  *query_radii;   /* of queries, if there are any; NULL where the rule needs none */
-    int32_t        n_types;       /* in place of radii, if not 0: */
-    const int32_t *types;         /* n, from 0 to n_types - 1 */
-    const int32_t *query_types;   /* of queries, if there are any */
-    const double  *cutoffs;       /* n_types * n_types, finite and symmetric; negative: no pairs */
+    const double  *radii;       /* n, from 0 to 2^1022; NULL where the rule needs none */
+    const double  *query_radii; /* of queries, if there are any; NULL where the rule needs none */
+    int32_t        n_types;     /* in place of radii, if not 0: */
+    const int32_t *types;       /* n, from 0 to n_types - 1 */
+    const int32_t *query_types; /* of queries, if there are any */
+    const double  *cutoffs;     /* n_types * n_types, finite and symmetric; negative: no pairs */
 } hs_reach;
 
 /*

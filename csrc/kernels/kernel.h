@@ -85,15 +85,15 @@ typedef struct hs_unsure {
 } hs_unsure;
 
 /* What a scan compares: s of either form, or of the direct one with a limit for each pair. */
-typedef enum scan_form { DIRECT, EXPANDED, LIMITS } scan_form;
+typedef enum hs_scan_form { HS_SCAN_DIRECT, HS_SCAN_EXPANDED, HS_SCAN_LIMITS } hs_scan_form;
 
 /* How the radii of a pair make its limit, for the scans that compare each pair with its own. */
 typedef struct hs_limit_scan {
     hs_rule       rule;
-    float         bound;     /* limits are no larger; infinity: none is bounded */
+    float         bound; /* limits are no larger; infinity: none is bounded */
     hs_limit_form form;
-    const float  *of_point;  /* radii, not negative: of the group; NULL: zeros */
-    const float  *of_block;  /* of the candidates, n + HS_PADDING; NULL: zeros */
+    const float  *of_point; /* radii, not negative: of the group; NULL: zeros */
+    const float  *of_block; /* of the candidates, n + HS_PADDING; NULL: zeros */
 } hs_limit_scan;
 
 /* The thresholds of a pair of these radii. */
@@ -281,11 +281,11 @@ typedef struct hs_kernel {
 } hs_kernel;
 
 /* The fields that each kernel's file fills with its own functions of these names. */
-#define HS_KERNEL_LOOPS                                                         \
-    .gather = gather, .list = list, .count = count, .list_direct = list_direct, \
-    .count_direct = count_direct, .list_limits = list_limits,                   \
-    .count_limits = count_limits, .squares = squares, .emit_int32 = emit_int32, \
-    .emit_int64 = emit_int64, .relate = relate, .order = order, .near_boxes = near_boxes
+#define HS_KERNEL_LOOPS                                                                       \
+    .gather = gather, .list = list, .count = count, .list_direct = list_direct,               \
+    .count_direct = count_direct, .list_limits = list_limits, .count_limits = count_limits,   \
+    .squares = squares, .emit_int32 = emit_int32, .emit_int64 = emit_int64, .relate = relate, \
+    .order = order, .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

@@ -17,21 +17,22 @@
 typedef struct scalar_scan {
     float         centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
     hs_thresholds thresholds;
-    float         radius; /* for LIMITS, of the point */
+    float         radius; /* for HS_SCAN_LIMITS, of the point */
 } scalar_scan;
 
 HS_ALWAYS_INLINE scalar_scan
-set_point(const hs_scan *scan, int32_t t, const int ndim, const scan_form form)
+set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form form)
 {
     scalar_scan v = {.centre = {0.0f}};
     for (int k = 0; k < ndim; k++) {
         v.centre[k] = scan->q[k][t];
     }
-    v.thresholds = form == EXPANDED ? hs_expanded_thresholds(scan->expanded, v.centre, ndim) : scan->direct;
+    v.thresholds = form == HS_SCAN_EXPANDED ? hs_expanded_thresholds(scan->expanded, v.centre, ndim)
+                                            : scan->direct;
     for (int k = 0; k < ndim; k++) {
-        v.centre[k] *= form == EXPANDED ? -2.0f : 1.0f;
+        v.centre[k] *= form == HS_SCAN_EXPANDED ? -2.0f : 1.0f;
     }
-    if (form == LIMITS && scan->limits.of_point != NULL) {
+    if (form == HS_SCAN_LIMITS && scan->limits.of_point != NULL) {
         v.radius = scan->limits.of_point[t];
     }
     return v;
@@ -40,11 +41,11 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const scan_form form)
 /* s of candidate c. */
 HS_ALWAYS_INLINE float
 square(const float *const *y, const float *norm, const float *centre, int32_t c, const int ndim,
-       const scan_form form)
+       const hs_scan_form form)
 {
-    float s = form == EXPANDED ? norm[c] : 0.0f;
+    float s = form == HS_SCAN_EXPANDED ? norm[c] : 0.0f;
     for (int k = 0; k < ndim; k++) {
-        if (form == EXPANDED) {
+        if (form == HS_SCAN_EXPANDED) {
             s = s + centre[k] * y[k][c];
         } else {
             const float along = y[k][c] - centre[k];
@@ -54,7 +55,7 @@ square(const float *const *y, const float *norm, const float *centre, int32_t c,
     return s;
 }
 
-/* The thresholds of candidate c, for LIMITS. */
+/* The thresholds of candidate c, for HS_SCAN_LIMITS. */
 HS_ALWAYS_INLINE hs_thresholds
 thresholds_of(const hs_scan *scan, const scalar_scan *v, int32_t c)
 {
@@ -66,7 +67,7 @@ thresholds_of(const hs_scan *scan, const scalar_scan *v, int32_t c)
  * unsure. */
 HS_ALWAYS_INLINE bool
 test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, const int ndim,
-           const scan_form form, int32_t *HS_RESTRICT near)
+           const hs_scan_form form, int32_t *HS_RESTRICT near)
 {
     float        in = v->thresholds.in, out = v->thresholds.out;
     const float *norm = scan->norm + begin;
@@ -79,7 +80,7 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
     }
     for (int32_t c = 0; c < n; c++) {
         const float s = square(y, norm, centre, c, ndim, form);
-        if (form == LIMITS) {
+        if (form == HS_SCAN_LIMITS) {
             const hs_thresholds own = thresholds_of(scan, v, begin + c);
             in = own.in;
             out = own.out;
@@ -93,11 +94,11 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
 /* Notes the unsure ones of a tile, by computing its sums again. */
 HS_ALWAYS_INLINE void
 note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32_t n,
-            const int ndim, const scan_form form, const int32_t *near, int32_t at)
+            const int ndim, const hs_scan_form form, const int32_t *near, int32_t at)
 {
     for (int32_t c = begin; c < begin + n; c++) {
         const float s = square(scan->y, scan->norm, v->centre, c, ndim, form);
-        const float in = form == LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in;
+        const float in = form == HS_SCAN_LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in;
         if (near[c - begin] && !(s < in)) {
             scan->unsure[scan->n_unsure++] = (hs_unsure){t, c, at};
         }
@@ -106,7 +107,7 @@ note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32
 }
 
 HS_ALWAYS_INLINE int32_t
-scan_points(hs_scan *scan, int32_t first, const int ndim, const scan_form form, const bool lists)
+scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form, const bool lists)
 {
     int32_t near[TILE];
     int32_t t = first, n_listed = 0;
@@ -150,7 +151,7 @@ square_chunk(const hs_scan *scan, const float *point, int32_t begin, int32_t n, 
         centre[k] = point[k];
     }
     for (int32_t c = 0; c < n; c++) {
-        s[c] = square(y, NULL, centre, c, ndim, DIRECT);
+        s[c] = square(y, NULL, centre, c, ndim, HS_SCAN_DIRECT);
         near[c] = !(s[c] > out);
     }
 }

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * scan_forms.h: the seven scans of a kernel, from its scan_points and square_points. Include it
- * after these functions. Defines list, count, list_direct, count_direct, list_limits,
- * count_limits and squares (hs_scan_fn), each with one loop for 1, 2, 3 and any number of axes, made by inlining with constants.
+ * after these functions. Defines list, count, list_direct, count_direct, list_limits, count_limits
+ * and squares (hs_scan_fn), each with one loop for 1, 2, 3 and any number of axes, made by inlining
+ * with constants.
  */
 
 HS_ALWAYS_INLINE int32_t
-scan_dimensions(hs_scan *scan, int32_t first, const scan_form form, const bool lists)
+scan_dimensions(hs_scan *scan, int32_t first, const hs_scan_form form, const bool lists)
 {
     switch (scan->ndim) {
     case 1: return scan_points(scan, first, 1, form, lists);
@@ -19,37 +20,37 @@ scan_dimensions(hs_scan *scan, int32_t first, const scan_form form, const bool l
 static int32_t
 list(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, EXPANDED, true);
+    return scan_dimensions(scan, first, HS_SCAN_EXPANDED, true);
 }
 
 static int32_t
 count(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, EXPANDED, false);
+    return scan_dimensions(scan, first, HS_SCAN_EXPANDED, false);
 }
 
 static int32_t
 list_direct(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, DIRECT, true);
+    return scan_dimensions(scan, first, HS_SCAN_DIRECT, true);
 }
 
 static int32_t
 count_direct(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, DIRECT, false);
+    return scan_dimensions(scan, first, HS_SCAN_DIRECT, false);
 }
 
 static int32_t
 list_limits(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, LIMITS, true);
+    return scan_dimensions(scan, first, HS_SCAN_LIMITS, true);
 }
 
 static int32_t
 count_limits(hs_scan *scan, int32_t first)
 {
-    return scan_dimensions(scan, first, LIMITS, false);
+    return scan_dimensions(scan, first, HS_SCAN_LIMITS, false);
 }
 
 static int32_t

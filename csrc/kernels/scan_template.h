@@ -32,20 +32,20 @@ typedef struct vector_scan {
 
 /* Sets what depends on the point. */
 HS_ALWAYS_INLINE void
-set_point(const hs_scan *scan, int32_t t, const int ndim, const scan_form form, vector_scan *v)
+set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form form, vector_scan *v)
 {
     float         centre[HS_MAX_DIM];
     hs_thresholds thresholds = scan->direct;
     for (int k = 0; k < ndim; k++) {
         centre[k] = scan->q[k][t];
-        v->centre[k] = broadcast(form == EXPANDED ? -2.0f * centre[k] : centre[k]);
+        v->centre[k] = broadcast(form == HS_SCAN_EXPANDED ? -2.0f * centre[k] : centre[k]);
     }
-    if (form == EXPANDED) {
+    if (form == HS_SCAN_EXPANDED) {
         thresholds = hs_expanded_thresholds(scan->expanded, centre, ndim);
     }
     v->in = broadcast(thresholds.in);
     v->out = broadcast(thresholds.out);
-    if (form == LIMITS) {
+    if (form == HS_SCAN_LIMITS) {
         const float *radii = scan->limits.of_point;
         v->radius = broadcast(radii != NULL ? radii[t] : 0.0f);
     }
@@ -62,15 +62,15 @@ limits_of(const hs_limit_scan *limits, floats radius, int32_t c)
     return smaller_of(limit, broadcast(limits->bound));
 }
 
-/* Thresholds of these candidates, for LIMITS. */
+/* Thresholds of these candidates, for HS_SCAN_LIMITS. */
 HS_ALWAYS_INLINE void
 set_limits(const hs_scan *scan, int32_t c, vector_scan *v)
 {
     const hs_limit_form form = scan->limits.form;
     const floats        limit = limits_of(&scan->limits, v->radius, c);
-    const floats less = broadcast(-form.in_less), more = broadcast(form.out_more);
-    const floats in = larger_of(multiply_add(limit, broadcast(form.in_factor), less),
-                                broadcast(0.0f));
+    const floats        less = broadcast(-form.in_less), more = broadcast(form.out_more);
+    const floats        in =
+        larger_of(multiply_add(limit, broadcast(form.in_factor), less), broadcast(0.0f));
     const floats out = multiply_add(limit, broadcast(form.out_factor), more);
     v->in = multiply(in, in);
     v->out = multiply(out, out);
@@ -78,9 +78,9 @@ set_limits(const hs_scan *scan, int32_t c, vector_scan *v)
 
 /* s of LANES candidates from c on. */
 HS_ALWAYS_INLINE floats
-sums_of(const vector_scan *v, int32_t c, const int ndim, const scan_form form)
+sums_of(const vector_scan *v, int32_t c, const int ndim, const hs_scan_form form)
 {
-    if (form == EXPANDED) {
+    if (form == HS_SCAN_EXPANDED) {
         floats s = load(v->norm + c);
         for (int k = 0; k < ndim; k++) {
             s = multiply_add(v->centre[k], load(v->y[k] + c), s);
@@ -97,7 +97,7 @@ sums_of(const vector_scan *v, int32_t c, const int ndim, const scan_form form)
 }
 
 HS_ALWAYS_INLINE int32_t
-scan_points(hs_scan *scan, int32_t first, const int ndim, const scan_form form, const bool lists)
+scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form, const bool lists)
 {
     const int32_t *label = scan->label;
     const int32_t  n = scan->n;
@@ -120,7 +120,7 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const scan_form form, 
         mask          keep = (mask)(~0u << from % LANES);
         for (int32_t c = FILLS_LINE ? from & ~(LANES - 1) : from; c < n; c += LANES) {
             const floats s = sums_of(&v, c, ndim, form);
-            if (form == LIMITS) {
+            if (form == HS_SCAN_LIMITS) {
                 set_limits(scan, c, &v);
             }
             mask near = not_greater(s, v.out);

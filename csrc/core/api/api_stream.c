@@ -17,21 +17,21 @@
 #define MOST_EXPECTED 0x1p24
 
 struct hs_stream {
-    hs_call     call;   /* that opened it; it has threads only while it looks for pairs */
-    hs_search  *search; /* one of the next two, open; or NULL between two steps */
-    hs_search   alone;
-    hs_by_reach by;   /* where pairs have a reach of their own: several searches, in steps, */
-    hs_level_search step;    /* one after the other, */
+    hs_call         call;   /* that opened it; it has threads only while it looks for pairs */
+    hs_search      *search; /* one of the next two, open; or NULL between two steps */
+    hs_search       alone;
+    hs_by_reach     by;   /* where pairs have a reach of their own: several searches, in steps, */
+    hs_level_search step; /* one after the other, */
     int64_t         n_steps; /* of which so many have been opened, */
     hs_box          box;     /* in this box */
     int             ndim;
-    hs_output   held;   /* pairs from `begin` on wait to be handed out */
-    int64_t     begin;
-    int64_t     max_pairs;
-    hs_bookmark next; /* where to go on looking */
-    double      told; /* the largest fraction that poll has been called with */
-    hs_poll_fn  poll; /* of the caller, during hs_stream_next */
-    void       *context;
+    hs_output       held; /* pairs from `begin` on wait to be handed out */
+    int64_t         begin;
+    int64_t         max_pairs;
+    hs_bookmark     next; /* where to go on looking */
+    double          told; /* the largest fraction that poll has been called with */
+    hs_poll_fn      poll; /* of the caller, during hs_stream_next */
+    void           *context;
 };
 
 static int64_t
@@ -136,9 +136,9 @@ static hs_status
 open_step(hs_stream *stream, hs_failure *failure)
 {
     close_search(stream);
-    const hs_status status =
-        hs_level_open(&stream->by.levels, &stream->by.plan, stream->n_steps, stream->by.box, true,
-                      &stream->call, &stream->step, failure);
+    const hs_status status = hs_level_open(&stream->by.levels, &stream->by.plan, stream->n_steps,
+                                           stream->by.box, true, &stream->call, &stream->step,
+                                           failure);
     if (status == HS_OK) {
         stream->search = &stream->step.search;
         stream->next = (hs_bookmark){.point = 0};

@@ -97,12 +97,12 @@ close_visitor(void *job, void *place)
 static hs_status
 visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
 {
-    visiting *shared = context;
-    hs_crew   crew = {.call = search->call,
-                      .job = shared,
-                      .worker_size = sizeof(visitor),
-                      .open = open_visitor,
-                      .close = close_visitor};
+    visiting     *shared = context;
+    hs_crew       crew = {.call = search->call,
+                          .job = shared,
+                          .worker_size = sizeof(visitor),
+                          .open = open_visitor,
+                          .close = close_visitor};
     const int64_t before = *shared->n_visited;
     shared->search = search;
     if (!shared->visit->thread_safe) { /* other threads only make the search ready */

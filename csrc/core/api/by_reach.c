@@ -72,11 +72,11 @@ hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_f
     }
     const hs_reach reach = needed_of(request);
     hs_call_gather(call, sets->points->n + (sets->queries != NULL ? sets->queries->n : 0));
-    status = hs_levels_divide(&call->account, sets->points, sets->queries, &reach, &by->levels,
-                              failure);
+    status =
+        hs_levels_divide(&call->account, sets->points, sets->queries, &reach, &by->levels, failure);
     if (status == HS_OK) {
-        status = hs_level_plan_make(&call->account, &by->levels, request->options->cutoff,
-                                    &by->plan);
+        status =
+            hs_level_plan_make(&call->account, &by->levels, request->options->cutoff, &by->plan);
     }
     if (status != HS_OK) {
         hs_by_reach_close(&call->account, by);

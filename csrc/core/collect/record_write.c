@@ -15,8 +15,8 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
     const hs_search *search = scanner->search;
     const int        d = search->scene.ndim;
     return search->call->kernel->write != NULL && search->limits == NULL &&
-           (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 && d <= HS_WRITE_MOST_DIM &&
-           (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) &&
+           (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 &&
+           d <= HS_WRITE_MOST_DIM && (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) &&
            !(recorder->columns & HS_WANT_BOTH) && scanner->trace.of.is_narrow &&
            !search->scene.extreme && search->scene.metric.floats_usable;
 }

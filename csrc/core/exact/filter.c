@@ -123,19 +123,20 @@ hs_limit_form_of(int ndim, double extent, double error)
     const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
     const double own = multiply_up(HS_FILTER_LIMIT_ROUNDINGS, unit);
     /* What is lost of the squares, and of both radii; (x + y)^2 is at least x^2 + y^2. */
-    const double lost = add_up(hs_next_up(sqrt(multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny))),
-                               4.0 * tiny);
+    const double lost =
+        add_up(hs_next_up(sqrt(multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny))), 4.0 * tiny);
     const double far = multiply_up(hs_next_up(1.0 + difference), hs_next_up(sqrt(1.0 + gamma)));
-    const double near = multiply_down(hs_next_down(1.0 - difference), sqrt(1.0 - gamma) - unit * unit);
+    const double near =
+        multiply_down(hs_next_down(1.0 - difference), sqrt(1.0 - gamma) - unit * unit);
     const double more = hs_next_up(1.0 + own);
     if (!(a <= DBL_MAX)) { /* not for NaN either */
         return (hs_limit_form){1.0f, INFINITY, 1.0f, INFINITY};
     }
-    return (hs_limit_form){
-        .in_factor = float_below(multiply_down(near, hs_next_down(1.0 - own))),
-        .in_less = float_above(multiply_up(add_up(a, lost), more)),
-        .out_factor = float_above(multiply_up(far, more)),
-        .out_more = float_above(multiply_up(add_up(multiply_up(a, far), lost), more))};
+    return (hs_limit_form){.in_factor = float_below(multiply_down(near, hs_next_down(1.0 - own))),
+                           .in_less = float_above(multiply_up(add_up(a, lost), more)),
+                           .out_factor = float_above(multiply_up(far, more)),
+                           .out_more =
+                               float_above(multiply_up(add_up(multiply_up(a, far), lost), more))};
 }
 
 hs_thresholds

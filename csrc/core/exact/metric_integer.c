@@ -30,10 +30,10 @@ typedef struct exact_term {
 typedef struct exact_sums {
     exact_term terms[HS_MAX_DIM][MAX_TERMS];
     int        n_terms[HS_MAX_DIM];
-    int        most_terms; /* of any axis */
+    int        most_terms;           /* of any axis */
     exact_term cutoff[CUTOFF_TERMS]; /* zeros where there is less */
-    int        lowest;  /* everything is a multiple of 2^lowest */
-    int        highest; /* and every term is below 2^highest */
+    int        lowest;               /* everything is a multiple of 2^lowest */
+    int        highest;              /* and every term is below 2^highest */
 } exact_sums;
 
 /* A nonzero finite double as an odd significand with sign and exponent. */

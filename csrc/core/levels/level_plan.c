@@ -68,8 +68,8 @@ add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
         return;
     }
     const radii_range a = range_of(askers, asking), b = range_of(&levels->points, points);
-    const hs_dw low = hs_limit_by(levels->rule, a.smallest, b.smallest, plan->bound);
-    const hs_dw high = hs_limit_by(levels->rule, a.largest, b.largest, plan->bound);
+    const hs_dw       low = hs_limit_by(levels->rule, a.smallest, b.smallest, plan->bound);
+    const hs_dw       high = hs_limit_by(levels->rule, a.largest, b.largest, plan->bound);
     step.cutoff = high.lo > 0.0 ? hs_next_up(high.hi) : high.hi;
     step.least = a.least > 0.0 && !(b.least > 0.0 && b.least < a.least) ? a.least : b.least;
     /* Among points that are asked by themselves, what is sifted is the point itself. */
@@ -132,8 +132,8 @@ hs_status
 hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound, hs_level_plan *plan)
 {
     const int64_t n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
-    const bool    is_directed = levels->cutoffs == NULL && (levels->rule == HS_RULE_GATHER ||
-                                                         levels->rule == HS_RULE_SCATTER);
+    const bool    is_directed = levels->cutoffs == NULL &&
+                             (levels->rule == HS_RULE_GATHER || levels->rule == HS_RULE_SCATTER);
     *plan = (hs_level_plan){.is_half = !levels->has_queries && !is_directed, .bound = bound};
     plan->steps = hs_alloc(account, HS_FOR_CELLS, n * most, sizeof *plan->steps);
     if (plan->steps == NULL) {

@@ -7,12 +7,12 @@
 
 #include <string.h>
 
-/* Radii beyond this, scaled, are beyond all distances: where the cutoff is, the scale does not go by
- * it. */
+/* Scaled radii that are larger are beyond all distances: the scale goes by a cutoff that is no
+ * larger than these. */
 #define BEYOND_ALL 0x1p600
 
-/* The radii of a set's points in the order of the cells, in one block, which is returned; NULL where
- * there are none, or when memory is short. */
+/* The radii of a set's points in the order of the cells, in one block, which is returned; NULL
+ * where there are none, or when memory is short. */
 static void *
 arrange_radii(const hs_search *search, const hs_bins *bins, const double *radii, hs_radii *to)
 {
@@ -65,13 +65,11 @@ set_limits(const hs_levels *levels, const hs_level_step *step, double bound, hs_
     hs_search          *search = &open->search;
     const hs_scene     *scene = &search->scene;
     const hs_level_set *asking = hs_levels_asking(levels);
-    const double       *of_points = levels->rule != HS_RULE_GATHER
-                                        ? radii_of(&levels->points, step->points)
-                                        : NULL;
-    const double       *of_asking = levels->rule != HS_RULE_SCATTER
-                                        ? radii_of(asking, step->asking)
-                                        : NULL;
-    const double        near_bound = hs_scale_apply(scene->scale, bound);
+    const double       *of_points =
+        levels->rule != HS_RULE_GATHER ? radii_of(&levels->points, step->points) : NULL;
+    const double *of_asking = levels->rule != HS_RULE_SCATTER ? radii_of(asking, step->asking)
+                                                              : NULL;
+    const double  near_bound = hs_scale_apply(scene->scale, bound);
     open->limits = (hs_limits){.rule = levels->rule,
                                .bound = scene->extreme ? bound : near_bound,
                                .near_bound = (float)near_bound};
@@ -113,9 +111,8 @@ name_row(const hs_levels *levels, const hs_level_step *step, hs_failure *failure
 }
 
 hs_status
-hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number,
-              const hs_box *box, bool keeps_none, hs_call *call, hs_level_search *open,
-              hs_failure *failure)
+hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number, const hs_box *box,
+              bool keeps_none, hs_call *call, hs_level_search *open, hs_failure *failure)
 {
     const hs_level_step *step = &plan->steps[number];
     const hs_level_set  *asking = hs_levels_asking(levels);

@@ -7,10 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-/* Exponents of float64 numbers, from subnormal ones on, and a place for zero before them. */
+/* Sizes count the binary orders of a radius below the largest one, and zero as the smallest. */
 #define LEAST_EXPONENT (-1074)
-#define MOST_EXPONENT  1023
-#define N_SIZES        (MOST_EXPONENT - LEAST_EXPONENT + 2)
+#define N_SIZES        (1 - LEAST_EXPONENT)
 
 /* Radii that no sum or half of the rules takes out of float64's range. */
 #define LARGEST_RADIUS  0x1p1022
@@ -22,6 +21,7 @@ typedef struct division {
     const hs_reach *reach;
     int64_t        *count; /* owned; points of each size or type, in both sets */
     int32_t         n_sizes;
+    double          largest; /* of all radii */
 } division;
 
 /* A set of points while it is divided. */
@@ -35,10 +35,13 @@ typedef struct division_set {
     int32_t         *size; /* of each point */
 } division_set;
 
+/* Ascends with the radius: the largest size are radii above half of the largest one, and so on, so
+ * that radii which differ little are of one or two sizes. */
 static int32_t
-size_of(double radius)
+size_of(double radius, double largest)
 {
-    return radius == 0.0 ? 0 : 1 + ilogb(radius) - LEAST_EXPONENT;
+    const double part = radius > 0.0 ? radius / largest : 0.0;
+    return part == 0.0 ? 0 : part == 1.0 ? N_SIZES - 1 : ilogb(part) - LEAST_EXPONENT + 1;
 }
 
 static hs_status
@@ -50,27 +53,30 @@ refuse(hs_status status, const division_set *set, int64_t row, double value, hs_
     return status;
 }
 
-/* Sizes of the points by their radii. Sets without any are of one size. */
 static hs_status
-read_radii(const division *by, division_set *set, hs_failure *failure)
+read_radii(division *by, division_set *set, hs_failure *failure)
 {
     const bool halves = by->reach->rule == HS_RULE_MEAN;
-    if (set->radii == NULL) {
-        memset(set->size, 0, (size_t)set->points->n * sizeof *set->size);
-        by->count[0] += set->points->n;
-        return HS_OK;
-    }
-    for (int64_t i = 0; i < set->points->n; i++) {
+    for (int64_t i = 0; set->radii != NULL && i < set->points->n; i++) {
         const double radius = set->radii[i] + 0.0; /* and no -0 */
         if (!(radius >= 0.0 && radius <= LARGEST_RADIUS) ||
             (halves && radius > 0.0 && radius < SMALLEST_HALVED)) {
             return refuse(HS_ERR_RADII, set, i, radius, failure);
         }
         set->copy[i] = halves ? 0.5 * radius : radius;
-        set->size[i] = size_of(set->copy[i]);
-        by->count[set->size[i]]++;
+        by->largest = hs_larger(by->largest, set->copy[i]);
     }
     return HS_OK;
+}
+
+/* Once the largest radius is known. Sets without any are of one size. */
+static void
+find_sizes(const division *by, division_set *set)
+{
+    for (int64_t i = 0; i < set->points->n; i++) {
+        set->size[i] = set->radii != NULL ? size_of(set->copy[i], by->largest) : 0;
+        by->count[set->size[i]]++;
+    }
 }
 
 static hs_status
@@ -103,7 +109,7 @@ read_rows(division_set *set, hs_failure *failure)
 }
 
 static hs_status
-read_set(const division *by, division_set *set, hs_failure *failure)
+read_set(division *by, division_set *set, hs_failure *failure)
 {
     const int64_t n = set->points->n;
     set->rows = hs_alloc(by->account, HS_FOR_POINTS, n * set->points->ndim, sizeof *set->rows);
@@ -161,7 +167,7 @@ arrange(const division *by, const division_set *from, int32_t n_levels, hs_level
         return HS_ERR_MEMORY;
     }
     const size_t bytes = (size_t)to->ndim * sizeof(double);
-    int64_t     *next = to->first; /* where each level goes on; then, where the one before it ends */
+    int64_t *next = to->first; /* where each level goes on; then, where the one before it ends */
     memset(next, 0, ((size_t)n_levels + 1) * sizeof *next);
     for (int64_t i = 0; i < to->n; i++) {
         next[by->count[from->size[i]] + 1]++;
@@ -189,8 +195,7 @@ static hs_status
 read_cutoffs(const division *by, hs_levels *levels, hs_failure *failure)
 {
     const int32_t n_types = by->reach->n_types, n = levels->n;
-    levels->cutoffs =
-        hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n * n, sizeof *levels->cutoffs);
+    levels->cutoffs = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n * n, sizeof *levels->cutoffs);
     if (levels->cutoffs == NULL) {
         return HS_ERR_MEMORY;
     }
@@ -226,6 +231,12 @@ divide(division *by, division_set *points, division_set *queries, hs_levels *lev
     }
     if (status != HS_OK) {
         return status;
+    }
+    if (!has_types) {
+        find_sizes(by, points);
+    }
+    if (!has_types && queries->points != NULL) {
+        find_sizes(by, queries);
     }
     levels->n = number_levels(by);
     status = has_types ? read_cutoffs(by, levels, failure) : HS_OK;

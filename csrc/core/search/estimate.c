@@ -178,7 +178,7 @@ hs_status
 hs_estimate_by_density(hs_search *search, hs_failure *failure)
 {
     const double bytes_per_pair = find_bytes_per_pair(search);
-    if (search->limits != NULL || /* the cutoff is that of few pairs */
+    if (search->limits != NULL ||                /* the cutoff is that of few pairs */
         search->scene.lattice.n_periodic == 0) { /* nothing tells the density; a scene without
                                                   * points has no box either */
         return HS_OK;

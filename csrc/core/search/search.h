@@ -27,11 +27,11 @@ typedef struct hs_search {
     hs_bins    query_bins;
     hs_sparse  query_sparse;
     bool       is_sparse;
-    const struct hs_limits *limits; /* borrowed; NULL: the cutoff is that of all pairs */
-    int64_t    first_point;         /* number of the first point */
-    int64_t    n_in_all;       /* asking points, of which these may be a part: for fractions done */
-    double     pairs_per_half; /* pairs to be found for each pair of the half list */
-    double     filter_error;   /* bound on each component before rounding to float32 */
+    const struct hs_limits *limits;      /* borrowed; NULL: the cutoff is that of all pairs */
+    int64_t                 first_point; /* number of the first point */
+    int64_t n_in_all;       /* asking points, of which these may be a part: for fractions done */
+    double  pairs_per_half; /* pairs to be found for each pair of the half list */
+    double  filter_error;   /* bound on each component before rounding to float32 */
 } hs_search;
 
 /* An empty search; the call must outlive it. */
@@ -40,8 +40,8 @@ void hs_search_begin(hs_call *call, hs_search *search);
 /* Points that are part of more: their numbers begin at first_point, of n_points_in_all. */
 void hs_search_renumber(int64_t first_point, int64_t n_points_in_all, hs_search *search);
 
-/* How much of all points lies behind when so many of the asking points do, those before the search's
- * own included: for progress and guesses. */
+/* How much of all points lies behind when so many of the asking points do, those before the
+ * search's own included: for progress and guesses. */
 HS_ALWAYS_INLINE double
 hs_search_fraction(const hs_search *search, int64_t n)
 {

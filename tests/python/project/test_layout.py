@@ -14,7 +14,7 @@ FILES = sorted(CSRC.rglob("*.[ch]"))
 # consumers of a search, which never include each other.
 ORDER = [
     {"base"}, {"memory"}, {"exact"}, {"kernels"}, {"threads"}, {"box"}, {"scene"}, {"cells"},
-    {"search"}, {"collect"}, {"rows", "histogram", "nearest", "verlet"}, {"api"},
+    {"search"}, {"levels"}, {"collect"}, {"rows", "histogram", "nearest", "verlet"}, {"api"},
 ]  # fmt: skip
 PLACE = {folder: place for place, folders in enumerate(ORDER) for folder in folders}
 
