@@ -89,12 +89,23 @@ typedef enum hs_scan_form { HS_SCAN_DIRECT, HS_SCAN_EXPANDED, HS_SCAN_LIMITS } h
 
 /* How the radii of a pair make its limit, for the scans that compare each pair with its own. */
 typedef struct hs_limit_scan {
-    hs_rule       rule;
-    float         bound; /* limits are no larger; infinity: none is bounded */
-    hs_limit_form form;
-    const float  *of_point; /* radii, not negative: of the group; NULL: zeros */
-    const float  *of_block; /* of the candidates, n + HS_PADDING; NULL: zeros */
+    hs_rule        rule;
+    float          bound; /* limits are no larger; infinity: none is bounded */
+    hs_limit_form  form;
+    const float   *of_point; /* radii, not negative: of the group; NULL: zeros */
+    const float   *of_block; /* of the candidates, n + HS_PADDING; NULL: zeros. Negative where a
+                             * pair has no limit */
+    const int32_t *row;      /* of of_block, for each point of the group; NULL: there is one */
+    int64_t        stride;   /* from one row to the next */
 } hs_limit_scan;
+
+/* The radii of the candidates that this point meets; NULL: zeros. */
+HS_ALWAYS_INLINE const float *
+hs_limit_row(const hs_limit_scan *limits, int32_t t)
+{
+    return limits->row != NULL ? limits->of_block + limits->row[t] * limits->stride
+                               : limits->of_block;
+}
 
 /* The thresholds of a pair of these radii. */
 HS_ALWAYS_INLINE hs_thresholds
@@ -108,7 +119,7 @@ hs_limit_thresholds(const hs_limit_scan *limits, float of_point, float of_other)
     const float         limit = made < limits->bound ? made : limits->bound;
     const float         in = limit * form.in_factor - form.in_less;
     const float         out = limit * form.out_factor + form.out_more;
-    return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out * out};
+    return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out > 0.0f ? out * out : 0.0f};
 }
 
 /* Points of a group against a block of candidates; all arrays borrowed. */

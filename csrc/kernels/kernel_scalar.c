@@ -17,7 +17,8 @@
 typedef struct scalar_scan {
     float         centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
     hs_thresholds thresholds;
-    float         radius; /* for HS_SCAN_LIMITS, of the point */
+    float         radius; /* for limits: of the point ... */
+    const float  *others; /* ... and of the candidates */
 } scalar_scan;
 
 HS_ALWAYS_INLINE scalar_scan
@@ -32,8 +33,9 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
     for (int k = 0; k < ndim; k++) {
         v.centre[k] *= form == HS_SCAN_EXPANDED ? -2.0f : 1.0f;
     }
-    if (form == HS_SCAN_LIMITS && scan->limits.of_point != NULL) {
-        v.radius = scan->limits.of_point[t];
+    if (form == HS_SCAN_LIMITS) {
+        v.radius = scan->limits.of_point != NULL ? scan->limits.of_point[t] : 0.0f;
+        v.others = hs_limit_row(&scan->limits, t);
     }
     return v;
 }
@@ -59,8 +61,7 @@ square(const float *const *y, const float *norm, const float *centre, int32_t c,
 HS_ALWAYS_INLINE hs_thresholds
 thresholds_of(const hs_scan *scan, const scalar_scan *v, int32_t c)
 {
-    const float *radii = scan->limits.of_block;
-    return hs_limit_thresholds(&scan->limits, v->radius, radii != NULL ? radii[c] : 0.0f);
+    return hs_limit_thresholds(&scan->limits, v->radius, v->others != NULL ? v->others[c] : 0.0f);
 }
 
 /* Tests n candidates from `begin` on: near[c] is 1 for hits, else 0. Returns whether any is

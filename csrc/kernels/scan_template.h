@@ -27,7 +27,8 @@ typedef struct vector_scan {
     const float *norm;
     floats       centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
     floats       in, out;
-    floats       radius; /* and, for limits: of the point */
+    floats       radius; /* and, for limits: of the point ... */
+    const float *others; /* ... and of the candidates */
 } vector_scan;
 
 /* Sets what depends on the point. */
@@ -48,14 +49,15 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
     if (form == HS_SCAN_LIMITS) {
         const float *radii = scan->limits.of_point;
         v->radius = broadcast(radii != NULL ? radii[t] : 0.0f);
+        v->others = hs_limit_row(&scan->limits, t);
     }
 }
 
 /* The limits of LANES candidates from c on, as floats. */
 HS_ALWAYS_INLINE floats
-limits_of(const hs_limit_scan *limits, floats radius, int32_t c)
+limits_of(const hs_limit_scan *limits, floats radius, const float *others, int32_t c)
 {
-    const floats other = limits->of_block != NULL ? load(limits->of_block + c) : broadcast(0.0f);
+    const floats other = others != NULL ? load(others + c) : broadcast(0.0f);
     const floats limit = limits->rule == HS_RULE_MAX   ? larger_of(radius, other)
                          : limits->rule == HS_RULE_MIN ? smaller_of(radius, other)
                                                        : add(radius, other);
@@ -67,11 +69,12 @@ HS_ALWAYS_INLINE void
 set_limits(const hs_scan *scan, int32_t c, vector_scan *v)
 {
     const hs_limit_form form = scan->limits.form;
-    const floats        limit = limits_of(&scan->limits, v->radius, c);
+    const floats        limit = limits_of(&scan->limits, v->radius, v->others, c);
     const floats        less = broadcast(-form.in_less), more = broadcast(form.out_more);
     const floats        in =
         larger_of(multiply_add(limit, broadcast(form.in_factor), less), broadcast(0.0f));
-    const floats out = multiply_add(limit, broadcast(form.out_factor), more);
+    const floats out =
+        larger_of(multiply_add(limit, broadcast(form.out_factor), more), broadcast(0.0f));
     v->in = multiply(in, in);
     v->out = multiply(out, out);
 }

@@ -15,6 +15,7 @@ typedef struct hs_level_step {
     double   cutoff;         /* the largest length that one of the pairs is compared with */
     double   least;          /* the smallest positive radius that is involved, or 0 */
     bool     is_own;         /* one level with itself, each pair once; asking is not looked at */
+    bool     by_table;       /* of all types: limits are those of the table */
     bool     has_limits;     /* pairs have lengths of their own, up to the cutoff */
 } hs_level_step;
 

@@ -38,6 +38,64 @@ arrange_radii(const hs_search *search, const hs_bins *bins, const double *radii,
     return exact;
 }
 
+/* The types of a set's points, which are their levels, in the order of the cells; NULL when memory
+ * is short. */
+static int32_t *
+arrange_types(hs_account *account, const hs_bins *bins, const hs_level_set *set, int32_t n_levels)
+{
+    int32_t *to = hs_alloc(account, HS_FOR_POINTS, bins->n, sizeof *to);
+    for (int64_t si = 0; to != NULL && si < bins->n; si++) {
+        int32_t level = 0;
+        while (level < n_levels - 1 && set->first[level + 1] <= bins->order[si]) {
+            level++;
+        }
+        to[si] = level;
+    }
+    return to;
+}
+
+/* The cutoffs of all types, exactly and as they are scanned with. */
+static void
+scale_table(const hs_levels *levels, const hs_scene *scene, double *exact, float *near)
+{
+    for (int32_t e = 0; e < levels->n * levels->n; e++) {
+        const double cutoff = levels->cutoffs[e];
+        const double scaled = hs_smaller(hs_scale_apply(scene->scale, cutoff), BEYOND_ALL);
+        exact[e] = cutoff < 0.0 ? -1.0 : scene->extreme ? cutoff : scaled;
+        near[e] = cutoff < 0.0 ? -1.0f : (float)scaled;
+    }
+}
+
+/* Limits by the types of both points, for a search of all of them. */
+static hs_status
+set_table(const hs_levels *levels, hs_level_search *open)
+{
+    hs_search    *search = &open->search;
+    hs_account   *account = &search->call->account;
+    const int32_t n = levels->n, size = n * n;
+    double       *exact = hs_alloc(account, HS_FOR_CELLS, size, sizeof(double) + sizeof(float));
+    open->table = exact;
+    open->of_points = arrange_types(account, &search->bins, &levels->points, n);
+    if (search->has_queries) {
+        open->of_asking = arrange_types(account, &search->query_bins, &levels->queries, n);
+    }
+    if (exact == NULL || open->of_points == NULL ||
+        (search->has_queries && open->of_asking == NULL)) {
+        return HS_ERR_MEMORY;
+    }
+    float *near = (float *)(exact + size);
+    scale_table(levels, &search->scene, exact, near);
+    open->limits.rule = HS_RULE_SCATTER;
+    open->limits.table = (hs_limit_table){
+        .n_types = n,
+        .of_points = open->of_points,
+        .of_asking = search->has_queries ? open->of_asking : open->of_points,
+        .exact = exact,
+        .near = near,
+    };
+    return HS_OK;
+}
+
 static void
 renumber(const int32_t *number, hs_bins *bins)
 {
@@ -73,6 +131,9 @@ set_limits(const hs_levels *levels, const hs_level_step *step, double bound, hs_
     open->limits = (hs_limits){.rule = levels->rule,
                                .bound = scene->extreme ? bound : near_bound,
                                .near_bound = (float)near_bound};
+    if (step->by_table) {
+        return set_table(levels, open);
+    }
     open->of_points = arrange_radii(search, &search->bins, of_points, &open->limits.of_points);
     open->limits.of_asking = open->limits.of_points;
     if (search->has_queries) {
@@ -124,7 +185,8 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
                                  .is_full = !step->is_own,
                                  .keeps_none = keeps_none,
                                  .least_cutoff = step->least};
-    open->of_asking = open->of_points = NULL;
+    open->of_asking = open->of_points = open->table = NULL;
+    open->limits.table.n_types = step->by_table ? levels->n : 0;
     call->options.cutoff = step->cutoff;
     hs_search_begin(call, search);
     search->limits = step->has_limits ? &open->limits : NULL;
@@ -154,6 +216,7 @@ hs_level_close(hs_level_search *open)
     hs_account *account = &open->search.call->account;
     hs_free(account, open->of_asking);
     hs_free(account, open->of_points);
-    open->of_asking = open->of_points = NULL;
+    hs_free(account, open->table);
+    open->of_asking = open->of_points = open->table = NULL;
     hs_search_close(&open->search);
 }

@@ -14,7 +14,8 @@
 typedef struct hs_level_search {
     hs_search search;
     hs_limits limits;
-    void     *of_asking, *of_points; /* owned: the radii of limits */
+    void     *of_asking, *of_points; /* owned: the radii of limits, or the types */
+    void     *table;                 /* owned: that of limits */
 } hs_level_search;
 
 /*

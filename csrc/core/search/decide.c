@@ -115,6 +115,9 @@ decide_by_limit(hs_scanner *scanner, int32_t e, hs_dw limit)
     int64_t        of_pair[HS_MAX_DIM];
     hs_metric      metric = scanner->search->scene.metric;
     const int64_t *shift = hs_trace_pair(&scanner->trace, e, p, q, of_pair);
+    if (limit.hi < 0.0) {
+        return false;
+    }
     if (scanner->options.precision == HS_SINGLE) {
         return scanner->options.inclusive; /* its square is that of the limit */
     }
@@ -132,12 +135,13 @@ decide_by_limits(hs_scanner *scanner, uint8_t *within)
 {
     const int32_t n = scanner->trace.n;
     hs_dw         limits[HS_BATCH];
-    bool          is_one = true;
+    bool          is_one = scanner->options.precision != HS_SINGLE;
     for (int32_t e = 0; e < n; e++) {
         limits[e] = hs_limit_of_pair(scanner, e);
-        is_one = is_one && limits[e].hi == limits[0].hi && limits[e].lo == 0.0;
+        is_one = is_one && limits[e].hi == limits[0].hi && limits[e].hi >= 0.0 &&
+                 limits[e].lo == 0.0;
     }
-    if (is_one && scanner->options.precision != HS_SINGLE) {
+    if (is_one) {
         hs_metric metric = scanner->search->scene.metric;
         hs_metric_set_cutoff(limits[0].hi, &metric);
         hs_decide_traced(scanner, &metric, within);

@@ -18,11 +18,23 @@ typedef struct hs_radii {
     const float  *near;  /* in the unit that is scanned in, rounded; HS_PADDING more can be read */
 } hs_radii;
 
+/* Most types of a table whose limits are laid out for the candidates of each block. */
+#define HS_TABLE_TYPES 8
+
+/* Limits by the types of both points, in place of radii; borrowed. */
+typedef struct hs_limit_table {
+    int32_t        n_types;
+    const int32_t *of_asking, *of_points; /* types, in the order of the cells */
+    const double  *exact; /* n_types * n_types; -1: no pairs. In the unit of the scene's metric */
+    const float   *near;  /* as many, in the unit that is scanned in; NULL: there is no table */
+} hs_limit_table;
+
 typedef struct hs_limits {
-    hs_rule  rule;
-    double   bound;      /* no pair is further apart than this; infinity: there is no bound */
-    float    near_bound; /* in the unit that is scanned in */
-    hs_radii of_asking, of_points;
+    hs_rule        rule;
+    double         bound;      /* no pair is further apart than this; infinity: there is no bound */
+    float          near_bound; /* in the unit that is scanned in */
+    hs_radii       of_asking, of_points;
+    hs_limit_table table;
 } hs_limits;
 
 /* The length that a pair is compared with, for the radii of the asking point and of the other one:
@@ -41,11 +53,16 @@ hs_limit_by(hs_rule rule, double asking, double other, double bound)
     return limit.hi > bound || (limit.hi == bound && limit.lo > 0.0) ? (hs_dw){bound, 0.0} : limit;
 }
 
-/* That of asking point si and point sj, in cell order. */
+/* That of asking point si and point sj, in cell order; negative where they are no pair. */
 HS_ALWAYS_INLINE hs_dw
 hs_limit_of(const hs_limits *limits, int32_t si, int32_t sj)
 {
     const double *asking = limits->of_asking.exact, *points = limits->of_points.exact;
+    if (limits->table.near != NULL) {
+        const hs_limit_table *table = &limits->table;
+        const int32_t         row = table->of_asking[si], column = table->of_points[sj];
+        return (hs_dw){hs_smaller(table->exact[row * table->n_types + column], limits->bound), 0.0};
+    }
     return hs_limit_by(limits->rule, asking != NULL ? asking[si] : 0.0,
                        points != NULL ? points[sj] : 0.0, limits->bound);
 }

@@ -62,10 +62,10 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
 }
 
 hs_status
-hs_block_add_radii(hs_account *account, hs_block *block)
+hs_block_add_radii(hs_account *account, int32_t n_rows, hs_block *block)
 {
-    block->radius =
-        hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)block->capacity + HS_PADDING, sizeof(float));
+    block->pitch = (int64_t)block->capacity + HS_PADDING;
+    block->radius = hs_alloc(account, HS_FOR_CANDIDATES, n_rows * block->pitch, sizeof(float));
     return block->radius != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 

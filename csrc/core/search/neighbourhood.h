@@ -30,7 +30,8 @@ typedef struct hs_block {
                         * when it did not */
     int32_t   *hits;    /* most_hits + HS_PADDING; NULL when only counting */
     float     *squares; /* of the hits, as many; NULL without HS_BLOCK_LISTS_SQUARES */
-    float     *radius;  /* of the candidates; NULL until hs_block_add_radii */
+    float     *radius;  /* rows of the candidates' radii; NULL until hs_block_add_radii */
+    int64_t    pitch;   /* from one row to the next */
     hs_unsure *unsure;  /* capacity */
     hs_run    *runs;    /* most_runs + 1; runs[n_runs].at is the number of candidates */
     int32_t    capacity, most_hits, most_runs;
@@ -60,8 +61,8 @@ typedef struct hs_group {
 hs_status hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t capacity,
                         int32_t most_runs, hs_block *block);
 
-/* Room for the radii of the candidates besides. On failure the block may be freed. */
-hs_status hs_block_add_radii(hs_account *account, hs_block *block);
+/* Room for so many rows of radii of the candidates besides. On failure the block may be freed. */
+hs_status hs_block_add_radii(hs_account *account, int32_t n_rows, hs_block *block);
 void      hs_block_free(hs_account *account, hs_block *block);
 
 /* most_hits of a block of this capacity. */

@@ -36,22 +36,52 @@
  */
 #define BURST 256
 
-/* The radii of the group and of the block. */
+/* The limits of each type with the candidates, a row a type. */
 static void
-set_limits(const hs_scanner *scanner, hs_limit_scan *scan)
+lay_out_table(const hs_limit_table *table, const hs_block *block)
 {
-    const hs_limits *limits = scanner->search->limits;
-    const float     *of_asking = limits->of_asking.near, *of_points = limits->of_points.near;
-    const hs_block  *block = &scanner->block;
-    scan->rule = limits->rule;
-    scan->bound = limits->near_bound;
-    scan->form = scanner->form->limits;
-    scan->of_point = of_asking != NULL ? of_asking + scanner->group.first : NULL;
-    scan->of_block = of_points != NULL ? block->radius : NULL;
-    for (int32_t c = 0; of_points != NULL && c < block->n; c++) {
+    for (int32_t row = 0; row < table->n_types; row++) {
+        const float *limits = table->near + row * table->n_types;
+        float       *to = block->radius + row * block->pitch;
+        for (int32_t c = 0; c < block->n; c++) {
+            to[c] = limits[table->of_points[block->number[c]]];
+        }
+        hs_pad_lanes(to, block->n);
+    }
+}
+
+static void
+lay_out_radii(const float *of_points, const hs_block *block)
+{
+    for (int32_t c = 0; c < block->n; c++) {
         block->radius[c] = of_points[block->number[c]];
     }
     hs_pad_lanes(block->radius, block->n);
+}
+
+/* The radii of the group and of the block, or what a table has in their place. */
+static void
+set_limits(const hs_scanner *scanner, hs_limit_scan *scan)
+{
+    const hs_limits      *limits = scanner->search->limits;
+    const hs_limit_table *table = &limits->table;
+    const float          *of_asking = limits->of_asking.near, *of_points = limits->of_points.near;
+    const hs_block       *block = &scanner->block;
+    const bool            has_table = table->near != NULL;
+    *scan = (hs_limit_scan){
+        .rule = limits->rule,
+        .bound = limits->near_bound,
+        .form = scanner->form->limits,
+        .of_point = of_asking != NULL ? of_asking + scanner->group.first : NULL,
+        .of_block = of_points != NULL || has_table ? block->radius : NULL,
+        .row = has_table ? table->of_asking + scanner->group.first : NULL,
+        .stride = block->pitch,
+    };
+    if (has_table) {
+        lay_out_table(table, block);
+    } else if (of_points != NULL) {
+        lay_out_radii(of_points, block);
+    }
 }
 
 /* The present block and group as a kernel sees them. */
@@ -324,7 +354,8 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     hs_status status =
         hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);
     if (status == HS_OK && search->limits != NULL) {
-        status = hs_block_add_radii(account, &scanner->block);
+        const int32_t n_types = search->limits->table.n_types;
+        status = hs_block_add_radii(account, n_types > 1 ? n_types : 1, &scanner->block);
     }
     if (status == HS_OK) {
         status = hs_trace_init(search, &scanner->block, &scanner->options,
