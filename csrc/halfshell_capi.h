@@ -31,7 +31,7 @@ extern "C" {
 
 /* Of the structs, enums and signatures in halfshell.h. It grows when one changes such that modules
  * that were compiled before would misread it; not when functions are appended to the table. */
-#define HS_CAPI_VERSION 2
+#define HS_CAPI_VERSION 3
 
 #define HS_CAPI_NAME "halfshell._core._C_API"
 
