@@ -23,17 +23,20 @@ hs_metric_within_sum(const hs_metric *metric, hs_dw limit, const double *p, cons
         hs_metric_set_cutoff(limit.hi, &side);
         return hs_metric_within(&side, p, q, shift, stages);
     }
-    hs_stages unused = {0, 0, 0}; /* a pair counts once */
+    hs_stages unused = {0, 0, 0}, first = *stages; /* a pair counts once */
     side.inclusive = true;
     hs_metric_set_cutoff(limit.lo < 0.0 ? hs_next_down(limit.hi) : limit.hi, &side);
-    if (hs_metric_within(&side, p, q, shift, stages)) {
+    if (hs_metric_within(&side, p, q, shift, &first)) {
+        *stages = first;
         return true;
     }
     side.inclusive = false;
     hs_metric_set_cutoff(limit.lo < 0.0 ? limit.hi : hs_next_up(limit.hi), &side);
     if (!hs_metric_within(&side, p, q, shift, &unused)) {
+        *stages = first;
         return false;
     }
+    stages->by_integers++;
     const int sign = hs_integer_compare_sum(metric, limit, p, q, shift);
     return sign < 0 || (sign == 0 && metric->inclusive);
 }
