@@ -9,9 +9,10 @@
 
 enum { MOST_HITS = 2 * HS_BLOCK_CANDIDATES }; /* of a scan here */
 
-/* A scan with its arrays, owned by this file and reused: y, norm, label, q, hits, end, unsure. */
+/* A scan with its arrays, owned by this file and reused. */
 static guarded y_pages[HS_MAX_DIM], norm_pages, label_pages, q_pages[HS_MAX_DIM];
 static guarded hits_pages, squares_pages, end_pages, unsure_pages;
+static guarded point_radius_pages, block_radius_pages;
 
 static inline void
 guard_scans(void)
@@ -22,6 +23,8 @@ guard_scans(void)
         q_pages[k] = guarded_pages(HS_GROUP_POINTS * sizeof(float));
     }
     norm_pages = guarded_pages(candidates);
+    block_radius_pages = guarded_pages(candidates);
+    point_radius_pages = guarded_pages(HS_GROUP_POINTS * sizeof(float));
     label_pages = guarded_pages(candidates);
     hits_pages = guarded_pages((MOST_HITS + HS_PADDING) * sizeof(int32_t));
     squares_pages = guarded_pages((MOST_HITS + HS_PADDING) * sizeof(float));
@@ -41,6 +44,11 @@ typedef struct numbers {
     float         q[HS_MAX_DIM][HS_GROUP_POINTS];
     hs_thresholds direct;
     hs_expanded   expanded;
+    hs_rule       rule;
+    float         bound;
+    hs_limit_form form;
+    bool          has_of_point, has_of_block; /* else NULL */
+    float         of_point[HS_GROUP_POINTS], of_block[HS_BLOCK_CANDIDATES];
 } numbers;
 
 /* What lies past the last candidate must never be listed, whatever it is. */
@@ -54,6 +62,21 @@ place_floats(guarded pages, const float *from, int32_t n, bool at_end, const flo
         array[c] = c % 3 == 0 ? NAN : c % 3 == 1 ? 0.0f : -INFINITY;
     }
     *to = array;
+}
+
+/* Radii against the guards. */
+static inline void
+place_limits(const numbers *s, bool at_end, hs_limit_scan *limits)
+{
+    *limits = (hs_limit_scan){.rule = s->rule, .bound = s->bound, .form = s->form};
+    if (s->has_of_point) {
+        float *radii = guarded_place(point_radius_pages, s->n_points, sizeof(float), at_end);
+        memcpy(radii, s->of_point, (size_t)s->n_points * sizeof(float));
+        limits->of_point = radii;
+    }
+    if (s->has_of_block) {
+        place_floats(block_radius_pages, s->of_block, s->n, at_end, &limits->of_block);
+    }
 }
 
 static inline hs_scan
@@ -76,6 +99,7 @@ place_scan(const numbers *s, bool at_end)
         place_floats(y_pages[k], s->y[k], s->n, at_end, &scan.y[k]);
     }
     place_floats(norm_pages, s->norm, s->n, at_end, &scan.norm);
+    place_limits(s, at_end, &scan.limits);
     int32_t *label = guarded_place(label_pages, s->n + HS_PADDING, sizeof(int32_t), at_end);
     memcpy(label, s->label, (size_t)s->n * sizeof(int32_t));
     memset(label + s->n, 0xff, HS_PADDING * sizeof(int32_t));
@@ -91,11 +115,11 @@ place_scan(const numbers *s, bool at_end)
 
 /* s of candidate c and point t, rounded step by step in the order that kernel.h gives. */
 static inline float
-square_of(const numbers *s, bool expanded, int32_t t, int32_t c)
+square_of(const numbers *s, scan_form form, int32_t t, int32_t c)
 {
-    volatile float sum = expanded ? s->norm[c] : 0.0f;
+    volatile float sum = form == EXPANDED ? s->norm[c] : 0.0f;
     for (int k = 0; k < s->ndim; k++) {
-        if (expanded) {
+        if (form == EXPANDED) {
             const volatile float product = -2.0f * s->q[k][t] * s->y[k][c];
             sum = sum + product;
         } else {
@@ -107,15 +131,36 @@ square_of(const numbers *s, bool expanded, int32_t t, int32_t c)
     return sum;
 }
 
+/* Those of one pair, each step rounded. */
 static inline hs_thresholds
-thresholds_of(const numbers *s, bool expanded, int32_t t)
+limit_thresholds_of(const numbers *s, int32_t t, int32_t c)
+{
+    const float    a = s->has_of_point ? s->of_point[t] : 0.0f;
+    const float    b = s->has_of_block ? s->of_block[c] : 0.0f;
+    const float    larger = a > b ? a : b, smaller = a > b ? b : a;
+    volatile float limit = s->rule == HS_RULE_MAX   ? larger
+                           : s->rule == HS_RULE_MIN ? smaller
+                                                    : a + b;
+    limit = limit > s->bound ? s->bound : limit;
+    volatile float in = limit * s->form.in_factor, out = limit * s->form.out_factor;
+    in = in - s->form.in_less;
+    out = out + s->form.out_more;
+    const volatile float in_square = in > 0.0f ? in * in : 0.0f, out_square = out * out;
+    return (hs_thresholds){in_square, out_square};
+}
+
+static inline hs_thresholds
+thresholds_of(const numbers *s, scan_form form, int32_t t, int32_t c)
 {
     double norm = 0.0;
+    if (form == LIMITS) {
+        return limit_thresholds_of(s, t, c);
+    }
     for (int k = 0; k < s->ndim; k++) {
         norm += (double)s->q[k][t] * (double)s->q[k][t];
     }
     const hs_thresholds moved = {(float)(s->expanded.in - norm), (float)(s->expanded.out - norm)};
-    return expanded ? moved : s->direct;
+    return form == EXPANDED ? moved : s->direct;
 }
 
 /* What points [first, next) must give, in arrays of the test. */
@@ -131,7 +176,7 @@ typedef struct expectation {
 static expectation expected;
 
 static inline void
-expect(const numbers *s, bool expanded, bool lists, int32_t first)
+expect(const numbers *s, scan_form form, bool lists, int32_t first)
 {
     int64_t n_hits = 0;
     int32_t n_unsure = 0, t = first;
@@ -139,9 +184,9 @@ expect(const numbers *s, bool expanded, bool lists, int32_t first)
         if ((lists && n_hits + s->n > s->most_hits) || n_unsure + s->n > s->most_unsure) {
             break;
         }
-        const hs_thresholds limits = thresholds_of(s, expanded, t);
         for (int32_t c = s->triangular ? t + 1 : 0; c < s->n; c++) {
-            const float square = square_of(s, expanded, t, c);
+            const hs_thresholds limits = thresholds_of(s, form, t, c);
+            const float         square = square_of(s, form, t, c);
             if (square > limits.out) {
                 continue;
             }
@@ -197,14 +242,14 @@ fill_with_sevens(const hs_scan *scan)
 
 /* All points, however many calls that takes, exactly as the plain loop; returns the calls. */
 static inline int
-check_form(hs_scan_fn function, const numbers *s, bool expanded, bool lists, bool at_end)
+check_form(hs_scan_fn function, const numbers *s, scan_form form, bool lists, bool at_end)
 {
     int     calls = 0;
     bool    same = true;
     hs_scan scan = place_scan(s, at_end);
     for (int32_t first = 0, next; first < s->n_points && same; first = next) {
         fill_with_sevens(&scan);
-        expect(s, expanded, lists, first);
+        expect(s, form, lists, first);
         next = function(&scan, first);
         calls++;
         same = next == expected.next && scan.n_hits == expected.n_hits && same_unsure(&scan, lists);
@@ -231,7 +276,7 @@ check_squares(const hs_kernel *kernel, const numbers *s, bool at_end)
         numbers listed = *s;
         listed.most_unsure = INT32_MAX / 2; /* none is noted, so none stops the scan */
         listed.direct.in = INFINITY;
-        expect(&listed, false, true, first);
+        expect(&listed, DIRECT, true, first);
         next = kernel->squares(&scan, first);
         calls++;
         same = next == expected.next && scan.n_hits == expected.n_hits && scan.n_unsure == -1 &&
@@ -240,7 +285,7 @@ check_squares(const hs_kernel *kernel, const numbers *s, bool at_end)
                       (size_t)(next - first) * sizeof(int32_t)) == 0;
         for (int32_t t = first, h = 0; same && t < next; t++) {
             for (int32_t c = s->triangular ? t + 1 : 0; same && c < s->n; c++) {
-                const float square = square_of(s, false, t, c);
+                const float square = square_of(s, DIRECT, t, c);
                 if (!(square > s->direct.out)) {
                     same = isnan(square) ? isnan(scan.squares[h]) : scan.squares[h] == square;
                     h++;
@@ -259,10 +304,10 @@ check_exactly(const hs_kernel *kernel, const numbers *s)
 {
     int calls = 0;
     for (int variant = 0; variant < 2; variant++) {
-        calls += check_form(kernel->list, s, true, true, variant);
-        calls += check_form(kernel->count, s, true, false, variant);
-        calls += check_form(kernel->list_direct, s, false, true, variant);
-        calls += check_form(kernel->count_direct, s, false, false, variant);
+        calls += check_form(kernel->list, s, EXPANDED, true, variant);
+        calls += check_form(kernel->count, s, EXPANDED, false, variant);
+        calls += check_form(kernel->list_direct, s, DIRECT, true, variant);
+        calls += check_form(kernel->count_direct, s, DIRECT, false, variant);
         calls += check_squares(kernel, s, variant);
     }
     return calls;
