@@ -254,9 +254,12 @@ hs_levels_divide(hs_account *account, const hs_points *points, const hs_points *
                  const hs_reach *reach, hs_levels *levels, hs_failure *failure)
 {
     division     by = {.account = account, .reach = reach};
-    division_set of_points = {.points = points, .radii = reach->radii, .types = reach->types};
+    const bool   has_types = reach->n_types > 0;
+    division_set of_points = {.points = points,
+                              .radii = has_types ? NULL : reach->radii,
+                              .types = reach->types};
     division_set of_queries = {.points = queries,
-                               .radii = reach->query_radii,
+                               .radii = has_types ? NULL : reach->query_radii,
                                .types = reach->query_types,
                                .are_queries = true};
     *levels = (hs_levels){.rule = reach->rule, .has_queries = queries != NULL};
