@@ -47,8 +47,8 @@ check_limits(const hs_kernel *kernel, const numbers *s)
 {
     int calls = 0;
     for (int variant = 0; variant < 2; variant++) {
-        calls += check_form(kernel->list_limits, s, LIMITS, true, variant);
-        calls += check_form(kernel->count_limits, s, LIMITS, false, variant);
+        calls += check_form(kernel->list_limits, s, HS_SCAN_LIMITS, true, variant);
+        calls += check_form(kernel->count_limits, s, HS_SCAN_LIMITS, false, variant);
     }
     return calls;
 }

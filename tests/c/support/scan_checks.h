@@ -115,11 +115,11 @@ place_scan(const numbers *s, bool at_end)
 
 /* s of candidate c and point t, rounded step by step in the order that kernel.h gives. */
 static inline float
-square_of(const numbers *s, scan_form form, int32_t t, int32_t c)
+square_of(const numbers *s, hs_scan_form form, int32_t t, int32_t c)
 {
-    volatile float sum = form == EXPANDED ? s->norm[c] : 0.0f;
+    volatile float sum = form == HS_SCAN_EXPANDED ? s->norm[c] : 0.0f;
     for (int k = 0; k < s->ndim; k++) {
-        if (form == EXPANDED) {
+        if (form == HS_SCAN_EXPANDED) {
             const volatile float product = -2.0f * s->q[k][t] * s->y[k][c];
             sum = sum + product;
         } else {
@@ -150,17 +150,17 @@ limit_thresholds_of(const numbers *s, int32_t t, int32_t c)
 }
 
 static inline hs_thresholds
-thresholds_of(const numbers *s, scan_form form, int32_t t, int32_t c)
+thresholds_of(const numbers *s, hs_scan_form form, int32_t t, int32_t c)
 {
     double norm = 0.0;
-    if (form == LIMITS) {
+    if (form == HS_SCAN_LIMITS) {
         return limit_thresholds_of(s, t, c);
     }
     for (int k = 0; k < s->ndim; k++) {
         norm += (double)s->q[k][t] * (double)s->q[k][t];
     }
     const hs_thresholds moved = {(float)(s->expanded.in - norm), (float)(s->expanded.out - norm)};
-    return form == EXPANDED ? moved : s->direct;
+    return form == HS_SCAN_EXPANDED ? moved : s->direct;
 }
 
 /* What points [first, next) must give, in arrays of the test. */
@@ -176,7 +176,7 @@ typedef struct expectation {
 static expectation expected;
 
 static inline void
-expect(const numbers *s, scan_form form, bool lists, int32_t first)
+expect(const numbers *s, hs_scan_form form, bool lists, int32_t first)
 {
     int64_t n_hits = 0;
     int32_t n_unsure = 0, t = first;
@@ -242,7 +242,7 @@ fill_with_sevens(const hs_scan *scan)
 
 /* All points, however many calls that takes, exactly as the plain loop; returns the calls. */
 static inline int
-check_form(hs_scan_fn function, const numbers *s, scan_form form, bool lists, bool at_end)
+check_form(hs_scan_fn function, const numbers *s, hs_scan_form form, bool lists, bool at_end)
 {
     int     calls = 0;
     bool    same = true;
@@ -276,7 +276,7 @@ check_squares(const hs_kernel *kernel, const numbers *s, bool at_end)
         numbers listed = *s;
         listed.most_unsure = INT32_MAX / 2; /* none is noted, so none stops the scan */
         listed.direct.in = INFINITY;
-        expect(&listed, DIRECT, true, first);
+        expect(&listed, HS_SCAN_DIRECT, true, first);
         next = kernel->squares(&scan, first);
         calls++;
         same = next == expected.next && scan.n_hits == expected.n_hits && scan.n_unsure == -1 &&
@@ -285,7 +285,7 @@ check_squares(const hs_kernel *kernel, const numbers *s, bool at_end)
                       (size_t)(next - first) * sizeof(int32_t)) == 0;
         for (int32_t t = first, h = 0; same && t < next; t++) {
             for (int32_t c = s->triangular ? t + 1 : 0; same && c < s->n; c++) {
-                const float square = square_of(s, DIRECT, t, c);
+                const float square = square_of(s, HS_SCAN_DIRECT, t, c);
                 if (!(square > s->direct.out)) {
                     same = isnan(square) ? isnan(scan.squares[h]) : scan.squares[h] == square;
                     h++;
@@ -304,10 +304,10 @@ check_exactly(const hs_kernel *kernel, const numbers *s)
 {
     int calls = 0;
     for (int variant = 0; variant < 2; variant++) {
-        calls += check_form(kernel->list, s, EXPANDED, true, variant);
-        calls += check_form(kernel->count, s, EXPANDED, false, variant);
-        calls += check_form(kernel->list_direct, s, DIRECT, true, variant);
-        calls += check_form(kernel->count_direct, s, DIRECT, false, variant);
+        calls += check_form(kernel->list, s, HS_SCAN_EXPANDED, true, variant);
+        calls += check_form(kernel->count, s, HS_SCAN_EXPANDED, false, variant);
+        calls += check_form(kernel->list_direct, s, HS_SCAN_DIRECT, true, variant);
+        calls += check_form(kernel->count_direct, s, HS_SCAN_DIRECT, false, variant);
         calls += check_squares(kernel, s, variant);
     }
     return calls;
