@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_level_search.c: one step of a plan as an open search: its points have the caller's numbers,
+ * and radii lie in the order of the cells; closed, nothing of it is left. */
+#include "../../../csrc/core/base/outcome.h"
+#include "../../../csrc/core/levels/level_search.h"
+#include "../support/poll_checks.h"
+#include "../support/reach_sets.h"
+
+void test_level_search(void);
+
+static reach_set points, queries;
+
+/* A plan and the call that its steps are opened for. */
+typedef struct planned {
+    hs_call       call;
+    hs_levels     levels;
+    hs_level_plan plan;
+    const hs_box *box;
+} planned;
+
+static void
+make_plan(const hs_reach *reach, bool has_queries, double bound, const hs_box *box, planned *made)
+{
+    hs_options      options = hs_options_default();
+    const hs_points p = reach_points(&points), q = reach_points(&queries);
+    hs_failure      failure = HS_NO_FAILURE;
+    options.cutoff = bound;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
+    made->box = box;
+    hs_call_begin(&options, &made->call);
+    hs_account *account = &made->call.account;
+    CHECK(hs_levels_divide(account, &p, has_queries ? &q : NULL, reach, &made->levels, &failure) ==
+          HS_OK);
+    CHECK(hs_level_plan_make(account, &made->levels, bound, &made->plan) == HS_OK);
+}
+
+static void
+free_plan(planned *made)
+{
+    hs_level_plan_free(&made->call.account, &made->plan);
+    hs_levels_free(&made->call.account, &made->levels);
+    hs_call_dismiss(&made->call);
+    CHECK(made->call.account.held == 0);
+    hs_account_close(&made->call.account);
+}
+
+static hs_status
+open_step(planned *made, int64_t step, hs_level_search *open, hs_failure *failure)
+{
+    *failure = HS_NO_FAILURE;
+    return hs_level_open(&made->levels, &made->plan, step, made->box, false, &made->call, open,
+                         failure);
+}
+
+/* The points of a slice, with the radii in the unit of the search: a power of two apart from the
+ * caller's, and halved for the mean. */
+static bool
+has_points(const hs_bins *bins, const hs_level_set *set, hs_slice slice, const hs_radii *radii,
+           hs_scale scale)
+{
+    const int64_t first = set->first[slice.first], end = set->first[slice.end];
+    bool          seen[REACH_POINTS] = {false};
+    bool          right = bins->n == end - first;
+    for (int64_t at = first; right && at < end; at++)
+        seen[set->number[at]] = true;
+    for (int64_t si = 0; right && si < bins->n; si++) {
+        const int32_t number = bins->order[si];
+        int64_t       at = first;
+        right = number >= 0 && number < set->n && seen[number];
+        seen[right ? number : 0] = false;
+        while (right && set->number[at] != number)
+            at++;
+        if (right && radii != NULL && radii->exact != NULL) {
+            right = radii->exact[si] == hs_scale_apply(scale, set->radii[at]) &&
+                    radii->near[si] == (float)radii->exact[si];
+        }
+    }
+    for (int p = 0; right && radii != NULL && radii->exact != NULL && p < HS_PADDING; p++)
+        right = radii->near[bins->n + p] == 0.0f;
+    return right;
+}
+
+static bool
+step_is_right(planned *made, int64_t s)
+{
+    const hs_level_step *step = &made->plan.steps[s];
+    const hs_level_set  *among = &made->levels.points;
+    hs_level_search      open;
+    hs_failure           failure;
+    bool                 right = open_step(made, s, &open, &failure) == HS_OK;
+    if (!right) {
+        return false;
+    }
+    const hs_search *search = &open.search;
+    const hs_limits *limits = search->limits;
+    const hs_scale   scale = search->scene.scale;
+    const hs_rule    rule = made->levels.rule;
+    right = (limits != NULL) == step->has_limits && made->call.options.cutoff == step->cutoff;
+    right = right && search->has_queries == !step->is_own && search->is_full == !step->is_own;
+    right = right && search->is_half == made->plan.is_half;
+    right = right && has_points(&search->bins, among, step->points,
+                                limits != NULL ? &limits->of_points : NULL, scale);
+    if (!step->is_own) {
+        right = right &&
+                has_points(&search->query_bins, hs_levels_asking(&made->levels), step->asking,
+                           limits != NULL ? &limits->of_asking : NULL, scale);
+    }
+    if (limits != NULL) {
+        right = right && limits->rule == rule;
+        right = right && (limits->of_points.exact == NULL) == (rule == HS_RULE_GATHER);
+        right = right && (limits->of_asking.exact == NULL) == (rule == HS_RULE_SCATTER);
+        right = right && limits->bound == hs_scale_apply(scale, made->plan.bound);
+        right = right && limits->near_bound == (float)limits->bound;
+    }
+    right = right && hs_search_fraction(search, 0) == (double)s / (double)made->plan.n;
+    right = right && hs_search_fraction(search, hs_search_asking(search)->n) ==
+                         (double)(s + 1) / (double)made->plan.n;
+    hs_level_close(&open);
+    hs_level_close(&open);
+    return right;
+}
+
+static void
+steps_have_the_callers_numbers(void)
+{
+    const hs_box   box = {.ndim = 3,
+                          .periodic = {true, false, true},
+                          .rows = {{4.0, 0.0, 0.0}, {0.5, 4.0, 0.0}, {0.0, 0.25, 4.0}}};
+    harness_random random = {91};
+    int            wrong = 0, opened = 0;
+    for (int trial = 0; trial < 96; trial++) {
+        const hs_reach reach = {.rule = (hs_rule)(trial / 2 % HS_RULE_END),
+                                .radii = points.radii,
+                                .query_radii = queries.radii};
+        planned        made;
+        reach_fill(&random, 100, 3, 4.0, trial / 12 % 5, 0.5, &points);
+        reach_fill(&random, trial % 5 ? 200 : 7, 3, 4.0, 2, 0.5, &queries);
+        make_plan(&reach, trial & 1, trial % 3 ? HUGE_VAL : 0.375, trial % 4 < 2 ? &box : NULL,
+                  &made);
+        for (int64_t s = 0; s < made.plan.n; s++, opened++)
+            wrong += !step_is_right(&made, s);
+        free_plan(&made);
+    }
+    CHECK(wrong == 0 && opened > 500);
+}
+
+/* Where scaling would lose digits, pairs are decided in the caller's unit, and so are limits. */
+static void
+extreme_radii_stay_as_they_are(void)
+{
+    const hs_reach reach = {.rule = HS_RULE_SUM, .radii = points.radii};
+    harness_random random = {92};
+    planned        made;
+    int            kept = 0;
+    reach_fill(&random, 40, 2, 1.0, 1, 0.5, &points);
+    for (int e = 0; e < 80; e++)
+        points.x[e] = e == 0 ? 0x1p-1070 : ldexp(points.x[e], 1010);
+    for (int i = 0; i < 40; i++)
+        points.radii[i] = i == 1 ? 0x1p-1060 : ldexp(points.radii[i], 1010);
+    make_plan(&reach, false, HUGE_VAL, NULL, &made);
+    for (int64_t s = 0; s < made.plan.n; s++) {
+        hs_level_search open;
+        hs_failure      failure;
+        CHECK(open_step(&made, s, &open, &failure) == HS_OK);
+        const hs_radii *radii = &open.limits.of_points;
+        for (int64_t si = 0;
+             open.search.scene.extreme && open.search.limits != NULL && si < open.search.bins.n;
+             si++, kept++) {
+            CHECK(radii->exact[si] == points.radii[open.search.bins.order[si]]);
+            CHECK(open.limits.bound == HUGE_VAL && radii->near[si] <= 0x1p100f);
+        }
+        hs_level_close(&open);
+    }
+    CHECK(kept > 10);
+    free_plan(&made);
+}
+
+/* A point too far for its box: the row is the caller's, of the set that it belongs to. */
+static void
+failures_name_the_callers_row(void)
+{
+    const hs_box   box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    harness_random random = {93};
+    for (int in_queries = 0; in_queries < 2; in_queries++) {
+        for (int has_queries = in_queries; has_queries < 2; has_queries++) {
+            const hs_reach reach = {
+                .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
+            planned made;
+            int     n_failed = 0;
+            reach_fill(&random, 60, 1, 1.0, 2, 0.25, &points);
+            reach_fill(&random, 50, 1, 1.0, 2, 0.25, &queries);
+            *(in_queries ? &queries.x[31] : &points.x[31]) = 1e300;
+            make_plan(&reach, has_queries, HUGE_VAL, &box, &made);
+            made.call.options.precision = HS_DOUBLE;
+            for (int64_t s = 0; s < made.plan.n; s++) {
+                hs_level_search open;
+                hs_failure      failure;
+                const hs_status status = open_step(&made, s, &open, &failure);
+                if (status == HS_OK) {
+                    hs_level_close(&open);
+                    continue;
+                }
+                CHECK(status == HS_ERR_ROUNDING && failure.row == 31);
+                CHECK(failure.in_queries == in_queries);
+                n_failed++;
+            }
+            CHECK(n_failed > 0);
+            free_plan(&made);
+        }
+    }
+}
+
+typedef struct one_step {
+    planned *made;
+    int64_t  step;
+} one_step;
+
+static hs_status
+open_once(void *context)
+{
+    const one_step *one = context;
+    hs_level_search open;
+    hs_failure      failure;
+    const int64_t   held = one->made->call.account.held;
+    const hs_status status = open_step(one->made, one->step, &open, &failure);
+    if (status == HS_OK) {
+        hs_level_close(&open);
+    }
+    CHECK(one->made->call.account.held == held);
+    return status;
+}
+
+static void
+nothing_leaks_when_memory_is_short(void)
+{
+    harness_random random = {94};
+    reach_fill(&random, 60, 2, 4.0, 2, 0.5, &points);
+    reach_fill(&random, 50, 2, 4.0, 2, 0.5, &queries);
+    for (int rule = 0; rule < HS_RULE_END; rule++) {
+        const hs_reach reach = {
+            .rule = (hs_rule)rule, .radii = points.radii, .query_radii = queries.radii};
+        planned made;
+        make_plan(&reach, rule % 2, HUGE_VAL, NULL, &made);
+        for (int64_t s = 0; s < made.plan.n && s < 6; s++) {
+            one_step one = {&made, s};
+            CHECK(fail_each_allocation(open_once, &one, 100) > 3);
+        }
+        free_plan(&made);
+    }
+}
+
+void
+test_level_search(void)
+{
+    RUN(steps_have_the_callers_numbers);
+    RUN(extreme_radii_stay_as_they_are);
+    RUN(failures_name_the_callers_row);
+    RUN(nothing_leaks_when_memory_is_short);
+}
