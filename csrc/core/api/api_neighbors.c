@@ -91,7 +91,7 @@ hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **r
     }
     const hs_options of_rows = options_of_rows(options);
     const hs_request request = hs_request_among(among, HS_FULL_LIST, &of_rows);
-    return request.reach != NULL ? hs_by_reach_rows(&request, result, failure)
+    return request.reach != NULL ? hs_by_reach_rows(&request, find_rows, result, failure)
                                  : hs_request_fill(&request, find_rows, result, failure);
 }
 
@@ -120,6 +120,6 @@ hs_neighbors_count(const hs_among *among, const hs_options *options, int64_t *co
     }
     const hs_options counting = hs_options_of_count(options);
     request.options = &counting;
-    return request.reach != NULL ? hs_by_reach_count_rows(&request, counts, failure)
+    return request.reach != NULL ? hs_by_reach_count_rows(&request, count_rows, counts, failure)
                                  : hs_request_use(&request, count_rows, counts, failure);
 }

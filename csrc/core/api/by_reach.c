@@ -91,26 +91,42 @@ hs_by_reach_close(hs_account *account, hs_by_reach *by)
     hs_levels_free(account, &by->levels);
 }
 
-hs_status
-hs_by_reach_each(const hs_request *request, hs_call *call, hs_use_fn use, void *context,
-                 int64_t *n_pairs, hs_failure *failure)
+/* Opens a step, and uses it. */
+static hs_status
+use_step(const hs_by_reach *by, int64_t step, bool keeps_none, hs_call *call, hs_use_fn use,
+         void *context, int64_t *n_pairs, hs_failure *failure)
 {
-    hs_by_reach by;
-    hs_status   status = hs_by_reach_open(request, call, &by, failure);
-    for (int64_t s = 0; status == HS_OK && s < by.plan.n; s++) {
-        hs_level_search open;
-        int64_t         n = 0;
-        status = hs_level_open(&by.levels, &by.plan, s, by.box, request->sets.keeps_none, call,
-                               &open, failure);
-        if (status == HS_OK) {
-            status = use(context, &open.search, &n, failure);
-            hs_level_close(&open);
-            *n_pairs += n;
-            failure->in_queries = failure->in_queries && by.levels.has_queries;
-        }
+    hs_level_search open;
+    int64_t         n = 0;
+    hs_status       status =
+        hs_level_open(&by->levels, &by->plan, step, by->box, keeps_none, call, &open, failure);
+    if (status == HS_OK) {
+        status = use(context, &open.search, &n, failure);
+        hs_level_close(&open);
+        *n_pairs += n;
+        failure->in_queries = failure->in_queries && by->levels.has_queries;
     }
-    hs_by_reach_close(&call->account, &by);
     return status;
+}
+
+hs_status
+hs_by_reach_each(const hs_by_reach *by, bool keeps_none, hs_call *call, hs_use_fn use,
+                 void *context, int64_t *n_pairs, hs_failure *failure)
+{
+    hs_status status = HS_OK;
+    for (int64_t s = 0; status == HS_OK && s < by->plan.n; s++) {
+        status = use_step(by, s, keeps_none, call, use, context, n_pairs, failure);
+    }
+    return status;
+}
+
+hs_status
+hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void *context, int64_t *n_pairs,
+                   hs_failure *failure)
+{
+    HS_ASSERT(hs_level_plan_is_single(&by->levels, &by->plan));
+    by->plan.is_half = false;
+    return use_step(by, 0, false, call, use, context, n_pairs, failure);
 }
 
 hs_status
@@ -122,7 +138,13 @@ hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context, hs_fail
         return hs_request_use(request, use, context, failure);
     }
     failure = hs_call_enter(request->options, failure, &call);
-    const hs_status status = hs_by_reach_each(request, &call, use, context, &n_pairs, failure);
+    hs_by_reach by;
+    hs_status   status = hs_by_reach_open(request, &call, &by, failure);
+    if (status == HS_OK) {
+        status =
+            hs_by_reach_each(&by, request->sets.keeps_none, &call, use, context, &n_pairs, failure);
+        hs_by_reach_close(&call.account, &by);
+    }
     if (status == HS_ERR_MEMORY) {
         failure->limit_bytes = call.account.limit;
     }

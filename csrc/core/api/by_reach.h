@@ -26,17 +26,24 @@ hs_status hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach
 void hs_by_reach_close(hs_account *account, hs_by_reach *by);
 
 /* Uses each search in turn, as long as that gives HS_OK; *n_pairs, zero before, is how many all of
- * them found. */
-hs_status hs_by_reach_each(const hs_request *request, hs_call *call, hs_use_fn use, void *context,
-                           int64_t *n_pairs, hs_failure *failure);
+ * them found. keeps_none: pairs are not kept. */
+hs_status hs_by_reach_each(const hs_by_reach *by, bool keeps_none, hs_call *call, hs_use_fn use,
+                           void *context, int64_t *n_pairs, hs_failure *failure);
+
+/* Uses the one search that there is, of all neighbours of each asking point. */
+hs_status hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void *context,
+                             int64_t *n_pairs, hs_failure *failure);
 
 /* hs_request_use for requests with a reach and without. */
 hs_status hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context,
                           hs_failure *failure);
 
-/* hs_pairs_find, hs_neighbors_find and hs_neighbors_count for such a request. */
+/* hs_pairs_find, hs_neighbors_find and hs_neighbors_count for such a request. fill, count: what
+ * does it for one search, which is taken where there is but one. */
 hs_status hs_by_reach_pairs(const hs_request *request, hs_pairs **result, hs_failure *failure);
-hs_status hs_by_reach_rows(const hs_request *request, hs_pairs **result, hs_failure *failure);
-hs_status hs_by_reach_count_rows(const hs_request *request, int64_t *counts, hs_failure *failure);
+hs_status hs_by_reach_rows(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
+                           hs_failure *failure);
+hs_status hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *counts,
+                                 hs_failure *failure);
 
 #endif

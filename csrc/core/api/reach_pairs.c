@@ -26,11 +26,11 @@ record_step(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
 }
 
 static hs_status
-record(const hs_request *request, hs_call *call, hs_output *output, hs_failure *failure)
+record(const hs_by_reach *by, hs_call *call, hs_output *output, hs_failure *failure)
 {
     int64_t         n_pairs = 0;
     const hs_status status =
-        hs_by_reach_each(request, call, record_step, output, &n_pairs, failure);
+        hs_by_reach_each(by, false, call, record_step, output, &n_pairs, failure);
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
         failure->limit_bytes = call->account.limit;
@@ -48,15 +48,6 @@ columns_of(const hs_request *request)
     }
     const unsigned wanted = request->options->want & ~(unsigned)HS_WANT_BOTH;
     return wanted | HS_WANT_I | HS_WANT_J | (repeats ? HS_WANT_SHIFT : 0);
-}
-
-static bool
-is_half(const hs_request *request)
-{
-    const hs_reach *reach = request->reach;
-    return request->sets.queries == NULL &&
-           (reach->n_types > 0 ||
-            (reach->rule != HS_RULE_GATHER && reach->rule != HS_RULE_SCATTER));
 }
 
 /* Appends (j, i, -S) for each of the first n pairs (i, j, S). */
@@ -97,9 +88,16 @@ mirror(hs_output *found, bool wants_shift, hs_failure *failure)
 
 /* Whether a point meets itself: in rows of one set that are not made of a half list. */
 static bool
-meets_itself(const hs_request *request)
+meets_itself(const hs_by_reach *by)
 {
-    return request->sets.queries == NULL && !is_half(request);
+    return !by->levels.has_queries && !by->plan.is_half;
+}
+
+/* Whether rows are those of a single search. */
+static bool
+is_single(const hs_by_reach *by)
+{
+    return hs_level_plan_is_single(&by->levels, &by->plan) && !meets_itself(by);
 }
 
 /* Moves pair `from` to place `to`. */
@@ -136,59 +134,79 @@ drop_selves(hs_output *found)
 
 /* All pairs, of both orders where rows are wanted of a half list, in an output that is opened. */
 static hs_status
-find(const hs_request *request, hs_call *call, unsigned columns, bool as_rows, hs_output *found,
-     hs_failure *failure)
+find(const hs_request *request, const hs_by_reach *by, hs_call *call, unsigned columns,
+     bool as_rows, hs_output *found, hs_failure *failure)
 {
-    hs_output_init(&call->account, request->sets.points != NULL ? request->sets.points->ndim : 1,
-                   columns, 4, found);
-    hs_status status = record(request, call, found, failure);
-    if (status == HS_OK && as_rows && is_half(request)) {
+    hs_output_init(&call->account, by->levels.points.ndim, columns, 4, found);
+    hs_status status = record(by, call, found, failure);
+    if (status == HS_OK && as_rows && by->plan.is_half) {
         status = mirror(found, request->options->want & HS_WANT_SHIFT, failure);
     }
-    if (status == HS_OK && meets_itself(request)) {
+    if (status == HS_OK && meets_itself(by)) {
         drop_selves(found);
     }
     return status;
 }
 
-/* Begins a result. NULL when memory is short, or where there are no points. */
+/* Begins a result and opens what is searched; on failure of the second it holds nothing. NULL when
+ * memory is short. */
 static hs_pairs *
-begin(const hs_request *request, hs_failure **failure)
+begin(const hs_request *request, hs_by_reach *by, hs_status *status, hs_failure **failure)
 {
     hs_pairs *pairs = hs_pairs_begin(request->options, failure);
-    if (pairs != NULL && request->sets.points != NULL) {
-        hs_pairs_open(pairs, request->sets.points->ndim);
+    if (pairs == NULL) {
+        return NULL;
+    }
+    *status = hs_by_reach_open(request, &pairs->call, by, *failure);
+    if (*status == HS_OK) {
+        hs_pairs_open(pairs, by->levels.points.ndim);
     }
     return pairs;
 }
 
-hs_status
-hs_by_reach_pairs(const hs_request *request, hs_pairs **result, hs_failure *failure)
+/* Ends it. */
+static hs_status
+finish(hs_by_reach *by, hs_pairs *pairs, hs_status status, hs_pairs **result, hs_failure *failure)
 {
-    hs_output found = {.columns = 0};
-    hs_pairs *pairs = begin(request, &failure);
-    if (pairs == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_call  *call = &pairs->call;
-    hs_status status;
-    if (!request->options->sorted) {
-        status = record(request, call, &pairs->output, failure);
-    } else {
-        status = find(request, call, columns_of(request), false, &found, failure);
-        if (status == HS_OK) {
-            status = hs_sort_pairs(call, 0, request->sets.points->n, &found, &pairs->output);
-        }
-        hs_output_free(&found);
-    }
+    hs_by_reach_close(&pairs->call.account, by);
     status = hs_pairs_conclude(&pairs->output, status, failure);
     return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
 }
 
 static int64_t
-count_asking(const hs_request *request)
+count_asking(const hs_by_reach *by)
 {
-    return request->sets.queries != NULL ? request->sets.queries->n : request->sets.points->n;
+    return hs_levels_asking(&by->levels)->n;
+}
+
+/* Pairs in ascending order. */
+static hs_status
+find_sorted(const hs_request *request, const hs_by_reach *by, hs_pairs *pairs, hs_failure *failure)
+{
+    hs_output found;
+    hs_status status = find(request, by, &pairs->call, columns_of(request), false, &found, failure);
+    if (status == HS_OK) {
+        status = hs_sort_pairs(&pairs->call, 0, count_asking(by), &found, &pairs->output);
+    }
+    hs_output_free(&found);
+    return status;
+}
+
+hs_status
+hs_by_reach_pairs(const hs_request *request, hs_pairs **result, hs_failure *failure)
+{
+    hs_by_reach by;
+    hs_status   status;
+    hs_pairs   *pairs = begin(request, &by, &status, &failure);
+    if (pairs == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    if (status == HS_OK && request->options->sorted) {
+        status = find_sorted(request, &by, pairs, failure);
+    } else if (status == HS_OK) {
+        status = record(&by, &pairs->call, &pairs->output, failure);
+    }
+    return finish(&by, pairs, status, result, failure);
 }
 
 /* Where each row begins, once all pairs are known. */
@@ -213,46 +231,95 @@ find_offsets(hs_pairs *rows, const hs_output *found, int64_t n)
     return HS_OK;
 }
 
-hs_status
-hs_by_reach_rows(const hs_request *request, hs_pairs **result, hs_failure *failure)
+/* Rows of the pairs of several searches. */
+static hs_status
+find_rows(const hs_request *request, const hs_by_reach *by, hs_pairs *rows, hs_failure *failure)
 {
     hs_output found;
-    hs_pairs *rows = begin(request, &failure);
-    if (rows == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    hs_call  *call = &rows->call;
-    hs_status status = find(request, call, columns_of(request), true, &found, failure);
+    hs_status status = find(request, by, &rows->call, columns_of(request), true, &found, failure);
     if (status == HS_OK) {
-        status = find_offsets(rows, &found, count_asking(request));
+        status = find_offsets(rows, &found, count_asking(by));
     }
     if (status == HS_OK) {
-        status = hs_sort_pairs(call, 0, count_asking(request), &found, &rows->output);
+        status = hs_sort_pairs(&rows->call, 0, count_asking(by), &found, &rows->output);
     }
     hs_output_free(&found);
-    status = hs_pairs_conclude(&rows->output, status, failure);
-    return hs_pairs_finish(rows, status, rows->output.n_pairs, result);
+    return status;
+}
+
+/* Rows that a single search fills. */
+typedef struct filling {
+    hs_fill_fn fill;
+    hs_pairs  *rows;
+} filling;
+
+/* A hs_use_fn. */
+static hs_status
+fill_rows(void *context, hs_search *search, int64_t *n_pairs, hs_failure *failure)
+{
+    const filling  *doing = context;
+    const hs_status status = doing->fill(search, doing->rows, failure);
+    *n_pairs = doing->rows->output.n_pairs;
+    return status;
 }
 
 hs_status
-hs_by_reach_count_rows(const hs_request *request, int64_t *counts, hs_failure *failure)
+hs_by_reach_rows(const hs_request *request, hs_fill_fn fill, hs_pairs **result, hs_failure *failure)
 {
-    hs_call   call;
-    hs_output found;
-    int64_t   n_entries = 0;
-    failure = hs_call_enter(request->options, failure, &call);
-    const unsigned  columns = meets_itself(request) ? columns_of(request) : HS_WANT_I | HS_WANT_J;
-    const hs_status status = find(request, &call, columns, true, &found, failure);
+    hs_by_reach by;
+    hs_status   status;
+    int64_t     n_pairs = 0;
+    hs_pairs   *rows = begin(request, &by, &status, &failure);
+    if (rows == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    if (status == HS_OK && is_single(&by)) {
+        filling doing = {fill, rows};
+        status = hs_by_reach_single(&by, &rows->call, fill_rows, &doing, &n_pairs, failure);
+    } else if (status == HS_OK) {
+        status = find_rows(request, &by, rows, failure);
+    }
+    return finish(&by, rows, status, result, failure);
+}
+
+/* Lengths of the rows of several searches. */
+static hs_status
+count_rows(const hs_request *request, const hs_by_reach *by, hs_call *call, int64_t *counts,
+           int64_t *n_entries, hs_failure *failure)
+{
+    hs_output       found;
+    const unsigned  columns = meets_itself(by) ? columns_of(request) : HS_WANT_I | HS_WANT_J;
+    const hs_status status = find(request, by, call, columns, true, &found, failure);
     if (status == HS_OK) {
         const int32_t *i = hs_output_column(&found, HS_WANT_I);
-        const int64_t  n = count_asking(request);
-        memset(counts, 0, (size_t)n * sizeof *counts);
+        const int64_t  n = count_asking(by);
+        if (n > 0) { /* otherwise counts may be NULL */
+            memset(counts, 0, (size_t)n * sizeof *counts);
+        }
         for (int64_t e = 0; e < found.n_pairs; e++) {
             counts[i[e]]++;
         }
-        n_entries = found.n_pairs;
+        *n_entries = found.n_pairs;
     }
     hs_output_free(&found);
+    return status;
+}
+
+hs_status
+hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *counts,
+                       hs_failure *failure)
+{
+    hs_call     call;
+    hs_by_reach by;
+    int64_t     n_entries = 0;
+    failure = hs_call_enter(request->options, failure, &call);
+    hs_status status = hs_by_reach_open(request, &call, &by, failure);
+    if (status == HS_OK && is_single(&by)) {
+        status = hs_by_reach_single(&by, &call, count, counts, &n_entries, failure);
+    } else if (status == HS_OK) {
+        status = count_rows(request, &by, &call, counts, &n_entries, failure);
+    }
+    hs_by_reach_close(&call.account, &by);
     hs_call_leave(&call, n_entries);
     hs_account_close(&call.account);
     return status;

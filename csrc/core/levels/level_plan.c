@@ -210,6 +210,14 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound, h
     return HS_OK;
 }
 
+bool
+hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan)
+{
+    const hs_level_step *step = plan->steps;
+    return plan->n == 1 && step->points.first == 0 && step->points.end == levels->n &&
+           step->asking.first == 0 && step->asking.end == levels->n;
+}
+
 void
 hs_level_plan_free(hs_account *account, hs_level_plan *plan)
 {

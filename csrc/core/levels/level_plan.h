@@ -22,7 +22,8 @@ typedef struct hs_level_step {
 typedef struct hs_level_plan {
     hs_level_step *steps; /* owned */
     int64_t        n;
-    bool           is_half; /* each pair of points once, the lower number first */
+    bool           is_half; /* each pair of points once, the lower number first. If not, a level
+                             * with itself gives each point all its neighbours */
     double         bound;   /* no pair is further apart than this; may be infinite */
 } hs_level_plan;
 
@@ -30,6 +31,9 @@ typedef struct hs_level_plan {
  * meets all that it can. HS_OK or HS_ERR_MEMORY. */
 hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
                              hs_level_plan *plan);
+
+/* Whether one step is all of the search. */
+bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan);
 
 /* Harmless twice. */
 void hs_level_plan_free(hs_account *account, hs_level_plan *plan);

@@ -182,7 +182,7 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
     hs_search           *search = &open->search;
     const hs_sets        sets = {.points = &points,
                                  .queries = step->is_own ? NULL : &queries,
-                                 .is_full = !step->is_own,
+                                 .is_full = !step->is_own || !plan->is_half,
                                  .keeps_none = keeps_none,
                                  .least_cutoff = step->least};
     open->of_asking = open->of_points = open->table = NULL;

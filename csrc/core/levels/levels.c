@@ -255,9 +255,8 @@ hs_levels_divide(hs_account *account, const hs_points *points, const hs_points *
 {
     division     by = {.account = account, .reach = reach};
     const bool   has_types = reach->n_types > 0;
-    division_set of_points = {.points = points,
-                              .radii = has_types ? NULL : reach->radii,
-                              .types = reach->types};
+    division_set of_points = {
+        .points = points, .radii = has_types ? NULL : reach->radii, .types = reach->types};
     division_set of_queries = {.points = queries,
                                .radii = has_types ? NULL : reach->query_radii,
                                .types = reach->query_types,

@@ -36,25 +36,35 @@
  */
 #define BURST 256
 
+/* The number in cell order of candidate c, which was put in order or not. */
+HS_ALWAYS_INLINE int32_t
+number_of(const hs_scanner *scanner, int32_t c)
+{
+    const hs_block *block = &scanner->block;
+    return block->number[scanner->is_ordered ? block->origin[c] : c];
+}
+
 /* The limits of each type with the candidates, a row a type. */
 static void
-lay_out_table(const hs_limit_table *table, const hs_block *block)
+lay_out_table(const hs_limit_table *table, const hs_scanner *scanner)
 {
+    const hs_block *block = &scanner->block;
     for (int32_t row = 0; row < table->n_types; row++) {
         const float *limits = table->near + row * table->n_types;
         float       *to = block->radius + row * block->pitch;
         for (int32_t c = 0; c < block->n; c++) {
-            to[c] = limits[table->of_points[block->number[c]]];
+            to[c] = limits[table->of_points[number_of(scanner, c)]];
         }
         hs_pad_lanes(to, block->n);
     }
 }
 
 static void
-lay_out_radii(const float *of_points, const hs_block *block)
+lay_out_radii(const float *of_points, const hs_scanner *scanner)
 {
+    const hs_block *block = &scanner->block;
     for (int32_t c = 0; c < block->n; c++) {
-        block->radius[c] = of_points[block->number[c]];
+        block->radius[c] = of_points[number_of(scanner, c)];
     }
     hs_pad_lanes(block->radius, block->n);
 }
@@ -78,9 +88,9 @@ set_limits(const hs_scanner *scanner, hs_limit_scan *scan)
         .stride = block->pitch,
     };
     if (has_table) {
-        lay_out_table(table, block);
+        lay_out_table(table, scanner);
     } else if (of_points != NULL) {
-        lay_out_radii(of_points, block);
+        lay_out_radii(of_points, scanner);
     }
 }
 
