@@ -208,6 +208,23 @@ huge_radii_are_beyond_all(void)
     CHECK(t.in > 3.99f && t.in < 4.0f && t.out > 4.0f && t.out < 4.01f);
 }
 
+/* A negative limit is that of no pair: nothing is sure, and nothing beyond what may be lost is a
+ * hit. */
+static void
+negative_limits_are_of_no_pair(void)
+{
+    hs_limit_scan limits = {
+        .rule = HS_RULE_SCATTER, .bound = INFINITY, .form = hs_limit_form_of(3, 2.0, 0.0)};
+    hs_thresholds t = hs_limit_thresholds(&limits, 0.0f, -1.0f);
+    CHECK(t.in == 0.0f && t.out == 0.0f);
+    limits.form = hs_limit_form_of(3, 0x1p25, 0.0);
+    t = hs_limit_thresholds(&limits, 0.0f, -1.0f);
+    CHECK(t.in == 0.0f && t.out > 1.0f);
+    limits.form = (hs_limit_form){1.0f, 0.0f, 1.0f, 0.0f};
+    t = hs_limit_thresholds(&limits, 0.0f, -1.0f);
+    CHECK(t.in == 0.0f && t.out == 0.0f);
+}
+
 /* Each rule takes the radii that it names, whichever of the two points has them. */
 static void
 rules_take_their_radii(void)
@@ -266,6 +283,7 @@ test_limit_form(void)
     RUN(what_is_lost_of_small_radii_is_not_sure);
     RUN(zero_radii_make_nothing_sure);
     RUN(huge_radii_are_beyond_all);
+    RUN(negative_limits_are_of_no_pair);
     RUN(rules_take_their_radii);
     RUN(nothing_is_sure_without_finite_inputs);
     RUN(thresholds_are_narrow);

@@ -21,7 +21,8 @@ static const hs_limit_form exact_forms[] = {{1.0f, 0.0f, 1.0f, 0.0f},
                                             {0.5f, 0.5f, 2.0f, 0.25f},
                                             {1.0f, INFINITY, 1.0f, INFINITY}};
 
-/* Small integers as radii, or none, of points or candidates; infinity, too, where that is odd. */
+/* Small integers as radii, or none, of points or candidates, in a row or several; infinity, too, where
+ * that is odd. */
 static void
 fill_radii(harness_random *random, bool odd, numbers *s)
 {
@@ -30,6 +31,7 @@ fill_radii(harness_random *random, bool odd, numbers *s)
     s->form = exact_forms[random_bits(random) % (odd ? 4 : 3)];
     s->has_of_point = random_bits(random) % 8 != 0;
     s->has_of_block = random_bits(random) % 8 != 0;
+    s->n_rows = random_bits(random) % 2 ? 0 : 1 + (int32_t)(random_bits(random) % MOST_ROWS);
     for (int32_t t = 0; t < s->n_points; t++) {
         s->of_point[t] = (float)(random_bits(random) % 5);
     }
@@ -148,6 +150,7 @@ fill_with_reals(harness_random *random, int ndim, int32_t n)
     fill_radii(random, false, &scene);
     scene.triangular = false;
     scene.has_of_point = scene.has_of_block = true;
+    scene.n_rows = 0;
     scene.bound = INFINITY;
     scene.form = hs_limit_form_of(ndim, 0.0, 0.0); /* these floats are the real numbers */
     scene.of_point[0] = (float)random_unit(random);

@@ -77,34 +77,60 @@ least_of(const hs_level_set *set, hs_slice slice)
     return least;
 }
 
-/* Counts the pairs of a step, and checks what it says of them. */
+/* The cutoff of two types by the table of the levels; negative: none. */
+static double
+cutoff_at(const planned *made, int64_t a, int64_t b)
+{
+    const hs_levels    *levels = &made->levels;
+    const hs_level_set *asking = hs_levels_asking(levels);
+    int32_t             row = 0, column = 0;
+    while (asking->first[row + 1] <= a)
+        row++;
+    while (levels->points.first[column + 1] <= b)
+        column++;
+    return levels->cutoffs[row * levels->n + column];
+}
+
+/* Of one pair: sign of its limit less the cutoff of the step. With a table, pairs of types that have
+ * none are not counted. */
+static int
+count_pair(const planned *made, const hs_level_step *step, int64_t a, int64_t b, int *covered)
+{
+    const bool has_types = made->levels.cutoffs != NULL;
+    double     cutoff = has_types ? cutoff_at(made, a, b) : 0.0;
+    if (cutoff < 0.0 && step->by_table) {
+        return -1;
+    }
+    ++*covered;
+    cutoff = fmin(cutoff, made->plan.bound);
+    return compare_limit(has_types ? (hs_dw){cutoff, 0.0} : limit_at(made, a, b), step->cutoff);
+}
+
+/* Counts the pairs of a step, and checks what it says of them: no limit passes the cutoff, one or
+ * more are it, and all of them are where there are no limits. */
 static bool
 cover(const planned *made, const hs_level_step *step, int *covered, int64_t n_points)
 {
     const hs_level_set *asking = hs_levels_asking(&made->levels), *among = &made->levels.points;
     const hs_slice      askers = step->is_own ? step->points : step->asking;
     const double        least = fmin(least_of(asking, askers), least_of(among, step->points));
-    bool                right = step->least == (least < HUGE_VAL ? least : 0.0);
-    bool                reaches = false, all_equal = true;
+    bool                right = true, reaches = false, all_equal = true;
+    if (made->levels.cutoffs == NULL) {
+        right = step->least == (least < HUGE_VAL ? least : 0.0) && !step->by_table;
+    }
     right = right && asking->first[askers.first] < asking->first[askers.end];
     right = right && among->first[step->points.first] < among->first[step->points.end];
     right = right && (!step->is_own || made->plan.is_half);
     for (int64_t a = asking->first[askers.first]; a < asking->first[askers.end]; a++) {
         const int64_t from = step->is_own ? a : among->first[step->points.first];
         for (int64_t b = from; b < among->first[step->points.end]; b++) {
-            covered[asking->number[a] * n_points + among->number[b]]++;
-            if (made->levels.cutoffs == NULL) {
-                const hs_dw limit = limit_at(made, a, b);
-                const int   sign = compare_limit(limit, step->cutoff);
-                right = right && sign <= 0;
-                all_equal = all_equal && sign == 0;
-                reaches = reaches || compare_limit(limit, hs_next_down(step->cutoff)) > 0 ||
-                          step->cutoff == 0.0;
-            }
+            const int64_t pair = asking->number[a] * n_points + among->number[b];
+            const int     sign = count_pair(made, step, a, b, &covered[pair]);
+            right = right && sign <= 0;
+            all_equal = all_equal && sign == 0;
+            reaches = reaches || sign == 0 || made->levels.cutoffs != NULL ||
+                      compare_limit(limit_at(made, a, b), hs_next_down(step->cutoff)) > 0;
         }
-    }
-    if (made->levels.cutoffs != NULL) {
-        return right && !step->has_limits;
     }
     return right && reaches && (step->has_limits || all_equal);
 }
@@ -164,11 +190,24 @@ each_pair_is_in_one_step(void)
     CHECK(plain > 50 && with_limits > 1000);
 }
 
+static bool
+is_least_of_table(const planned *made, double least)
+{
+    bool found = least == 0.0, right = true;
+    for (int32_t e = 0; e < made->levels.n * made->levels.n; e++) {
+        const double cutoff = made->levels.cutoffs[e];
+        found = found || cutoff == least;
+        right = right && (cutoff <= 0.0 || cutoff >= least);
+    }
+    return found && right;
+}
+
+/* Searched two by two, or all at once by a table. */
 static void
 each_pair_of_types_is_in_one_step(void)
 {
     harness_random random = {72};
-    int            wrong = 0;
+    int            wrong = 0, by_table = 0, by_pairs = 0;
     for (int trial = 0; trial < 200; trial++) {
         const hs_reach reach = {.rule = (hs_rule)(trial % HS_RULE_END),
                                 .n_types = REACH_TYPES,
@@ -182,20 +221,24 @@ each_pair_of_types_is_in_one_step(void)
         for (int a = 0; a < REACH_TYPES; a++) {
             for (int b = 0; b <= a; b++)
                 table[a * REACH_TYPES + b] = table[b * REACH_TYPES + a] =
-                    random_bits(&random) % 4 ? random_unit(&random) : -1.0;
+                    random_bits(&random) % 4 ? random_unit(&random) * (trial % 2 ? 1.0 : a == 5)
+                                             : -1.0;
         }
         make_plan(&reach, trial & 1, bound, &made);
         CHECK(made.plan.is_half == !(trial & 1));
         wrong += !covers_each_once(&made);
         for (int64_t s = 0; s < made.plan.n; s++) {
             const hs_level_step *step = &made.plan.steps[s];
-            const int64_t        a = step->is_own ? step->points.first : step->asking.first;
-            CHECK(step->cutoff ==
-                  fmin(made.levels.cutoffs[a * made.levels.n + step->points.first], bound));
+            CHECK(step->by_table == step->has_limits && (!step->by_table || made.plan.n == 1));
+            CHECK(step->by_table || step->least == 0.0);
+            CHECK(!step->by_table || is_least_of_table(&made, step->least));
+            by_table += step->by_table;
+            by_pairs += !step->by_table;
         }
         free_plan(&made);
     }
     CHECK(wrong == 0);
+    CHECK(by_table > 20 && by_pairs > 200);
 }
 
 /* One radius for all needs one step and no limits; with a sum that is no float64 it does. */

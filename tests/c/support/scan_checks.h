@@ -7,12 +7,15 @@
 
 #include "kernel_checks.h"
 
-enum { MOST_HITS = 2 * HS_BLOCK_CANDIDATES }; /* of a scan here */
+enum {
+    MOST_HITS = 2 * HS_BLOCK_CANDIDATES, /* of a scan here */
+    MOST_ROWS = 3                        /* of radii */
+};
 
 /* A scan with its arrays, owned by this file and reused. */
 static guarded y_pages[HS_MAX_DIM], norm_pages, label_pages, q_pages[HS_MAX_DIM];
 static guarded hits_pages, squares_pages, end_pages, unsure_pages;
-static guarded point_radius_pages, block_radius_pages;
+static guarded point_radius_pages, block_radius_pages, row_pages;
 
 static inline void
 guard_scans(void)
@@ -23,7 +26,8 @@ guard_scans(void)
         q_pages[k] = guarded_pages(HS_GROUP_POINTS * sizeof(float));
     }
     norm_pages = guarded_pages(candidates);
-    block_radius_pages = guarded_pages(candidates);
+    block_radius_pages = guarded_pages(MOST_ROWS * candidates);
+    row_pages = guarded_pages(HS_GROUP_POINTS * sizeof(int32_t));
     point_radius_pages = guarded_pages(HS_GROUP_POINTS * sizeof(float));
     label_pages = guarded_pages(candidates);
     hits_pages = guarded_pages((MOST_HITS + HS_PADDING) * sizeof(int32_t));
@@ -49,7 +53,21 @@ typedef struct numbers {
     hs_limit_form form;
     bool          has_of_point, has_of_block; /* else NULL */
     float         of_point[HS_GROUP_POINTS], of_block[HS_BLOCK_CANDIDATES];
+    int32_t       n_rows; /* of radii of the block; 0: one for all points */
 } numbers;
+
+/* The radius of candidate c in this row: some are negative in a row that is one of several. */
+static inline float
+row_radius(const numbers *s, int32_t row, int32_t c)
+{
+    return s->n_rows > 0 && (c + row) % 5 == 0 ? -1.0f : s->of_block[(c + 7 * row) % s->n];
+}
+
+static inline int32_t
+row_of(const numbers *s, int32_t t)
+{
+    return s->n_rows > 0 ? t * 5 % s->n_rows : 0;
+}
 
 /* What lies past the last candidate must never be listed, whatever it is. */
 static inline void
@@ -75,7 +93,21 @@ place_limits(const numbers *s, bool at_end, hs_limit_scan *limits)
         limits->of_point = radii;
     }
     if (s->has_of_block) {
-        place_floats(block_radius_pages, s->of_block, s->n, at_end, &limits->of_block);
+        const int32_t n_rows = s->n_rows > 0 ? s->n_rows : 1, pitch = s->n + HS_PADDING;
+        float        *all =
+            guarded_place(block_radius_pages, (int64_t)n_rows * pitch, sizeof(float), at_end);
+        for (int32_t e = 0; e < n_rows * pitch; e++) {
+            all[e] = e % pitch < s->n ? row_radius(s, e / pitch, e % pitch) : NAN;
+        }
+        limits->of_block = all;
+        limits->stride = pitch;
+    }
+    if (s->has_of_block && s->n_rows > 0) {
+        int32_t *row = guarded_place(row_pages, s->n_points, sizeof(int32_t), at_end);
+        for (int32_t t = 0; t < s->n_points; t++) {
+            row[t] = row_of(s, t);
+        }
+        limits->row = row;
     }
 }
 
@@ -136,7 +168,7 @@ static inline hs_thresholds
 limit_thresholds_of(const numbers *s, int32_t t, int32_t c)
 {
     const float    a = s->has_of_point ? s->of_point[t] : 0.0f;
-    const float    b = s->has_of_block ? s->of_block[c] : 0.0f;
+    const float    b = s->has_of_block ? row_radius(s, row_of(s, t), c) : 0.0f;
     const float    larger = a > b ? a : b, smaller = a > b ? b : a;
     volatile float limit = s->rule == HS_RULE_MAX   ? larger
                            : s->rule == HS_RULE_MIN ? smaller
@@ -145,7 +177,8 @@ limit_thresholds_of(const numbers *s, int32_t t, int32_t c)
     volatile float in = limit * s->form.in_factor, out = limit * s->form.out_factor;
     in = in - s->form.in_less;
     out = out + s->form.out_more;
-    const volatile float in_square = in > 0.0f ? in * in : 0.0f, out_square = out * out;
+    const volatile float in_square = in > 0.0f ? in * in : 0.0f;
+    const volatile float out_square = out > 0.0f ? out * out : 0.0f;
     return (hs_thresholds){in_square, out_square};
 }
 
