@@ -144,6 +144,86 @@ steps_have_the_callers_numbers(void)
     CHECK(wrong == 0 && opened > 500);
 }
 
+typedef struct one_step {
+    planned *made;
+    int64_t  step;
+} one_step;
+
+static hs_status
+open_once(void *context)
+{
+    const one_step *one = context;
+    hs_level_search open;
+    hs_failure      failure;
+    const int64_t   held = one->made->call.account.held;
+    const hs_status status = open_step(one->made, one->step, &open, &failure);
+    if (status == HS_OK) {
+        hs_level_close(&open);
+    }
+    CHECK(one->made->call.account.held == held);
+    return status;
+}
+
+/* Whether the search has the limits of the types of each two of its points, or -1. */
+static bool
+has_table(const hs_search *search, const double *table)
+{
+    const hs_limits *limits = search->limits;
+    const hs_bins   *asking = hs_search_asking(search);
+    const int32_t   *of_asking = search->has_queries ? queries.types : points.types;
+    const double     bound = limits->bound;
+    bool             right = true;
+    for (int64_t si = 0; si < asking->n; si++) {
+        for (int64_t sj = 0; sj < search->bins.n; sj++) {
+            const int32_t a = of_asking[asking->order[si]];
+            const int32_t b = points.types[search->bins.order[sj]];
+            const double  cutoff = table[a * REACH_TYPES + b];
+            const double scaled = cutoff < 0.0 ? -1.0 : hs_scale_apply(search->scene.scale, cutoff);
+            const hs_dw  limit = hs_limit_of(limits, (int32_t)si, (int32_t)sj);
+            const int32_t place =
+                limits->table.of_asking[si] * limits->table.n_types + limits->table.of_points[sj];
+            right = right && limit.hi == fmin(scaled, bound) && limit.lo == 0.0 &&
+                    limits->table.near[place] == (float)scaled;
+        }
+    }
+    return right;
+}
+
+static void
+tables_are_those_of_the_types(void)
+{
+    double         table[REACH_TYPES * REACH_TYPES];
+    harness_random random = {95};
+    for (int trial = 0; trial < 12; trial++) {
+        const hs_reach reach = {.n_types = REACH_TYPES,
+                                .types = points.types,
+                                .query_types = queries.types,
+                                .cutoffs = table};
+        planned        made;
+        one_step       one = {&made, 0};
+        reach_fill(&random, 80, 3, 4.0, 0, 0.5, &points);
+        reach_fill(&random, 30, 3, 4.0, 0, 0.5, &queries);
+        for (int i = 0; i < 80; i++)
+            points.types[i] = points.types[i] == 1 ? 4 : points.types[i]; /* one is of no point */
+        for (int a = 0; a < REACH_TYPES; a++) {
+            for (int b = 0; b <= a; b++)
+                table[a * REACH_TYPES + b] = table[b * REACH_TYPES + a] =
+                    a == b && a % 2 ? -3.0 : 0.9 + 0.1 * random_unit(&random);
+        }
+        make_plan(&reach, trial & 1, trial % 3 ? 5.0 : 0.95, NULL, &made);
+        CHECK(made.plan.n == 1 && made.plan.steps[0].by_table);
+        hs_level_search open;
+        hs_failure      failure;
+        CHECK(open_step(&made, 0, &open, &failure) == HS_OK);
+        CHECK(has_table(&open.search, table));
+        CHECK(has_points(&open.search.bins, &made.levels.points, made.plan.steps[0].points, NULL,
+                         open.search.scene.scale));
+        hs_level_close(&open);
+        CHECK(fail_each_allocation(open_once, &one, 100) > 5);
+        free_plan(&made);
+    }
+}
+
 /* Where scaling would lose digits, pairs are decided in the caller's unit, and so are limits. */
 static void
 extreme_radii_stay_as_they_are(void)
@@ -210,26 +290,6 @@ failures_name_the_callers_row(void)
     }
 }
 
-typedef struct one_step {
-    planned *made;
-    int64_t  step;
-} one_step;
-
-static hs_status
-open_once(void *context)
-{
-    const one_step *one = context;
-    hs_level_search open;
-    hs_failure      failure;
-    const int64_t   held = one->made->call.account.held;
-    const hs_status status = open_step(one->made, one->step, &open, &failure);
-    if (status == HS_OK) {
-        hs_level_close(&open);
-    }
-    CHECK(one->made->call.account.held == held);
-    return status;
-}
-
 static void
 nothing_leaks_when_memory_is_short(void)
 {
@@ -253,6 +313,7 @@ void
 test_level_search(void)
 {
     RUN(steps_have_the_callers_numbers);
+    RUN(tables_are_those_of_the_types);
     RUN(extreme_radii_stay_as_they_are);
     RUN(failures_name_the_callers_row);
     RUN(nothing_leaks_when_memory_is_short);
