@@ -31,12 +31,12 @@ refuse_once(void *context, double fraction)
  * refused, until it has no more: each call succeeds or says that memory is short, and nothing is
  * left. Returns which allocation there was not; 0 if `most` were not enough. */
 static inline int
-fail_each_allocation(hs_status (*call)(void *), void *context, int most)
+fail_each_allocation(hs_status (*run)(void *), void *context, int most)
 {
     const int64_t before = hs_test_live_blocks();
     for (int nth = 1; nth <= most; nth++) {
         hs_test_fail_allocation(nth);
-        const hs_status status = call(context);
+        const hs_status status = run(context);
         const bool      ended = hs_test_failure_is_due();
         hs_test_fail_allocation(0);
         CHECK(status == HS_OK || (status == HS_ERR_MEMORY && !ended));
