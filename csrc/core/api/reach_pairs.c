@@ -93,11 +93,28 @@ meets_itself(const hs_by_reach *by)
     return !by->levels.has_queries && !by->plan.is_half;
 }
 
+/* Whether each point is within its limit of itself, which the rows of one search count on. */
+static bool
+has_selves(const hs_request *request, const hs_by_reach *by)
+{
+    const hs_levels *levels = &by->levels;
+    if (levels->has_queries || !by->plan.steps[0].has_limits) {
+        return true;
+    }
+    for (int32_t l = 0; levels->cutoffs != NULL && l < levels->n; l++) {
+        if (levels->cutoffs[l * levels->n + l] < 0.0) {
+            return false;
+        }
+    }
+    return request->options->inclusive && request->options->precision == HS_EXACT;
+}
+
 /* Whether rows are those of a single search. */
 static bool
-is_single(const hs_by_reach *by)
+is_single(const hs_request *request, const hs_by_reach *by)
 {
-    return hs_level_plan_is_single(&by->levels, &by->plan) && !meets_itself(by);
+    return hs_level_plan_is_single(&by->levels, &by->plan) && !meets_itself(by) &&
+           has_selves(request, by);
 }
 
 /* Moves pair `from` to place `to`. */
@@ -273,7 +290,7 @@ hs_by_reach_rows(const hs_request *request, hs_fill_fn fill, hs_pairs **result, 
     if (rows == NULL) {
         return HS_ERR_MEMORY;
     }
-    if (status == HS_OK && is_single(&by)) {
+    if (status == HS_OK && is_single(request, &by)) {
         filling doing = {fill, rows};
         status = hs_by_reach_single(&by, &rows->call, fill_rows, &doing, &n_pairs, failure);
     } else if (status == HS_OK) {
@@ -314,7 +331,7 @@ hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *coun
     int64_t     n_entries = 0;
     failure = hs_call_enter(request->options, failure, &call);
     hs_status status = hs_by_reach_open(request, &call, &by, failure);
-    if (status == HS_OK && is_single(&by)) {
+    if (status == HS_OK && is_single(request, &by)) {
         status = hs_by_reach_single(&by, &call, count, counts, &n_entries, failure);
     } else if (status == HS_OK) {
         status = count_rows(request, &by, &call, counts, &n_entries, failure);
