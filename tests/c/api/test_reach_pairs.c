@@ -179,6 +179,26 @@ axes_and_exponents_make_no_difference(void)
     }
 }
 
+/* Limits of zero: of all points, of some, or of each type with itself. */
+static void
+zero_limits_find_equal_points(void)
+{
+    harness_random random = {20264};
+    for (int trial = 0; trial < 8 * (HS_RULE_END + 1); trial++) {
+        const bool all = trial & 1;
+        reach_make(&random, trial & 4 ? SCENE_ALIGNED : SCENE_OPEN, 2, 20, trial & 2 ? 9 : -1,
+                   (hs_rule)(trial / 8), 0, &s);
+        s.of.scene.inclusive = trial % 3;
+        for (int e = 0; e < 2 * (int)(s.n + s.n_queries); e++)
+            s.of.x[e] = floor(s.of.x[e]);
+        for (int i = 0; i < s.n + s.n_queries; i++)
+            s.radii[i] = all || i % 2 ? 0.0 : 1.0;
+        for (int e = 0; e < REACH_TYPES * REACH_TYPES; e++)
+            s.table[e] = all || e % (REACH_TYPES + 1) == 0 ? 0.0 : 1.0;
+        check_scene(trial, "zeros");
+    }
+}
+
 /* Where nothing is rounded, float32 and the formula of float64 find what exact arithmetic does. */
 static void
 precisions_agree_on_small_integers(void)
@@ -219,5 +239,6 @@ test_reach_pairs(void)
     RUN(every_rule_finds_what_the_brute_force_finds);
     RUN(two_sets_find_what_the_brute_force_finds);
     RUN(axes_and_exponents_make_no_difference);
+    RUN(zero_limits_find_equal_points);
     RUN(precisions_agree_on_small_integers);
 }
