@@ -2,7 +2,8 @@
 /*
  * levels.h: points divided by the size of their reach, so that small ones are searched in small
  * cells however large others are: a level is all points whose radii are of one binary order, counted
- * from the largest one, or all points of one type. Each level lies in one piece, which is a set of points by itself.
+ * from the largest one, or all points of one type. Each level lies in one piece, which is a set of
+ * points by itself.
  */
 #ifndef HS_LEVELS_H
 #define HS_LEVELS_H
