@@ -96,7 +96,7 @@ compare(unsigned columns, int index_bytes)
 }
 
 /* Open, upright, and tilted so that the points are kept as given; with turns and without; half
- * lists and full ones. */
+ * lists and full ones, whose i and j the writer leaves to others: it puts the lower one first. */
 static void
 what_is_written_is_what_is_recorded(void)
 {
@@ -117,7 +117,8 @@ what_is_written_is_what_is_recorded(void)
                                          ALL & ~(unsigned)HS_WANT_I};
         for (int w = 0; w < 4; w++) {
             compare(wants[w], w % 2 ? 4 : 8);
-            CHECK(n_written == (has_writer ? n_visits : 0));
+            const bool is_directed = is_full && (wants[w] & (HS_WANT_I | HS_WANT_J));
+            CHECK(n_written == (has_writer && !is_directed ? n_visits : 0));
         }
         search_unit_close(&unit);
     }
