@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
 from halfshell._convert.options import kernels
 from halfshell._errors import CapacityError
+from halfshell._functions.between import pairs_between
 from halfshell._functions.counts import count_pairs
-from halfshell._functions.pairs import pairs, pairs_between
+from halfshell._functions.pairs import pairs
 from halfshell._objects.box import Box
 
 if TYPE_CHECKING:

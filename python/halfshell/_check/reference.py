@@ -7,7 +7,8 @@ of the compiled core.
 
 A pair is ``(i, j, S)`` with the vector ``D = points[j] - points[i] + S @ box``, S an integer
 row that is 0 on every axis that does not repeat. It counts when ``|D| <= cutoff`` (or
-``<``). Every float is taken as the real number that it is. The half list has each pair once:
+``<``), where each pair may have a cutoff of its own, such as the sum of two radii. Every float is
+taken as the real number that it is. The half list has each pair once:
 ``i < j``, or ``i == j`` and the first nonzero component of S is positive.
 """
 
@@ -20,10 +21,18 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["exact_square", "exact_vector", "reference_pairs", "ulp_error"]
+__all__ = [
+    "exact_square",
+    "exact_vector",
+    "reach_by_radii",
+    "reach_by_types",
+    "reference_pairs",
+    "ulp_error",
+]
 
 _Vector = list[int]
 _Pair = tuple[int, int, tuple[int, ...]]
+_Reach = list[list[Fraction | None]]
 
 
 def reference_pairs(
@@ -35,8 +44,9 @@ def reference_pairs(
     ----------
     points : array_like, shape (n, d)
         Floats of any width, integers or Fractions; all finite.
-    cutoff : float
-        Largest distance, not negative.
+    cutoff : float or list of lists
+        Largest distance, not negative; or a table of one for each i and j (those with j >= i are
+        used), None for those that are no pairs, as `reach_by_radii` and `reach_by_types` make it.
     box : float or array_like, shape (d,) or (d, d), optional
         Edge lengths, or edge vectors as rows; the rows of axes that do not repeat are not
         used. None: open space.
@@ -62,20 +72,27 @@ def reference_pairs(
     [(0, 1, (-1,))]
     >>> reference_pairs([[0.0]], 1.0, box=[1.0])
     [(0, 0, (1,))]
+    >>> reference_pairs([[0.0], [1.0], [3.0]], reach_by_radii([0.5, 0.5, 1.25]))
+    [(0, 1, (0,))]
     """
     rows, flags = _box_rows(box, periodic, np.shape(points)[1])
-    table, grid, (radius,) = _common_unit(
-        _fractions(points), [row for row, flag in zip(rows, flags) if flag], _fractions([[cutoff]])
-    )
-    if radius[0] < 0:
+    is_own = isinstance(cutoff, list)  # of each pair
+    table, grid, reach = _common_unit(
+        _fractions(points), [row for row, flag in zip(rows, flags) if flag],
+        _numbers(cutoff) if is_own else _fractions([[cutoff]]),
+    )  # fmt: skip
+    if not is_own and reach[0][0] < 0:
         raise ValueError(f"cutoff is {cutoff}; it must not be negative")
-    limit = radius[0] ** 2
     axes = [axis for axis, flag in enumerate(flags) if flag]
     lattice = _Lattice(grid, axes, len(flags))
 
     pairs = []
     for i, p in enumerate(table):
         for j in range(i, len(table)):
+            radius = reach[i][j] if is_own else reach[0][0]
+            if radius < 0:
+                continue
+            limit = radius**2
             between = [a - b for a, b in zip(table[j], p)]
             for shift, vector in lattice.images_within(between, limit):
                 square = _dot(vector, vector)
@@ -84,6 +101,68 @@ def reference_pairs(
                 if i < j or shift > (0,) * len(flags):
                     pairs.append((i, j, shift))
     return sorted(pairs)
+
+
+def reach_by_radii(radii: Sequence[Any], rule: str = "sum", cutoff: Any = None) -> _Reach:
+    """Return how far i reaches j, as a table of exact rational numbers.
+
+    Parameters
+    ----------
+    radii : sequence of float, length n
+    rule : {"sum", "mean", "max", "min", "gather", "scatter"}
+        Of two radii their sum, half of it, the larger, the smaller, that of i, that of j.
+    cutoff : float, optional
+        Largest distance of any pair.
+
+    Examples
+    --------
+    >>> reach_by_radii([0.5, 1.0], "mean")
+    [[Fraction(1, 2), Fraction(3, 4)], [Fraction(3, 4), Fraction(1, 1)]]
+    """
+    exact = _fractions([radii])[0]
+    combine: Any = {
+        "sum": lambda a, b: a + b,
+        "mean": lambda a, b: (a + b) / 2,
+        "max": max,
+        "min": min,
+        "gather": lambda a, b: a,
+        "scatter": lambda a, b: b,
+    }[rule]
+    table: _Reach = [[combine(a, b) for b in exact] for a in exact]
+    if cutoff is None:
+        return table
+    most = Fraction(float(cutoff))
+    return [[min(reach, most) for reach in row if reach is not None] for row in table]
+
+
+def reach_by_types(types: Sequence[Any], cutoffs: Any) -> _Reach:
+    """Return how far i reaches j by their types, None for those that are no pairs.
+
+    Parameters
+    ----------
+    types : sequence, length n
+        Rows of a table, or what the keys of a dict are made of.
+    cutoffs : array_like, shape (t, t), or dict
+        Symmetric; a key of a dict counts both ways.
+
+    Examples
+    --------
+    >>> reach_by_types(["H", "O"], {("O", "H"): 0.5})
+    [[None, Fraction(1, 2)], [Fraction(1, 2), None]]
+    """
+
+    def reach(a: Any, b: Any) -> Fraction | None:
+        if not isinstance(cutoffs, dict):
+            return Fraction(float(cutoffs[a][b]))
+        length = cutoffs.get((a, b), cutoffs.get((b, a)))
+        return None if length is None else Fraction(float(length))
+
+    return [[reach(a, b) for b in types] for a in types]
+
+
+def _numbers(reach: _Reach) -> list[list[Fraction]]:
+    """The table with -1 for those that are no pairs."""
+    return [[Fraction(-1) if x is None else Fraction(x) for x in row] for row in reach]
 
 
 class _Lattice:

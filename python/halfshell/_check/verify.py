@@ -10,18 +10,22 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.arrays import as_array
+from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag
-from halfshell._convert.search import as_search
+from halfshell._convert.reach import DIRECTED, check_radii
+from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
     ArrayLike,
     BoxLike,
-    Number,
+    PairCutoff,
     PeriodicLike,
     PointArray,
     PointsLike,
+    Reach,
+    Rule,
 )
+from halfshell._functions.between import pairs_between as find_between
 from halfshell._functions.pairs import pairs as find_pairs
-from halfshell._functions.pairs import pairs_between as find_between
 from halfshell._objects.neighbor_table import NeighborTable
 
 IntArray = npt.NDArray[np.int64]
@@ -71,12 +75,17 @@ class Verdict:
 
 def verify(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     i: ArrayLike | NeighborTable,
     j: ArrayLike | None = None,
     S: ArrayLike | None = None,
     *,
     queries: PointsLike | None = None,
+    radii: ArrayLike | None = None,
+    query_radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
@@ -97,9 +106,12 @@ def verify(
     queries : array_like of float, shape (q, d), optional
         The list is one of two sets, with i in `queries` and j in `points`, as from `pairs_between`
         or from `neighbors` with queries.
+    radii, query_radii, rule, types, query_types
+        As in `neighbors`. A list for the rules "gather" or "scatter" has a direction, as one of two
+        sets has.
     full : bool, default False
         Whether the list should have both (i, j, S) and (j, i, -S). Of arrays for one set of
-        points; a table tells by itself.
+        points and a rule without direction; a table tells by itself.
 
     Returns
     -------
@@ -113,8 +125,8 @@ def verify(
         part of the scene is of the wrong kind.
     ValueError
         If `i`, `j` and `S` do not fit each other or the points, a table is of other points, or of
-        queries and these are not given, `full` is given for two sets, or the scene is refused by
-        `pairs`.
+        queries and these are not given, `full` is given for two sets or a rule with a direction, or
+        the scene is refused by `pairs`.
     OverflowError, MemoryError
         As `pairs`, for the right list.
 
@@ -131,37 +143,33 @@ def verify(
     correct: 4 pairs
     """
     full = as_flag(full, "full")
-    search, asking = as_search(
-        points, cutoff, box, periodic, inclusive, "exact", None, None, None, None, queries
+    given = Given(radii, query_radii, rule, types, query_types)
+    rest = as_rest(inclusive, "exact", None, None, None, None)
+    search, asking, reach = as_search_of_each(
+        points, cutoff, box, periodic, rest, given, queries, directed=True
     )
-    array, cutoff, vectors, bits, inclusive = search[:5]
-    ndim = array.shape[1]
-    flags = [bool(bits >> axis & 1) for axis in range(ndim)]
+    array, bound, vectors, bits = search[:4]
+    flags = [bool(bits >> axis & 1) for axis in range(array.shape[1])]
+    how: Any = {
+        "box": vectors, "periodic": flags if vectors is not None else None, "inclusive": rest[0],
+    }  # fmt: skip
+    is_directed = asking is not None or rule in DIRECTED
     if isinstance(i, NeighborTable):
         if j is not None or S is not None or full:
             raise TypeError("a table has j, S and both directions itself: leave j, S and full out")
-        _check_table(i, len(array), None if asking is None else len(asking))
-        full = asking is None
+        _check_table(i, len(array), None if asking is None else len(asking), is_directed)
+        full = not is_directed
         i, j, S = _columns(i)
     elif j is None:
         raise TypeError("j must be given, unless i is a NeighborTable")
-    elif full and asking is not None:
-        raise ValueError("full is about one set of points: leave it out, or queries")
-    given = _rows(i, j, S, array, asking)
-    how: Any = {
-        "box": vectors,
-        "periodic": flags if vectors is not None else None,
-        "quantities": "ij" if S is None else "ijS",
-        "inclusive": inclusive,
-    }
-    if asking is None:
-        found = find_pairs(array, cutoff, **how)
-    else:
-        found = find_between(asking, array, cutoff, **how)
-    expected = np.column_stack(tuple(found)).astype(np.int64)
-    verdict = compare(expected, given, "directed" if asking is not None else LIST[full])
+    elif full and is_directed:
+        raise ValueError("full is about pairs without a direction: leave it, queries or rule out")
+    rows = _rows(i, j, S, array, asking)
+    right = _right(array, asking, bound, reach, how)
+    expected = right.rows(with_shifts=S is not None)
+    verdict = compare(expected, rows, "directed" if is_directed else LIST[full])
     if S is not None:
-        _confirm(verdict, array, asking, cutoff, vectors, flags, inclusive)
+        _confirm(verdict, right, flags)
     return verdict
 
 
@@ -193,14 +201,16 @@ def compare(
     )
 
 
-def _check_table(table: NeighborTable, n: int, q: int | None) -> None:
+def _check_table(table: NeighborTable, n: int, q: int | None, is_directed: bool) -> None:
     """ValueError unless rows and points of a table are as many as those of the scene."""
     if table.n_points != n:
         raise ValueError(f"i is a table of {table.n_points} points, got {n} points")
-    if q is None:
+    if not is_directed:
         table._refuse_queries("verify without queries")
-    elif table.n_rows != q:
+    elif q is not None and table.n_rows != q:
         raise ValueError(f"i is a table of {table.n_rows} rows, got {q} queries")
+    elif q is None and table.n_rows != n:
+        raise ValueError(f"i is a table of {table.n_rows} rows, got {n} points")
 
 
 def _columns(table: NeighborTable) -> tuple[Any, Any, Any]:
@@ -277,32 +287,64 @@ def _differences(expected: IntArray, given: IntArray) -> tuple[IntArray, IntArra
     return missed, surplus
 
 
-def _confirm(
-    verdict: Verdict,
-    points: Any,
-    queries: Any,
-    cutoff: float,
-    box: Any,
-    periodic: list[bool],
-    inclusive: bool,
-) -> None:
+class _ByCutoff:
+    """The right list where all pairs have the same cutoff, and what decides on one of them."""
+
+    def __init__(
+        self, points: PointArray, queries: PointArray | None, cutoff: float, how: dict[str, Any]
+    ) -> None:
+        self.points = points
+        self.asking = points if queries is None else queries
+        self.is_one_set = queries is None
+        self.cutoff = cutoff
+        self.how = how
+
+    def rows(self, with_shifts: bool) -> IntArray:
+        """(i, j) or (i, j, *S) of each pair, once."""
+        how = {"quantities": "ijS" if with_shifts else "ij", **self.how}
+        if self.is_one_set:
+            found = find_pairs(self.points, self.cutoff, **how)
+        else:
+            found = find_between(self.asking, self.points, self.cutoff, **how)
+        return np.column_stack(tuple(found)).astype(np.int64)
+
+    def holds(self, i: int, j: int, *shift: int) -> bool:
+        """Whether this is within the cutoff, in rational arithmetic."""
+        # Here, because importing fractions takes longer than the rest.
+        from fractions import Fraction
+
+        from halfshell._check.reference import exact_square
+
+        square = exact_square((self.asking[i], self.points[j]), 0, 1, shift, self.how["box"])
+        limit = Fraction(self.cutoff) ** 2
+        return square <= limit if self.how["inclusive"] else square < limit
+
+
+def _right(
+    points: PointArray,
+    queries: PointArray | None,
+    bound: float,
+    reach: Reach | None,
+    how: dict[str, Any],
+) -> Any:
+    """The right list, for one cutoff or for a reach of each pair."""
+    if reach is None:
+        return _ByCutoff(points, queries, bound, how)
+    from halfshell._check.by_reach import ByReach  # here, as it imports fractions
+
+    check_radii(reach)
+    return ByReach(points, queries, bound, reach, how)
+
+
+def _confirm(verdict: Verdict, right: Any, periodic: list[bool]) -> None:
     """Recompute the differences in rational arithmetic, which shares nothing with the search."""
-    # Here, because importing fractions takes longer than the rest.
-    from fractions import Fraction
-
-    from halfshell._check.reference import exact_square
-
-    square = Fraction(float(cutoff)) ** 2
-    for rows, should_be_within in ((verdict.missed, True), (verdict.spurious, False)):
+    for rows, should_hold in ((verdict.missed, True), (verdict.spurious, False)):
         for i, j, *shift in rows[:_CONFIRMED].tolist():
-            if queries is None and i == j and not any(shift):
+            if right.is_one_set and i == j and not any(shift):
                 continue  # a point with itself is never a pair
             if any(s and not repeats for s, repeats in zip(shift, periodic)):
                 continue  # nor is anything across an axis that does not repeat
-            ends = points[i] if queries is None else queries[i], points[j]
-            distance = exact_square(ends, 0, 1, shift, box)
-            within = distance <= square if inclusive else distance < square
-            if within != should_be_within:
+            if right.holds(i, j, *shift) != should_hold:
                 raise AssertionError(
                     f"the search and rational arithmetic disagree on pair {(i, j, *shift)}"
                 )

@@ -6,7 +6,7 @@ Modules that `import halfshell` loads import this one, and `numpy.typing`, for t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypedDict, TypeVar
 
 import numpy as np
@@ -22,6 +22,16 @@ Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 Letter = Literal["i", "j", "d", "D", "S", "P"]
 
 Progress = Callable[[float], object] | None
+
+# By what a pair of radii is compared; the last two go from i to j.
+Rule = Literal["sum", "mean", "max", "min", "gather", "scatter"]
+
+# What the core takes last for a reach of each pair: number of the rule, radii of the points and of
+# the queries, types of both, table of cutoffs by types. Of radii or types one are None.
+_Ints = npt.NDArray[np.int32]
+Reach = tuple[
+    int, FloatArray | None, FloatArray | None, _Ints | None, _Ints | None, FloatArray | None
+]
 
 # What the core takes from `inclusive` to `threads`.
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
@@ -62,6 +72,11 @@ class _HasVectors(Protocol):
 Number = float | np.floating[Any] | np.integer[Any]
 ArrayLike = npt.ArrayLike | _HandsOver
 PointsLike = ArrayLike | _BringsBox
+# A cutoff; one for each pair of types; none but what radii say.
+PairCutoff = (
+    Number | Sequence[Sequence[float]] | npt.NDArray[Any]
+    | Mapping[tuple[int, int], float] | Mapping[tuple[str, str], float] | None
+)  # fmt: skip
 BoxLike = ArrayLike | _HasVectors
 PeriodicLike = ArrayLike
 Out = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
@@ -79,25 +94,41 @@ class SearchOptions(TypedDict, total=False):
     memory_limit: float | None
 
 
-class ArrayOptions(SearchOptions, total=False):
-    """The same, and those of functions that return arrays of pairs, without `quantities`."""
+class ReachOptions(SearchOptions, total=False):
+    """The same, and a reach for each pair of one set."""
 
-    index_dtype: npt.DTypeLike
-    out: Out | None
+    radii: ArrayLike | None
+    rule: Rule | None
+    types: npt.ArrayLike | None
 
 
-class PairOptions(ArrayOptions, total=False):
+class PairOptions(ReachOptions, total=False):
     """Of `pairs`, without `quantities`."""
 
     sort: bool
+    index_dtype: npt.DTypeLike
+    out: Out | None
     progress: Progress
     batch: npt.ArrayLike | None
+
+
+class BetweenOptions(ReachOptions, total=False):
+    """Of `pairs_between`, without `quantities`."""
+
+    query_radii: ArrayLike | None
+    query_types: npt.ArrayLike | None
+    index_dtype: npt.DTypeLike
+    out: Out | None
 
 
 class CountOptions(SearchOptions, total=False):
     """Of `count_pairs`, without those that its type depends on."""
 
     queries: PointsLike | None
+    radii: ArrayLike | None
+    query_radii: ArrayLike | None
+    rule: Rule | None
+    query_types: npt.ArrayLike | None
     batch: None
 
 

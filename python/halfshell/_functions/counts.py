@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, overload
 
 from halfshell import _core
 from halfshell._convert.batch import as_systems
+from halfshell._convert.foreign import is_a
+from halfshell._convert.given import Given
 from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.scene import as_sets
-from halfshell._convert.search import as_rest, count_within
+from halfshell._convert.search import as_rest, as_search_of_each, count_within
 from halfshell._objects.box import Box
 
 if TYPE_CHECKING:
@@ -21,13 +23,16 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from halfshell._convert.types import (
+        ArrayLike,
         BoxLike,
         CountOptions,
         FloatArray,
         Number,
+        PairCutoff,
         PeriodicLike,
         PointsLike,
         Precision,
+        Rule,
         SearchOptions,
     )
 
@@ -36,11 +41,27 @@ _MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: Number, **options: Unpack[CountOptions]
+    points: PointsLike,
+    cutoff: Number | Mapping[tuple[int, int], float] | Mapping[tuple[str, str], float] | None,
+    *,
+    types: None = None,
+    **options: Unpack[CountOptions],
 ) -> int: ...
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: Sequence[float] | npt.NDArray[Any], **options: Unpack[CountOptions]
+    points: PointsLike,
+    cutoff: PairCutoff,
+    *,
+    types: npt.ArrayLike,
+    **options: Unpack[CountOptions],
+) -> int: ...
+@overload
+def count_pairs(
+    points: PointsLike,
+    cutoff: Sequence[float] | npt.NDArray[Any],
+    *,
+    types: None = None,
+    **options: Unpack[CountOptions],
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
@@ -52,13 +73,22 @@ def count_pairs(
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
-    points: PointsLike, cutoff: npt.ArrayLike, **options: Unpack[CountOptions]
-) -> int | npt.NDArray[np.int64]: ...
-def count_pairs(
     points: PointsLike,
     cutoff: npt.ArrayLike,
     *,
+    types: None = None,
+    **options: Unpack[CountOptions],
+) -> int | npt.NDArray[np.int64]: ...
+def count_pairs(
+    points: PointsLike,
+    cutoff: npt.ArrayLike | PairCutoff,
+    *,
     queries: PointsLike | None = None,
+    radii: ArrayLike | None = None,
+    query_radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
@@ -74,17 +104,20 @@ def count_pairs(
     ----------
     points, box, periodic, inclusive, precision, kernel, threads
         As in `pairs`.
-    cutoff : float or array_like of float, shape (k,)
+    cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
         One cutoff, or several in ascending order, for which there is one search up to the largest
-        (k searches where `precision` is not "exact"). With `batch`: one for all systems, or one
-        for each.
+        (k searches where `precision` is not "exact", or with `radii`). With `batch`: one for all
+        systems, or one for each. With `radii`, None is no further limit; with `types` a table or a
+        dict, as in `pairs`.
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
         finds them.
+    radii, query_radii, rule, types, query_types
+        As in `pairs`, and with `queries` as in `pairs_between`.
     memory_limit : float, optional
         Bytes that the search may take.
     batch : array_like of int, shape (n,), optional
-        Count many systems in one call, as in `pairs`; not with `queries`.
+        Count many systems in one call, as in `pairs`; not with `queries`, `radii` or `types`.
 
     Returns
     -------
@@ -117,10 +150,15 @@ def count_pairs(
     [1, 0, 0]
     >>> hs.count_pairs(points, 1.5, queries=[[2.0, 0.0]])
     2
+    >>> hs.count_pairs(points, None, radii=[0.5, 1.0, 1.0])
+    2
     """
     if type(box) is Box:
         box = box.vectors
-    if batch is None:
+    if batch is None and (
+        radii is None and query_radii is None and rule is None
+        and types is None and query_types is None
+    ):  # fmt: skip
         result: Any = (
             _core.plain(
                 _core.count_pairs, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -133,14 +171,31 @@ def count_pairs(
         if result is not NotImplemented:
             return cast("int", result)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
+    given = Given(radii, query_radii, rule, types, query_types)
     if batch is not None:
         if queries is not None:
             raise ValueError("batch and queries cannot be given together")
+        given.refuse_with("batch")
         scene, own = as_systems(points, cutoff, box, periodic, batch)
         _refuse_systems(*own)
         return _core.batch_count(*(*scene, *rest, *own))
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    return count_within(as_cutoffs(cutoff), array, vectors, bits, rest, asking)
+    several = _several(cutoff, given)
+    one = cutoff if several is None else 0.0
+    search, asking, reach = as_search_of_each(
+        points, one, box, periodic, rest, given, queries, directed=queries is not None
+    )
+    array, largest, vectors, bits = search[:4]
+    within = largest if several is None else several
+    return count_within(within, array, vectors, bits, rest, asking, reach)
+
+
+def _several(cutoff: Any, given: Given) -> FloatArray | None:
+    """Ascending cutoffs, if they are several; None if it is one, or one for each pair of types."""
+    by_types = given.types is not None or given.query_types is not None
+    if cutoff is None or by_types or is_a(cutoff, Mapping):
+        return None
+    cutoffs = as_cutoffs(cutoff)
+    return None if isinstance(cutoffs, float) else cutoffs
 
 
 def _refuse_systems(

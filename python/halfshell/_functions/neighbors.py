@@ -9,9 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.given import Given
 from halfshell._convert.options import as_index_bytes
-from halfshell._convert.search import as_search
-from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
+from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.types import (
+    ArrayLike,
+    BoxLike,
+    PairCutoff,
+    PeriodicLike,
+    PointsLike,
+    Precision,
+    Rule,
+)
 from halfshell._objects.box import Box
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin, shifts_of_search
@@ -19,9 +28,14 @@ from halfshell._objects.origin import Origin, shifts_of_search
 
 def neighbors(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     *,
     queries: PointsLike | None = None,
+    radii: ArrayLike | None = None,
+    query_radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "j",
@@ -38,12 +52,22 @@ def neighbors(
     ----------
     points : array_like of float, shape (n, d)
         Coordinates, as in `pairs`; an object such as ``ase.Atoms`` brings its own box.
-    cutoff : float
-        Largest distance of a neighbour, in the unit of `points`; finite, not negative.
+    cutoff : float, array_like of float, shape (t, t), dict or None
+        Largest distance of a neighbour, in the unit of `points`; finite, not negative. With `radii`
+        a further limit, or None; with `types` one for each pair of types, as in `pairs`.
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries, in the unit of `points`; they may lie anywhere. The table then has
         a row for each query, with the neighbours that `pairs_between` finds. Default: a row for
         each point.
+    radii : array_like of float, shape (n,), optional
+        A radius for each point, as in `pairs`.
+    query_radii : array_like of float, shape (q,), optional
+        A radius for each query, beside `radii`; alone if the rule is "gather".
+    rule : {"sum", "mean", "max", "min", "gather", "scatter"}, optional
+        As in `pairs`, or with a direction: "gather", row i holds all within the radius of i, or
+        "scatter", those within whose radius i is.
+    types, query_types : array_like of int or str, shape (n,) and (q,), optional
+        As in `pairs_between`.
     quantities : str, default "j"
         Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
         vectors, shifts. Only these are computed, and the table has no others.
@@ -57,13 +81,14 @@ def neighbors(
         ``D = points[j] - points[i] + S @ box`` in real arithmetic. This is the full list: with
         (i, j, S) there is (j, i, -S), with the same d and the opposite D. Without `queries` a
         point is no neighbour of itself, though its images within the cutoff are; with them
-        nothing is left out.
+        nothing is left out. With the rules "gather" and "scatter" there may be (i, j, S) without
+        (j, i, -S); ``reverse()`` and ``to_pairs(half=True)`` of such a table are refused.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
         As `pairs`, which see; ValueError also if `queries` have another number of columns than
-        `points`, or a box that is not theirs.
+        `points`, or a box that is not theirs, or without the radii or types that they need.
 
     See Also
     --------
@@ -93,36 +118,55 @@ def neighbors(
 
     >>> [row.tolist() for row in hs.neighbors(points, 1.5, queries=[[2.0, 0.0], [9.0, 9.0]])]
     [[1, 2], []]
+
+    Each point looks as far as its own radius:
+
+    >>> [row.tolist() for row in hs.neighbors(points, None, radii=[0.5, 1.5, 3.0], rule="gather")]
+    [[], [0], [0, 1]]
     """
     if type(box) is Box:
         box = box.vectors
-    found: Any = points  # these four as the core has them
+    found: Any = points  # these five as the core has them
+    largest: Any = cutoff
     vectors: Any = box
     periods: Any = periodic
     asking: Any = queries
-    arrays: Any = _core.plain(
-        _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
-        memory_limit, None, threads, quantities, index_dtype, queries,
-    )
-    if arrays is NotImplemented:
-        search, asking = as_search(
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None,
-            threads, queries,
+    arrays: Any = NotImplemented
+    reach = None
+    if (
+        radii is None and query_radii is None and rule is None
+        and types is None and query_types is None
+    ):  # fmt: skip
+        arrays = _core.plain(
+            _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
+            memory_limit, None, threads, quantities, index_dtype, queries,
         )
-        arrays = _core.neighbors(*search, quantities, as_index_bytes(index_dtype), asking)
-        found, _, vectors, periods = search[:4]
+    if arrays is NotImplemented:
+        search, asking, reach = as_search_of_each(
+            points, cutoff, box, periodic,
+            as_rest(inclusive, precision, kernel, memory_limit, None, threads),
+            Given(radii, query_radii, rule, types, query_types), queries, directed=True,
+        )  # fmt: skip
+        arrays = _core.neighbors(*search, quantities, as_index_bytes(index_dtype), asking, reach)
+        found, largest, vectors, periods = search[:4]
     origin = None
     if "d" in quantities and "j" in quantities:  # else it cannot be sorted
-        find_shifts = shifts_of_search(cutoff, inclusive, precision, threads)
+        find_shifts = shifts_of_search(largest, inclusive, precision, threads, reach)
         origin = Origin(found, asking, vectors, periods, find_shifts)
-    return NeighborTable(arrays, quantities, len(found), queries is None, origin=origin)
+    is_full = queries is None and rule not in ("gather", "scatter")
+    return NeighborTable(arrays, quantities, len(found), is_full, origin=origin)
 
 
 def coordination(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     *,
     queries: PointsLike | None = None,
+    radii: ArrayLike | None = None,
+    query_radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
@@ -135,7 +179,9 @@ def coordination(
 
     Parameters
     ----------
-    points, cutoff, queries, box, periodic, inclusive, precision, kernel, threads
+    points, cutoff, queries, radii, query_radii, rule, types, query_types
+        As in `neighbors`.
+    box, periodic, inclusive, precision, kernel, threads
         As in `neighbors`.
     memory_limit : float, optional
         Bytes that the search may take.
@@ -144,7 +190,7 @@ def coordination(
     -------
     ndarray of int64, shape (n,) or (q,)
         Length of each row of the full list; images count one by one. The sum is twice
-        `count_pairs`, or with `queries` just that.
+        `count_pairs`, or with `queries` just that; but for rules with a direction.
 
     Raises
     ------
@@ -160,17 +206,24 @@ def coordination(
     >>> import halfshell as hs
     >>> hs.coordination([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 2.0).tolist()
     [1, 2, 1]
+    >>> hs.coordination([[0.0], [1.0], [3.0]], None, radii=[1.0, 0.5, 1.0], rule="max").tolist()
+    [1, 1, 0]
     """
     if type(box) is Box:
         box = box.vectors
-    counts: Any = _core.plain(
-        _core.coordination, points, cutoff, box, periodic, inclusive, precision, kernel,
-        memory_limit, None, threads, queries,
-    )
-    if counts is not NotImplemented:
-        return cast("npt.NDArray[np.int64]", counts)
-    search, asking = as_search(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        queries,
-    )
-    return _core.coordination(*search, asking)
+    if (
+        radii is None and query_radii is None and rule is None
+        and types is None and query_types is None
+    ):  # fmt: skip
+        counts: Any = _core.plain(
+            _core.coordination, points, cutoff, box, periodic, inclusive, precision, kernel,
+            memory_limit, None, threads, queries,
+        )
+        if counts is not NotImplemented:
+            return cast("npt.NDArray[np.int64]", counts)
+    search, asking, reach = as_search_of_each(
+        points, cutoff, box, periodic,
+        as_rest(inclusive, precision, kernel, memory_limit, None, threads),
+        Given(radii, query_radii, rule, types, query_types), queries, directed=True,
+    )  # fmt: skip
+    return _core.coordination(*search, asking, reach)

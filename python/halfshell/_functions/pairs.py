@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`pairs` and `pairs_between`: signatures, defaults, documentation; the work is done in C."""
+"""`pairs`: signature, defaults, documentation; the work is done in C."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.batch import as_systems
+from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._convert.scene import check_apart
-from halfshell._convert.search import as_rest, as_search
+from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box
 
 if TYPE_CHECKING:
@@ -21,23 +22,24 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from halfshell._convert.types import (
-        ArrayOptions,
+        ArrayLike,
         Arrays,
         BoxLike,
         Letter,
-        Number,
         Out,
+        PairCutoff,
         PairOptions,
         PeriodicLike,
         PointsLike,
         Precision,
+        Rule,
     )
 
 
 @overload
 def pairs(
     points: PointsLike,
-    cutoff: npt.ArrayLike,
+    cutoff: npt.ArrayLike | PairCutoff,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[PairOptions],
@@ -45,7 +47,7 @@ def pairs(
 @overload
 def pairs(
     points: PointsLike,
-    cutoff: npt.ArrayLike,
+    cutoff: npt.ArrayLike | PairCutoff,
     *,
     quantities: Letter,
     **options: Unpack[PairOptions],
@@ -53,15 +55,18 @@ def pairs(
 @overload
 def pairs(
     points: PointsLike,
-    cutoff: npt.ArrayLike,
+    cutoff: npt.ArrayLike | PairCutoff,
     *,
     quantities: str,
     **options: Unpack[PairOptions],
 ) -> Arrays: ...
 def pairs(
     points: PointsLike,
-    cutoff: npt.ArrayLike,
+    cutoff: npt.ArrayLike | PairCutoff,
     *,
+    radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -86,9 +91,21 @@ def pairs(
         anywhere, also outside the box. ``[]`` counts as shape (0, 3). An object with
         ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
         periodicity.
-    cutoff : float
+    cutoff : float, array_like of float, shape (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
-        larger than the box.
+        larger than the box. With `radii` a further limit, or None; with `types` one for each pair
+        of types.
+    radii : array_like of float, shape (n,), optional
+        A radius for each point, in the unit of `points`; finite, not negative, at most 2**1022. A
+        pair then counts within what `rule` makes of the two radii, and within `cutoff`, if any.
+    rule : {"sum", "mean", "max", "min"}, optional
+        How far a pair of `radii` reaches: their sum, half of it, the larger or the smaller one.
+        Default: "sum", by which balls touch.
+    types : array_like of int or str, shape (n,), optional
+        The type of each point. `cutoff` is then a symmetric table with a row for each type from 0
+        on, or a dict such as ``{(0, 1): 1.5}`` or ``{("H", "O"): 1.2}``, where a key counts both
+        ways and types that it does not pair are no pairs. With a dict, an object such as
+        ``ase.Atoms`` brings its elements as types.
     box : float, array_like of float, shape (d,) or (d, d), or Box, optional
         The length of all edges, their lengths, or edge vectors as rows, in the unit of `points`;
         finite. None: open space. Rows of axes that are not periodic may be anything finite, such
@@ -99,7 +116,7 @@ def pairs(
         Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
         both indices. Only these are computed.
     inclusive : bool, default True
-        Whether a pair at exactly `cutoff` counts.
+        Whether a pair at exactly `cutoff`, or at exactly its reach by radii or types, counts.
     sort : bool, default False
         Ascending (i, j, S). Otherwise the order is fixed by the scene but not specified.
     index_dtype : numpy.int64 or numpy.int32, default numpy.int64
@@ -136,7 +153,7 @@ def pairs(
         else hold for every system, but `box` may have shape (s, d, d), one a system, and `cutoff`
         shape (s,); then every number in `batch` is less than s. A `box` with two axes is one box
         for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
-        systems out.
+        systems out. Not with `radii` or `types`.
 
     Returns
     -------
@@ -151,6 +168,11 @@ def pairs(
         positive. (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within
         1 ulp and never on the wrong side of the cutoff; each component of D is within 1 ulp of d.
 
+        With radii the real number that `rule` makes of them is compared, not a rounded sum: 0.1
+        and 0.2 do not touch at a distance of 0.30000000000000004, though Python adds them up to
+        that. d is on the right side of the float64 next to that number, ``radii[i] + radii[j]``;
+        without `inclusive` it may be equal to it.
+
     Raises
     ------
     TypeError
@@ -164,7 +186,12 @@ def pairs(
         along the short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
         or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
         without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
-        not ascending or has a negative number or one that there is no box or cutoff for.
+        not ascending or has a negative number or one that there is no box or cutoff for; if a
+        radius is negative, not finite, above 2**1022 or, not being 0, below 2**-1021 with `rule`
+        "mean", as its half may be no float64; if `rule` is given without `radii`, or has a
+        direction, as those of `neighbors` may; if a table of cutoffs is not symmetric, a dict is in
+        contradiction or names no element, or a type is none of the table; if `radii`, `types` and
+        `batch` are given together.
     CapacityError
         If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
         then.
@@ -213,6 +240,15 @@ def pairs(
     >>> i.tolist(), j.tolist(), d.tolist(), S.tolist()
     ([0, 0], [1, 2], [1.0, 1.0], [[0, 0], [-1, 0]])
 
+    Balls that touch, and cutoffs by type, of which 0 and 0 have none:
+
+    >>> i, j = hs.pairs([[0.0], [1.0], [3.0]], None, radii=[0.25, 0.75, 1.0])
+    >>> i.tolist(), j.tolist()
+    ([0], [1])
+    >>> i, j = hs.pairs([[0.0], [1.0], [3.0]], {(0, 1): 2.0}, types=[0, 0, 1])
+    >>> i.tolist(), j.tolist()
+    ([1], [2])
+
     Two systems in one call, which do not see each other:
 
     >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
@@ -222,7 +258,7 @@ def pairs(
     """
     if type(box) is Box:
         box = box.vectors
-    if batch is None:
+    if batch is None and radii is None and types is None and rule is None:
         # A small search takes as long as a handful of Python operations: none are made where the
         # arguments need no conversion.
         result: Any = _core.plain(
@@ -231,129 +267,16 @@ def pairs(
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
-    check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch)
-    if batch is None:
-        search, _ = as_search(
-            points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress,
-            threads,
-        )
-        return _core.pairs(
-            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
-        )
-    scene, own = as_systems(points, cutoff, box, periodic, batch)
+    check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch, radii=radii, types=types)
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
+    given = Given(radii, None, rule, types)
+    if batch is None:
+        search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+        return _core.pairs(
+            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach
+        )
+    given.refuse_with("batch")
+    scene, own = as_systems(points, cutoff, box, periodic, batch)
     return _core.batch_pairs(
         *(*scene, *rest, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, *own)
-    )
-
-
-@overload
-def pairs_between(
-    queries: PointsLike,
-    points: PointsLike,
-    cutoff: Number,
-    *,
-    quantities: Literal["ij"] = "ij",
-    **options: Unpack[ArrayOptions],
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
-@overload
-def pairs_between(
-    queries: PointsLike,
-    points: PointsLike,
-    cutoff: Number,
-    *,
-    quantities: Letter,
-    **options: Unpack[ArrayOptions],
-) -> npt.NDArray[Any]: ...
-@overload
-def pairs_between(
-    queries: PointsLike,
-    points: PointsLike,
-    cutoff: Number,
-    *,
-    quantities: str,
-    **options: Unpack[ArrayOptions],
-) -> Arrays: ...
-def pairs_between(
-    queries: PointsLike,
-    points: PointsLike,
-    cutoff: Number,
-    *,
-    box: BoxLike | None = None,
-    periodic: PeriodicLike | None = None,
-    quantities: str = "ij",
-    inclusive: bool = True,
-    index_dtype: npt.DTypeLike = np.int64,
-    out: Out | None = None,
-    precision: Precision = "exact",
-    kernel: str | None = None,
-    threads: int | None = None,
-    memory_limit: float | None = None,
-) -> Arrays:
-    """Find every pair of a query and a point within a cutoff.
-
-    Parameters
-    ----------
-    queries : array_like of float, shape (q, d)
-        Coordinates of queries, in the unit of `points` and with as many columns. They may lie
-        anywhere, also far from all points or outside the box. float32 beside float64 is fine:
-        each number is used as it is.
-    points : array_like of float, shape (n, d)
-        Coordinates of the points to find, as in `pairs`. An object such as ``ase.Atoms`` brings
-        its box; `queries` may be another one with the same box.
-    cutoff, box, periodic, inclusive, index_dtype, out, precision, kernel, threads, memory_limit
-        As in `pairs`.
-    quantities : str, default "ij"
-        Any of the letters ``i j d D S P``, each at most once, as in `pairs`.
-
-    Returns
-    -------
-    ndarray or tuple of ndarray
-        One array per letter of `quantities`, in that order; a bare array for one letter. Types and
-        shapes are those of `pairs`: i is the number of a query, j that of a point, and in real
-        arithmetic ``D = points[j] - queries[i] + S @ box``. Ascending (i, j, S).
-
-        Nothing is left out: a query that lies on a point is its neighbour at distance 0, also
-        where one array is given for both, and each image of a point within the cutoff is a pair.
-
-    Raises
-    ------
-    TypeError, ValueError, CapacityError, OverflowError, MemoryError
-        As `pairs`, which see; ValueError also if `queries` have another number of columns than
-        `points`, or a box that is not theirs.
-
-    See Also
-    --------
-    neighbors : the same as a table, a row for each query.
-    count_pairs : how many there are.
-
-    Examples
-    --------
-    >>> import halfshell as hs
-    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
-    >>> i, j, d = hs.pairs_between([[0.5, 0.0], [9.0, 9.0]], points, 1.0, quantities="ijd")
-    >>> i.tolist(), j.tolist(), d.tolist()
-    ([0, 0], [0, 1], [0.5, 0.5])
-
-    Each point is found by a query at the same place:
-
-    >>> i, j = hs.pairs_between(points, points, 1.0)
-    >>> i.tolist(), j.tolist()
-    ([0, 0, 1, 1, 2], [0, 1, 0, 1, 2])
-    """
-    if type(box) is Box:
-        box = box.vectors
-    result: Any = _core.plain(
-        _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
-        memory_limit, None, threads, quantities, True, index_dtype, out, queries,
-    )
-    if result is not NotImplemented:
-        return cast("Arrays", result)
-    check_apart(out, queries=queries, points=points, box=box)
-    search, asking = as_search(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads,
-        queries,
-    )
-    return _core.pairs_between(
-        *search, quantities, True, as_index_bytes(index_dtype), out, asking
     )

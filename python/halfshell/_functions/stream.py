@@ -10,22 +10,25 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
-from halfshell._convert.search import as_search
+from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
+    ArrayLike,
     Arrays,
     BoxLike,
     Letter,
-    Number,
     PairBlocks,
+    PairCutoff,
     PeriodicLike,
     PointsLike,
     Precision,
-    SearchOptions,
+    ReachOptions,
+    Rule,
 )
 
 
-class _StreamOptions(SearchOptions, total=False):
+class _StreamOptions(ReachOptions, total=False):
     """For overloads: the keywords of `iter_pairs`, without `quantities`."""
 
     max_pairs: int
@@ -36,23 +39,26 @@ class _StreamOptions(SearchOptions, total=False):
 @overload
 def iter_pairs(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     *,
     quantities: Literal["ij"] = "ij",
     **options: Unpack[_StreamOptions],
 ) -> PairBlocks[tuple[npt.NDArray[Any], npt.NDArray[Any]]]: ...
 @overload
 def iter_pairs(
-    points: PointsLike, cutoff: Number, *, quantities: Letter, **options: Unpack[_StreamOptions]
+    points: PointsLike, cutoff: PairCutoff, *, quantities: Letter, **options: Unpack[_StreamOptions]
 ) -> PairBlocks[npt.NDArray[Any]]: ...
 @overload
 def iter_pairs(
-    points: PointsLike, cutoff: Number, *, quantities: str, **options: Unpack[_StreamOptions]
+    points: PointsLike, cutoff: PairCutoff, *, quantities: str, **options: Unpack[_StreamOptions]
 ) -> PairBlocks[Arrays]: ...
 def iter_pairs(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     *,
+    radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -69,9 +75,11 @@ def iter_pairs(
 
     Parameters
     ----------
-    points, cutoff, box, periodic, quantities, inclusive, index_dtype, precision, kernel
-        As in `pairs`. They are checked, and the points copied, when `iter_pairs` is called: what
-        happens to them afterwards changes nothing.
+    points, cutoff, radii, rule, types, box, periodic
+        As in `pairs`. They are checked and copied when `iter_pairs` is called: what happens to
+        them afterwards changes nothing.
+    quantities, inclusive, index_dtype, precision, kernel
+        As in `pairs`.
     max_pairs : int, default 2**20
         Pairs in each block but the last, which has what is left; at least 1. Blocks of fewer than
         65 536 pairs are cut from larger ones.
@@ -130,19 +138,22 @@ def iter_pairs(
     True
     """
     most = most_pairs(max_pairs)
-    search, _ = as_search(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, progress, threads
-    )
-    blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most)
+    rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
+    given = Given(radii, None, rule, types)
+    search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+    blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most, reach)
     return cast("PairBlocks[Any]", blocks)
 
 
 def for_each_pair(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     callback: Any,
     *,
     user_data: Any = None,
+    radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
@@ -156,7 +167,7 @@ def for_each_pair(
 
     Parameters
     ----------
-    points, cutoff, box, periodic, inclusive, precision, kernel
+    points, cutoff, radii, rule, types, box, periodic, inclusive, precision, kernel
         As in `pairs`.
     callback : scipy.LowLevelCallable, numba cfunc, ctypes or cffi function pointer, or callable
         What to call. A compiled function has the C signature ::
@@ -210,7 +221,8 @@ def for_each_pair(
     Each pair comes once, with ``i < j`` or the orientation that `pairs` says, in the order of
     `pairs` with ``sort=False``. S is zero where the box does not repeat. D is that of `pairs`,
     and ``d2`` is ``d * d``, rounded once, of its d: sqrt(d2) gives d back, unless d * d overflows
-    or is subnormal. With `inclusive` d2 <= cutoff * cutoff as float64 rounds it.
+    or is subnormal. With `inclusive` d2 <= cutoff * cutoff as float64 rounds it, and so with
+    radii of their reach.
 
     The function runs with round-to-nearest and without flushing of subnormal numbers. Ctrl-C is
     looked for between calls, once for some ten thousand pairs. When a function ends the search on
@@ -229,9 +241,9 @@ def for_each_pair(
     from halfshell._convert.callbacks import target_of  # here: iter_pairs does without
 
     target = target_of(callback, user_data)
-    search, _ = as_search(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
-    )
+    rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
+    given = Given(radii, None, rule, types)
+    search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
     return _core.for_each_pair(
-        *search, target.function, target.user, as_flag(thread_safe, "thread_safe")
+        *search, target.function, target.user, as_flag(thread_safe, "thread_safe"), reach
     )

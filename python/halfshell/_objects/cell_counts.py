@@ -83,8 +83,8 @@ class CellCounts(KeptCells):
         if not isinstance(cutoffs, float):
             return count_within(cutoffs, self._cells, None, 0, search[4:], asking)
         if asking is None:
-            return _core.count_pairs(*search)
-        return _core.count_between(*search, asking)
+            return _core.count_pairs(*search, None)
+        return _core.count_between(*search, asking, None)
 
     def coordination(
         self,
@@ -117,7 +117,7 @@ class CellCounts(KeptCells):
         """
         asking = None if queries is None else self._queries(queries)
         options = inclusive, kernel, threads, memory_limit
-        return _core.coordination(*self._arguments(cutoff, options), asking)
+        return _core.coordination(*self._arguments(cutoff, options), asking, None)
 
     def pair_histogram(
         self,

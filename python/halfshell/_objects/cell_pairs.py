@@ -61,7 +61,7 @@ class CellPairs(KeptCells):
         options = inclusive, kernel, threads, memory_limit
         return _core.pairs(
             *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
-            as_index_bytes(index_dtype), out,
+            as_index_bytes(index_dtype), out, None,
         )
 
     def iter_pairs(
@@ -105,7 +105,7 @@ class CellPairs(KeptCells):
         search = self._arguments(
             cutoff, (inclusive, kernel, threads, memory_limit), progress
         )
-        blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most)
+        blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most, None)
         return cast("PairBlocks[Any]", blocks)
 
     def for_each_pair(
@@ -149,5 +149,5 @@ class CellPairs(KeptCells):
         options = inclusive, kernel, threads, memory_limit
         return _core.for_each_pair(
             *self._arguments(cutoff, options), target.function, target.user,
-            as_flag(thread_safe, "thread_safe"),
+            as_flag(thread_safe, "thread_safe"), None,
         )

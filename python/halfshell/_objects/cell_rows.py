@@ -190,7 +190,7 @@ class CellRows(KeptCells):
     ) -> tuple[npt.NDArray[Any], ...]:
         """Offsets of the rows and an array for each quantity."""
         return _core.neighbors(
-            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype), asking
+            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype), asking, None
         )
 
     def _rows(
@@ -240,4 +240,4 @@ class _Searches:
 
     def counts(self, queries: PointArray, radius: float) -> npt.NDArray[np.int64]:
         with of_argument("radius"):
-            return _core.coordination(*self._cells._arguments(radius, self._options), queries)
+            return _core.coordination(*self._cells._arguments(radius, self._options), queries, None)

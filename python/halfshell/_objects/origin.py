@@ -13,7 +13,7 @@ from halfshell import _core
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_scene
-from halfshell._convert.types import PointArray
+from halfshell._convert.types import PointArray, Reach
 
 FindShifts = Callable[["Origin"], npt.NDArray[Any]]
 Floats = npt.NDArray[np.float64]
@@ -149,16 +149,19 @@ class Origin:
 
 
 def shifts_of_search(
-    cutoff: Any, inclusive: Any, precision: Any, threads: int | None
+    cutoff: Any, inclusive: Any, precision: Any, threads: int | None, reach: Reach | None = None
 ) -> FindShifts:
     """A search for the shifts of all rows that `neighbors` returns for these arguments."""
-    reach, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
+    largest, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
+    own: Any = None  # the caller's arrays may change
+    if reach is not None:
+        own = tuple(part.copy() if isinstance(part, np.ndarray) else part for part in reach)
 
     def find(origin: Origin) -> npt.NDArray[Any]:
         points, vectors, bits = origin.scene()
         found = _core.neighbors(
-            points, reach, vectors, bits, includes_cutoff, precision, None, None, None, threads,
-            "S", 8, origin.queries,
+            points, largest, vectors, bits, includes_cutoff, precision, None, None, None, threads,
+            "S", 8, origin.queries, own,
         )
         return found[1]
 

@@ -126,6 +126,7 @@ class VerletList:
             _core.count_pairs(
                 np.empty((0, ndim)), 0.0, vectors, 0 if vectors is None else bits,
                 self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
+                None,
             )
 
     def update(
@@ -214,7 +215,7 @@ class VerletList:
         points, vectors, bits = scene
         return _core.pairs(
             points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
-            self._memory_limit, None, self._threads, quantities, sort, index_bytes, out,
+            self._memory_limit, None, self._threads, quantities, sort, index_bytes, out, None,
         )
 
     @overload

@@ -14,9 +14,10 @@ import halfshell as hs
 #: What `import halfshell` may load of its own.
 OWN = {
     "_core", "_errors",
-    "_convert", "_convert.arrays", "_convert.batch", "_convert.foreign", "_convert.lengths",
-    "_convert.memory", "_convert.options", "_convert.scene", "_convert.search",
-    "_functions", "_functions.counts", "_functions.pairs", "_objects", "_objects.box",
+    "_convert", "_convert.arrays", "_convert.batch", "_convert.foreign", "_convert.given",
+    "_convert.lengths", "_convert.memory", "_convert.options", "_convert.scene", "_convert.search",
+    "_functions", "_functions.between", "_functions.counts", "_functions.pairs", "_objects",
+    "_objects.box",
 }  # fmt: skip
 
 

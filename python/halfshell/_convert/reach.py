@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A reach for each pair of points, by their radii or by their types, as the core takes it.
+
+Rules, types, shapes and tables are settled here. Whether radii are finite, not negative and small
+enough to be added is checked in the core, which reads them anyway and names the row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from halfshell._convert.arrays import as_real_array, in_order
+from halfshell._convert.foreign import is_a
+from halfshell._convert.lengths import as_cutoff, check_lengths
+from halfshell._convert.marks import as_types
+from halfshell._convert.memory import refuse_large
+from halfshell._convert.options import as_choice
+from halfshell._convert.species import types_of_species
+
+if TYPE_CHECKING:
+    from halfshell._convert.given import Given, Sets
+    from halfshell._convert.types import FloatArray, Reach
+
+#: In the order of the core, which knows them by number.
+RULES = ("sum", "mean", "max", "min", "gather", "scatter")
+#: Those by which i may reach j, and j not i.
+DIRECTED = RULES[4:]
+
+_LARGEST = 2.0**1022  # sums of two are finite
+_LEAST_HALVED = 2.0**-1021  # halves lose no bit
+
+
+def as_reach(cutoff: Any, given: Given, sets: Sets, directed: bool) -> tuple[float, Reach]:
+    """The largest distance of any pair, or infinity, and the reach of each.
+
+    For a cutoff that is a dict, or where something else is given. directed: the result has a
+    direction, so that rules may have one.
+    """
+    if given.radii is not None or given.query_radii is not None:
+        if given.types is not None or given.query_types is not None:
+            raise ValueError("radii and types cannot be given together")
+        return _by_radii(cutoff, given, sets, directed)
+    if given.rule is not None:
+        raise ValueError("rule needs radii")
+    if given.query_types is not None and sets.q is None:
+        raise ValueError("query_types needs queries")
+    if is_a(cutoff, Mapping):
+        types, query_types, table = types_of_species(cutoff, given, sets)
+    else:
+        table = _as_table(cutoff)
+        types, query_types = _as_numbers(given, sets, len(table))
+    largest = max(float(table.max(initial=0.0)), 0.0)
+    return largest, (0, None, None, types, query_types, table)
+
+
+# ---- radii ---------------------------------------------------------------------------------
+
+
+def _by_radii(
+    cutoff: Any, given: Given, sets: Sets, directed: bool
+) -> tuple[float, Reach]:
+    rule = "sum" if given.rule is None else as_choice(given.rule, "rule", RULES)
+    if rule in DIRECTED and not directed:
+        raise ValueError(
+            f"rule {rule!r} has a direction, and these pairs have none: use neighbors, which has a "
+            "row for each point"
+        )
+    _check_sides(rule, given, sets.q is not None)
+    bound = math.inf if cutoff is None else as_cutoff(cutoff)
+    own = None if given.radii is None else _as_radii(given.radii, "radii", sets.n)
+    asking = None
+    if given.query_radii is not None and sets.q is not None:
+        asking = _as_radii(given.query_radii, "query_radii", sets.q)
+    return bound, (RULES.index(rule), own, asking, None, None, None)
+
+
+def _check_sides(rule: str, given: Given, has_queries: bool) -> None:
+    """ValueError unless the radii that the rule needs are given, and no others."""
+    if not has_queries:
+        if given.query_radii is not None:
+            raise ValueError("query_radii needs queries")
+        return
+    needed = {"gather": ("query_radii",), "scatter": ("radii",)}.get(rule, ("radii", "query_radii"))
+    for name in ("radii", "query_radii"):
+        if (name in needed) == (getattr(given, name) is not None):
+            continue
+        if len(needed) == 2:
+            raise ValueError("with queries, radii and query_radii must be given together")
+        raise ValueError(f"rule {rule!r} goes by {needed[0]} alone, with queries: give no others")
+
+
+def _as_radii(values: Any, name: str, n: int) -> FloatArray:
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (n,):
+            of_whom = "query" if name == "query_radii" else "point"
+            raise ValueError(f"{name} must have shape ({n},), one a {of_whom}, got {shape}")
+
+    array = as_real_array(values, name, check_shape=check)
+    if array.dtype != np.float64:
+        refuse_large(8 * array.size, array, name)
+    return in_order(array, np.float64)
+
+
+def check_radii(reach: Reach) -> None:
+    """ValueError for radii that the core would refuse, where it is not asked."""
+    rule, *sides = reach[:3]
+    for name, radii in zip(("radii", "query_radii"), sides):
+        if radii is None:
+            continue
+        check_lengths(radii, name)
+        for k in np.flatnonzero(radii > _LARGEST):
+            raise ValueError(f"{name} must be at most 2**1022, got {name}[{k}] = {radii[k]}")
+        if RULES[rule] == "mean":
+            for k in np.flatnonzero((radii > 0.0) & (radii < _LEAST_HALVED)):
+                raise ValueError(
+                    f"{name} must be 0 or at least 2**-1021 for the rule 'mean', got "
+                    f"{name}[{k}] = {radii[k]}"
+                )
+
+
+# ---- types ---------------------------------------------------------------------------------
+
+
+def _as_table(values: Any) -> FloatArray:
+    """A cutoff for each pair of types: symmetric, finite, not negative."""
+    must = "have shape (t, t), one for each pair of types, or be a dict"
+
+    def check(shape: tuple[int, ...]) -> None:
+        if len(shape) != 2 or shape[0] != shape[1]:
+            raise ValueError(f"with types, cutoff must {must}, got shape {shape}")
+
+    array = as_real_array(values, "cutoff", f"{must}, with types", check)
+    refuse_large(8 * array.size, array, "cutoff")
+    table = in_order(array, np.float64)
+    for a, b in np.argwhere(~(np.isfinite(table) & (table >= 0.0))):
+        raise ValueError(
+            f"cutoff must be finite and not negative, got cutoff[{a}, {b}] = {table[a, b]}"
+        )
+    for a, b in np.argwhere(table != table.T):
+        raise ValueError(
+            f"cutoff must be symmetric, got cutoff[{a}, {b}] = {table[a, b]} and "
+            f"cutoff[{b}, {a}] = {table[b, a]}"
+        )
+    return table
+
+
+def _as_numbers(given: Given, sets: Sets, n_types: int) -> tuple[Any, Any]:
+    """Types of points and of queries, each a row of the table."""
+    found: list[Any] = []
+    for name, n in (("types", sets.n), ("query_types", sets.q)):
+        if n is None:
+            found.append(None)
+            continue
+        values = getattr(given, name)
+        if values is None:
+            raise ValueError(f"{name} must be given with a table of cutoffs")
+        types = as_types(values, name, n)
+        for k in np.flatnonzero(types >= n_types):
+            raise ValueError(
+                f"{name} must be less than {n_types}, the types that cutoff is given for, got "
+                f"{name}[{k}] = {types[k]}"
+            )
+        found.append(in_order(types, np.int32))
+    return found[0], found[1]

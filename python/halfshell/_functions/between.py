@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`pairs_between`: signature, defaults, documentation; the work is done in C."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast, overload
+
+import numpy as np
+
+from halfshell import _core
+from halfshell._convert.given import Given
+from halfshell._convert.options import as_index_bytes
+from halfshell._convert.scene import check_apart
+from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._objects.box import Box
+
+if TYPE_CHECKING:
+    from typing import Literal, Unpack
+
+    import numpy.typing as npt
+
+    from halfshell._convert.types import (
+        ArrayLike,
+        Arrays,
+        BetweenOptions,
+        BoxLike,
+        Letter,
+        Out,
+        PairCutoff,
+        PeriodicLike,
+        PointsLike,
+        Precision,
+        Rule,
+    )
+
+
+@overload
+def pairs_between(
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: PairCutoff,
+    *,
+    quantities: Literal["ij"] = "ij",
+    **options: Unpack[BetweenOptions],
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
+@overload
+def pairs_between(
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: PairCutoff,
+    *,
+    quantities: Letter,
+    **options: Unpack[BetweenOptions],
+) -> npt.NDArray[Any]: ...
+@overload
+def pairs_between(
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: PairCutoff,
+    *,
+    quantities: str,
+    **options: Unpack[BetweenOptions],
+) -> Arrays: ...
+def pairs_between(
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: PairCutoff,
+    *,
+    radii: ArrayLike | None = None,
+    query_radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
+    query_types: npt.ArrayLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    index_dtype: npt.DTypeLike = np.int64,
+    out: Out | None = None,
+    precision: Precision = "exact",
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+) -> Arrays:
+    """Find every pair of a query and a point within a cutoff.
+
+    Parameters
+    ----------
+    queries : array_like of float, shape (q, d)
+        Coordinates of queries, in the unit of `points` and with as many columns. They may lie
+        anywhere, also far from all points or outside the box. float32 beside float64 is fine:
+        each number is used as it is.
+    points : array_like of float, shape (n, d)
+        Coordinates of the points to find, as in `pairs`. An object such as ``ase.Atoms`` brings
+        its box; `queries` may be another one with the same box.
+    cutoff, box, periodic, inclusive, index_dtype, out, precision, kernel, threads, memory_limit
+        As in `pairs`.
+    radii, query_radii : array_like of float, shape (n,) and (q,), optional
+        A radius for each point and for each query, as in `pairs`. Both, but for rules that go by
+        one of them alone.
+    rule : {"sum", "mean", "max", "min", "gather", "scatter"}, optional
+        As in `pairs`, or "gather": within the radius of the query, or "scatter": within that of
+        the point. Then `query_radii` or `radii` are given alone.
+    types, query_types : array_like of int or str, shape (n,) and (q,), optional
+        Types of points and queries, as in `pairs`; both are numbers, or both are names.
+    quantities : str, default "ij"
+        Any of the letters ``i j d D S P``, each at most once, as in `pairs`.
+
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        One array per letter of `quantities`, in that order; a bare array for one letter. Types and
+        shapes are those of `pairs`: i is the number of a query, j that of a point, and in real
+        arithmetic ``D = points[j] - queries[i] + S @ box``. Ascending (i, j, S).
+
+        Nothing is left out: a query that lies on a point is its neighbour at distance 0, also
+        where one array is given for both, and each image of a point within the cutoff is a pair.
+
+    Raises
+    ------
+    TypeError, ValueError, CapacityError, OverflowError, MemoryError
+        As `pairs`, which see; ValueError also if `queries` have another number of columns than
+        `points`, or a box that is not theirs.
+
+    See Also
+    --------
+    neighbors : the same as a table, a row for each query.
+    count_pairs : how many there are.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    >>> i, j, d = hs.pairs_between([[0.5, 0.0], [9.0, 9.0]], points, 1.0, quantities="ijd")
+    >>> i.tolist(), j.tolist(), d.tolist()
+    ([0, 0], [0, 1], [0.5, 0.5])
+
+    Each point is found by a query at the same place:
+
+    >>> i, j = hs.pairs_between(points, points, 1.0)
+    >>> i.tolist(), j.tolist()
+    ([0, 0, 1, 1, 2], [0, 1, 0, 1, 2])
+
+    A radius for each query:
+
+    >>> i, j = hs.pairs_between(points[:2], points, None, query_radii=[1.0, 2.0], rule="gather")
+    >>> i.tolist(), j.tolist()
+    ([0, 0, 1, 1, 1], [0, 1, 0, 1, 2])
+    """
+    if type(box) is Box:
+        box = box.vectors
+    if (
+        radii is None and query_radii is None and rule is None
+        and types is None and query_types is None
+    ):  # fmt: skip
+        result: Any = _core.plain(
+            _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
+            memory_limit, None, threads, quantities, True, index_dtype, out, queries,
+        )
+        if result is not NotImplemented:
+            return cast("Arrays", result)
+    given = Given(radii, query_radii, rule, types, query_types)
+    check_apart(out, queries=queries, points=points, box=box, cutoff=cutoff, **given._asdict())
+    rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
+    search, asking, reach = as_search_of_each(
+        points, cutoff, box, periodic, rest, given, queries, directed=True
+    )
+    return _core.pairs_between(
+        *search, quantities, True, as_index_bytes(index_dtype), out, asking, reach
+    )
