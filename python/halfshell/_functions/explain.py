@@ -10,9 +10,19 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes
-from halfshell._convert.search import as_search
-from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
+from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.types import (
+    ArrayLike,
+    BoxLike,
+    PairCutoff,
+    PeriodicLike,
+    PointsLike,
+    Precision,
+    Rule,
+)
+from halfshell._functions.parts import parts_of
 
 
 @dataclass(frozen=True)
@@ -21,8 +31,9 @@ class Explanation:
 
     Attributes
     ----------
-    algorithm : {"all-pairs", "grid", "sparse"}
-        One cell, a grid of cells, or a grid of which only the occupied cells are stored.
+    algorithm : {"all-pairs", "grid", "sparse", "hierarchy"}
+        One cell, a grid of cells, or a grid of which only the occupied cells are stored; with radii
+        or types several searches, and then what follows is about the one with the largest reach.
     reason : str
         Why.
     n, ndim : int
@@ -93,8 +104,11 @@ class Explanation:
 
 def explain(
     points: PointsLike,
-    cutoff: Number,
+    cutoff: PairCutoff,
     *,
+    radii: ArrayLike | None = None,
+    rule: Rule | None = None,
+    types: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -111,13 +125,13 @@ def explain(
 
     Parameters
     ----------
-    points, cutoff, box, periodic, quantities, inclusive, sort
+    points, cutoff, radii, rule, types, box, periodic, quantities, inclusive, sort
         As in `pairs`.
     index_dtype, precision, kernel, threads, memory_limit
         As in `pairs`.
     measure : bool, default False
         Run the search too, and report its own counters: bytes allocated by purpose, candidates
-        tested, and how many decisions each stage took.
+        tested, and how many decisions each stage took. Not with radii or types.
 
     Returns
     -------
@@ -126,7 +140,7 @@ def explain(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`.
+        As `pairs`; ValueError also for `measure` with radii or types.
 
     Examples
     --------
@@ -135,15 +149,25 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
-    search, _ = as_search(
-        points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit, None, threads
-    )
+    rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
+    given = Given(radii, None, rule, types)
+    search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+    parts = None
+    if reach is not None:
+        if as_flag(measure, "measure"):
+            raise ValueError("measure is for one cutoff: leave it out, or radii and types")
+        parts = parts_of(reach, search[1])
+        search = (search[0], parts.largest, *search[2:])
     sort, index_bytes = as_flag(sort, "sort"), as_index_bytes(index_dtype)
     plan = _core.explain(*search, quantities, sort, index_bytes, as_flag(measure, "measure"))
     ndim = plan["ndim"]
+    algorithm, reason = _algorithm(plan), _reason(plan)
+    if parts is not None:
+        algorithm, reason = "hierarchy", parts.reason
+        plan["expected_pairs"] *= parts.share(ndim)
     return Explanation(
-        algorithm="all-pairs" if plan["all_pairs"] else "sparse" if plan["sparse"] else "grid",
-        reason=_reason(plan),
+        algorithm=algorithm,
+        reason=reason,
         n=len(search[0]),
         ndim=ndim,
         shape=plan["shape"],
@@ -169,6 +193,10 @@ _MEASURED = (
     "by_double_word",
     "by_integers",
 )
+
+
+def _algorithm(plan: dict[str, Any]) -> str:
+    return "all-pairs" if plan["all_pairs"] else "sparse" if plan["sparse"] else "grid"
 
 
 def _reason(plan: dict[str, Any]) -> str:

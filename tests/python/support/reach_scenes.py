@@ -102,7 +102,7 @@ class Reaching:
         return sorted((i, j - q, S) for i, j, S in self._among("there") if i < q <= j)
 
     def _among(self, way):
-        """(i, j, S) with i <= j within the reach of i to j, or "back" of j to i; worked out once."""
+        """(i, j, S) with i <= j within the reach of i to j, or "back" of j to i; kept."""
         parts = (way, self.cutoff, *self.scene.values(), self.points.dtype, self.points)
         parts += tuple(x for mark in sorted(self.marks) for x in (mark, self.marks[mark]))
         key = "|".join(repr(np.asarray(x).tolist() if x is not None else x) for x in parts)
