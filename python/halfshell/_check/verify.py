@@ -12,7 +12,7 @@ import numpy.typing as npt
 from halfshell._convert.arrays import as_array
 from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag
-from halfshell._convert.reach import DIRECTED, check_radii
+from halfshell._convert.reach import DIRECTED
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
     ArrayLike,
@@ -332,7 +332,6 @@ def _right(
         return _ByCutoff(points, queries, bound, how)
     from halfshell._check.by_reach import ByReach  # here, as it imports fractions
 
-    check_radii(reach)
     return ByReach(points, queries, bound, reach, how)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A reach for each pair of points, by their radii or by their types, as the core takes it.
 
-Rules, types, shapes and tables are settled here. Whether radii are finite, not negative and small
-enough to be added is checked in the core, which reads them anyway and names the row.
+Rules, radii, types and tables are settled here: the core checks again only that no number can harm
+it, for arrays may change meanwhile.
 """
 
 from __future__ import annotations
@@ -71,10 +71,10 @@ def _by_radii(
         )
     _check_sides(rule, given, sets.q is not None)
     bound = math.inf if cutoff is None else as_cutoff(cutoff)
-    own = None if given.radii is None else _as_radii(given.radii, "radii", sets.n)
+    own = None if given.radii is None else _as_radii(given.radii, "radii", sets.n, rule)
     asking = None
     if given.query_radii is not None and sets.q is not None:
-        asking = _as_radii(given.query_radii, "query_radii", sets.q)
+        asking = _as_radii(given.query_radii, "query_radii", sets.q, rule)
     return bound, (RULES.index(rule), own, asking, None, None, None)
 
 
@@ -93,7 +93,7 @@ def _check_sides(rule: str, given: Given, has_queries: bool) -> None:
         raise ValueError(f"rule {rule!r} goes by {needed[0]} alone, with queries: give no others")
 
 
-def _as_radii(values: Any, name: str, n: int) -> FloatArray:
+def _as_radii(values: Any, name: str, n: int, rule: str) -> FloatArray:
     def check(shape: tuple[int, ...]) -> None:
         if shape != (n,):
             of_whom = "query" if name == "query_radii" else "point"
@@ -102,24 +102,27 @@ def _as_radii(values: Any, name: str, n: int) -> FloatArray:
     array = as_real_array(values, name, check_shape=check)
     if array.dtype != np.float64:
         refuse_large(8 * array.size, array, name)
-    return in_order(array, np.float64)
+    radii = in_order(array, np.float64)
+    least, largest = (float(radii.min()), float(radii.max())) if n > 0 else (1.0, 1.0)
+    if not (least >= 0.0 and largest <= _LARGEST):
+        _refuse_lengths(radii, name)
+    if rule == "mean" and least < _LEAST_HALVED:
+        _refuse_halves(radii, name)
+    return radii
 
 
-def check_radii(reach: Reach) -> None:
-    """ValueError for radii that the core would refuse, where it is not asked."""
-    rule, *sides = reach[:3]
-    for name, radii in zip(("radii", "query_radii"), sides):
-        if radii is None:
-            continue
-        check_lengths(radii, name)
-        for k in np.flatnonzero(radii > _LARGEST):
-            raise ValueError(f"{name} must be at most 2**1022, got {name}[{k}] = {radii[k]}")
-        if RULES[rule] == "mean":
-            for k in np.flatnonzero((radii > 0.0) & (radii < _LEAST_HALVED)):
-                raise ValueError(
-                    f"{name} must be 0 or at least 2**-1021 for the rule 'mean', got "
-                    f"{name}[{k}] = {radii[k]}"
-                )
+def _refuse_lengths(radii: FloatArray, name: str) -> None:
+    check_lengths(radii, name)
+    for k in np.flatnonzero(radii > _LARGEST):
+        raise ValueError(f"{name} must be at most 2**1022, got {name}[{k}] = {radii[k]}")
+
+
+def _refuse_halves(radii: FloatArray, name: str) -> None:
+    for k in np.flatnonzero((radii > 0.0) & (radii < _LEAST_HALVED)):
+        raise ValueError(
+            f"{name} must be 0 or at least 2**-1021 for the rule 'mean', got {name}[{k}] = "
+            f"{radii[k]}"
+        )
 
 
 # ---- types ---------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from halfshell._convert.reach import RULES, check_radii
+from halfshell._convert.reach import RULES
 from halfshell._convert.types import FloatArray, Reach
 
 
@@ -38,7 +38,6 @@ def parts_of(reach: Reach, bound: float) -> Parts:
         reason = f"{_several(len(named), 'type')}, each two of them searched with their own cutoff"
         return Parts(counts.astype(np.float64), among, largest, reason)
     assert radii is not None
-    check_radii(reach)
     octave = np.where(radii > 0.0, np.frexp(radii)[1].astype(np.int64), -(1 << 20))
     _, place, counts = np.unique(octave, return_inverse=True, return_counts=True)
     middle = np.zeros(len(counts))
