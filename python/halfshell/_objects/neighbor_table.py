@@ -183,7 +183,8 @@ class NeighborTable(TableRows):
         AttributeError
             If the table lacks a quantity that is needed.
         ValueError
-            If `quantities` has other letters, or `half` is set for a table of queries.
+            If `quantities` has other letters, or `half` is set for a table of queries or of a rule
+            with a direction.
 
         Examples
         --------
@@ -377,7 +378,8 @@ class NeighborTable(TableRows):
         AttributeError
             If the table has no indices, or was filtered or sorted and has no shifts.
         ValueError
-            If it is a table of queries, or a filter has left an entry without its other direction.
+            If it is a table of queries or of a rule with a direction, or a filter has left an entry
+            without its other direction.
 
         Examples
         --------

@@ -33,7 +33,7 @@ class TableRows:
     _arrays: tuple[Array, ...]  # offsets, then one for each quantity
     _quantities: str
     _n_points: int
-    _is_of_one_set: bool  # rows are those of the points themselves
+    _is_of_one_set: bool  # rows are those of the points themselves, with both directions
     _is_complete: bool  # no entry was left out
     _is_in_order: bool  # each row ascends by (j, S)
     _origin: Origin | None  # None: exact comparisons are not possible
@@ -249,8 +249,9 @@ class TableRows:
     def _refuse_queries(self, what: str) -> None:
         if not self._is_of_one_set:
             raise ValueError(
-                f"{what} needs a table of one set of points: rows of this one are of queries, or "
-                "some of the rows of another table"
+                f"{what} needs a table of one set of points, with both directions of each pair: "
+                "rows of this one are of queries, or of a rule with a direction, or some of the "
+                "rows of another table"
             )
 
 

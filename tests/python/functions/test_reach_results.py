@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What comes out where pairs have a reach each: quantities, order, streams, threads, kernels; and
+scenes too large for rational arithmetic, held against searches that have one cutoff each."""
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from full_lists import same_tables
+from oracles import same_arrays
+from reach_scenes import RULES, SYMMETRIC, boxed, spread_radii
+
+RNG = np.random.default_rng(77)
+POINTS = RNG.random((400, 3))
+RADII = spread_radii(RNG, 400, 0.15, 3.0)
+TYPES = RNG.integers(0, 4, 400)
+CUTOFFS = {(0, 1): 0.2, (2, 2): 0.15, (3, 3): 0.05, (0, 3): 0.1}
+
+#: Cutoff and keywords.
+SCENES = {
+    "radii": (None, {"radii": RADII, "box": 1.0}),
+    "radii within a bound": (0.21, {"radii": RADII, "rule": "max"}),
+    "triclinic": (None, {"radii": 2 * RADII, "rule": "mean",
+                         "box": [[1.0, 0.0, 0.0], [0.4, 0.9, 0.0], [-0.3, 0.2, 1.1]]}),
+    "types": (CUTOFFS, {"types": TYPES, "box": 1.0, "periodic": [True, False, True]}),
+}  # fmt: skip
+every_scene = pytest.mark.parametrize("name", SCENES)
+
+
+@every_scene
+def test_quantities_are_those_of_pairs(name, kernel):
+    cutoff, how = SCENES[name]
+    how = how | {"kernel": kernel}
+    i, j, S, d, D, P = hs.pairs(POINTS, cutoff, quantities="ijSdDP", sort=True, **how)
+    assert len(i) > 100
+    assert (i.dtype, S.dtype, d.dtype, D.shape) == (np.int64, np.int32, np.float64, (len(i), 3))
+    assert np.array_equal(P, np.column_stack((i, j)))
+    for letter, column in (("i", i), ("d", d), ("D", D), ("S", S), ("P", P)):
+        assert same_arrays(
+            hs.pairs(POINTS, cutoff, quantities=letter, sort=True, **how), column
+        )
+    # Each is one of the pairs within the longest distance, with the same numbers.
+    scene = {key: how[key] for key in ("box", "periodic", "kernel") if key in how}
+    plain = hs.pairs(POINTS, 1.01 * d.max(), quantities="ijSdD", sort=True, **scene)
+    rows = {row: k for k, row in enumerate(zip(*(c.tolist() for c in plain[:2]),
+                                                map(tuple, plain[2].tolist())))}  # fmt: skip
+    places = [rows[row] for row in zip(i.tolist(), j.tolist(), map(tuple, S.tolist()))]
+    assert np.array_equal(plain[3][places], d) and np.array_equal(plain[4][places], D)
+
+
+@every_scene
+def test_sorted_and_unsorted_pairs_are_the_same(name):
+    cutoff, how = SCENES[name]
+    unsorted = hs.pairs(POINTS, cutoff, quantities="ijSdD", **how)
+    ascending = hs.pairs(POINTS, cutoff, quantities="ijSdD", sort=True, **how)
+    order = np.lexsort((*unsorted[2].T[::-1], unsorted[1], unsorted[0]))
+    assert same_arrays(tuple(column[order] for column in unsorted), ascending)
+
+
+@every_scene
+def test_kernels_and_threads_give_the_same_arrays(name):
+    cutoff, how = SCENES[name]
+    calls = {
+        "pairs": lambda **by: hs.pairs(POINTS, cutoff, quantities="ijSdD", **how, **by),
+        "sorted": lambda **by: hs.pairs(POINTS, cutoff, sort=True, **how, **by),
+        "rows": lambda **by: hs.neighbors(POINTS, cutoff, quantities="jd", **how, **by)._arrays,
+        "counts": lambda **by: hs.coordination(POINTS, cutoff, **how, **by),
+    }
+    for call in calls.values():
+        expected = call(kernel="scalar", threads=1)
+        for kernel in hs.kernels():
+            for threads in (1, 2, 3):
+                assert same_arrays(call(kernel=kernel, threads=threads), expected)
+
+
+@every_scene
+def test_int32_and_out(name):
+    cutoff, how = SCENES[name]
+    expected = hs.pairs(POINTS, cutoff, quantities="ijSd", **how)
+    short = hs.pairs(POINTS, cutoff, quantities="ijSd", index_dtype=np.int32, **how)
+    assert short[0].dtype == short[1].dtype == np.int32
+    assert all(np.array_equal(a, b) for a, b in zip(short, expected))
+    m = len(expected[0])
+    out = (np.empty(m + 9, np.int64), np.empty(m, np.int64), np.empty((m + 1, 3), np.int32),
+           np.empty(m))  # fmt: skip
+    found = hs.pairs(POINTS, cutoff, quantities="ijSd", out=out, **how)
+    assert same_arrays(found, expected)
+    assert all(np.shares_memory(a, b) for a, b in zip(found, out))
+    with pytest.raises(hs.CapacityError) as caught:
+        hs.pairs(POINTS, cutoff, quantities="i", out=np.empty(m - 1, np.int64), **how)
+    assert caught.value.needed == m
+    table = hs.neighbors(POINTS, cutoff, index_dtype=np.int32, **how)
+    assert table.indices.dtype == np.int32 and table.n_entries == 2 * m
+
+
+@every_scene
+def test_blocks_and_calls_are_pairs_in_their_order(name):
+    cutoff, how = SCENES[name]
+    expected = hs.pairs(POINTS, cutoff, quantities="ijSdD", **how)
+    for most in (1 << 20, 1000, 37):
+        for threads in (1, 2):
+            blocks = list(hs.iter_pairs(
+                POINTS, cutoff, quantities="ijSdD", max_pairs=most, threads=threads, **how
+            ))  # fmt: skip
+            assert [len(block[0]) for block in blocks[:-1]] == [most] * (len(blocks) - 1)
+            found = tuple(np.concatenate(columns) for columns in zip(*blocks))
+            assert same_arrays(found, expected)
+    visited = []
+    count = hs.for_each_pair(POINTS, cutoff, lambda *pair: visited.append(pair), **how)
+    i, j, S, d, D = expected
+    assert count == len(i)
+    assert visited == list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()),
+                               map(tuple, D.tolist()), (d * d).tolist()))  # fmt: skip
+    stopped = []
+    how = how | {"threads": 1}
+    assert hs.for_each_pair(POINTS, cutoff, lambda i, *_: stopped.append(i) or i == 3, **how) == (
+        len(stopped)
+    )
+
+
+@pytest.mark.parametrize("name", ["radii", "types"])
+def test_progress_rises_to_its_end(name):
+    cutoff, how = SCENES[name]
+    seen = []
+    for _ in hs.iter_pairs(POINTS, cutoff, max_pairs=100, progress=seen.append, **how):
+        pass
+    assert seen == sorted(seen) and 0.0 <= seen[0] and seen[-1] == 1.0
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_rows_are_pairs_with_their_direction(rule):
+    how = {"radii": RADII, "rule": rule, "box": 1.0}
+    table = hs.neighbors(POINTS, None, quantities="jdDS", **how)
+    assert same_arrays(hs.coordination(POINTS, None, **how), table.counts)
+    i, j, d, D, S = table.to_pairs(quantities="ijdDS")
+    if rule in SYMMETRIC:
+        assert same_arrays(table.distances[table.reverse()], table.distances)
+        half = table.to_pairs(quantities="ijS", half=True)
+        assert same_arrays(half, hs.pairs(POINTS, None, quantities="ijS", sort=True, **how))
+    else:
+        for call in (table.reverse, lambda: table.to_pairs(half=True)):
+            with pytest.raises(ValueError, match="needs a table of one set"):
+                call()
+    reach = {"gather": RADII[i], "scatter": RADII[j], "sum": RADII[i] + RADII[j],
+             "mean": (RADII[i] + RADII[j]) / 2, "max": np.maximum(RADII[i], RADII[j]),
+             "min": np.minimum(RADII[i], RADII[j])}[rule]  # fmt: skip
+    assert (d <= reach).all()
+    assert np.allclose(POINTS[j] - POINTS[i] + S, D, atol=1e-15)
+    near = table.sort()
+    assert all((np.diff(row[1]) >= 0.0).all() for row in near)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_queries_may_be_points_and_points_queries(rule, rng):
+    queries, radii = rng.random((50, 3)), rng.random(50) * 0.2
+    sides = {"radii": RADII, "query_radii": radii, "rule": rule, "box": 1.0}
+    if rule in ("gather", "scatter"):
+        del sides["radii" if rule == "gather" else "query_radii"]
+    i, j, S, d = hs.pairs_between(queries, POINTS, None, quantities="ijSd", **sides)
+    table = hs.neighbors(POINTS, None, queries=queries, quantities="jSd", **sides)
+    assert same_arrays(table.to_pairs(quantities="ijSd"), (i, j, S, d))
+    assert hs.count_pairs(POINTS, None, queries=queries, **sides) == len(i)
+    # Who asks does not matter, but for the direction of the rule.
+    turned = {"gather": "scatter", "scatter": "gather"}.get(rule, rule)
+    names = {"radii": "query_radii", "query_radii": "radii"}
+    back = {names.get(key, key): value for key, value in sides.items()} | {"rule": turned}
+    b, a, T, e = hs.pairs_between(POINTS, queries, None, quantities="ijSd", **back)
+    order = np.lexsort((*(-T).T[::-1], b, a))
+    assert same_arrays((a[order], b[order], -T[order], e[order]), (i, j, S, d))
+
+
+# ---- large scenes --------------------------------------------------------------------------
+
+LARGE = {
+    "two octaves": lambda n, rng: rng.uniform(0.5, 2.0, n),
+    "lognormal": lambda n, rng: np.exp(0.7 * rng.normal(size=n)),
+    "six decades": lambda n, rng: 3.0 * 10.0 ** -rng.uniform(0, 6, n),
+    "one giant": lambda n, rng: np.where(np.arange(n) == n // 3, 12.0, 0.7),
+    "two sizes": lambda n, rng: rng.choice([0.01, 2.0], n),
+    "zero and one": lambda n, rng: rng.choice([0.0, 1.0], n),
+}
+
+
+@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("kind", ["open", "triclinic"])
+def test_large_scenes_are_right(name, rule, kind, rng):
+    n = 3000
+    points, scene = boxed(rng, kind, 3, n)
+    radii = LARGE[name](n, rng) * 0.03 * (1 if rule == "sum" else 2)
+    how = {"radii": radii, "rule": rule, **scene}
+    verdict = hs.verify(points, None, hs.neighbors(points, None, quantities="jS", **how), **how)
+    assert verdict, str(verdict)
+    assert verdict.n_expected > 0
+    if rule in SYMMETRIC:
+        found = hs.pairs(points, None, quantities="ijS", **how)
+        assert hs.verify(points, None, *found, **how)
+    queries = {"queries": points[:900], "query_radii": radii[:900], "radii": radii[900:]}
+    if rule in ("gather", "scatter"):
+        del queries["radii" if rule == "gather" else "query_radii"]
+    how = scene | {"rule": rule} | queries
+    table = hs.neighbors(points[900:], None, quantities="jS", **how)
+    assert hs.verify(points[900:], None, table, **how)
+
+
+def test_many_types_in_a_large_scene(rng):
+    points, scene = boxed(rng, "triclinic", 3, 4000)
+    types = rng.integers(0, 12, 4000)
+    table = rng.uniform(0.0, 0.12, (12, 12))
+    table = np.minimum(table, table.T)
+    found = hs.pairs(points, table, types=types, quantities="ijS", **scene)
+    assert hs.verify(points, table, *found, types=types, **scene)
+    again = hs.neighbors(points, table, types=types, quantities="jS", **scene)
+    assert hs.verify(points, table, again, types=types, **scene)
+    assert not same_tables(again, hs.neighbors(points, 0.12, quantities="jS", **scene))
+
+
+def test_dwarfs_in_a_giant_cost_what_they_find(rng):
+    """One giant over all: its pairs are n, not n squared, and so is the work."""
+    n = 200_000
+    points = rng.random((n, 3))
+    radii = np.full(n, 1e-3)
+    radii[7] = 2.0
+    assert hs.count_pairs(points, None, radii=radii, threads=1) < 3 * n
+    assert len(hs.pairs(points, None, radii=radii, quantities="i", memory_limit=2e8)) < 3 * n
