@@ -13,12 +13,13 @@ from halfshell import _core
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_radii
 from halfshell._convert.nearest import as_k, as_max_distance, in_rows
-from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.options import as_index_bytes
+from halfshell._convert.reach import RULES
 from halfshell._convert.types import Arrays, Number, PointArray, PointsLike
 from halfshell._objects.kept_cells import KeptCells, Options
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin
-from halfshell._objects.radii import Columns, search_each
+from halfshell._objects.radii import Columns, search_apart, search_each
 
 
 class CellRows(KeptCells):
@@ -119,13 +120,9 @@ class CellRows(KeptCells):
             with of_argument("radius"):
                 return self._rows(asking, radii, quantities, index_dtype, options)
 
-        inclusive = as_flag(inclusive, "inclusive")
-        is_exact = self._precision == "exact"
-        searches = _Searches(self, index_dtype, options)
-        arrays = search_each(searches, asking, radii, quantities, inclusive, is_exact)
-        origin = self._origin_of(asking, quantities, lambda queries: search_each(
-            searches, queries, radii, "S", inclusive, is_exact
-        ))  # fmt: skip
+        search = _EachRadius(self, radii, index_dtype, options)
+        arrays = search.rows(asking, quantities)
+        origin = self._origin_of(asking, quantities, lambda queries: search.rows(queries, "S"))
         return NeighborTable(arrays, quantities, self._n_points, False, origin=origin)
 
     def nearest(
@@ -220,24 +217,46 @@ class CellRows(KeptCells):
         return self._origin.asked_by(asking, lambda origin: search(origin.queries)[1])
 
 
-class _Searches:
-    """The searches that rows with a radius each are made of."""
+class _EachRadius:
+    """The search for rows of queries with a radius each."""
 
-    def __init__(self, cells: CellRows, index_dtype: npt.DTypeLike, options: Options) -> None:
+    def __init__(
+        self,
+        cells: CellRows,
+        radii: npt.NDArray[np.float64],
+        index_dtype: npt.DTypeLike,
+        options: Options,
+    ) -> None:
         self._cells = cells
+        self._radii = radii
         self._index_dtype = index_dtype
         self._options = options
-        self.limit = options[-1]
 
-    def rows(
-        self, queries: PointArray, radius: float, quantities: str, room: float | None
-    ) -> Columns:
-        options = self._options
-        if room is not None:
-            options = *options[:-1], room
+    def rows(self, queries: PointArray, quantities: str) -> Columns:
+        """Offsets and an array for each quantity."""
+        cells, radii = self._cells, self._radii
         with of_argument("radius"):
-            return self._cells._arrays(queries, radius, quantities, self._index_dtype, options)
+            if len(radii) == 0 or (radii == radii[0]).all():
+                radius = float(radii[0]) if len(radii) else 0.0
+                return cells._arrays(queries, radius, quantities, self._index_dtype, self._options)
+            if not search_apart(radii, cells._cutoff, cells._n_points):
+                return self._gathered(queries, quantities)
 
-    def counts(self, queries: PointArray, radius: float) -> npt.NDArray[np.int64]:
-        with of_argument("radius"):
-            return _core.coordination(*self._cells._arguments(radius, self._options), queries, None)
+            def search(
+                members: npt.NDArray[np.intp], radius: float, room: float | None
+            ) -> Columns:
+                options = self._options if room is None else (*self._options[:-1], room)
+                some = queries[members]
+                return cells._arrays(some, radius, quantities, self._index_dtype, options)
+
+            return search_each(search, radii, self._options[-1])
+
+    def _gathered(self, queries: PointArray, quantities: str) -> Columns:
+        """All at once, among the points as they were given."""
+        points, vectors, bits = self._cells._origin.scene()
+        rest = self._cells._arguments(None, self._options)[4:]
+        reach = (RULES.index("gather"), None, self._radii, None, None, None)
+        return _core.neighbors(
+            points, np.inf, vectors, bits, *rest, quantities, as_index_bytes(self._index_dtype),
+            queries, reach,
+        )

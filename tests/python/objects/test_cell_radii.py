@@ -44,12 +44,17 @@ def test_what_is_left_out_takes_little_memory_at_a_time():
     assert peak < 40e6
 
 
-@pytest.mark.parametrize("block_bytes", [1, 3000, 1 << 24])
+# All at once, or one search of the cells for each radius.
+both_ways = pytest.mark.parametrize("sorted_meanwhile", [1 << 40, 1])
+
+
+@both_ways
 @pytest.mark.parametrize("inclusive", [True, False])
-def test_rows_are_those_of_each_radius_alone(block_bytes, inclusive, monkeypatch):
-    monkeypatch.setattr(radii_module, "_BLOCK_BYTES", block_bytes)
+@pytest.mark.parametrize("cutoff", [1.5, 2.5])  # less than some radii, and than none
+def test_rows_are_those_of_each_radius_alone(sorted_meanwhile, inclusive, cutoff, monkeypatch):
+    monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
     grid = np.indices((5, 5, 5)).reshape(3, -1).T.astype(float)
-    cells = hs.CellList(grid, 1.5, box=[5.0] * 3)
+    cells = hs.CellList(grid, cutoff, box=[5.0] * 3)
     queries = np.vstack([grid, RNG.random((40, 3)) * 5.0])
     exact = np.sqrt(np.array([0.0, 1.0, 2.0, 3.0, 5.0]))
     radii = RNG.choice(np.concatenate([exact, np.nextafter(exact, 9.0), RNG.random(30) * 2.2]), 165)
@@ -59,6 +64,29 @@ def test_rows_are_those_of_each_radius_alone(block_bytes, inclusive, monkeypatch
             queries[k : k + 1], radii[k], quantities="jdDS", inclusive=inclusive
         )
         assert same_arrays(table[k], alone[0])
+
+
+@both_ways
+@pytest.mark.parametrize("precision", ["exact", "double"])
+def test_the_table_can_be_sorted_and_is_read_only(sorted_meanwhile, precision, monkeypatch):
+    monkeypatch.setattr(radii_module, "_SORTED_MEANWHILE", sorted_meanwhile)
+    points = RNG.random((300, 3))
+    cells = hs.CellList(points, 0.5, box=1.0, precision=precision)
+    queries, radii = RNG.random((40, 3)), RNG.choice([0.1, 0.2, 0.3, 0.4], 40)
+    table = cells.query(queries, radii, quantities="jd", index_dtype=np.int32)
+    assert table.indices.dtype == np.int32
+    assert not any(array.flags.writeable for array in table._arrays)
+    queries[:], kept = 0.0, queries.copy()
+    near = table.sort()
+    for k, (j, d) in enumerate(near):
+        alone = cells.query(kept[k : k + 1], radii[k], quantities="jd").sort()
+        assert np.array_equal(j, alone[0][0]) and np.array_equal(d, alone[0][1])
+
+
+def test_radii_at_the_end_of_float64():
+    cells = hs.CellList([[-1.5e308], [0.0], [1.5e308]], 1.0)
+    table = cells.query([[0.0], [0.0], [0.0]], [1.6e308, 1.4e308, 0.0])
+    assert [row.tolist() for row in table] == [[0, 1, 2], [1], [1]]
 
 
 def test_equal_radii_are_one_search(monkeypatch):
