@@ -95,6 +95,25 @@ def test_examples_of_streaming_run():
     assert np.isclose(names["total"][0], (s * s - s).sum(), rtol=1e-9)
 
 
+def test_examples_of_supports_run():
+    text = (ROOT / "docs/supports.md").read_text()
+    balls, bonds, types, smoothing = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(balls), "supports.md", "exec"), names)
+    assert len(names["i"]) > 100 and (names["overlap"] >= 0.0).all()
+    assert names["contacts"].sum() == 2 * len(names["i"]) and len(names["near"][0]) > 10
+    exec(compile(ast.parse(bonds), "supports.md", "exec"), names)
+    exec(compile(ast.parse(types), "supports.md", "exec"), names)
+    assert len(names["hydrogen_bonds"][0]) == names["by_number"] > 0
+    for one, other in zip(names["pairs_by_type"], names["same"]):
+        assert len(one) > 100 and np.array_equal(np.sort(one), np.sort(other))
+    assert set(names["named"][names["ions"][0]]) == {"ion"}
+    exec(compile(ast.parse(smoothing), "supports.md", "exec"), names)
+    counts = names["gathered"].counts
+    assert ((counts == 31) | (counts == 32)).all()
+    assert len(names["mutual"][0]) < counts.sum() / 2 < len(names["either"][0])
+
+
 def test_example_of_histograms_runs():
     text = (ROOT / "docs/histograms.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
