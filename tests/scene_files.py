@@ -23,6 +23,7 @@ from halfshell import scenes
 
 FILE = Path(__file__).with_name("scenes.json")
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scenes.md"
+NAMES = (*scenes.names(), *scenes.names(radii=True))
 ABOUT = "pairs and SHA-256 of scenes; written by tests/scene_files.py"
 BEGIN, END = "<!-- scenes: begin -->\n", "<!-- scenes: end -->\n"
 
@@ -30,9 +31,12 @@ BEGIN, END = "<!-- scenes: begin -->\n", "<!-- scenes: end -->\n"
 def digest(scene: scenes.Scene) -> str:
     """SHA-256 of everything that decides the answer, the same on every machine."""
     hashed = hashlib.sha256()
-    hashed.update(f"{scene.cutoff.hex()} {scene.periodic} {scene.inclusive}\n".encode())
+    limit = scene.rule if scene.radii is not None else scene.cutoff.hex()
+    hashed.update(f"{limit} {scene.periodic} {scene.inclusive}\n".encode())
     add(hashed, scene.points)
     add(hashed, scene.box)
+    if scene.radii is not None:
+        add(hashed, scene.radii)
     if scene.motion is not None:
         for value in vars(scene.motion).values():
             add(hashed, value)
@@ -64,7 +68,7 @@ def read() -> dict[str, Any]:
 def table() -> str:
     """The scenes as a table in Markdown: a row for each docstring."""
     rows: dict[str, list[scenes.Scene]] = {}
-    for name in scenes.names():
+    for name in NAMES:
         scene = scenes.load(name, "small")
         rows.setdefault(" ".join(scene.stresses.split()), []).append(scene)
     lines = ["| scene | what it is | what it stresses |", "| --- | --- | --- |"]
@@ -90,7 +94,7 @@ def main(arguments: list[str]) -> int:
     kept = read()
     found = {
         name: {size: entry(scenes.load(name, size)) for size in scenes.SIZES}
-        for name in scenes.names()
+        for name in NAMES
     }
     for name in {**kept, **found}:
         if kept.get(name) != found.get(name):

@@ -29,6 +29,7 @@ from halfshell.scenes import (  # noqa: F401, I001
     _reach,
     _density,
     _steps,
+    _balls,
 )
 from halfshell.scenes._catalogue import load, names
 from halfshell.scenes._scene import SIZES, Motion, Scene, Size

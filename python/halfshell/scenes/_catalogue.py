@@ -21,12 +21,15 @@ class _Entry:
     title: str
     make: Callable[..., Scene]
     arguments: tuple[Any, ...]
+    has_radii: bool
 
 
 _ENTRIES: dict[str, _Entry] = {}
 
 
-def add(entries: Mapping[str, tuple[Any, ...]]) -> Callable[[_Make], _Make]:
+def add(
+    entries: Mapping[str, tuple[Any, ...]], has_radii: bool = False
+) -> Callable[[_Make], _Make]:
     """Register a function that makes scenes; its docstring says what they stress.
 
     `entries` holds for each name the title and what the function is called with after the size.
@@ -36,22 +39,29 @@ def add(entries: Mapping[str, tuple[Any, ...]]) -> Callable[[_Make], _Make]:
         for name, (title, *arguments) in entries.items():
             if name in _ENTRIES:
                 raise ValueError(f"there are two scenes {name!r}")
-            _ENTRIES[name] = _Entry(title, make, tuple(arguments))
+            _ENTRIES[name] = _Entry(title, make, tuple(arguments), has_radii)
         return make
 
     return keep
 
 
-def names() -> tuple[str, ...]:
+def names(*, radii: bool = False) -> tuple[str, ...]:
     """Return the names of all scenes, in the order in which they are meant to be run.
+
+    Parameters
+    ----------
+    radii : bool, default False
+        Those with a radius for each point instead of those with one cutoff.
 
     Examples
     --------
     >>> from halfshell import scenes
     >>> scenes.names()[:3]
     ('uniform', 'order-random', 'order-sorted')
+    >>> scenes.names(radii=True)[0]
+    'balls-decades'
     """
-    return tuple(_ENTRIES)
+    return tuple(name for name, entry in _ENTRIES.items() if entry.has_radii == radii)
 
 
 def load(name: str, size: Size = "full") -> Scene:
@@ -60,7 +70,7 @@ def load(name: str, size: Size = "full") -> Scene:
     Parameters
     ----------
     name : str
-        One of `names`.
+        One of `names`, of either kind.
     size : {"full", "quick", "small"}, default "full"
         "full": about 1e5 points, more or fewer where that shows more. "quick": some thousand,
         for a look. "small": at most 300, so that every pair can be checked in rational numbers.

@@ -9,10 +9,11 @@ from typing import Any, Literal, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SIZES", "Floats", "Motion", "Scene", "Size", "pick"]
+__all__ = ["SIZES", "Floats", "Motion", "Rule", "Scene", "Size", "pick"]
 
 Floats = NDArray[np.float64]
 Size = Literal["small", "quick", "full"]
+Rule = Literal["sum", "mean", "max", "min"]
 _T = TypeVar("_T")
 
 #: The sizes that a scene comes in, smallest first.
@@ -84,8 +85,8 @@ class Scene:
     ----------
     points : ndarray of float64 or float32, shape (n, d)
         Coordinates.
-    cutoff : float
-        Largest distance of a pair.
+    cutoff : float or None
+        Largest distance of a pair; None where radii say it.
     box : ndarray of float64, shape (d,) or (d, d), or None
         Edge lengths, or edge vectors as rows; None: open space.
     periodic : tuple of bool, length d
@@ -94,6 +95,10 @@ class Scene:
         Whether a pair at exactly the cutoff counts.
     motion : Motion or None
         For scenes that are hard when they move.
+    radii : ndarray of float64, shape (n,), or None
+        The radius of each point, for scenes without a cutoff.
+    rule : {"sum", "mean", "max", "min"} or None
+        What is made of two radii.
     name, title, stresses : str
         What `load` knows it by, one line that says what it is, and what it is hard for.
 
@@ -111,11 +116,13 @@ class Scene:
     """
 
     points: NDArray[Any]
-    cutoff: float
+    cutoff: Any  # a float; None with radii
     box: Floats | None = None
     periodic: tuple[bool, ...] = ()
     inclusive: bool = True
     motion: Motion | None = None
+    radii: Floats | None = None
+    rule: Rule | None = None
     name: str = ""
     title: str = ""
     stresses: str = ""
@@ -133,10 +140,13 @@ class Scene:
     @property
     def arguments(self) -> dict[str, Any]:
         """The arguments of `halfshell.pairs` that make up the scene."""
-        return {
+        arguments = {
             "points": self.points,
             "cutoff": self.cutoff,
             "box": self.box,
             "periodic": self.periodic,
             "inclusive": self.inclusive,
         }
+        return arguments if self.radii is None else arguments | {
+            "radii": self.radii, "rule": self.rule,
+        }  # fmt: skip
