@@ -17,6 +17,10 @@ SEARCHES = {
     "count": "hs.count_pairs(points, 0.5)",
     "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
     "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
+    "pairs of balls": "hs.pairs(points, None, radii=sizes, sort=True, memory_limit=1e13)",
+    "count of balls": "hs.count_pairs(points, None, radii=4 * sizes)",
+    "rows of balls": "hs.neighbors(points, None, radii=sizes, rule='max', memory_limit=1e13)",
+    "pairs by type": "hs.pairs(points, np.eye(9) * 0.3, types=kinds, memory_limit=1e13)",
     "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
     "nearest": "hs.nearest(points, 100, memory_limit=1e13)",
     "nearest, all equally far": """hs.nearest(
@@ -43,6 +47,7 @@ import halfshell as hs
 
 rng = np.random.default_rng(1)
 points = rng.random((400_000, 3))
+sizes, kinds = 0.08 * 2.0 ** -rng.random(len(points)), np.arange(len(points)) % 9
 grid = np.stack(np.meshgrid(*[np.arange(60.0)] * 3), axis=-1).reshape(-1, 3)
 small = points[:500]
 expected = hs.count_pairs(small, 0.2)

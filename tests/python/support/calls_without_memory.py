@@ -31,6 +31,8 @@ POINTS = rng.uniform(0.0, 5.0 * SIZE ** (1 / 3), (N, 3))
 OTHER = rng.uniform(0.0, 5.0 * SIZE ** (1 / 3), (12, 3))
 CROWD = rng.uniform(0.0, 1.0, (300, 3))  # pairs of more than 256 kB, which are not copied
 TYPES = np.arange(N) % 3
+RADII = 0.9 * 4.0 ** -(np.arange(N) % 5)
+CUTOFFS = {(0, 1): 1.5, (2, 2): 0.8}
 WEIGHTS = rng.uniform(-1.0, 1.0, N)
 EDGES = np.linspace(0.0, 2.0, 9)
 BATCH = np.arange(N) // (N // 5)
@@ -58,6 +60,17 @@ def visited(**options):
         seen[0] ^= hash((i, j, S, D, d2))
 
     return hs.for_each_pair(POINTS, 1.5, add, **options), seen
+
+
+def visited_balls(**options):
+    """The same of balls, and their blocks."""
+    seen = [0]
+
+    def add(i, j, S, D, d2):
+        seen[0] ^= hash((i, j, S, D, d2))
+
+    n = hs.for_each_pair(POINTS, None, add, radii=RADII, **options)
+    return n, seen, list(hs.iter_pairs(POINTS, None, radii=RADII, max_pairs=9, **options))
 
 
 def verlet(threads=None):
@@ -125,6 +138,19 @@ CALLS = {
         POINTS, 1.5, queries=OTHER, quantities="jdDS", **PERIODIC)._arrays,
     "neighbors, large": lambda: hs.neighbors(CROWD, 2.0, quantities="jdD")._arrays,
     "coordination": lambda: hs.coordination(POINTS, 1.5, **PERIODIC),
+    "pairs of balls": lambda: hs.pairs(
+        POINTS, None, radii=RADII, quantities=LETTERS, sort=True, **PERIODIC),
+    "pairs of balls, threads": lambda: hs.pairs(
+        POINTS, 1.5, radii=RADII.tolist(), rule="max", sort=True, threads=2, **PERIODIC),
+    "pairs by type": lambda: hs.pairs(POINTS, CUTOFFS, types=TYPES, sort=True, **PERIODIC),
+    "pairs_between, balls": lambda: hs.pairs_between(
+        OTHER, POINTS, None, query_radii=RADII[:12], radii=RADII, quantities="ijdDS", **PERIODIC),
+    "neighbors, gather": lambda: hs.neighbors(
+        POINTS, None, radii=RADII, rule="gather", quantities="jd", **PERIODIC).sort()._arrays,
+    "coordination, types": lambda: hs.coordination(POINTS, np.ones((3, 3)), types=TYPES),
+    "count_pairs, balls": lambda: hs.count_pairs(POINTS, [1.0, 2.0], radii=RADII, rule="mean"),
+    "visited and blocks, balls": lambda: visited_balls(**PERIODIC),
+    "bad radii": lambda: message(hs.pairs, POINTS, None, radii=-RADII),
     "histogram": lambda: hs.pair_histogram(POINTS, EDGES, **PERIODIC),
     "histogram, types": lambda: hs.pair_histogram(POINTS, EDGES, types=TYPES, threads=2),
     "histogram, weights": lambda: hs.pair_histogram(
