@@ -146,7 +146,7 @@ CALLS = {
     "pairs_between, balls": lambda: hs.pairs_between(
         OTHER, POINTS, None, query_radii=RADII[:12], radii=RADII, quantities="ijdDS", **PERIODIC),
     "neighbors, gather": lambda: hs.neighbors(
-        POINTS, None, radii=RADII, rule="gather", quantities="jd", **PERIODIC).sort()._arrays,
+        POINTS, None, radii=RADII, rule="gather", quantities="jdS", **PERIODIC)._arrays,
     "coordination, types": lambda: hs.coordination(POINTS, np.ones((3, 3)), types=TYPES),
     "count_pairs, balls": lambda: hs.count_pairs(POINTS, [1.0, 2.0], radii=RADII, rule="mean"),
     "visited and blocks, balls": lambda: visited_balls(**PERIODIC),
