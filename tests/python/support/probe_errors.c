@@ -62,6 +62,7 @@ static const struct {
     {"HS_ERR_EDGES", HS_ERR_EDGES},
     {"HS_ERR_TYPES", HS_ERR_TYPES},
     {"HS_ERR_WEIGHTS", HS_ERR_WEIGHTS},
+    {"HS_ERR_RADII", HS_ERR_RADII},
     {"HS_ERR_ARGUMENT", HS_ERR_ARGUMENT},
     {"HS_STATUS_END", HS_STATUS_END},
 };
