@@ -48,7 +48,7 @@ RAISED = {
     "HS_ERR_EDGES": (ValueError, "edges must be finite, not negative and ascending, got edges[3]"),
     "HS_ERR_TYPES": (ValueError, "types must be from 0 on, got types[3] = 0.5"),
     "HS_ERR_WEIGHTS": (ValueError, "weights must be finite, got weights[3] = 0.5"),
-    "HS_ERR_RADII": (ValueError, "radii must be finite, not negative, and of ordinary size, got rad"),
+    "HS_ERR_RADII": (ValueError, "radii must be finite, not negative, and of ordinary size, got"),
     "HS_ERR_ARGUMENT": (ValueError, "an argument is out of its range, or an array is missing"),
 }
 

@@ -64,6 +64,17 @@ assert_type(table.distances, npt.NDArray[np.float64])
 assert_type(table.reverse(), npt.NDArray[np.int64])
 assert_type(hs.coordination(p, 1.0, box=[2.0] * 3), npt.NDArray[np.int64])
 
+i, j = hs.pairs(p, None, radii=[0.5, 1.0, 1.5], rule="max")
+i, j, d = hs.pairs(p, {("H", "O"): 1.0}, types=["H", "O", "O"], quantities="ijd")
+assert_type(hs.count_pairs(p, None, radii=p[:, 0]), int)
+assert_type(hs.count_pairs(p, np.eye(2), types=[0, 1, 1]), int)
+assert_type(hs.count_pairs(p, {(0, 1): 1}, types=[0, 1, 1]), int)
+assert_type(hs.count_pairs(p, [0.5, 1.0], radii=p[:, 0]), npt.NDArray[np.int64])
+assert_type(hs.neighbors(p, None, radii=p[:, 0], rule="gather"), hs.NeighborTable)
+i, j = hs.pairs_between(p, p, None, query_radii=p[:, 0], rule="gather")
+for i, j in hs.iter_pairs(p, 1.0, radii=p[:, 0], rule="min"):
+    i.sum()
+
 plan: hs.Explanation = hs.explain(p, 1.0, precision="exact")
 verdict: hs.Verdict = hs.verify(p, 1.0, i, j)
 box = hs.Box.orthorhombic(1.0, 1.0)
@@ -112,6 +123,8 @@ BAD = {
     "hs.CellList(p, 1.0).neighbors(boks=1)": "call-arg",
     "hs.CellList(p, 1.0).nearest(1, p)": "call-arg|misc",
     "hs.VerletList(1.0).pairs('ij')": "call-overload",
+    "hs.neighbors(p, None, radii=p[0], rule='product')": "arg-type",
+    "hs.pairs(p, None, query_radii=p[0])": "call-overload",
 }
 
 needs_mypy = pytest.mark.skipif(
