@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * levels.h: points divided by the size of their reach, so that small ones are searched in small
- * cells however large others are: a level is all points whose radii are of one binary order, counted
- * from the largest one, or all points of one type. Each level lies in one piece, which is a set of
- * points by itself.
+ * cells however large others are: a level is all points whose radii are of one binary order,
+ * counted from the largest one, or all points of one type. Each level lies in one piece, which is a
+ * set of points by itself.
  */
 #ifndef HS_LEVELS_H
 #define HS_LEVELS_H

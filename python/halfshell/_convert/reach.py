@@ -53,6 +53,8 @@ def as_reach(cutoff: Any, given: Given, sets: Sets, directed: bool) -> tuple[flo
     else:
         table = _as_table(cutoff)
         types, query_types = _as_numbers(given, sets, len(table))
+    if len(table) == 0:
+        table = np.full((1, 1), -1.0)  # of no points: the core wants one type at least
     largest = max(float(table.max(initial=0.0)), 0.0)
     return largest, (0, None, None, types, query_types, table)
 
@@ -71,6 +73,8 @@ def _by_radii(
         )
     _check_sides(rule, given, sets.q is not None)
     bound = math.inf if cutoff is None else as_cutoff(cutoff)
+    if cutoff is not None and not math.isfinite(bound):
+        raise ValueError(f"cutoff must be finite and not negative, or None, got {bound}")
     own = None if given.radii is None else _as_radii(given.radii, "radii", sets.n, rule)
     asking = None
     if given.query_radii is not None and sets.q is not None:

@@ -280,3 +280,9 @@ def test_results_that_do_not_fit_are_refused(rule):
             lambda call=call: call(LARGE, None, radii=radii, rule=rule, memory_limit=1e8),
             MemoryError, "fit",
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("cutoff", [INF, NAN, -1.0])
+def test_a_further_cutoff_is_a_length(cutoff):
+    with pytest.raises(ValueError, match="cutoff must be finite and not negative"):
+        hs.count_pairs([[0.0], [1.0]], cutoff, radii=[1.0, 1.0])

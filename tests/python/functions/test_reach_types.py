@@ -208,3 +208,10 @@ def test_types_with_other_arguments():
         lambda: hs.count_pairs(POINTS, {(0, 1): 1.0}, types=TYPES, batch=np.zeros(20, int)),
         ValueError, "batch and types",
     )  # fmt: skip
+
+
+def test_a_table_of_no_types_holds_for_no_points():
+    nothing, table = np.zeros((0, 3)), np.zeros((0, 0))
+    i, j = hs.pairs(nothing, table, types=[])
+    assert len(i) == len(j) == hs.count_pairs(nothing, table, types=[]) == 0
+    assert hs.neighbors(nothing, table, types=[]).n_rows == 0
