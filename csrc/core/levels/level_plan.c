@@ -74,9 +74,7 @@ add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
     const hs_dw       high = hs_limit_by(levels->rule, a.largest, b.largest, plan->bound);
     step.cutoff = high.lo > 0.0 ? hs_next_up(high.hi) : high.hi;
     step.least = a.least > 0.0 && !(b.least > 0.0 && b.least < a.least) ? a.least : b.least;
-    /* Among points that are asked by themselves, what is sifted is the point itself. */
-    step.has_limits = low.hi != high.hi || low.lo != 0.0 || high.lo != 0.0 ||
-                      (!plan->is_half && !levels->has_queries);
+    step.has_limits = low.hi != high.hi || low.lo != 0.0 || high.lo != 0.0;
     plan->steps[plan->n++] = step;
 }
 
