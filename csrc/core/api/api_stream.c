@@ -264,6 +264,7 @@ open_search(const hs_request *request, hs_stream *stream, hs_failure *failure)
         return status;
     }
     const hs_status status = hs_by_reach_open(request, call, &stream->by, failure);
+    hs_by_reach_tell(call, status, failure);
     if (status == HS_OK && request->box != NULL) {
         stream->box = *request->box;
         stream->by.box = &stream->box;

@@ -54,6 +54,14 @@ needed_of(const hs_request *request)
     return reach;
 }
 
+void
+hs_by_reach_tell(const hs_call *call, hs_status status, hs_failure *failure)
+{
+    if (status == HS_ERR_MEMORY) {
+        failure->limit_bytes = call->account.limit;
+    }
+}
+
 hs_status
 hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_failure *failure)
 {
@@ -145,9 +153,7 @@ hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context, hs_fail
             hs_by_reach_each(&by, request->sets.keeps_none, &call, use, context, &n_pairs, failure);
         hs_by_reach_close(&call.account, &by);
     }
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = call.account.limit;
-    }
+    hs_by_reach_tell(&call, status, failure);
     hs_call_leave(&call, n_pairs);
     hs_account_close(&call.account);
     return status;

@@ -22,6 +22,9 @@ typedef struct hs_by_reach {
 hs_status hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by,
                            hs_failure *failure);
 
+/* How much memory was allowed, if that was the failure. */
+void hs_by_reach_tell(const hs_call *call, hs_status status, hs_failure *failure);
+
 /* Harmless twice. */
 void hs_by_reach_close(hs_account *account, hs_by_reach *by);
 

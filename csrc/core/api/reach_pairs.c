@@ -33,7 +33,6 @@ record(const hs_by_reach *by, hs_call *call, hs_output *output, hs_failure *fail
         hs_by_reach_each(by, false, call, record_step, output, &n_pairs, failure);
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
-        failure->limit_bytes = call->account.limit;
     }
     return status;
 }
@@ -187,6 +186,7 @@ finish(hs_by_reach *by, hs_pairs *pairs, hs_status status, hs_pairs **result, hs
 {
     hs_by_reach_close(&pairs->call.account, by);
     status = hs_pairs_conclude(&pairs->output, status, failure);
+    hs_by_reach_tell(&pairs->call, status, failure);
     return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
 }
 
@@ -337,6 +337,7 @@ hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *coun
         status = count_rows(request, &by, &call, counts, &n_entries, failure);
     }
     hs_by_reach_close(&call.account, &by);
+    hs_by_reach_tell(&call, status, failure);
     hs_call_leave(&call, n_entries);
     hs_account_close(&call.account);
     return status;
