@@ -164,6 +164,36 @@ threads_make_no_difference(void)
     }
 }
 
+/* Whatever the limit, a call succeeds or says what it was; what is enough once is enough. */
+static void
+limits_of_memory_are_kept(void)
+{
+    hs_points      points;
+    hs_reach       reach;
+    const hs_among among = make_many(HS_RULE_SUM, &points, &reach);
+    memset(&scene, 0, sizeof scene);
+    scene.of.scene.ndim = 3;
+    for (int which = 0; which < ENTRIES; which++) {
+        entry_call e = {.which = (entry)which, .among = among, .options = hs_options_default()};
+        int        n_failed = 0;
+        hs_status  status = HS_ERR_MEMORY;
+        if (which == ROW_COUNTS) { /* CALL_ROOM is too small for so many */
+            continue;
+        }
+        e.options.cutoff = 1.0;
+        for (double limit = 1000.0; status != HS_OK && limit < 1e10; limit *= 1.15) {
+            const int64_t before = hs_test_live_blocks();
+            e.options.memory_limit = limit;
+            status = run_entry(&e);
+            CHECK(status == HS_OK || status == HS_ERR_MEMORY);
+            CHECK(status == HS_OK || e.failure.limit_bytes == limit);
+            CHECK(hs_test_live_blocks() == before);
+            n_failed += status != HS_OK;
+        }
+        CHECK(status == HS_OK && n_failed > 10);
+    }
+}
+
 /* Fractions that a poll is told: they never fall. */
 typedef struct told {
     int64_t n;
@@ -238,5 +268,6 @@ test_by_reach(void)
     RUN(cells_and_arrays_of_the_caller_serve);
     RUN(threads_make_no_difference);
     RUN(one_refusal_ends_any_entry);
+    RUN(limits_of_memory_are_kept);
     RUN(fractions_of_a_stream_never_fall);
 }

@@ -104,6 +104,54 @@ what_is_no_table_is_refused(void)
     all_refuse(HS_ERR_CUTOFF, -1);
 }
 
+/* Types go by no rule, be it one of the two that half lists do not know. */
+static void
+types_take_any_rule(void)
+{
+    for (int rule = 0; rule < HS_RULE_END; rule++) {
+        make_plain(HS_RULE_END, -1);
+        scene.reach.rule = (hs_rule)rule;
+        all_refuse(HS_OK, -1);
+    }
+}
+
+/* A shift of -2^31 fits int32, and that of the same pair the other way round does not: of two
+ * levels, whose rows are made of pairs and their mirror images. One more box, and no shift fits. */
+static void
+shifts_that_do_not_fit_name_the_callers_row(void)
+{
+    const hs_box   box = {.ndim = 1, .periodic = {true}, .rows = {{1.0}}};
+    double         x[] = {0.0, 0.25, 0x1p31, 0.5}, radii[] = {0.3, 0.001, 0.3, 0.002};
+    const hs_reach reach = {.rule = HS_RULE_SUM, .radii = radii, .query_radii = radii};
+    hs_points      points = {x, 4, 1, HS_FLOAT64, 8, 8}, queries = points;
+    hs_options     options = hs_options_default();
+    hs_among       among = {.points = &points, .box = &box, .reach = &reach};
+    options.cutoff = 1.0;
+    for (int further = 0; further < 2; further++) {
+        x[2] = 0x1p31 + further;
+        for (int wants = 0; wants < 2; wants++) {
+            hs_failure failure;
+            hs_pairs  *found = NULL;
+            options.want = HS_WANT_I | HS_WANT_J | (wants ? HS_WANT_SHIFT : 0);
+            memset(&failure, 0x5a, sizeof failure);
+            hs_status status = hs_pairs_find(&among, &options, &found, &failure);
+            CHECK(status == (wants && further ? HS_ERR_SHIFT_RANGE : HS_OK));
+            hs_pairs_free(found);
+            status = hs_neighbors_find(&among, &options, &found, &failure);
+            CHECK(status == (wants ? HS_ERR_SHIFT_RANGE : HS_OK));
+            CHECK(!wants || failure.row == (further ? 0 : 2)); /* as without a reach */
+            CHECK(!failure.in_queries || !wants);
+            hs_pairs_free(found);
+        }
+    }
+    among.queries = &queries;
+    options.want = HS_WANT_SHIFT;
+    hs_failure failure;
+    hs_pairs  *found = NULL;
+    CHECK(hs_neighbors_find(&among, &options, &found, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(found == NULL && failure.row == 0 && failure.in_queries);
+}
+
 /* Each set needs the radii that the rule looks at, and no more; sets without points need none. */
 static void
 both_sets_need_what_the_rule_looks_at(void)
@@ -217,6 +265,8 @@ test_reach_refusals(void)
 {
     RUN(what_is_no_reach_is_refused);
     RUN(what_is_no_table_is_refused);
+    RUN(types_take_any_rule);
+    RUN(shifts_that_do_not_fit_name_the_callers_row);
     RUN(both_sets_need_what_the_rule_looks_at);
     RUN(other_arguments_are_checked_first);
     RUN(other_functions_refuse_a_reach);
