@@ -52,6 +52,7 @@ def energy(const double[:, :] points, double cutoff, const double[:] lengths):
     among.box = &box
     among.queries = NULL
     among.cells = NULL
+    among.reach = NULL
 
     cdef hs_options options = halfshell.options_default()
     options.cutoff = cutoff

@@ -110,6 +110,8 @@ hs_commits_join(hs_commits *commits, hs_committer *committer)
     committer->poll = options->poll;
     committer->poll_context = options->poll_context;
     committer->range = -1;
+    committer->most_bytes = commits->enough < INT64_MAX ? HS_COMMIT_BYTES_OF_BLOCKS
+                                                        : HS_COMMIT_BYTES;
     hs_mutex_lock(&commits->mutex);
     commits->n_working++;
     hs_mutex_unlock(&commits->mutex);
@@ -272,8 +274,8 @@ hs_commit(hs_committer *committer, double fraction, bool ends)
     const int64_t    bytes = pairs->n_pairs * hs_output_bytes_per_pair(pairs);
     committer->parts[committer->n_parts++] = (hs_commit_part){
         .range = committer->range, .end = pairs->n_pairs, .fraction = fraction, .is_last = ends};
-    return write_parts(committer,
-                       !ends || committer->n_parts == HS_COMMIT_PARTS || bytes >= HS_COMMIT_BYTES);
+    return write_parts(committer, !ends || committer->n_parts == HS_COMMIT_PARTS ||
+                                      bytes >= committer->most_bytes);
 }
 
 /* There is no range left for this thread. The caller's thread goes on polling for the others. */

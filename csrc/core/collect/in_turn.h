@@ -20,6 +20,8 @@ typedef struct hs_commits hs_commits;
  * cache of them: threads that sleep cost more than pairs that come from the third. */
 #define HS_COMMIT_PARTS 32
 #define HS_COMMIT_BYTES (1024 * 1024)
+/* As many where the output is to have few pairs at a time: what is held back is memory besides. */
+#define HS_COMMIT_BYTES_OF_BLOCKS (256 * 1024)
 /* A range should have no more: a thread whose range is not due yet can go on with others. */
 #define HS_RANGE_BYTES (HS_COMMIT_BYTES / 8)
 
@@ -34,11 +36,12 @@ typedef struct hs_commit_part {
 
 /* What one thread needs to take ranges and commit their pairs. */
 typedef struct hs_committer {
-    hs_options    *options; /* borrowed; its poll tells whether to go on */
-    hs_output     *pairs;   /* borrowed: where the thread collects them; NULL when counting */
-    hs_failure     failure; /* of its range that fails */
-    hs_commits    *commits; /* borrowed */
-    hs_poll_fn     poll;    /* as it was before; for the caller's thread */
+    hs_options    *options;    /* borrowed; its poll tells whether to go on */
+    hs_output     *pairs;      /* borrowed: where the thread collects them; NULL when counting */
+    hs_failure     failure;    /* of its range that fails */
+    hs_commits    *commits;    /* borrowed */
+    int64_t        most_bytes; /* held back: one of the two above */
+    hs_poll_fn     poll;       /* as it was before; for the caller's thread */
     void          *poll_context;
     int64_t        range;   /* that the thread is working on */
     int64_t        written; /* of the pairs, those that are in the output already */

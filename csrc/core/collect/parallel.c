@@ -77,7 +77,8 @@ backlog_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *h
     hs_backlog      *backlog = context;
     const hs_output *pairs = &backlog->pairs;
     const hs_status  status = hs_record_hits(&backlog->recorder, scanner, first, hits);
-    if (status == HS_OK && pairs->n_pairs * hs_output_bytes_per_pair(pairs) >= HS_COMMIT_BYTES) {
+    const int64_t    n_bytes = pairs->n_pairs * hs_output_bytes_per_pair(pairs);
+    if (status == HS_OK && n_bytes >= backlog->committer->most_bytes) {
         const hs_status committed =
             hs_commit(backlog->committer, hs_scanner_fraction(scanner), false);
         scanner->leaves = backlog->committer->is_full;
@@ -147,8 +148,8 @@ static int64_t
 most_pairs(const walk_job *job)
 {
     const int64_t bytes = hs_output_bytes_per_pair(job->output);
-    const int64_t slack =
-        hs_team_size(job->search->call->team) * (int64_t)HS_COMMIT_BYTES / (bytes > 0 ? bytes : 1);
+    const int64_t slack = hs_team_size(job->search->call->team) *
+                          (int64_t)HS_COMMIT_BYTES_OF_BLOCKS / (bytes > 0 ? bytes : 1);
     return job->enough <= INT64_MAX - slack ? job->enough + slack : INT64_MAX;
 }
 
