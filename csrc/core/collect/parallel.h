@@ -29,8 +29,9 @@ hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *f
 
 /*
  * Records pairs from the bookmark on, until the output has `enough` pairs or all have been found:
- * then the bookmark says where to go on. The output has at most HS_COMMIT_BYTES_OF_BLOCKS a thread and one
- * block of candidates more than that. A failure leaves the bookmark, and in the output what it may.
+ * then the bookmark says where to go on. The output has at most HS_COMMIT_BYTES_OF_BLOCKS a thread
+ * and one block of candidates more than that. A failure leaves the bookmark, and in the output what
+ * it may.
  */
 hs_status hs_parallel_record_on(hs_search *search, hs_output *output, int64_t enough,
                                 hs_bookmark *bookmark, hs_failure *failure);
