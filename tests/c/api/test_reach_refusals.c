@@ -144,10 +144,14 @@ shifts_that_do_not_fit_name_the_callers_row(void)
             hs_pairs_free(found);
         }
     }
-    among.queries = &queries;
-    options.want = HS_WANT_SHIFT;
     hs_failure failure;
     hs_pairs  *found = NULL;
+    options.want = HS_WANT_SHIFT;
+    radii[0] = 0.001; /* now each such pair is one of two levels, of which one asks the other */
+    CHECK(hs_pairs_find(&among, &options, &found, &failure) == HS_ERR_SHIFT_RANGE);
+    CHECK(found == NULL && !failure.in_queries && (failure.row == 0 || failure.row == 2));
+    radii[0] = 0.3;
+    among.queries = &queries;
     CHECK(hs_neighbors_find(&among, &options, &found, &failure) == HS_ERR_SHIFT_RANGE);
     CHECK(found == NULL && failure.row == 0 && failure.in_queries);
 }

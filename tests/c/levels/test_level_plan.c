@@ -206,6 +206,23 @@ many_types_are_searched_in_pairs(void)
     }
 }
 
+/* Queries of one level that look among all points ask for less than all levels. */
+static void
+a_level_of_two_is_not_all(void)
+{
+    const hs_reach reach = {
+        .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
+    harness_random random = {79};
+    planned        made;
+    reach_fill(&random, 10, 1, 1.0, 0, 0.1, &points);
+    reach_fill(&random, 10, 1, 1.0, 0, 0.1, &queries);
+    points.radii[4] = 0.9;
+    make_plan(&reach, true, HUGE_VAL, &made);
+    CHECK(made.levels.n == 2 && made.plan.n == 1);
+    CHECK(!hs_level_plan_is_single(&made.levels, &made.plan));
+    free_plan(&made);
+}
+
 /* Small levels join for the search with a far larger one: a few steps a level. */
 static void
 far_smaller_levels_join(void)
@@ -256,6 +273,7 @@ test_level_plan(void)
     RUN(sums_that_round_to_one_are_not_one);
     RUN(sums_above_an_exact_one_are_not_it);
     RUN(many_types_are_searched_in_pairs);
+    RUN(a_level_of_two_is_not_all);
     RUN(far_smaller_levels_join);
     RUN(nothing_leaks_when_memory_is_short);
 }
