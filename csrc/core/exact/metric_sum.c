@@ -8,9 +8,8 @@
 void
 hs_metric_set_cutoff(double cutoff, hs_metric *metric)
 {
-    double rows[HS_MAX_DIM][HS_MAX_DIM];
-    memcpy(rows, metric->rows, sizeof rows);
-    hs_metric_init(metric, metric->ndim, metric->n_rows, rows, cutoff, metric->inclusive);
+    hs_metric_init(metric, metric->ndim, metric->n_rows, (const double(*)[HS_MAX_DIM])metric->rows,
+                   cutoff, metric->inclusive);
 }
 
 bool

@@ -147,10 +147,9 @@ set_limits(const hs_levels *levels, const hs_level_step *step, double bound, hs_
 
 /* Fractions done are those of all asking points of all steps, as far as these are equal. */
 static void
-set_progress(const hs_levels *levels, const hs_level_plan *plan, int64_t step, hs_search *search)
+set_progress(const hs_level_plan *plan, int64_t step, hs_search *search)
 {
     const int64_t n = hs_search_asking(search)->n;
-    (void)levels;
     search->first_point = step * n;
     search->n_in_all = plan->n * n;
 }
@@ -206,7 +205,7 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
     if (search->has_queries) {
         renumber(numbers_of(asking, step->asking), &search->query_bins);
     }
-    set_progress(levels, plan, number, search);
+    set_progress(plan, number, search);
     return HS_OK;
 }
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Cutoffs by kind of point, as a dict of pairs: kinds are numbers, names, or elements of ASE.
 
-A dict becomes a table of its kinds and, in the last row, of all others, which pair with nobody.
+A dict becomes a table of its kinds and, in the last row, of all others, which are no pairs.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def types_of_species(
     if sets.q is not None:
         kinds.append(_kinds(given.query_types, "query_types", sets.queries, "queries", sets.q))
         kinds = _alike(*kinds)
-    # Of nobody's types nothing says whether they are names.
+    # Where there are no points, nothing says whether types are names.
     lengths = _lengths(cutoff, kinds) if any(len(kind.values) for kind in kinds) else {}
     names = np.array(sorted({name for pair in lengths for name in pair}))
     rows = {name: row for row, name in enumerate(names.tolist())}
