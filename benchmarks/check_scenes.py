@@ -14,6 +14,7 @@ import argparse
 import itertools
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,8 @@ def _count_one(scene: Scene) -> int:
         tree = cKDTree(scene.asking, boxsize=np.diag(scene.rows))
         other = cKDTree(scene.found, boxsize=np.diag(scene.rows))
         return int(tree.count_neighbors(other, scene.cutoff))
+    if scene.has_reach:
+        return _count_by_reach(scene)
     tree = cKDTree(scene.points)
     if scene.rows is None:
         return int(tree.count_neighbors(tree, scene.cutoff) - scene.n) // 2
@@ -53,6 +56,45 @@ def _count_one(scene: Scene) -> int:
         if near.any():
             found += int(tree.count_neighbors(cKDTree(moved[near]), scene.cutoff))
     return (found - scene.n) // 2
+
+
+def _parts(scene: Scene) -> list[Any]:
+    """Numbers of points of one type, or of about one radius."""
+    if scene.radii is None:
+        assert scene.types is not None
+        labels = scene.types
+    else:
+        labels = np.frexp(scene.radii)[1]
+    return [np.flatnonzero(labels == label) for label in np.unique(labels)]
+
+
+def _reach(scene: Scene, i: Any, j: Any) -> Any:
+    """The reach of each pair, rounded."""
+    if scene.radii is None:
+        assert scene.types is not None and scene.table is not None
+        return scene.table[scene.types[i], scene.types[j]]
+    a, b = scene.radii[i], scene.radii[j]
+    return a + b if scene.rule == "sum" else np.maximum(a, b)
+
+
+def _count_by_reach(scene: Scene) -> int:
+    """Count pairs of each two parts, one image of each, in float64."""
+    from scipy.spatial import cKDTree
+
+    lengths = None if scene.rows is None else np.diag(scene.rows)
+    parts = _parts(scene)
+    trees = [cKDTree(scene.points[part], boxsize=lengths) for part in parts]
+    found = 0
+    for a, one in enumerate(parts):
+        for b, other in enumerate(parts[: a + 1]):
+            tops = [part if scene.radii is None else part[[scene.radii[part].argmax()]]
+                    for part in (one, other)]  # fmt: skip
+            largest = float(_reach(scene, tops[0][:1], tops[1][:1])[0])
+            table = trees[a].sparse_distance_matrix(trees[b], largest, output_type="ndarray")
+            i, j = one[table["i"]], other[table["j"]]
+            within = (table["v"] <= _reach(scene, i, j)) & (i != j)
+            found += int(within.sum()) // (2 if a == b else 1)
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

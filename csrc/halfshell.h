@@ -60,14 +60,20 @@ typedef enum hs_status {
     HS_ERR_ROUNDING,      /* precision="double" cannot tell: failure.row is the farthest point */
     HS_ERR_KERNEL,        /* no kernel of that name on this CPU, or none compiled as it must be */
     HS_ERR_INTERRUPTED,   /* poll() asked to stop */
-    HS_ERR_FAR,           /* queries, or points from each other, lie too far away for cells */
+    HS_ERR_FAR,           /* queries, or points from each other, lie too far away for cells; or a
+                             point lies outside of what keys are for: failure.row */
     HS_ERR_CAPACITY,      /* the caller's arrays are too small: failure.expected_pairs are needed */
     HS_ERR_EDGES,         /* edges are negative, not finite or not ascending: failure.row */
     HS_ERR_TYPES,         /* a type is negative or too large: failure.row */
     HS_ERR_WEIGHTS,       /* a weight is NaN or infinite: failure.row */
     HS_ERR_RADII,         /* a radius is negative, NaN, infinite or out of range: failure.row */
+    HS_ERR_SUPPORTS,      /* a support is not symmetric and positive definite: failure.row */
+    HS_ERR_SUPPORT_REACH, /* one reaches further than 2^1022, or is a needle beyond all floats:
+                             failure.row */
+    HS_ERR_EXTENT,        /* the extent of supports is negative, NaN or infinite */
     HS_ERR_ARGUMENT,      /* ndim, n, want, index_bytes, ... is none that there is, or a pointer is
                              NULL; failure.system: where first descends */
+    HS_ERR_KEY,           /* a key is not there, comes twice, or has no position: failure.row */
     HS_STATUS_END         /* number of codes, not a code; it grows with them */
 } hs_status;
 
@@ -115,6 +121,19 @@ typedef enum hs_precision {
     HS_SINGLE  /* by one float32 comparison of a fixed, unfused formula */
 } hs_precision;
 
+/* Which cells the points are sorted into. The pairs are the same; their order, unless they are
+ * sorted, is fixed by scene and algorithm. */
+typedef enum hs_algorithm {
+    HS_AUTO,      /* what is expected to be quickest; with a reach that is levels */
+    HS_ALL_PAIRS, /* one cell: every point meets all others */
+    HS_GRID,      /* all cells are stored. Their number is in proportion to the points: where these
+                   * are far apart, cells are wider than they need be */
+    HS_HASH,      /* only cells that hold points are stored */
+    HS_HIERARCHY, /* levels of points of about the same reach, or of one type, which are searched
+                   * apart; without a reach one level, in cells that are expected to be quickest */
+    HS_ALGORITHM_END /* number of algorithms */
+} hs_algorithm;
+
 /* What to return for each pair: a union of these bits. */
 enum {
     HS_WANT_I = 1,        /* lower point number */
@@ -139,6 +158,7 @@ typedef enum hs_purpose {
     HS_FOR_VECTORS,    /* D */
     HS_FOR_SHIFTS,     /* S */
     HS_FOR_SORTING,    /* scratch of sort=true */
+    HS_FOR_SUPPORTS,   /* supports of points, as they are read and as kernels read them */
     HS_PURPOSE_END
 } hs_purpose;
 
@@ -193,10 +213,12 @@ typedef struct hs_options {
     unsigned     want;         /* HS_WANT_ bits */
     int          index_bytes;  /* 4 or 8: int32 or int64 i and j */
     double       cell_size;    /* least width of cells, as far as possible; 0: what is quick */
+    hs_algorithm algorithm;    /* not looked at where there are cells already; cell_size is for
+                                  those that store all of them */
     const hs_pair_arrays *out; /* borrowed: where to write all that is wanted; NULL: new arrays */
     const char           *kernel;  /* borrowed; NULL: the best of this CPU */
-    int                   threads; /* so many, 0 as 1, at most HS_MOST_THREADS; -n: n from
-                                  HS_POINTS_FOR_THREADS on, else 1 */
+    int                   threads; /* at most so many, 0 as 1, where the work is worth them, and
+                                  HS_MOST_THREADS; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
     double       memory_limit;     /* bytes that result and search may take; infinity: no limit */
     hs_limit_fn  find_limit;       /* NULL, or called for a further limit beyond 64 MB */
     void        *find_context;
@@ -224,18 +246,29 @@ typedef enum hs_rule {
 } hs_rule;
 
 /*
- * A reach for each pair, by the radii of its points or by their types; everything is borrowed. With
- * it options->cutoff is a further limit, which may be infinite for radii, and failure->row may be
- * that of a radius or type.
+ * A reach for each pair, by the radii of its points, by their types or by their supports; all is
+ * borrowed. With it options->cutoff is a further limit, which may be infinite but for types, and
+ * failure->row may be that of a radius, type or support.
+ *
+ * The support of a point is a symmetric positive definite matrix H: D is within it if |H D| is at
+ * most the extent, or less than that where options->inclusive is false. The rule says within whose
+ * support D must be: HS_RULE_MAX, that of i or of j; HS_RULE_MIN, both; HS_RULE_GATHER, that of i;
+ * HS_RULE_SCATTER, that of j. For 1, 2 and 3 dimensions.
  */
 typedef struct hs_reach {
     hs_rule        rule;
-    const double  *radii;       /* n, from 0 to 2^1022; NULL where the rule needs none */
-    const double  *query_radii; /* of queries, if there are any; NULL where the rule needs none */
-    int32_t        n_types;     /* in place of radii, if not 0: */
-    const int32_t *types;       /* n, from 0 to n_types - 1 */
-    const int32_t *query_types; /* of queries, if there are any */
-    const double  *cutoffs;     /* n_types * n_types, finite and symmetric; negative: no pairs */
+    const double  *radii;         /* n, from 0 to 2^1022; NULL where the rule needs none */
+    const double  *query_radii;   /* of queries, if there are any; NULL where the rule needs none */
+    int32_t        n_types;       /* in place of radii, if not 0: */
+    const int32_t *types;         /* n, from 0 to n_types - 1 */
+    const int32_t *query_types;   /* of queries, if there are any */
+    const double  *cutoffs;       /* n_types * n_types, finite and symmetric; negative: no pairs */
+    bool           has_supports;  /* in place of radii and types: */
+    const double  *supports;      /* n * ndim * ndim; NULL where the rule needs none */
+    const double *query_supports; /* of queries, if there are any; NULL where the rule needs none */
+    double extent; /* of supports: finite, not negative. Radii count so many times, as real numbers:
+                    * from 2^-64 to 2^64, with radii of 0 or from 2^-500 to 2^500, and rules that
+                    * take one of two radii; 0 as 1, without these bounds */
 } hs_reach;
 
 /*
@@ -251,7 +284,8 @@ typedef struct hs_among {
     const hs_points *queries; /* where neighbours are looked for; NULL: at each of the points */
     const hs_cells  *cells;   /* in place of points and box, which are NULL then; or NULL */
     const hs_reach  *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
-                               * hs_pairs_count, hs_neighbors_*, hs_stream_open, hs_pairs_visit */
+                               * hs_pairs_count, hs_neighbors_*, hs_stream_open, hs_pairs_visit,
+                               * hs_plan_make */
 } hs_among;
 
 /* A finished search: opaque, owned by the caller. */
@@ -476,8 +510,8 @@ hs_status hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t 
  * once, for several images. HS_ERR_CUTOFF for a cutoff that the cells cannot serve, HS_ERR_FAR for
  * queries that they cannot. Open space and boxes along the coordinate axes take queries up to some
  * 2^850 cutoffs away, skewed boxes those within four times the distance of the points or 1024 box
- * vectors. failure.row, column and value tell which one; row is -1 for cells that are
- * one cell with everything. Of the options out, sorted and want are ignored; counters.pairs is 0.
+ * vectors. failure.row, column and value tell which one; row is -1 for cells that are one cell with
+ * everything. Of the options out, precision, sorted and want are ignored; counters.pairs is 0.
  */
 hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
                               const hs_options *options, hs_pairs **ranges, hs_failure *failure);
@@ -487,11 +521,12 @@ hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
  * with another. All arrays are borrowed.
  */
 typedef struct hs_systems {
-    int64_t        n;       /* 0 <= n < 2^31 */
-    const int64_t *first;   /* n + 1; from 0, not descending, to the number of points */
-    const hs_box  *box;     /* of all; NULL: open space */
-    const double  *rows;    /* n * ndim * ndim, in place of box->rows: of each; or NULL */
-    const double  *cutoffs; /* n, in place of options->cutoff; or NULL */
+    int64_t         n;       /* 0 <= n < 2^31 */
+    const int64_t  *first;   /* n + 1; from 0, not descending, to the number of points */
+    const hs_box   *box;     /* of all; NULL: open space */
+    const double   *rows;    /* n * ndim * ndim, in place of box->rows: of each; or NULL */
+    const double   *cutoffs; /* n, in place of options->cutoff; or NULL */
+    const hs_reach *reach;   /* of all points; the cutoffs are further limits; or NULL */
 } hs_systems;
 
 /*
@@ -556,23 +591,28 @@ hs_verlet_state hs_verlet_look(const hs_verlet *list);
 void hs_verlet_free(hs_verlet *list);
 
 /* What a search of this scene would do: cells are made, by threads if these pay, and not searched.
- * No queries. */
+ * No queries. With a reach there may be several searches: then what is said of cells and images is
+ * that of the one with the largest reach. */
 typedef struct hs_plan {
-    int         ndim;
-    int         n_periodic;
-    bool        aligned;           /* every periodic box vector lies along one coordinate axis */
-    bool        reduced;           /* the box was replaced by an equivalent, less skewed one */
-    bool        keeps_originals;   /* coordinates as given are kept beside the wrapped */
-    bool        all_pairs;         /* one cell: every point meets every point */
-    bool        sparse;            /* only occupied cells are stored, out of those of shape */
-    int64_t     shape[HS_MAX_DIM]; /* cells along each grid axis */
-    double      cell_size[HS_MAX_DIM]; /* extent of a cell along each grid axis */
-    int64_t     reach[HS_MAX_DIM];     /* cells to look at on either side */
-    int64_t     images[HS_MAX_DIM];    /* periods that a pair can be apart; 0 on open axes */
-    int64_t     stencil_rows;          /* neighbouring rows of cells, own row included */
-    double      expected_pairs;        /* from the density; NaN where there is none */
-    int         threads;               /* that the walk would be shared by */
-    const char *kernel;                /* static storage */
+    int          ndim;
+    int          n_periodic;
+    bool         aligned;           /* every periodic box vector lies along one coordinate axis */
+    bool         reduced;           /* the box was replaced by an equivalent, less skewed one */
+    bool         keeps_originals;   /* coordinates as given are kept beside the wrapped */
+    hs_algorithm algorithm;         /* that of the options, or what was chosen for HS_AUTO */
+    bool         all_pairs;         /* one cell: every point meets every point */
+    bool         sparse;            /* only occupied cells are stored, out of those of shape */
+    int64_t      n_searches;        /* 1, or those of a hierarchy; 0: no points can be pairs */
+    int64_t      n_cells;           /* cells that are stored */
+    int64_t      shape[HS_MAX_DIM]; /* cells along each grid axis */
+    double       cell_size[HS_MAX_DIM]; /* extent of a cell along each grid axis */
+    int64_t      reach[HS_MAX_DIM];     /* cells to look at on either side */
+    int64_t      images[HS_MAX_DIM];    /* periods that a pair can be apart; 0 on open axes */
+    int64_t      stencil_rows;          /* neighbouring rows of cells, own row included */
+    double       expected_pairs;        /* from the pairs of some points; where these are too many
+                                        * to count, from the density if that says more */
+    int          threads;               /* that the walk would be shared by */
+    const char  *kernel;                /* static storage */
 } hs_plan;
 
 hs_status hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan,
@@ -593,9 +633,9 @@ hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrappe
                       hs_failure *failure);
 
 /*
- * Memory of results that are gone is kept for the next ones, up to a limit: the one thing that
- * outlives a call. No answer depends on it. Bytes kept at most (256 MB at first; 0 keeps nothing),
- * bytes kept now, and giving all of it back to the system.
+ * Memory of results that are gone, and a megabyte that a call has worked in, is kept for the next
+ * ones, up to a limit: the one thing that outlives a call. No answer depends on it. Bytes kept at
+ * most (256 MB at first; 0 keeps nothing), bytes kept now, and giving all of it back to the system.
  */
 size_t hs_pool_limit(void);
 void   hs_pool_set_limit(size_t bytes);

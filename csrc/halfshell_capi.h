@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * halfshell_capi.h: the functions of halfshell.h for other extension modules, without linking: a
- * table of pointers that the Python package holds out in a capsule. Include Python.h before it.
+ * halfshell_capi.h: the functions of halfshell.h, halfshell_nodes.h and halfshell_dynamic.h for
+ * other extension modules, without linking: a table of pointers that the Python package holds out
+ * in a capsule. Include Python.h before it.
  *
  *     static const hs_capi *halfshell;                      once, when the module is initialised:
  *     halfshell = hs_capi_import();                         NULL: an exception is set
  *     status = halfshell->pairs_find(&among, &options, &pairs, &failure);
  *
- * Member `pairs_find` is hs_pairs_find, and so on: halfshell.h says what each does. Do not call the
+ * Member `pairs_find` is hs_pairs_find, and so on: the headers say what each does. Do not call the
  * functions by their own names, unless you link a core of your own; never free by one of the two
  * what came from the other.
  *
@@ -23,7 +24,8 @@
 #error "include Python.h before halfshell_capi.h"
 #endif
 
-#include "halfshell.h"
+#include "halfshell_dynamic.h"
+#include "halfshell_nodes.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -31,7 +33,7 @@ extern "C" {
 
 /* Of the structs, enums and signatures in halfshell.h. It grows when one changes such that modules
  * that were compiled before would misread it; not when functions are appended to the table. */
-#define HS_CAPI_VERSION 3
+#define HS_CAPI_VERSION 4
 
 #define HS_CAPI_NAME "halfshell._core._C_API"
 
@@ -104,6 +106,71 @@ typedef struct hs_capi {
     size_t (*pool_held)(void);
     void (*pool_clear)(void);
     int (*kernel_names)(const char **names, int capacity);
+    hs_status (*connectivity_build)(const hs_among *among, const hs_node_lists *lists,
+                                    const hs_options *options, hs_connectivity **connectivity,
+                                    hs_failure *failure);
+    hs_status (*connectivity_link)(const hs_half_list *pairs, const hs_node_lists *lists,
+                                   const hs_options *options, hs_connectivity **connectivity,
+                                   hs_failure *failure);
+    hs_pairs *(*connectivity_rows)(hs_connectivity *connectivity);
+    hs_pairs *(*connectivity_pairs)(hs_connectivity *connectivity);
+    hs_pairs *(*connectivity_lists)(hs_connectivity *connectivity);
+    void (*connectivity_free)(hs_connectivity *connectivity);
+    hs_status (*connectivity_pair)(const hs_list_rows *rows, const hs_node_lists *lists,
+                                   const hs_options *options, hs_connectivity **connectivity,
+                                   hs_failure *failure);
+    hs_status (*rows_keep)(const hs_list_rows *rows, const hs_node_change *change,
+                           const int64_t *source, int64_t n, const hs_options *options,
+                           hs_pairs **result, hs_failure *failure);
+    hs_status (*node_pairs_keep)(const hs_node_pairs *pairs, const hs_node_change *change,
+                                 const bool *keep, const hs_options *options,
+                                 hs_connectivity **result, hs_failure *failure);
+    hs_status (*rows_without)(const hs_list_rows *rows, const hs_list_rows *without, bool ascend,
+                              const hs_options *options, hs_pairs **result, hs_failure *failure);
+    hs_status (*connectivity_overlap)(const hs_points *points, const hs_index_rows *gather,
+                                      const hs_node_lists *lists, const hs_options *options,
+                                      hs_pairs **rows, hs_failure *failure);
+    hs_status (*connectivity_intersect)(const hs_points *points, const hs_half_list *pairs,
+                                        const hs_node_lists *lists, const hs_options *options,
+                                        hs_pairs **result, hs_failure *failure);
+    hs_status (*feet_between)(const hs_points *points, const double *p, const double *q,
+                              bool *between, hs_failure *failure);
+    hs_status (*morton_keys)(const hs_points *points, const double *low, const double *high,
+                             uint64_t *keys, hs_failure *failure);
+    hs_dynamic_options (*dynamic_options_default)(void);
+    hs_status (*dynamic_new)(const hs_dynamic_options *options, hs_dynamic **list,
+                             hs_failure *failure);
+    void (*dynamic_free)(hs_dynamic *list);
+    hs_status (*dynamic_copy)(const hs_dynamic *list, hs_dynamic **copy);
+    hs_status (*dynamic_insert)(hs_dynamic *list, hs_key key, const double *position,
+                                hs_failure *failure);
+    hs_status (*dynamic_move)(hs_dynamic *list, hs_key key, const double *position,
+                              hs_failure *failure);
+    bool (*dynamic_remove)(hs_dynamic *list, hs_key key);
+    hs_status (*dynamic_insert_many)(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                                     const hs_points *positions, hs_failure *failure);
+    hs_status (*dynamic_move_many)(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                                   const hs_points *positions, hs_failure *failure);
+    hs_status (*dynamic_remove_many)(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
+                                     int64_t n, bool *removed, hs_failure *failure);
+    void (*dynamic_clear)(hs_dynamic *list);
+    hs_status (*dynamic_shrink_to_fit)(hs_dynamic *list);
+    int64_t (*dynamic_length)(const hs_dynamic *list);
+    bool (*dynamic_has)(const hs_dynamic *list, hs_key key);
+    hs_status (*dynamic_position)(const hs_dynamic *list, hs_key key, double *position);
+    hs_status (*dynamic_cell)(const hs_dynamic *list, hs_key key, int64_t *cell);
+    hs_status (*dynamic_near)(const hs_dynamic *list, const double *position, double radius,
+                              hs_dynamic_fn visit, void *user, hs_failure *failure);
+    hs_status (*dynamic_within)(const hs_dynamic *list, const double *position, double radius,
+                                bool with_shift, hs_dynamic_fn visit, void *user,
+                                hs_failure *failure);
+    hs_status (*dynamic_any_within)(const hs_dynamic *list, const double *position, double radius,
+                                    const hs_key *skip, bool *any, hs_failure *failure);
+    int64_t (*dynamic_keys)(const hs_dynamic *list, int64_t *cursor, hs_key *keys, int64_t n);
+    void (*dynamic_hold)(hs_dynamic *list);
+    void (*dynamic_release)(hs_dynamic *list);
+    hs_dynamic_state (*dynamic_look)(const hs_dynamic *list);
+    void (*dynamic_count)(hs_dynamic *list, hs_dynamic_counters *counters);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What compiled modules know of halfshell.h and halfshell_capi.h, kept in capi_layout.json: a
-module that was compiled against an older header must not misread what a newer core hands out.
+"""What compiled modules know of halfshell.h, halfshell_nodes.h, halfshell_dynamic.h and
+halfshell_capi.h, kept in capi_layout.json: a module that was compiled against an older header must
+not misread what a newer core hands out.
 
     python tests/capi_layout.py            compare
     python tests/capi_layout.py --write    after structs or functions were added, or after
@@ -25,7 +26,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 CSRC = ROOT / "csrc"
 FILE = Path(__file__).with_name("capi_layout.json")
-GROWING = {"HS_STATUS_END"}  # the number of those before it
+GROWING = {"HS_STATUS_END", "HS_RULE_END"}  # the number of those before it
 
 Layout = dict[str, Any]
 
@@ -35,10 +36,15 @@ def bare(name: str) -> str:
     return re.sub(r"/\*.*?\*/", "", (CSRC / name).read_text(), flags=re.DOTALL)
 
 
+def public() -> str:
+    """The text of the public headers without comments."""
+    return "".join(map(bare, ("halfshell.h", "halfshell_nodes.h", "halfshell_dynamic.h")))
+
+
 def structs() -> dict[str, list[str]]:
-    """The members of each struct in halfshell.h."""
+    """The members of each struct in the public headers."""
     found = {}
-    for name, body in re.findall(r"typedef struct (\w+) \{(.*?)\n\}", bare("halfshell.h"), re.S):
+    for name, body in re.findall(r"typedef struct (\w+) \{(.*?)\n\}", public(), re.S):
         declarations = re.sub(r"\[\w+\]", "", body).split(";")
         members = [m for text in declarations for m in re.findall(r"(\w+)\s*(?:,|$)", text.strip())]
         found[name] = members
@@ -46,14 +52,14 @@ def structs() -> dict[str, list[str]]:
 
 
 def constants() -> list[str]:
-    """The names of all members of enums in halfshell.h."""
-    bodies = re.findall(r"enum[ \w]*\{(.*?)\}", bare("halfshell.h"), re.DOTALL)
+    """The names of all members of enums in the public headers."""
+    bodies = re.findall(r"enum[ \w]*\{(.*?)\}", public(), re.DOTALL)
     return [name for body in bodies for name in re.findall(r"\bHS_\w+", body)]
 
 
 def declared() -> list[str]:
-    """The functions of halfshell.h, without their prefix, in order."""
-    text = re.sub(r"\{[^{}]*\}", "", re.sub(r"^#.*", "", bare("halfshell.h"), flags=re.MULTILINE))
+    """The functions of the public headers, without their prefix, in order."""
+    text = re.sub(r"\{[^{}]*\}", "", re.sub(r"^#.*", "", public(), flags=re.MULTILINE))
     return re.findall(r"^(?!typedef)[\w ]+[ *]hs_(\w+)\(", text, re.MULTILINE)
 
 
@@ -69,7 +75,8 @@ def version() -> int:
 
 def measured() -> Layout:
     """What a compiler says of structs and constants."""
-    lines = ['#include "halfshell.h"', "#include <stdio.h>", "int main(void) {"]
+    headers = ('"halfshell_dynamic.h"', '"halfshell_nodes.h"', "<stdio.h>")
+    lines = [*(f"#include {header}" for header in headers), "int main(void) {"]
     show = '    printf("%s %lld\\n", "{}", (long long)({}));'
     for name, members in structs().items():
         lines.append(show.format(name, f"sizeof({name})"))

@@ -23,7 +23,7 @@ from halfshell import scenes
 
 FILE = Path(__file__).with_name("scenes.json")
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scenes.md"
-NAMES = (*scenes.names(), *scenes.names(radii=True))
+NAMES = (*scenes.names(), *scenes.names(radii=True, supports=True, updates=True))
 ABOUT = "pairs and SHA-256 of scenes; written by tests/scene_files.py"
 BEGIN, END = "<!-- scenes: begin -->\n", "<!-- scenes: end -->\n"
 
@@ -31,14 +31,20 @@ BEGIN, END = "<!-- scenes: begin -->\n", "<!-- scenes: end -->\n"
 def digest(scene: scenes.Scene) -> str:
     """SHA-256 of everything that decides the answer, the same on every machine."""
     hashed = hashlib.sha256()
-    limit = scene.rule if scene.radii is not None else scene.cutoff.hex()
+    limit = scene.rule if scene.cutoff is None else scene.cutoff.hex()
     hashed.update(f"{limit} {scene.periodic} {scene.inclusive}\n".encode())
     add(hashed, scene.points)
     add(hashed, scene.box)
     if scene.radii is not None:
         add(hashed, scene.radii)
+    if scene.supports is not None:
+        add(hashed, scene.supports)
+        add(hashed, scene.extent)
     if scene.motion is not None:
         for value in vars(scene.motion).values():
+            add(hashed, value)
+    if scene.updates is not None:
+        for value in vars(scene.updates).values():
             add(hashed, value)
     return hashed.hexdigest()
 

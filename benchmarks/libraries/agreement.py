@@ -171,10 +171,11 @@ def is_pair(
     else:
         vectors = [_moved(between, rows, near) for near in _nearest(scene, rows, i, j)]
     square = min(sum(x * x for x in vector) for vector in vectors)
-    limit = Fraction(scene.cutoff) ** 2
+    reach = sum(Fraction(part) for part in scene.reach(i, j))
+    limit = reach**2
     inside = square <= limit if inclusive else square < limit
     # sqrt(1 + e) - 1 = e / 2 where it matters, and the sign is exact.
-    return inside, float((square - limit) / limit) / 2.0
+    return inside, float((square - limit) / limit * reach) / 2.0 / scene.cutoff
 
 
 def _nearest(scene: Scene, rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from halfshell._peers import in_space
 from halfshell._peers.adapters import columns
-from libraries import histogram_peers, nearest_peers
+from libraries import histogram_peers, nearest_peers, reach_peers
 from libraries.contestant import Call, Contestant, Halfshell
 from libraries.peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin
 from scenes import Scene
@@ -204,6 +204,8 @@ def for_scene(peer: Contestant, scene: Scene) -> Contestant:
         return nearest_peers.PEERS[peer.name]
     if scene.task in _PEERS:
         return _PEERS[scene.task][peer.name]
+    if scene.has_reach:
+        return reach_peers.PEERS[peer.name]
     return peer if scene.batch is None else peer.for_batch()
 
 
@@ -214,6 +216,8 @@ def ours_for(ours: Halfshell | None, scene: Scene) -> Halfshell | None:
         return histogram_peers.OwnHistogram(ours.options)
     if ours is not None and scene.nearest:
         return nearest_peers.OwnNearest(ours.options)
+    if ours is not None and scene.has_reach:
+        return reach_peers.OwnReach(ours.options)
     if ours is None or scene.task not in kinds:
         return ours
     return kinds[scene.task](ours.options)

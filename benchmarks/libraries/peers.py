@@ -118,6 +118,23 @@ class PyKDTree(Contestant):
         raise ValueError(f"{self.name} finds no pairs")
 
 
+class PySPH(Contestant):
+    """PySPH: neighbours within the larger smoothing length alone (`reach_peers`)."""
+
+    name = "PySPH"
+    distribution = "pysph"
+    module = "pysph.base.nnps"
+    counts_alone = True
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Refuse all that `reach_peers` does not ask for."""
+        return "one cutoff"
+
+    def prepare(self, scene: Scene) -> Call:
+        """Fail: whoever is refused is not asked."""
+        raise ValueError(f"{self.name} does not take one cutoff")
+
+
 PEERS: dict[str, Contestant] = {
     peer.name: peer
     for peer in (
@@ -131,5 +148,6 @@ PEERS: dict[str, Contestant] = {
         Ase(),
         Corrfunc(),
         PyKDTree(),
+        PySPH(),
     )
 }

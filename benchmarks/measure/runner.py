@@ -160,8 +160,9 @@ def _held_against(scene: Scene, ours: Halfshell) -> dict[str, tuple[Scene, Call,
             found[name] = (scene, call, variant.count(scene, call()))
         elif limit.kind in ("scene", "growth"):
             other = load(limit.other)
-            call = ours.prepare(other)
-            found[name] = (other, call, ours.count(other, call()))
+            asked = ours_for(Halfshell(ours.options), other) or ours
+            call = asked.prepare(other)
+            found[name] = (other, call, asked.count(other, call()))
     return found
 
 

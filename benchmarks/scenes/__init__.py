@@ -12,7 +12,7 @@ machines.
 
 # In this order they are run and listed.
 from scenes import main, small, crystals, uniform, sparse  # noqa: F401, I001
-from scenes import contacts, sets, histograms, order, nearest  # noqa: F401
+from scenes import contacts, sets, histograms, order, nearest, reach  # noqa: F401
 from scenes.registry import GROUPS, SCENES, TITLES, known, load
 from scenes.scene import Limit, Scene
 

@@ -41,6 +41,7 @@ TITLES = {
     "S13": "input order: random, sorted, and the worst",
     "S14": "one thread and two",
     "S15": "the k nearest points",
+    "S16": "a reach for each pair, by radii or types",
 }
 GROUPS: dict[str, list[str]] = {group: [] for group in TITLES}
 

@@ -12,8 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "COUNT_PEERS", "FAST_PEERS", "HISTOGRAM_PEERS", "LIST_PEERS", "NEAREST_PEERS", "Floats",
-    "Limit", "Scene",
+    "COUNT_PEERS",
+    "FAST_PEERS",
+    "HISTOGRAM_PEERS",
+    "LIST_PEERS",
+    "NEAREST_PEERS",
+    "REACH_PEERS",
+    "Floats",
+    "Limit",
+    "Scene",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -32,6 +39,7 @@ LIST_PEERS = (
 FAST_PEERS = ("vesin", "cKDTree", "neighborlist-rs", "pymatgen")
 HISTOGRAM_PEERS = ("Corrfunc", "cKDTree", "freud")
 NEAREST_PEERS = ("pykdtree", "cKDTree", "freud")
+REACH_PEERS = ("cKDTree", "matscipy-neighbours", "ase")
 COUNT_PEERS = ("Corrfunc", "cKDTree", "vesin", "neighborlist-rs")
 
 
@@ -70,7 +78,8 @@ class Scene:
 
     With `batch` the points are those of several systems, one after the other, and pairs are
     sought within each; the box is then of shape (systems, d, d), or None. The task "between" takes
-    the first `n_queries` points as queries, and pairs them with the others.
+    the first `n_queries` points as queries, and pairs them with the others. With `radii` or `types`
+    each pair has a reach of its own, and the cutoff is at least the largest.
     """
 
     name: str
@@ -88,6 +97,11 @@ class Scene:
     limits: tuple[Limit, ...] = ()
     peers: tuple[str, ...] = LIST_PEERS
     batch: NDArray[np.int64] | None = None  # (n,) ascending numbers of systems
+    radii: Floats | None = None  # (n,)
+    rule: str = "sum"  # or "max", what is made of two radii
+    supports: Floats | None = None  # (n, d, d); those of the report have some
+    types: NDArray[np.int32] | None = None  # (n,)
+    table: Floats | None = None  # (t, t), cutoffs by type
     n_queries: int = 0
     nearest: int = 0  # with the task "nearest": so many of each point; there is no cutoff
     bins: int = 0  # with the task "count": so many bins of equal width, or one number
@@ -143,6 +157,20 @@ class Scene:
         heights = 1.0 / np.linalg.norm(np.linalg.inv(self.rows), axis=-2)
         return bool(np.any(heights[..., list(self.periodic)] <= 2.0 * self.cutoff))
 
+    @property
+    def has_reach(self) -> bool:
+        """Whether each pair has a reach of its own."""
+        return self.radii is not None or self.types is not None
+
+    def reach(self, i: int, j: int) -> tuple[float, ...]:
+        """Return the numbers whose sum is the reach of a pair."""
+        if self.table is not None and self.types is not None:
+            return (float(self.table[self.types[i], self.types[j]]),)
+        if self.radii is None:
+            return (self.cutoff,)
+        both = float(self.radii[i]), float(self.radii[j])
+        return both if self.rule == "sum" else (max(both),)
+
     def systems(self) -> list[Scene]:
         """Return a scene for each system of a batch, or this scene alone."""
         if self.batch is None:
@@ -163,6 +191,9 @@ class Scene:
             state.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
         if self.batch is not None:
             state.update(self.batch.tobytes())
+        for array in (self.radii, self.types, self.table):
+            if array is not None:
+                state.update(array.tobytes() + self.rule.encode())
         if self.n_queries > 0:
             state.update(str(self.n_queries).encode())
         if self.nearest > 0:

@@ -134,19 +134,42 @@ hs_quantities_of(PyObject *object, const char *known, const char **letters, unsi
     return seen != 0;
 }
 
+/* The number of the name that it is; -1 with an exception that says what it must be. */
+static int
+number_of_name(PyObject *object, const char *const *names, int n, const char *must_be)
+{
+    for (int k = 0; PyUnicode_Check(object) && k < n; k++) {
+        if (PyUnicode_CompareWithASCIIString(object, names[k]) == 0) {
+            return k;
+        }
+    }
+    hs_refuse(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError, must_be, object);
+    return -1;
+}
+
 bool
 hs_precision_of(PyObject *object, hs_precision *precision)
 {
     static const char *const names[] = {"exact", "double", "single"};
-    for (int k = 0; PyUnicode_Check(object) && k < 3; k++) {
-        if (PyUnicode_CompareWithASCIIString(object, names[k]) == 0) {
-            *precision = (hs_precision)k;
-            return true;
-        }
-    }
-    hs_refuse(PyUnicode_Check(object) ? PyExc_ValueError : PyExc_TypeError,
-              "precision must be 'exact', 'double' or 'single'", object);
-    return false;
+    const int                k =
+        number_of_name(object, names, 3, "precision must be 'exact', 'double' or 'single'");
+    *precision = k >= 0 ? (hs_precision)k : HS_EXACT;
+    return k >= 0;
+}
+
+const char *const hs_algorithm_names[HS_ALGORITHM_END] = {
+    [HS_AUTO] = "auto", [HS_ALL_PAIRS] = "all-pairs", [HS_GRID] = "grid",
+    [HS_HASH] = "hash", [HS_HIERARCHY] = "hierarchy",
+};
+
+bool
+hs_algorithm_of(PyObject *object, hs_algorithm *algorithm)
+{
+    const int k =
+        number_of_name(object, hs_algorithm_names, HS_ALGORITHM_END,
+                       "algorithm must be 'auto', 'all-pairs', 'grid', 'hash' or 'hierarchy'");
+    *algorithm = k >= 0 ? (hs_algorithm)k : HS_AUTO;
+    return k >= 0;
 }
 
 bool

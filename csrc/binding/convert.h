@@ -36,6 +36,10 @@ bool hs_quantities_of(PyObject *object, const char *known, const char **letters,
 
 bool hs_precision_of(PyObject *object, hs_precision *precision);
 
+/* One of these names, by number of the algorithm. */
+extern const char *const hs_algorithm_names[HS_ALGORITHM_END];
+bool                     hs_algorithm_of(PyObject *object, hs_algorithm *algorithm);
+
 /* None or a string; the string borrows from the object. */
 bool hs_name_of(PyObject *object, const char *argument, const char **name);
 

@@ -105,14 +105,22 @@ hs_format_bytes(double bytes, char *text, size_t size)
 {
     static const char *const units[] = {"bytes", "kB", "MB", "GB"};
     int                      unit = 0;
-    if (isinf(bytes)) {
-        snprintf(text, size, "no more");
-        return text;
-    }
     for (; unit < 3 && bytes >= 999.5; unit++) {
         bytes /= 1e3;
     }
     snprintf(text, size, "%.3g %s", bytes, units[unit]);
+    return text;
+}
+
+const char *
+hs_format_limit(double bytes, char *text, size_t size)
+{
+    char allowed[32];
+    if (isinf(bytes)) {
+        snprintf(text, size, "the system has no more");
+    } else {
+        snprintf(text, size, "%s are allowed", hs_format_bytes(bytes, allowed, sizeof allowed));
+    }
     return text;
 }
 
@@ -126,11 +134,14 @@ hs_took_more(const hs_failure *failure)
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
-    char text[320], needed[32], search[32], limit[32];
-    hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
-    const bool stored = failure->expected_bytes > 0.0; /* and not only counted */
+    char text[320], pairs[80], bytes[32], search[32], limit[48];
+    snprintf(pairs, sizeof pairs, "about %.3g pairs", failure->expected_pairs);
+    if (failure->expected_bytes > 0.0) { /* they were to be stored, and not only counted */
+        snprintf(pairs, sizeof pairs, "about %.3g pairs (%s)", failure->expected_pairs,
+                 hs_format_bytes(failure->expected_bytes, bytes, sizeof bytes));
+    }
     hs_format_bytes(failure->search_bytes, search, sizeof search);
-    hs_format_bytes(failure->limit_bytes, limit, sizeof limit);
+    hs_format_limit(failure->limit_bytes, limit, sizeof limit);
     if (isinf(failure->expected_bytes)) {
         snprintf(text, sizeof text,
                  "the result would not fit: the cutoff spans more images of the box than any "
@@ -138,25 +149,20 @@ raise_memory(const hs_failure *failure)
     } else if (failure->search_bytes > 0.0 && hs_took_more(failure)) {
         snprintf(text, sizeof text,
                  "the search would not fit: it needs more than the %s that are allowed, where "
-                 "about %.3g pairs%s%s%s and %s for the search itself were expected",
-                 limit, failure->expected_pairs, stored ? " (" : "", stored ? needed : "",
-                 stored ? ")" : "", search);
+                 "%s and %s for the search itself were expected",
+                 hs_format_bytes(failure->limit_bytes, bytes, sizeof bytes), pairs, search);
     } else if (failure->search_bytes > 0.0) {
         snprintf(text, sizeof text,
-                 "the search would not fit: about %.3g pairs%s%s%s are expected and the search "
-                 "itself takes about %s, but %s %s",
-                 failure->expected_pairs, stored ? " (" : "", stored ? needed : "",
-                 stored ? ")" : "", search, limit,
-                 isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
+                 "the search would not fit: %s are expected and the search itself takes about %s, "
+                 "but %s",
+                 pairs, search, limit);
     } else if (failure->expected_pairs == 0.0) { /* nothing is known of what is lacking */
-        snprintf(text, sizeof text, "no memory for the search, its cells or its counts: %s %s",
-                 limit, isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
+        snprintf(text, sizeof text, "no memory for the search, its cells or its counts: %s", limit);
     } else {
         snprintf(text, sizeof text,
-                 "the result would not fit: about %.3g pairs (%s) are expected, %s are allowed%s; "
+                 "the result would not fit: %s are expected, %s%s; "
                  "use a smaller cutoff, fewer quantities, iter_pairs or count_pairs",
-                 failure->expected_pairs, needed, limit,
-                 hs_took_more(failure) ? " for them and the search" : "");
+                 pairs, limit, hs_took_more(failure) ? " for them and the search" : "");
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
@@ -218,9 +224,11 @@ raise_edges(const hs_failure *failure)
 static PyObject *
 raise_types(const hs_failure *failure)
 {
-    return raise_number(PyExc_ValueError, failure->value,
-                        "types must be from 0 on, got %stypes[%lld] = ",
-                        failure->in_queries ? "query_" : "", (long long)failure->row);
+    const char *name = failure->in_queries ? "query_types" : "types";
+    PyErr_Format(PyExc_ValueError,
+                 "%s must be from 0 on and below the number of types, got %s[%lld] = %lld", name,
+                 name, (long long)failure->row, (long long)failure->value);
+    return NULL;
 }
 
 static PyObject *
@@ -238,6 +246,35 @@ raise_weights(const hs_failure *failure)
     const char *name = failure->in_queries ? "query_weights" : "weights";
     return raise_number(PyExc_ValueError, failure->value,
                         "%s must be finite, got %s[%lld] = ", name, name, (long long)failure->row);
+}
+
+static PyObject *
+raise_supports(const hs_failure *failure)
+{
+    const char *name = failure->in_queries ? "query_supports" : "supports";
+    PyErr_Format(PyExc_ValueError,
+                 "%s must be finite, symmetric and positive definite; %s[%lld] is not, for "
+                 "exactly the numbers given",
+                 name, name, (long long)failure->row);
+    return NULL;
+}
+
+static PyObject *
+raise_support_reach(const hs_failure *failure)
+{
+    const char *name = failure->in_queries ? "query_supports" : "supports";
+    PyErr_Format(PyExc_ValueError,
+                 "%s must reach at most 2**1022, and at most 2**1074 times as far in one direction "
+                 "as in another; %s[%lld] reaches further",
+                 name, name, (long long)failure->row);
+    return NULL;
+}
+
+static PyObject *
+raise_extent(const hs_failure *failure)
+{
+    return raise_number(PyExc_ValueError, failure->value,
+                        "extent must be finite and not negative, got ");
 }
 
 static PyObject *
@@ -299,6 +336,15 @@ raise_argument(const hs_failure *failure)
     return NULL;
 }
 
+/* The binding of dynamic lists names keys itself. */
+static PyObject *
+raise_key(const hs_failure *failure)
+{
+    (void)failure;
+    PyErr_SetString(PyExc_KeyError, hs_status_text(HS_ERR_KEY));
+    return NULL;
+}
+
 /* By status; NULL for those that are no failure, and for a kernel, whose name the options have. */
 static PyObject *(*const RAISE[])(const hs_failure *) = {
     [HS_ERR_MEMORY] = raise_memory,
@@ -317,7 +363,11 @@ static PyObject *(*const RAISE[])(const hs_failure *) = {
     [HS_ERR_TYPES] = raise_types,
     [HS_ERR_WEIGHTS] = raise_weights,
     [HS_ERR_RADII] = raise_radii,
+    [HS_ERR_SUPPORTS] = raise_supports,
+    [HS_ERR_SUPPORT_REACH] = raise_support_reach,
+    [HS_ERR_EXTENT] = raise_extent,
     [HS_ERR_ARGUMENT] = raise_argument,
+    [HS_ERR_KEY] = raise_key,
 };
 
 PyObject *

@@ -14,8 +14,12 @@ PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options
 /* Of HS_ERR_MEMORY: whether what was expected is within the limit, and more was taken. */
 bool hs_took_more(const hs_failure *failure);
 
-/* Bytes in the largest unit of which there is one, such as "1.5 GB"; "no more" of infinitely many,
- * for what may be taken. Returns text, of so many bytes; 32 suffice. */
+/* Bytes in the largest unit of which there is one, such as "1.5 GB". Returns text, of so many
+ * bytes; 32 suffice, and 48 for the next. */
 const char *hs_format_bytes(double bytes, char *text, size_t size);
+
+/* What may be taken: "1.5 GB are allowed", or where nothing but the system sets a limit, "the
+ * system has no more". */
+const char *hs_format_limit(double bytes, char *text, size_t size);
 
 #endif

@@ -28,6 +28,20 @@ static PyMethodDef methods[] = {
     {"batch_pairs", FASTCALL(hs_py_batch_pairs), METH_FASTCALL, "pairs of many systems."},
     {"batch_count", FASTCALL(hs_py_batch_count), METH_FASTCALL, "count_pairs of many systems."},
     {"nearest", FASTCALL(hs_py_nearest), METH_FASTCALL, "See halfshell.nearest."},
+    {"connect", FASTCALL(hs_py_connect), METH_FASTCALL, "See halfshell.Connectivity."},
+    {"connect_search", FASTCALL(hs_py_connect_search), METH_FASTCALL,
+     "See halfshell.Connectivity."},
+    {"overlap", FASTCALL(hs_py_overlap), METH_FASTCALL, "See halfshell.Connectivity.overlap."},
+    {"intersect", FASTCALL(hs_py_intersect), METH_FASTCALL,
+     "See halfshell.Connectivity.intersection."},
+    {"pair_rows", FASTCALL(hs_py_pair_rows), METH_FASTCALL, "See halfshell.Connectivity.pairs."},
+    {"keep_rows", FASTCALL(hs_py_keep_rows), METH_FASTCALL, "See halfshell.Connectivity.patch."},
+    {"keep_pairs", FASTCALL(hs_py_keep_pairs), METH_FASTCALL, "See halfshell.Connectivity.patch."},
+    {"rows_without", FASTCALL(hs_py_rows_without), METH_FASTCALL,
+     "See halfshell.Connectivity.remove."},
+    {"feet_between", FASTCALL(hs_py_feet_between), METH_FASTCALL,
+     "See halfshell.Connectivity.intersection_of."},
+    {"morton_keys", FASTCALL(hs_py_morton_keys), METH_FASTCALL, "Places on the Z curve."},
     {"explain", FASTCALL(hs_py_explain), METH_FASTCALL, "See halfshell.explain."},
     {"kernels", hs_py_kernels, METH_NOARGS, "See halfshell.kernels."},
     {"default_kernel", hs_py_default_kernel, METH_NOARGS, "The kernel where none is named."},
@@ -48,16 +62,18 @@ static PyMethodDef methods[] = {
     {"verlet_pairs", FASTCALL(hs_py_verlet_pairs), METH_FASTCALL,
      "See halfshell.VerletList.pairs."},
     {"verlet_look", hs_py_verlet_look, METH_O, "What a list of halfshell.VerletList is like."},
+    {"dynamic_new", FASTCALL(hs_py_dynamic_new), METH_FASTCALL, "See halfshell.DynamicCellList."},
     {NULL, NULL, 0, NULL},
 };
 
 static int
 module_exec(PyObject *module)
 {
-    PyObject **stream_type = PyModule_GetState(module);
+    PyObject **types = PyModule_GetState(module);
     hs_environment_read();
-    *stream_type = hs_py_stream_type(module);
-    if (*stream_type == NULL || hs_py_add_capi(module) < 0) {
+    types[HS_STREAM_TYPE] = hs_py_stream_type(module);
+    types[HS_DYNAMIC_TYPE] = types[HS_STREAM_TYPE] != NULL ? hs_py_dynamic_type(module) : NULL;
+    if (types[HS_DYNAMIC_TYPE] == NULL || hs_py_add_capi(module) < 0) {
         return -1;
     }
     return PyArray_ImportNumPyAPI();
@@ -66,16 +82,18 @@ module_exec(PyObject *module)
 static int
 module_traverse(PyObject *module, visitproc visit, void *arg)
 {
-    PyObject **stream_type = PyModule_GetState(module);
-    Py_VISIT(*stream_type);
+    PyObject **types = PyModule_GetState(module);
+    Py_VISIT(types[HS_STREAM_TYPE]);
+    Py_VISIT(types[HS_DYNAMIC_TYPE]);
     return 0;
 }
 
 static int
 module_clear(PyObject *module)
 {
-    PyObject **stream_type = PyModule_GetState(module);
-    Py_CLEAR(*stream_type);
+    PyObject **types = PyModule_GetState(module);
+    Py_CLEAR(types[HS_STREAM_TYPE]);
+    Py_CLEAR(types[HS_DYNAMIC_TYPE]);
     return 0;
 }
 
@@ -94,7 +112,7 @@ static struct PyModuleDef definition = {
     .m_base = PyModuleDef_HEAD_INIT,
     .m_name = "halfshell._core",
     .m_doc = "The C core of halfshell. Private: use the functions of halfshell.",
-    .m_size = sizeof(PyObject *), /* hs_py_stream_type */
+    .m_size = HS_TYPES * sizeof(PyObject *),
     .m_methods = methods,
     .m_slots = slots,
     .m_traverse = module_traverse,

@@ -156,6 +156,7 @@ take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
         return false;
     }
     systems->box = call->among.box;
+    systems->reach = call->among.reach;
     if (systems->rows != NULL) {
         const npy_intp *shape = PyArray_DIMS((PyArrayObject *)arguments[2]);
         if (systems->box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1] ||
@@ -192,7 +193,7 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     batch            given;
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS + 4;
     (void)module;
-    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaa", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaahg", arguments, n_arguments) ||
         !hs_py_call_is_apart(&call, more[0], "batch") ||
         !hs_py_call_is_apart(&call, more[1], "cutoff") ||
         !hs_py_call_is_apart(&call, more[2], "box") || !take_batch(more, &call, &given)) {
@@ -235,7 +236,7 @@ hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_py_call call;
     batch      given;
     (void)module;
-    if (!hs_py_call_take(&call, "batch_count", "aaa", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "batch_count", "aaahg", arguments, n_arguments) ||
         !take_batch(arguments + HS_CALL_ARGUMENTS, &call, &given)) {
         return NULL;
     }

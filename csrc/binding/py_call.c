@@ -123,6 +123,7 @@ take_number(char letter, PyObject *object, bool is_plain, hs_py_call *call)
     case 'b': return take_index_bytes(object, is_plain, options);
     case 'f': return take_truth(object, &call->flag);
     case 'i': call->integer = PyLong_AsLongLong(object); return !PyErr_Occurred();
+    case 'g': return hs_algorithm_of(object, &options->algorithm);
     case 'x': call->real = PyFloat_AsDouble(object); return !PyErr_Occurred();
     default: return true;
     }
@@ -180,7 +181,7 @@ take_reach(PyObject *object, hs_py_call *call)
 {
     const int64_t n_queries = call->among.queries != NULL ? call->queries.n : 0;
     call->among.reach = &call->reach;
-    return hs_reach_of(object, call->points.n, n_queries, &call->reach);
+    return hs_reach_of(object, call->points.n, n_queries, call->points.ndim, &call->reach);
 }
 
 /* What else is a view: queries, reach, and `out`, which comes last and is compared with others. */
@@ -216,15 +217,25 @@ hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
     return n_arguments == expected;
 }
 
+/* Letters of arguments that cannot be left out. */
+static int
+count_needed(const char *more, int n_letters)
+{
+    int n = n_letters;
+    while (n > 0 && (more[n - 1] == 'h' || more[n - 1] == 'g')) {
+        n--;
+    }
+    return n;
+}
+
 bool
 hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *const *arguments,
                 Py_ssize_t n_arguments)
 {
-    const bool       is_plain = (n_arguments & HS_PLAIN) != 0;
-    const int        n_given = (int)((n_arguments & ~HS_PLAIN) - HS_CALL_ARGUMENTS);
-    const int        n_letters = (int)strlen(more);
-    const bool       may_reach = n_letters > 0 && more[n_letters - 1] == 'h';
-    const int        n_more = n_letters - (may_reach && n_given == n_letters - 1);
+    const bool is_plain = (n_arguments & HS_PLAIN) != 0;
+    const int  n_given = (int)((n_arguments & ~HS_PLAIN) - HS_CALL_ARGUMENTS);
+    const int  n_letters = (int)strlen(more), n_needed = count_needed(more, n_letters);
+    const int  n_more = n_given < n_needed ? n_needed : n_given < n_letters ? n_given : n_letters;
     PyObject *const *own = arguments + HS_CALL_ARGUMENTS;
     PyObject        *queries = NULL, *out = NULL, *reach = NULL;
     hs_options      *options = &call->options;

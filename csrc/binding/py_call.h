@@ -46,7 +46,8 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  *   Q  queries, or None                      o  out, or None
  *   R  queries                               f, i, x  `flag`, `integer`, `real` of the call
  *   a  anything: left to the function, which runs no Python code for it
- *   h  reach (reach.h), or None: the last one, which may be left out
+ *   h  reach (reach.h), or None: may be left out
+ *   g  name of an algorithm: the last one, which may be left out
  *
  * Returns false with an exception set, or without one where HS_PLAIN is set: see plain.h.
  */

@@ -2,9 +2,16 @@
 /* py_explain.c: _core.explain: what would be done, and what was done. */
 #include "py_functions.h"
 
+#include "convert.h"
 #include "py_call.h"
 #include "errors.h"
 #include "tuples.h"
+
+static PyObject *
+name_of(hs_algorithm algorithm)
+{
+    return PyUnicode_FromString(hs_algorithm_names[algorithm]);
+}
 
 static bool
 put_plan(PyObject *dict, const hs_plan *plan)
@@ -14,6 +21,9 @@ put_plan(PyObject *dict, const hs_plan *plan)
            hs_dict_put(dict, "aligned", PyBool_FromLong(plan->aligned)) &&
            hs_dict_put(dict, "reduced", PyBool_FromLong(plan->reduced)) &&
            hs_dict_put(dict, "keeps_originals", PyBool_FromLong(plan->keeps_originals)) &&
+           hs_dict_put(dict, "algorithm", name_of(plan->algorithm)) &&
+           hs_dict_put(dict, "n_searches", PyLong_FromLongLong(plan->n_searches)) &&
+           hs_dict_put(dict, "n_cells", PyLong_FromLongLong(plan->n_cells)) &&
            hs_dict_put(dict, "all_pairs", PyBool_FromLong(plan->all_pairs)) &&
            hs_dict_put(dict, "sparse", PyBool_FromLong(plan->sparse)) &&
            hs_dict_put(dict, "shape", hs_tuple_of_integers(plan->shape, plan->ndim)) &&
@@ -36,6 +46,7 @@ put_bytes(PyObject *dict, const hs_counters *counters)
         [HS_FOR_CANDIDATES] = "candidates", [HS_FOR_INDICES] = "indices",
         [HS_FOR_DISTANCES] = "distances",   [HS_FOR_VECTORS] = "vectors",
         [HS_FOR_SHIFTS] = "shifts",         [HS_FOR_SORTING] = "sorting",
+        [HS_FOR_SUPPORTS] = "supports",
     };
     for (int p = 0; p < HS_PURPOSE_END; p++) {
         if (!hs_dict_put(dict, names[p], PyLong_FromLongLong(counters->bytes[p]))) {
@@ -85,7 +96,7 @@ hs_py_explain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
     hs_counters counters = {0};
     hs_pairs   *pairs = NULL;
     (void)module;
-    if (!hs_py_call_take(&call, "explain", "qsbf", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "explain", "qsbfhg", arguments, n_arguments)) {
         return NULL;
     }
     hs_py_call_release(&call);

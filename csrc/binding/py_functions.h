@@ -42,9 +42,12 @@ hs_py_search hs_py_cells_find;
 /* The arguments of py_call.h with cells, queries or None -> (offsets, (first, end)). */
 hs_py_search hs_py_cells_candidates;
 
+/* The types that the module keeps as its state, by number. */
+enum { HS_STREAM_TYPE, HS_DYNAMIC_TYPE, HS_TYPES };
+
 /* py_stream.c. Those of py_call.h, then quantities, index_bytes, max_pairs -> an iterator. */
 hs_py_search hs_py_iter_pairs;
-/* The type of these, a new reference or NULL; the module keeps it as its state. */
+/* The type of these, a new reference or NULL. */
 PyObject *hs_py_stream_type(PyObject *module);
 
 /* py_visit.c. The arguments of py_call.h, then what to call (a callable, or the address of a
@@ -52,10 +55,38 @@ PyObject *hs_py_stream_type(PyObject *module);
 hs_py_search hs_py_for_each_pair;
 
 /* py_batch.c. The arguments of py_call.h (where each system has a box of its own, any one of that
- * shape), quantities, sort, index_bytes, out; batch, cutoffs or None, boxes or None. */
+ * shape), quantities, sort, index_bytes, out; batch, cutoffs or None, boxes or None; reach and
+ * algorithm, as all that find pairs. */
 hs_py_search hs_py_batch_pairs;
 /* The arguments of py_call.h, batch, cutoffs, boxes. */
 hs_py_search hs_py_batch_count;
+
+/* py_connectivity.c. The arguments of py_call.h, of which points and resources count, then i, j,
+ * shifts or None of a half list; n_nodes, n_ghosts, number or None, flags (1: rows of ghosts, 2:
+ * pairs of them, 4: rows alone) -> (rows, (nodes, lists)): rows are offsets, indices and, where
+ * there are any, shifts; nodes those of pairs, i, j and shifts; lists theirs, or None for both. */
+hs_py_search hs_py_connect;
+/* Those of py_call.h; n_nodes, n_ghosts, number or None, flags; reach -> the same. */
+hs_py_search hs_py_connect_search;
+/* Those of py_call.h, offsets and indices of rows; n_nodes, n_ghosts, number or None, flags
+ * -> offsets, indices. */
+hs_py_search hs_py_overlap;
+/* Those of py_call.h, i, j; n_nodes, n_ghosts, number or None, flags -> offsets, indices. */
+hs_py_search hs_py_intersect;
+/* py_node_changes.c, all with the arguments of py_call.h, of which resources count. offsets,
+ * indices, shifts or None of rows; n_nodes, n_ghosts, None, flags -> (None, (nodes, lists)). */
+hs_py_search hs_py_pair_rows;
+/* offsets, indices, shifts or None; n_nodes, target, place or None; source or None -> rows. */
+hs_py_search hs_py_keep_rows;
+/* offsets, indices, shifts or None, the same of what goes; the number of lists, whether rows ascend
+ * -> rows. */
+hs_py_search hs_py_rows_without;
+/* i_node, i_list, j_node, j_list, shifts or None; n_nodes or None, target or None; keep or None
+ * -> (None, (nodes, lists)). */
+hs_py_search hs_py_keep_pairs;
+/* py_connectivity.c. points, p, q -> bools; points, low, high -> keys. */
+hs_py_search hs_py_feet_between;
+hs_py_search hs_py_morton_keys;
 
 /* py_nearest.c. Those of py_call.h (cutoff: the largest distance), then quantities of j d D S,
  * index_bytes; queries or None, k -> arrays of k entries a query, one query after another. */
@@ -93,5 +124,11 @@ hs_py_search hs_py_verlet_update;
 hs_py_search hs_py_verlet_pairs;
 /* A list -> dict of its state. */
 hs_py_single hs_py_verlet_look;
+
+/* py_dynamic_new.c. dim, cell_size, box or None, periodic (bits), storage (a number), max_radius or
+ * 0, inclusive, tagged, what makes arrays of positions -> a list. */
+hs_py_search hs_py_dynamic_new;
+/* py_dynamic.c. The type of these, a new reference or NULL. */
+PyObject *hs_py_dynamic_type(PyObject *module);
 
 #endif

@@ -12,21 +12,20 @@
 static PyObject *
 raise_memory(const hs_failure *failure)
 {
-    char        text[320], needed[32], limit[32];
-    const char *verb = isinf(failure->limit_bytes) ? "is to be had" : "are allowed";
-    hs_format_bytes(failure->limit_bytes, limit, sizeof limit);
+    char text[320], needed[32], limit[48];
+    hs_format_limit(failure->limit_bytes, limit, sizeof limit);
     if (failure->expected_bytes > 0.0 && !isinf(failure->expected_bytes)) {
         hs_format_bytes(failure->expected_bytes, needed, sizeof needed);
         snprintf(text, sizeof text,
-                 "the result would not fit: %.3g entries (%s), %s %s%s; use a smaller k, fewer "
+                 "the result would not fit: %.3g entries (%s), %s%s; use a smaller k, fewer "
                  "quantities, or fewer queries at a time",
-                 failure->expected_pairs, needed, limit, verb,
+                 failure->expected_pairs, needed, limit,
                  hs_took_more(failure) ? " for them and the search" : "");
     } else {
         snprintf(text, sizeof text,
-                 "no memory for the search: %s %s; perhaps a point is so far from the others, or "
+                 "no memory for the search: %s; perhaps a point is so far from the others, or "
                  "the box so small, that too many images are about as near",
-                 limit, verb);
+                 limit);
     }
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;

@@ -22,7 +22,7 @@ hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_py_call call;
     hs_pairs  *rows;
     (void)module;
-    if (!hs_py_call_take(&call, "pairs_between", "qsboRh", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "pairs_between", "qsboRhg", arguments, n_arguments)) {
         return NULL;
     }
     const hs_status status = find_rows(&call, &rows);
@@ -35,7 +35,7 @@ hs_py_neighbors(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     hs_py_call call;
     hs_pairs  *rows;
     (void)module;
-    if (!hs_py_call_take(&call, "neighbors", "rbQh", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "neighbors", "rbQhg", arguments, n_arguments)) {
         return NULL;
     }
     const hs_status status = find_rows(&call, &rows);
@@ -47,7 +47,7 @@ hs_py_coordination(PyObject *module, PyObject *const *arguments, Py_ssize_t n_ar
 {
     hs_py_call call;
     (void)module;
-    if (!hs_py_call_take(&call, "coordination", "Qh", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "coordination", "Qhg", arguments, n_arguments)) {
         return NULL;
     }
     npy_intp  n_rows = (npy_intp)(call.among.queries != NULL ? call.queries.n : call.points.n);

@@ -11,7 +11,7 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
     hs_py_call call;
     hs_pairs  *pairs = NULL;
     (void)module;
-    if (!hs_py_call_take(&call, "pairs", "qsboh", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "pairs", "qsbohg", arguments, n_arguments)) {
         return NULL;
     }
     hs_py_call_release(&call);
@@ -39,12 +39,12 @@ PyObject *
 hs_py_count_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     (void)module;
-    return count("count_pairs", "h", arguments, n_arguments);
+    return count("count_pairs", "hg", arguments, n_arguments);
 }
 
 PyObject *
 hs_py_count_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     (void)module;
-    return count("count_between", "Rh", arguments, n_arguments);
+    return count("count_between", "Rhg", arguments, n_arguments);
 }

@@ -5,7 +5,6 @@
 #include "py_call.h"
 #include "errors.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -56,13 +55,12 @@ end(pair_stream *self)
 static PyObject *
 raise_block_too_large(const pair_stream *self, const hs_failure *failure)
 {
-    char text[192], limit[32];
+    char text[192], limit[48];
     snprintf(text, sizeof text,
-             "no memory for blocks of max_pairs = %lld pairs: %s %s; use a smaller max_pairs or "
+             "no memory for blocks of max_pairs = %lld pairs: %s; use a smaller max_pairs or "
              "fewer quantities",
              (long long)self->call.integer,
-             hs_format_bytes(failure->limit_bytes, limit, sizeof limit),
-             isinf(failure->limit_bytes) ? "is to be had" : "are allowed");
+             hs_format_limit(failure->limit_bytes, limit, sizeof limit));
     PyErr_SetString(PyExc_MemoryError, text);
     return NULL;
 }
@@ -179,7 +177,7 @@ static bool
 take_arguments(pair_stream *self, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call *call = &self->call;
-    if (!hs_py_call_take(call, "iter_pairs", "qbih", arguments, n_arguments)) {
+    if (!hs_py_call_take(call, "iter_pairs", "qbihg", arguments, n_arguments)) {
         return false;
     }
     strcpy(self->letters, call->letters); /* six different ones at most */
@@ -192,7 +190,7 @@ take_arguments(pair_stream *self, PyObject *const *arguments, Py_ssize_t n_argum
 PyObject *
 hs_py_iter_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
-    PyTypeObject *type = *(PyTypeObject **)PyModule_GetState(module);
+    PyTypeObject *type = ((PyTypeObject **)PyModule_GetState(module))[HS_STREAM_TYPE];
     pair_stream  *self = (pair_stream *)type->tp_alloc(type, 0); /* zeros */
     if (self == NULL || !take_arguments(self, arguments, n_arguments)) {
         Py_XDECREF(self);

@@ -121,7 +121,7 @@ hs_py_for_each_pair(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_visit   visit = {0};
     int64_t    n = 0;
     (void)module;
-    if (!hs_py_call_take(&call, "for_each_pair", "aafh", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "for_each_pair", "aafhg", arguments, n_arguments) ||
         !take_function(arguments + HS_CALL_ARGUMENTS, &to_call, &visit)) {
         return NULL;
     }

@@ -4,7 +4,18 @@
 
 #include "convert.h"
 
-enum { RULE, RADII, QUERY_RADII, TYPES, QUERY_TYPES, TABLE, N_FIELDS };
+enum {
+    RULE,
+    RADII,
+    QUERY_RADII,
+    TYPES,
+    QUERY_TYPES,
+    TABLE,
+    SUPPORTS,
+    QUERY_SUPPORTS,
+    EXTENT,
+    N_FIELDS
+};
 
 /* The entries of a C-contiguous array of this type and length, or NULL for None. */
 static bool
@@ -40,14 +51,51 @@ take_table(PyObject *object, hs_reach *reach)
     return true;
 }
 
+/* The entries of a C-contiguous float64 array of so many square matrices, or NULL for None. */
+static bool
+take_matrices(PyObject *object, int64_t length, int ndim, const double **entries)
+{
+    PyArrayObject *array = (PyArrayObject *)object;
+    if (object == Py_None) {
+        return true;
+    }
+    if (!hs_is_array(object, NPY_DOUBLE, 3) || PyArray_DIM(array, 0) != length ||
+        PyArray_DIM(array, 1) != ndim || PyArray_DIM(array, 2) != ndim) {
+        PyErr_SetString(PyExc_TypeError,
+                        "supports must be float64 arrays of one matrix for each point or query");
+        return false;
+    }
+    *entries = PyArray_DATA(array);
+    return true;
+}
+
+static bool
+take_supports(PyObject *object, int64_t n_points, int64_t n_queries, int ndim, hs_reach *reach)
+{
+    PyObject *extent = PyTuple_GET_ITEM(object, EXTENT);
+    if (extent == Py_None) {
+        return true;
+    }
+    if (!PyFloat_CheckExact(extent)) {
+        PyErr_SetString(PyExc_TypeError, "extent must be a float");
+        return false;
+    }
+    reach->has_supports = PyTuple_GET_ITEM(object, SUPPORTS) != Py_None ||
+                          PyTuple_GET_ITEM(object, QUERY_SUPPORTS) != Py_None;
+    reach->extent = PyFloat_AS_DOUBLE(extent);
+    return take_matrices(PyTuple_GET_ITEM(object, SUPPORTS), n_points, ndim, &reach->supports) &&
+           take_matrices(PyTuple_GET_ITEM(object, QUERY_SUPPORTS), n_queries, ndim,
+                         &reach->query_supports);
+}
+
 bool
-hs_reach_of(PyObject *object, int64_t n_points, int64_t n_queries, hs_reach *reach)
+hs_reach_of(PyObject *object, int64_t n_points, int64_t n_queries, int ndim, hs_reach *reach)
 {
     const void *radii, *query_radii, *types, *query_types;
     *reach = (hs_reach){.n_types = 0};
     if (!PyTuple_CheckExact(object) || PyTuple_GET_SIZE(object) != N_FIELDS ||
         !PyLong_CheckExact(PyTuple_GET_ITEM(object, RULE))) {
-        PyErr_SetString(PyExc_TypeError, "reach must be None or a tuple of six");
+        PyErr_SetString(PyExc_TypeError, "reach must be None or a tuple of nine");
         return false;
     }
     const long rule = PyLong_AsLong(PyTuple_GET_ITEM(object, RULE));
@@ -67,5 +115,6 @@ hs_reach_of(PyObject *object, int64_t n_points, int64_t n_queries, hs_reach *rea
     reach->query_radii = query_radii;
     reach->types = types;
     reach->query_types = query_types;
-    return take_table(PyTuple_GET_ITEM(object, TABLE), reach);
+    return take_table(PyTuple_GET_ITEM(object, TABLE), reach) &&
+           take_supports(object, n_points, n_queries, ndim, reach);
 }

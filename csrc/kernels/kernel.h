@@ -28,6 +28,7 @@
 
 #include "../core/base/base.h"
 #include "../core/exact/filter.h"
+#include "../core/exact/support.h"
 #include "../halfshell.h"
 #include "batch.h"
 #include "sift.h"
@@ -84,8 +85,14 @@ typedef struct hs_unsure {
     int32_t at;    /* its entry of hits; of no meaning when counting */
 } hs_unsure;
 
-/* What a scan compares: s of either form, or of the direct one with a limit for each pair. */
-typedef enum hs_scan_form { HS_SCAN_DIRECT, HS_SCAN_EXPANDED, HS_SCAN_LIMITS } hs_scan_form;
+/* What a scan compares: s of either form, or of the direct one with a limit for each pair, or of
+ * the direct one and of the supports of each pair. */
+typedef enum hs_scan_form {
+    HS_SCAN_DIRECT,
+    HS_SCAN_EXPANDED,
+    HS_SCAN_LIMITS,
+    HS_SCAN_SUPPORTS
+} hs_scan_form;
 
 /* How the radii of a pair make its limit, for the scans that compare each pair with its own. */
 typedef struct hs_limit_scan {
@@ -122,27 +129,50 @@ hs_limit_thresholds(const hs_limit_scan *limits, float of_point, float of_other)
     return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out > 0.0f ? out * out : 0.0f};
 }
 
+/*
+ * Supports over their extent (filter.h), for the scans that compare |N (y - q)| of a point's or a
+ * candidate's N, each as so many numbers (hs_support_numbers).
+ */
+typedef struct hs_support_scan {
+    hs_rule rule; /* HS_RULE_MAX: within one of the two; HS_RULE_MIN: within both; HS_RULE_GATHER:
+                   * within that of the point; HS_RULE_SCATTER: within that of the candidate */
+    hs_limit_form form;
+    const float  *of_point; /* all numbers of one point of the group after those of the other */
+    const float  *of_block; /* of the candidates, a row for each number; n + HS_PADDING */
+    int64_t       pitch;    /* from one row to the next */
+} hs_support_scan;
+
+/* The thresholds of a support of this size. */
+HS_ALWAYS_INLINE hs_thresholds
+hs_support_thresholds(hs_limit_form form, float size)
+{
+    const float in = size * form.in_factor - form.in_less;
+    const float out = size * form.out_factor + form.out_more;
+    return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out > 0.0f ? out * out : 0.0f};
+}
+
 /* Points of a group against a block of candidates; all arrays borrowed. */
 typedef struct hs_scan {
-    int            ndim;
-    const float   *y[HS_MAX_DIM]; /* candidates, n + HS_PADDING each, those past n of any value */
-    const float   *norm;          /* sum of y_k^2, n + HS_PADDING */
-    const int32_t *label;         /* what a hit is listed as; n + HS_PADDING */
-    int32_t        n;             /* candidates */
-    const float   *q[HS_MAX_DIM]; /* points, n_points each */
-    int32_t        n_points;      /* at most HS_GROUP_POINTS */
-    bool           triangular;    /* point t meets only the candidates after place t */
-    hs_thresholds  direct;        /* thresholds of the direct form */
-    hs_expanded    expanded;      /* and of the expanded one */
-    hs_limit_scan  limits;        /* for list_limits and count_limits only */
-    int32_t       *hits;          /* receives labels; most_hits + HS_PADDING */
-    int32_t       *end;           /* receives, for each point, where its hits end; n_points */
-    float         *squares;       /* receives s of each hit, by `squares` alone; as hits */
-    hs_unsure     *unsure;        /* receives hits with !(s < in); most_unsure */
-    int32_t        most_hits;     /* at least n */
-    int32_t        most_unsure;   /* at least n */
-    int32_t        n_unsure;      /* set by the scan */
-    int64_t        n_hits;        /* set by the scan: their number, unsure ones included */
+    int             ndim;
+    const float    *y[HS_MAX_DIM]; /* candidates, n + HS_PADDING each, those past n of any value */
+    const float    *norm;          /* sum of y_k^2, n + HS_PADDING */
+    const int32_t  *label;         /* what a hit is listed as; n + HS_PADDING */
+    int32_t         n;             /* candidates */
+    const float    *q[HS_MAX_DIM]; /* points, n_points each */
+    int32_t         n_points;      /* at most HS_GROUP_POINTS */
+    bool            triangular;    /* point t meets only the candidates after place t */
+    hs_thresholds   direct;        /* thresholds of the direct form */
+    hs_expanded     expanded;      /* and of the expanded one */
+    hs_limit_scan   limits;        /* for list_limits and count_limits only */
+    hs_support_scan supports;      /* for list_supports and count_supports only */
+    int32_t        *hits;          /* receives labels; most_hits + HS_PADDING */
+    int32_t        *end;           /* receives, for each point, where its hits end; n_points */
+    float          *squares;       /* receives s of each hit, by `squares` alone; as hits */
+    hs_unsure      *unsure;        /* receives hits with !(s < in); most_unsure */
+    int32_t         most_hits;     /* at least n */
+    int32_t         most_unsure;   /* at least n */
+    int32_t         n_unsure;      /* set by the scan */
+    int64_t         n_hits;        /* set by the scan: their number, unsure ones included */
 } hs_scan;
 
 /*
@@ -154,6 +184,11 @@ typedef struct hs_scan {
  *
  * list_limits and count_limits take the thresholds of each pair from scan->limits, and are of the
  * direct form.
+ *
+ * list_supports and count_supports list candidates that are not surely beyond by the direct form,
+ * nor by the rule and the supports, of which s = z_0^2 + z_1^2 + ..., z_k = N_k0 (y_0 - q_0) + ...,
+ * fused or not, is compared with thresholds of its own. Unsure are those that are not surely within
+ * by both. Up to HS_SUPPORT_DIM axes only.
  *
  * `squares` lists as the direct form does, and writes s of each hit, fused or not. It does not look
  * at `in`, notes none as unsure and leaves unsure and n_unsure alone.
@@ -276,6 +311,8 @@ typedef struct hs_kernel {
     hs_scan_fn    count_direct;
     hs_scan_fn    list_limits;
     hs_scan_fn    count_limits;
+    hs_scan_fn    list_supports;
+    hs_scan_fn    count_supports;
     hs_scan_fn    squares;
     hs_emit_fn    emit_int32;
     hs_emit_fn    emit_int64;
@@ -292,11 +329,12 @@ typedef struct hs_kernel {
 } hs_kernel;
 
 /* The fields that each kernel's file fills with its own functions of these names. */
-#define HS_KERNEL_LOOPS                                                                       \
-    .gather = gather, .list = list, .count = count, .list_direct = list_direct,               \
-    .count_direct = count_direct, .list_limits = list_limits, .count_limits = count_limits,   \
-    .squares = squares, .emit_int32 = emit_int32, .emit_int64 = emit_int64, .relate = relate, \
-    .order = order, .near_boxes = near_boxes
+#define HS_KERNEL_LOOPS                                                                     \
+    .gather = gather, .list = list, .count = count, .list_direct = list_direct,             \
+    .count_direct = count_direct, .list_limits = list_limits, .count_limits = count_limits, \
+    .list_supports = list_supports, .count_supports = count_supports, .squares = squares,   \
+    .emit_int32 = emit_int32, .emit_int64 = emit_int64, .relate = relate, .order = order,   \
+    .near_boxes = near_boxes
 
 extern const hs_kernel hs_kernel_scalar; /* plain C, any CPU; the specification of the others */
 extern const hs_kernel hs_kernel_avx2;   /* x86-64 only */

@@ -7,6 +7,7 @@
  * the second packs the labels. Measured: half the time of one loop that does both.
  */
 #include "kernel.h"
+#include "support_scalar.h"
 
 #include <string.h>
 
@@ -19,6 +20,7 @@ typedef struct scalar_scan {
     hs_thresholds thresholds;
     float         radius; /* for limits: of the point ... */
     const float  *others; /* ... and of the candidates */
+    scalar_own    own;    /* its support */
 } scalar_scan;
 
 HS_ALWAYS_INLINE scalar_scan
@@ -37,6 +39,7 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
         v.radius = scan->limits.of_point != NULL ? scan->limits.of_point[t] : 0.0f;
         v.others = hs_limit_row(&scan->limits, t);
     }
+    v.own = own_support(&scan->supports, form == HS_SCAN_SUPPORTS, t, ndim);
     return v;
 }
 
@@ -64,8 +67,7 @@ thresholds_of(const hs_scan *scan, const scalar_scan *v, int32_t c)
     return hs_limit_thresholds(&scan->limits, v->radius, v->others != NULL ? v->others[c] : 0.0f);
 }
 
-/* Tests n candidates from `begin` on: near[c] is 1 for hits, else 0. Returns whether any is
- * unsure. */
+/* Tests n candidates from `begin` on: near[c] is 1 for hits, else 0. Returns if any is unsure. */
 HS_ALWAYS_INLINE bool
 test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, const int ndim,
            const hs_scan_form form, int32_t *HS_RESTRICT near)
@@ -80,6 +82,10 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
         centre[k] = v->centre[k];
     }
     for (int32_t c = 0; c < n; c++) {
+        if (form == HS_SCAN_SUPPORTS) {
+            unsure |= note_supports(scan, v->centre, &v->own, begin + c, ndim, &near[c]);
+            continue;
+        }
         const float s = square(y, norm, centre, c, ndim, form);
         if (form == HS_SCAN_LIMITS) {
             const hs_thresholds own = thresholds_of(scan, v, begin + c);
@@ -92,15 +98,24 @@ test_chunk(const hs_scan *scan, const scalar_scan *v, int32_t begin, int32_t n, 
     return unsure != 0;
 }
 
+/* Whether candidate c, a hit, is surely within. */
+HS_ALWAYS_INLINE bool
+is_sure(const hs_scan *scan, const scalar_scan *v, int32_t c, const int ndim, hs_scan_form form)
+{
+    if (form == HS_SCAN_SUPPORTS) {
+        return meet_supports(scan, v->centre, &v->own, c, ndim).sure;
+    }
+    const float s = square(scan->y, scan->norm, v->centre, c, ndim, form);
+    return s < (form == HS_SCAN_LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in);
+}
+
 /* Notes the unsure ones of a tile, by computing its sums again. */
 HS_ALWAYS_INLINE void
 note_unsure(hs_scan *scan, const scalar_scan *v, int32_t t, int32_t begin, int32_t n,
             const int ndim, const hs_scan_form form, const int32_t *near, int32_t at)
 {
     for (int32_t c = begin; c < begin + n; c++) {
-        const float s = square(scan->y, scan->norm, v->centre, c, ndim, form);
-        const float in = form == HS_SCAN_LIMITS ? thresholds_of(scan, v, c).in : v->thresholds.in;
-        if (near[c - begin] && !(s < in)) {
+        if (near[c - begin] && !is_sure(scan, v, c, ndim, form)) {
             scan->unsure[scan->n_unsure++] = (hs_unsure){t, c, at};
         }
         at += near[c - begin];

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * scan_forms.h: the seven scans of a kernel, from its scan_points and square_points. Include it
- * after these functions. Defines list, count, list_direct, count_direct, list_limits, count_limits
- * and squares (hs_scan_fn), each with one loop for 1, 2, 3 and any number of axes, made by inlining
- * with constants.
+ * scan_forms.h: the nine scans of a kernel, from its scan_points and square_points. Include it
+ * after these functions. Defines list, count, list_direct, count_direct, list_limits, count_limits,
+ * list_supports, count_supports and squares (hs_scan_fn), each with one loop for 1, 2, 3 and, but
+ * for supports, any number of axes, made by inlining with constants.
  */
 
 HS_ALWAYS_INLINE int32_t
@@ -51,6 +51,28 @@ static int32_t
 count_limits(hs_scan *scan, int32_t first)
 {
     return scan_dimensions(scan, first, HS_SCAN_LIMITS, false);
+}
+
+HS_ALWAYS_INLINE int32_t
+scan_supports(hs_scan *scan, int32_t first, const bool lists)
+{
+    switch (scan->ndim) {
+    case 1: return scan_points(scan, first, 1, HS_SCAN_SUPPORTS, lists);
+    case 2: return scan_points(scan, first, 2, HS_SCAN_SUPPORTS, lists);
+    default: return scan_points(scan, first, 3, HS_SCAN_SUPPORTS, lists);
+    }
+}
+
+static int32_t
+list_supports(hs_scan *scan, int32_t first)
+{
+    return scan_supports(scan, first, true);
+}
+
+static int32_t
+count_supports(hs_scan *scan, int32_t first)
+{
+    return scan_supports(scan, first, false);
 }
 
 static int32_t

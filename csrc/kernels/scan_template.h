@@ -27,9 +27,28 @@ typedef struct vector_scan {
     const float *norm;
     floats       centre[HS_MAX_DIM]; /* q_k, or -2 q_k for the expanded form */
     floats       in, out;
-    floats       radius; /* and, for limits: of the point ... */
-    const float *others; /* ... and of the candidates */
+    floats       radius;                      /* and, for limits: of the point ... */
+    const float *others;                      /* ... and of the candidates */
+    floats       support[HS_SUPPORT_ENTRIES]; /* of the point, and thresholds */
+    floats       support_in, support_out;
 } vector_scan;
+
+/* The support of a point; zeros where the rule does not look at it. */
+HS_ALWAYS_INLINE void
+set_support(const hs_support_scan *supports, int32_t t, const int ndim, vector_scan *v)
+{
+    const float         none[HS_SUPPORT_ENTRIES + 1] = {0.0f};
+    const int           n = hs_support_entries(ndim);
+    const float        *numbers = supports->rule != HS_RULE_SCATTER
+                                      ? supports->of_point + (int64_t)t * hs_support_numbers(ndim)
+                                      : none;
+    const hs_thresholds thresholds = hs_support_thresholds(supports->form, numbers[n]);
+    for (int e = 0; e < n; e++) {
+        v->support[e] = broadcast(numbers[e]);
+    }
+    v->support_in = broadcast(thresholds.in);
+    v->support_out = broadcast(thresholds.out);
+}
 
 /* Sets what depends on the point. */
 HS_ALWAYS_INLINE void
@@ -51,25 +70,29 @@ set_point(const hs_scan *scan, int32_t t, const int ndim, const hs_scan_form for
         v->radius = broadcast(radii != NULL ? radii[t] : 0.0f);
         v->others = hs_limit_row(&scan->limits, t);
     }
+    if (form == HS_SCAN_SUPPORTS) {
+        set_support(&scan->supports, t, ndim, v);
+    }
 }
 
 /* The limits of LANES candidates from c on, as floats. */
 HS_ALWAYS_INLINE floats
-limits_of(const hs_limit_scan *limits, floats radius, const float *others, int32_t c)
+limits_of(const hs_limit_scan *limits, const hs_rule rule, floats radius, const float *others,
+          int32_t c)
 {
     const floats other = others != NULL ? load(others + c) : broadcast(0.0f);
-    const floats limit = limits->rule == HS_RULE_MAX   ? larger_of(radius, other)
-                         : limits->rule == HS_RULE_MIN ? smaller_of(radius, other)
-                                                       : add(radius, other);
+    const floats limit = rule == HS_RULE_MAX   ? larger_of(radius, other)
+                         : rule == HS_RULE_MIN ? smaller_of(radius, other)
+                                               : add(radius, other);
     return smaller_of(limit, broadcast(limits->bound));
 }
 
 /* Thresholds of these candidates, for HS_SCAN_LIMITS. */
 HS_ALWAYS_INLINE void
-set_limits(const hs_scan *scan, int32_t c, vector_scan *v)
+set_limits(const hs_scan *scan, const hs_rule rule, int32_t c, vector_scan *v)
 {
     const hs_limit_form form = scan->limits.form;
-    const floats        limit = limits_of(&scan->limits, v->radius, v->others, c);
+    const floats        limit = limits_of(&scan->limits, rule, v->radius, v->others, c);
     const floats        less = broadcast(-form.in_less), more = broadcast(form.out_more);
     const floats        in =
         larger_of(multiply_add(limit, broadcast(form.in_factor), less), broadcast(0.0f));
@@ -99,8 +122,100 @@ sums_of(const vector_scan *v, int32_t c, const int ndim, const hs_scan_form form
     return s;
 }
 
+/* |N along|^2 for the entries of N. */
+HS_ALWAYS_INLINE floats
+square_within(const floats *entries, const floats *along, const int ndim)
+{
+    floats s = broadcast(0.0f);
+    for (int k = 0; k < ndim; k++) {
+        floats z = multiply(entries[hs_support_at(k, 0)], along[0]);
+        for (int l = 1; l < ndim; l++) {
+            z = multiply_add(entries[hs_support_at(k, l)], along[l], z);
+        }
+        s = k == 0 ? multiply(z, z) : multiply_add(z, z, s);
+    }
+    return s;
+}
+
+/* Lanes that are not surely beyond, and of these, those that are not surely within. */
+typedef struct lanes_near {
+    mask near, maybe;
+} lanes_near;
+
+/* By the candidates' own supports. */
+HS_ALWAYS_INLINE lanes_near
+meet_candidates(const hs_support_scan *supports, const floats *along, int32_t c, const int ndim)
+{
+    const hs_limit_form form = supports->form;
+    const int           n = hs_support_entries(ndim);
+    const floats        zero = broadcast(0.0f);
+    floats              entries[HS_SUPPORT_ENTRIES];
+    for (int e = 0; e < n; e++) {
+        entries[e] = load(supports->of_block + e * supports->pitch + c);
+    }
+    const floats size = load(supports->of_block + n * supports->pitch + c);
+    const floats in =
+        larger_of(multiply_add(size, broadcast(form.in_factor), broadcast(-form.in_less)), zero);
+    const floats out =
+        larger_of(multiply_add(size, broadcast(form.out_factor), broadcast(form.out_more)), zero);
+    const floats s = square_within(entries, along, ndim);
+    const mask   near = not_greater(s, multiply(out, out));
+    return (lanes_near){near, and_not_less(near, s, multiply(in, in))};
+}
+
+/* The same by both supports, as the rule says. */
+HS_ALWAYS_INLINE lanes_near
+meet_supports(const hs_support_scan *supports, const vector_scan *v, const floats *along, int32_t c,
+              const int ndim)
+{
+    if (supports->rule == HS_RULE_SCATTER) {
+        return meet_candidates(supports, along, c, ndim);
+    }
+    const floats s = square_within(v->support, along, ndim);
+    const mask   near = not_greater(s, v->support_out);
+    const mask   maybe = and_not_less(near, s, v->support_in);
+    if (supports->rule == HS_RULE_GATHER) {
+        return (lanes_near){near, maybe};
+    }
+    const lanes_near other = meet_candidates(supports, along, c, ndim);
+    if (supports->rule == HS_RULE_MIN) {
+        const mask both = (mask)(near & other.near);
+        return (lanes_near){both, (mask)(both & (maybe | other.maybe))};
+    }
+    const mask sure = (mask)((near & ~maybe) | (other.near & ~other.maybe));
+    const mask either = (mask)(near | other.near);
+    return (lanes_near){either, (mask)(either & ~sure)};
+}
+
+HS_ALWAYS_INLINE floats
+sum_squares(const floats *along, const int ndim)
+{
+    floats s = multiply(along[0], along[0]);
+    for (int k = 1; k < ndim; k++) {
+        s = add(s, multiply(along[k], along[k]));
+    }
+    return s;
+}
+
+/* LANES candidates from c on, by the direct form and their supports. */
+HS_ALWAYS_INLINE lanes_near
+test_supports(const hs_scan *scan, const vector_scan *v, int32_t c, const int ndim)
+{
+    floats along[HS_SUPPORT_DIM];
+    for (int k = 0; k < ndim; k++) {
+        along[k] = subtract(load(v->y[k] + c), v->centre[k]);
+    }
+    const floats     s = sum_squares(along, ndim);
+    const mask       in_ball = not_greater(s, v->out);
+    const mask       maybe = and_not_less(in_ball, s, v->in);
+    const lanes_near found = meet_supports(&scan->supports, v, along, c, ndim);
+    const mask       near = (mask)(in_ball & found.near);
+    return (lanes_near){near, (mask)(near & (maybe | found.maybe))};
+}
+
 HS_ALWAYS_INLINE int32_t
-scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form, const bool lists)
+scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form,
+           const hs_rule rule, const bool lists)
 {
     const int32_t *label = scan->label;
     const int32_t  n = scan->n;
@@ -122,11 +237,17 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
         const int32_t from = scan->triangular ? t + 1 : 0;
         mask          keep = (mask)(~0u << from % LANES);
         for (int32_t c = FILLS_LINE ? from & ~(LANES - 1) : from; c < n; c += LANES) {
-            const floats s = sums_of(&v, c, ndim, form);
-            if (form == HS_SCAN_LIMITS) {
-                set_limits(scan, c, &v);
+            lanes_near found = {0, 0};
+            floats     sum = v.in;
+            if (form == HS_SCAN_SUPPORTS) {
+                found = test_supports(scan, &v, c, ndim);
+            } else {
+                sum = sums_of(&v, c, ndim, form);
             }
-            mask near = not_greater(s, v.out);
+            if (form == HS_SCAN_LIMITS) {
+                set_limits(scan, rule, c, &v);
+            }
+            mask near = form == HS_SCAN_SUPPORTS ? found.near : not_greater(sum, v.out);
             if (FILLS_LINE) {
                 near = (mask)(near & keep);
                 keep = (mask)~0u;
@@ -134,7 +255,8 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
             if (HS_UNLIKELY(n - c < LANES)) {
                 near = (mask)(near & first_lanes(n - c));
             }
-            const mask maybe = and_not_less(near, s, v.in);
+            const mask maybe = form == HS_SCAN_SUPPORTS ? (mask)(near & found.maybe)
+                                                        : and_not_less(near, sum, v.in);
             if (HS_UNLIKELY(maybe != 0)) {
                 note_unsure(scan, t, c, near, maybe, (int32_t)(hit - scan->hits));
             }
@@ -148,6 +270,19 @@ scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form for
     }
     scan->n_hits = lists ? hit - scan->hits : count;
     return t;
+}
+
+/* The rule of limits is a constant of each loop. */
+HS_ALWAYS_INLINE int32_t
+scan_points(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form, const bool lists)
+{
+    if (form == HS_SCAN_LIMITS && scan->limits.rule == HS_RULE_MAX) {
+        return scan_ruled(scan, first, ndim, form, HS_RULE_MAX, lists);
+    }
+    if (form == HS_SCAN_LIMITS && scan->limits.rule == HS_RULE_MIN) {
+        return scan_ruled(scan, first, ndim, form, HS_RULE_MIN, lists);
+    }
+    return scan_ruled(scan, first, ndim, form, HS_RULE_SUM, lists);
 }
 
 /* Unlike the direct form above, fused where that is quicker: only the caller sees s, and the bounds

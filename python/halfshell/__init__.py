@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from halfshell._convert.memory import CacheInfo, cache_info, clear_cache, set_cache_limit
 from halfshell._convert.options import kernels
-from halfshell._errors import CapacityError
+from halfshell._errors import CapacityError, StaleError
 from halfshell._functions.between import pairs_between
 from halfshell._functions.counts import count_pairs
 from halfshell._functions.pairs import pairs
@@ -23,8 +23,14 @@ if TYPE_CHECKING:
     from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._include import get_include
     from halfshell._objects.cell_list import CellList
+    from halfshell._objects.connectivity import Connectivity
+    from halfshell._objects.dynamic_cell_list import DynamicCellList
     from halfshell._objects.graph import Graph
     from halfshell._objects.neighbor_table import NeighborTable
+    from halfshell._objects.node_list import NodeList
+    from halfshell._objects.pair_changes import PairChanges
+    from halfshell._objects.pair_field import PairField
+    from halfshell._objects.pair_table import PairTable
     from halfshell._objects.verlet_list import VerletList
 
 __version__ = "0.1.0"
@@ -34,10 +40,17 @@ __all__ = [
     "CacheInfo",
     "CapacityError",
     "CellList",
+    "Connectivity",
+    "DynamicCellList",
     "Explanation",
     "Graph",
     "NeighborTable",
+    "NodeList",
+    "PairChanges",
+    "PairField",
+    "PairTable",
     "RadialDistribution",
+    "StaleError",
     "Verdict",
     "VerletList",
     "cache_info",
@@ -63,9 +76,15 @@ __all__ = [
 #: Where names are that are imported when they are first used, for a quick start.
 _LATER = {
     "CellList": "_objects.cell_list",
+    "Connectivity": "_objects.connectivity",
+    "DynamicCellList": "_objects.dynamic_cell_list",
     "Explanation": "_functions.explain",
     "Graph": "_objects.graph",
     "NeighborTable": "_objects.neighbor_table",
+    "NodeList": "_objects.node_list",
+    "PairChanges": "_objects.pair_changes",
+    "PairField": "_objects.pair_field",
+    "PairTable": "_objects.pair_table",
     "RadialDistribution": "_functions.rdf",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",

@@ -31,3 +31,25 @@ class CapacityError(ValueError):
 
     def __reduce__(self) -> tuple[type[CapacityError], tuple[str, int]]:
         return type(self), (str(self), self.needed)
+
+
+class StaleError(RuntimeError):
+    """A pair field is used whose pairs are no longer those of its connectivity.
+
+    Raised by every access to a `PairField` after `Connectivity.rebuild`, ``patch`` or ``remove``.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> c = hs.Connectivity([hs.NodeList("fluid", [[0.0], [1.0]], [1.0, 1.0])])
+    >>> field = hs.PairField(c.pairs)
+    >>> c.rebuild([hs.NodeList("fluid", [[0.0], [1.5]], [1.0, 1.0])])
+    >>> try:
+    ...     field[0]
+    ... except hs.StaleError as error:
+    ...     print(error)
+    this field belongs to pairs before rebuild(): make a new PairField of Connectivity.pairs
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)

@@ -29,7 +29,7 @@ def get_include() -> str:
     >>> import os
     >>> import halfshell as hs
     >>> sorted(name for name in os.listdir(hs.get_include()) if name.startswith("halfshell"))
-    ['halfshell.h', 'halfshell_capi.h']
+    ['halfshell.h', 'halfshell_capi.h', 'halfshell_dynamic.h', 'halfshell_nodes.h']
     """
     package = Path(__file__).resolve().parent
     installed, checkout = package / "include", package.parents[1] / "csrc"

@@ -22,6 +22,7 @@ FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", f
 
 MODULES = ["doubleword", "metric_decide", "metric_integer", "metric_compare", "metric_measure"]
 MODULES += ["metric_sum", "filter", "limit_form", "expanded", "reach"]
+MODULES += ["dyadic", "support", "support_form", "metric_support"]
 SOURCES = sorted(CORE.glob("*.c"))
 SOURCES += [HERE / "exact" / f"test_{name}.c" for name in MODULES]
 

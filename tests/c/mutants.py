@@ -7,11 +7,11 @@ Usage: python3 mutants.py [--jobs N] [--work FOLDER] SEED NUMBER [part of a file
 
 The first form tries NUMBER changes chosen by SEED in csrc/core/*/*.c, the second all changes of
 some lines; mutations.py says what is changed. Each mutant is compiled, linked with what has not
-changed, and judged by the C tests that reach its function, quick ones first, until one fails,
-crashes or takes far longer than it should. --binding changes csrc/binding instead:
-mutants_python.py has the Python tests judge. Uses $CC, or cc; "ccache gcc" makes the first build
-quick. $MUTANT_FLAGS: further flags for the core; with -fsanitize=address,undefined the sanitizers
-judge too, in several times as long.
+changed, and judged by the C tests that reach its function, quick ones first, then by quick ones
+that reach its file, until one fails, crashes or takes far longer than it should. --binding changes
+csrc/binding instead: mutants_python.py has the Python tests judge. Uses $CC, or cc; "ccache gcc"
+makes the first build quick. $MUTANT_FLAGS: further flags for the core; with
+-fsanitize=address,undefined the sanitizers judge too, in several times as long.
 
 Prints a line for each mutant, and the rate at the end:
 
@@ -51,6 +51,7 @@ FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-UNDEBUG", "-DHS_TESTING=1", "
 FURTHER = os.environ.get("MUTANT_FLAGS", "").split()
 LIBRARIES = ["-lm", "-lpthread"] + ["-Wl,--wrap=pthread_create"] * sys.platform.startswith("linux")
 PARTS = ["csrc/core", "csrc/kernels", "tests/c"]
+QUICK = 0.1  # seconds of a test
 
 # A call of what is below precedes each basic block of the core. The harness counts the tests.
 REACH_FLAGS = ["-O1", "-g", "-fPIE", "-fsanitize-coverage=trace-pc"]
@@ -237,7 +238,8 @@ class CTests(Judge):
 
     def near(self, mutation, source):
         """Tests that enter the function, and of these first those that reach the line or the last
-        before it that any reaches; all tests if none does, as far as is known."""
+        before it that any reaches; then quick ones that reach the file elsewhere, for code that is
+        inlined may count for its caller. None if no test enters the function."""
         first, last = next(f for f in functions(source) if f[0] < mutation.line < f[1])
         hits = {}
         for test, files in self.reached.items():
@@ -246,7 +248,13 @@ class CTests(Judge):
                 hits[test] = lines
         seen = {n for lines in hits.values() for n in lines if n <= mutation.line}
         anchor = max(seen, default=0)
-        return sorted(hits, key=lambda test: (anchor not in hits[test], self.seconds[test]))
+        inside = sorted(hits, key=lambda test: (anchor not in hits[test], self.seconds[test]))
+        beside = [
+            test
+            for test in sorted(self.reached, key=self.seconds.get)
+            if test not in hits and mutation.file in self.reached[test]
+        ]
+        return inside + [test for test in beside if self.seconds[test] <= QUICK] if hits else []
 
     def is_sound(self, test):
         """Whether the unchanged core passes a test, run alone."""

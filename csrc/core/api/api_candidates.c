@@ -169,7 +169,7 @@ tell_unserved(const hs_cells *cells, const hs_points *queries, double cutoff, hs
         failure->value = cutoff;
         return HS_ERR_CUTOFF;
     }
-    if (queries != NULL && !cells->search.scene.in_one_cell) {
+    if (queries != NULL) {
         hs_scene_name_refused(&cells->search.scene, queries, failure);
     }
     return HS_ERR_FAR;
@@ -187,6 +187,7 @@ find_candidates(const hs_cells *cells, const hs_points *queries, hs_pairs *rows,
     sets.keeps_none = true; /* no pairs; the ranges are allocated when their number is known */
     hs_status status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
     if (status == HS_OK) {
+        call->options.precision = cells->call.options.precision; /* no pair is decided on */
         status = hs_search_reuse(&sets, call, &search, failure);
     }
     if (status == HS_OK) {

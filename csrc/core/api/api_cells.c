@@ -6,6 +6,9 @@
 #include "../scene/points.h"
 #include "../search/search_open.h"
 
+/* Sorting so many points takes as long as all of a search with one. */
+#define POINTS_FOR_ONE 4
+
 /* The points in memory of the cells: the caller cannot change them between searches. */
 static hs_status
 keep_points(const hs_points *points, hs_cells *cells)
@@ -31,7 +34,6 @@ options_of_cells(const hs_options *options)
 {
     hs_options of_cells = *options;
     of_cells.want = HS_WANT_SHIFT;
-    of_cells.sorted = false;
     of_cells.out = NULL;
     return of_cells;
 }
@@ -43,6 +45,7 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     const hs_options of_cells = options_of_cells(options);
     hs_call         *call = &cells->call;
     failure = hs_call_enter(&of_cells, failure, call);
+    call->account.is_kept = true;
     hs_search_begin(call, &cells->search);
     hs_status status =
         hs_check_arguments(points, NULL, cells->has_box ? &cells->box : NULL, &of_cells, failure);
@@ -52,16 +55,14 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     if (status == HS_OK) {
         /* keeps_none: no pairs are kept by this call */
         const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
-        hs_call_gather(call, points->n);
+        hs_call_gather(call, points->n / POINTS_FOR_ONE);
         status =
             hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search, failure);
     }
     if (status == HS_OK && cells->trees == NULL) {
         status = HS_ERR_MEMORY;
     }
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = call->account.limit;
-    }
+    hs_call_tell_limit(call, status, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
     return status;

@@ -73,13 +73,12 @@ cell_of_point(const hs_search *search, const hs_scene *scene, int64_t i, int64_t
 hs_status
 hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_failure *failure)
 {
-    hs_call    call;
-    hs_scene   scene;
-    hs_options options = hs_options_default();
+    const hs_options options = hs_options_default();
+    hs_call          call;
+    hs_scene         scene;
     if (cells == NULL || points == NULL || !hs_has_entries(cell, points)) {
         return hs_end_early(HS_ERR_ARGUMENT, NULL, failure);
     }
-    options.cutoff = cells->call.options.cutoff;
     failure = hs_call_enter(&options, failure, &call);
     hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
     if (status == HS_OK) {

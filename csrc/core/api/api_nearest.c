@@ -35,9 +35,7 @@ find_nearest(hs_nearest *near, const hs_sets *sets, const hs_box *box, hs_failur
     if (status == HS_OK) {
         status = hs_nearest_search(near, failure);
     }
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = search->call->account.limit;
-    }
+    hs_call_tell_limit(search->call, status, failure);
     hs_nearest_release(near);
     hs_search_close(search);
     return status;

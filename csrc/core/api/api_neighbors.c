@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_neighbors.c: the public searches for all neighbours of each point, or of each query. */
-#include "by_reach.h"
+#include "reach_pairs.h"
 #include "request.h"
 #include "../base/outcome.h"
 #include "../search/estimate.h"

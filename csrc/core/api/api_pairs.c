@@ -3,6 +3,7 @@
 #include "../../halfshell.h"
 
 #include "by_reach.h"
+#include "reach_pairs.h"
 #include "request.h"
 #include "../search/estimate.h"
 #include "../collect/parallel.h"

@@ -231,9 +231,7 @@ hs_stream_next(hs_stream *stream, hs_poll_fn poll, void *context, hs_pairs **blo
     if (status == HS_OK && waiting(stream) > 0) {
         status = take_block(stream, block);
     }
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = stream->call.account.limit;
-    }
+    hs_call_tell_limit(&stream->call, status, failure);
     hs_call_set_poll(NULL, NULL, &stream->call);
     hs_leave(entry);
     return status;
@@ -264,7 +262,7 @@ open_search(const hs_request *request, hs_stream *stream, hs_failure *failure)
         return status;
     }
     const hs_status status = hs_by_reach_open(request, call, &stream->by, failure);
-    hs_by_reach_tell(call, status, failure);
+    hs_call_tell_limit(call, status, failure);
     if (status == HS_OK && request->box != NULL) {
         stream->box = *request->box;
         stream->by.box = &stream->box;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_systems.c: the public searches of many systems: find and count. Threads take ranges of
  * them. */
-#include "request.h"
+#include "by_reach.h"
 #include "../search/estimate.h"
 #include "../collect/result.h"
 #include "../box/lattice.h"
@@ -27,9 +27,19 @@ check_shared(const hs_systems_job *job, hs_failure *failure)
     if (job->total->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
-    if (systems->cutoffs == NULL && !(options->cutoff >= 0.0 && isfinite(options->cutoff))) {
+    if (systems->reach != NULL) {
+        /* Limits of each system are looked at with it. */
+        hs_options       without = *options;
+        const hs_request request = {
+            .sets.points = points, .options = &without, .reach = systems->reach};
+        without.cutoff = systems->cutoffs != NULL ? 0.0 : options->cutoff;
+        status = hs_by_reach_check(&request, failure);
+    } else if (systems->cutoffs == NULL && !(options->cutoff >= 0.0 && isfinite(options->cutoff))) {
         failure->value = options->cutoff;
-        return HS_ERR_CUTOFF;
+        status = HS_ERR_CUTOFF;
+    }
+    if (status != HS_OK) {
+        return status;
     }
     return systems->rows == NULL ? hs_box_check(systems->box, failure) : HS_OK;
 }
@@ -71,7 +81,7 @@ search_systems(hs_systems_job *job, hs_failure *failure)
     const hs_options *options = &total->options;
     hs_status         status = HS_OK;
     if (job->systems->n > 0) {
-        const int n_threads = hs_call_threads(job->points->n, options);
+        const int n_threads = hs_call_threads((double)job->points->n, options);
         const int most = job->systems->n < n_threads ? (int)job->systems->n : n_threads;
         total->team = hs_team_create(most);
         share_limit(&total->options, hs_team_size(total->team));
@@ -80,7 +90,11 @@ search_systems(hs_systems_job *job, hs_failure *failure)
     if (status == HS_ERR_MEMORY) {
         const double found = job->output != NULL ? (double)job->output->n_pairs : 0.0;
         failure->expected_pairs = fmax(failure->expected_pairs, found);
-        tell_shortage(job, failure);
+        if (job->systems->reach == NULL) {
+            tell_shortage(job, failure);
+        } else {
+            hs_call_tell_limit(total, status, failure);
+        }
     }
     return status;
 }

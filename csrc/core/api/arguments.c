@@ -154,6 +154,7 @@ hs_check_options(const hs_options *options)
     return status_of((want & ~HS_WANT_ALL) == 0 &&
                      (want == 0 || is_index_size(options->index_bytes)) &&
                      (out == NULL || can_hold(out, want)) && options->cell_size >= 0.0 &&
+                     (unsigned)options->algorithm < HS_ALGORITHM_END &&
                      (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
                       options->precision == HS_SINGLE));
 }

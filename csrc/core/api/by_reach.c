@@ -2,28 +2,54 @@
 /* by_reach.c: arguments, the division into levels, and one search after the other. */
 #include "by_reach.h"
 
+#include "../exact/support.h"
+
 #include <math.h>
+
+/* Several searches take as long for each point as one that has so many pairs of it, at least. */
+#define PAIRS_PER_POINT 60.0
 
 /* Whether a set of points has what the rule goes by. */
 static bool
-has_marks(const hs_reach *reach, const hs_points *points, const double *radii, const int32_t *types,
-          bool needs_radii)
+has_marks(const hs_reach *reach, const hs_points *points, const double *numbers,
+          const int32_t *types, bool needs_numbers)
 {
     if (reach->n_types > 0) {
         return types != NULL || points->n == 0;
     }
-    return radii != NULL || points->n == 0 || !needs_radii;
+    return numbers != NULL || points->n == 0 || !needs_numbers;
 }
 
-static hs_status
-check_reach(const hs_request *request, hs_failure *failure)
+/* Whether the limit is that of one of the two points: supports do not add up, and neither do radii
+ * that count several times. */
+static bool
+takes_one(hs_rule rule)
+{
+    return rule != HS_RULE_SUM && rule != HS_RULE_MEAN;
+}
+
+/* Whether radii may count so many times. */
+static bool
+may_extend(const hs_reach *reach)
+{
+    return reach->has_supports || reach->extent == 0.0 ||
+           (takes_one(reach->rule) && reach->n_types == 0 && reach->extent >= 0x1p-64 &&
+            reach->extent <= 0x1p64);
+}
+
+hs_status
+hs_by_reach_check(const hs_request *request, hs_failure *failure)
 {
     const hs_sets  *sets = &request->sets;
     const hs_reach *reach = request->reach;
     const bool      asks = reach->rule != HS_RULE_SCATTER, meets = reach->rule != HS_RULE_GATHER;
     const double    cutoff = request->options->cutoff;
-    if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 ||
+    const double   *own = reach->has_supports ? reach->supports : reach->radii;
+    const double   *of_queries = reach->has_supports ? reach->query_supports : reach->query_radii;
+    if ((unsigned)reach->rule >= HS_RULE_END || reach->n_types < 0 || !may_extend(reach) ||
         (reach->n_types > 0 && reach->cutoffs == NULL) ||
+        (reach->has_supports &&
+         (reach->n_types > 0 || sets->points->ndim > HS_SUPPORT_DIM || !takes_one(reach->rule))) ||
         (!sets->is_full && !(asks && meets) && reach->n_types == 0)) {
         return HS_ERR_ARGUMENT;
     }
@@ -31,12 +57,15 @@ check_reach(const hs_request *request, hs_failure *failure)
         failure->value = cutoff;
         return HS_ERR_CUTOFF;
     }
-    if (sets->queries == NULL) {
-        return has_marks(reach, sets->points, reach->radii, reach->types, true) ? HS_OK
-                                                                                : HS_ERR_ARGUMENT;
+    if (reach->has_supports && !(reach->extent >= 0.0 && isfinite(reach->extent))) {
+        failure->value = reach->extent;
+        return HS_ERR_EXTENT;
     }
-    return has_marks(reach, sets->points, reach->radii, reach->types, meets) &&
-                   has_marks(reach, sets->queries, reach->query_radii, reach->query_types, asks)
+    if (sets->queries == NULL) {
+        return has_marks(reach, sets->points, own, reach->types, true) ? HS_OK : HS_ERR_ARGUMENT;
+    }
+    return has_marks(reach, sets->points, own, reach->types, meets) &&
+                   has_marks(reach, sets->queries, of_queries, reach->query_types, asks)
                ? HS_OK
                : HS_ERR_ARGUMENT;
 }
@@ -47,19 +76,11 @@ needed_of(const hs_request *request)
 {
     hs_reach reach = *request->reach;
     if (request->sets.queries != NULL && reach.rule == HS_RULE_GATHER) {
-        reach.radii = NULL;
+        reach.radii = reach.supports = NULL;
     } else if (reach.rule == HS_RULE_SCATTER) {
-        reach.query_radii = NULL;
+        reach.query_radii = reach.query_supports = NULL;
     }
     return reach;
-}
-
-void
-hs_by_reach_tell(const hs_call *call, hs_status status, hs_failure *failure)
-{
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = call->account.limit;
-    }
 }
 
 hs_status
@@ -70,7 +91,7 @@ hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_f
     hs_status status =
         hs_check_arguments(sets->points, sets->queries, request->box, request->options, failure);
     if (status == HS_OK) {
-        status = check_reach(request, failure);
+        status = hs_by_reach_check(request, failure);
     }
     if (status == HS_OK) {
         status = call->kernel == NULL ? HS_ERR_KERNEL : hs_box_check(request->box, failure);
@@ -79,12 +100,15 @@ hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_f
         return status;
     }
     const hs_reach reach = needed_of(request);
-    hs_call_gather(call, sets->points->n + (sets->queries != NULL ? sets->queries->n : 0));
-    status =
-        hs_levels_divide(&call->account, sets->points, sets->queries, &reach, &by->levels, failure);
+    const int64_t  n = sets->points->n + (sets->queries != NULL ? sets->queries->n : 0);
+    hs_call_gather(call, n);
+    hs_call_gather_for(call, n, PAIRS_PER_POINT * (double)n);
+    status = hs_levels_divide(&call->account, &call->options, sets->points, sets->queries, &reach,
+                              &by->levels, failure);
     if (status == HS_OK) {
-        status =
-            hs_level_plan_make(&call->account, &by->levels, request->options->cutoff, &by->plan);
+        status = hs_level_plan_choose(&call->account, &call->options, &by->levels, by->box,
+                                      request->options->cutoff, request->options->algorithm,
+                                      &by->plan);
     }
     if (status != HS_OK) {
         hs_by_reach_close(&call->account, by);
@@ -153,7 +177,7 @@ hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context, hs_fail
             hs_by_reach_each(&by, request->sets.keeps_none, &call, use, context, &n_pairs, failure);
         hs_by_reach_close(&call.account, &by);
     }
-    hs_by_reach_tell(&call, status, failure);
+    hs_call_tell_limit(&call, status, failure);
     hs_call_leave(&call, n_pairs);
     hs_account_close(&call.account);
     return status;

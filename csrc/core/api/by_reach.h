@@ -6,6 +6,7 @@
 #ifndef HS_BY_REACH_H
 #define HS_BY_REACH_H
 
+#include "../levels/level_join.h"
 #include "../levels/level_search.h"
 
 #include "request.h"
@@ -17,13 +18,13 @@ typedef struct hs_by_reach {
     const hs_box *box; /* borrowed */
 } hs_by_reach;
 
+/* Whether a request has all that its reach needs; points and options have been checked. */
+hs_status hs_by_reach_check(const hs_request *request, hs_failure *failure);
+
 /* Checks the arguments of a request that has a reach, and divides the points, for a call that has
  * begun. On failure it holds nothing. */
 hs_status hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by,
                            hs_failure *failure);
-
-/* How much memory was allowed, if that was the failure. */
-void hs_by_reach_tell(const hs_call *call, hs_status status, hs_failure *failure);
 
 /* Harmless twice. */
 void hs_by_reach_close(hs_account *account, hs_by_reach *by);
@@ -40,13 +41,5 @@ hs_status hs_by_reach_single(hs_by_reach *by, hs_call *call, hs_use_fn use, void
 /* hs_request_use for requests with a reach and without. */
 hs_status hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context,
                           hs_failure *failure);
-
-/* hs_pairs_find, hs_neighbors_find and hs_neighbors_count for such a request. fill, count: what
- * does it for one search, which is taken where there is but one. */
-hs_status hs_by_reach_pairs(const hs_request *request, hs_pairs **result, hs_failure *failure);
-hs_status hs_by_reach_rows(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
-                           hs_failure *failure);
-hs_status hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *counts,
-                                 hs_failure *failure);
 
 #endif

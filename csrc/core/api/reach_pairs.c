@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* reach_pairs.c: pairs of all searches in one output, in their order or in the ascending one. Rows
- * are made of ascending pairs: where the rule is the same both ways, of each pair and its mirror
- * image. */
-#include "by_reach.h"
+ * are made of ascending pairs: where the rule is the same both ways, each pair is in two of
+ * them. */
+#include "reach_pairs.h"
 
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
@@ -37,52 +37,31 @@ record(const hs_by_reach *by, hs_call *call, hs_output *output, hs_failure *fail
     return status;
 }
 
-/* Columns that put pairs in order and have all that is wanted. */
-static unsigned
-columns_of(const hs_request *request)
+/* Whether two points may be a pair in several images, or one with itself. Twice the cutoff is
+ * shorter than any period where not, by far more than rounding errors. */
+static bool
+images_repeat(const hs_by_reach *by)
 {
-    bool repeats = false;
-    for (int l = 0; request->box != NULL && l < request->box->ndim; l++) {
-        repeats = repeats || request->box->periodic[l];
+    hs_lattice lattice;
+    double     cutoff = 0.0;
+    for (int64_t s = 0; s < by->plan.n; s++) {
+        cutoff = hs_larger(by->plan.steps[s].cutoff, cutoff);
     }
-    const unsigned wanted = request->options->want & ~(unsigned)HS_WANT_BOTH;
-    return wanted | HS_WANT_I | HS_WANT_J | (repeats ? HS_WANT_SHIFT : 0);
+    hs_lattice_init(by->box, by->levels.points.ndim, hs_scale_of(0), &lattice);
+    for (int k = 0; k < lattice.ndim; k++) {
+        if (lattice.row_of_axis[k] >= 0 && !(2.1 * cutoff < lattice.period[k])) {
+            return true;
+        }
+    }
+    return false;
 }
 
-/* Appends (j, i, -S) for each of the first n pairs (i, j, S). */
-static hs_status
-mirror(hs_output *found, bool wants_shift, hs_failure *failure)
+/* Columns that put pairs in order and have all that is wanted. */
+static unsigned
+columns_of(const hs_request *request, const hs_by_reach *by)
 {
-    const int64_t n = found->n_pairs;
-    const int     d = found->ndim;
-    hs_status     status = hs_output_reserve(found, n, 1.0);
-    if (status != HS_OK) {
-        failure->expected_pairs = 2.0 * (double)n;
-        return status;
-    }
-    int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
-    int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
-    double  *distance = hs_output_column(found, HS_WANT_DISTANCE);
-    double  *vector = hs_output_column(found, HS_WANT_VECTOR);
-    for (int64_t e = 0; e < n; e++) {
-        i[n + e] = j[e];
-        j[n + e] = i[e];
-    }
-    for (int64_t e = 0; distance != NULL && e < n; e++) {
-        distance[n + e] = distance[e];
-    }
-    for (int64_t e = 0; vector != NULL && e < n * d; e++) {
-        vector[n * d + e] = -vector[e] + 0.0; /* a zero has no sign */
-    }
-    for (int64_t e = 0; shift != NULL && e < n * d; e++) {
-        if (wants_shift && shift[e] == INT32_MIN) {
-            failure->row = j[e / d];
-            return HS_ERR_SHIFT_RANGE;
-        }
-        shift[n * d + e] = (int32_t)(0u - (uint32_t)shift[e]);
-    }
-    found->n_pairs = 2 * n;
-    return HS_OK;
+    const unsigned wanted = request->options->want & ~(unsigned)HS_WANT_BOTH;
+    return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(by) ? HS_WANT_SHIFT : 0);
 }
 
 /* Whether a point meets itself: in rows of one set that are not made of a half list. */
@@ -94,13 +73,12 @@ meets_itself(const hs_by_reach *by)
 
 /* Whether each point is within its limit of itself, which the rows of one search count on. */
 static bool
-has_selves(const hs_request *request, const hs_by_reach *by)
+has_selves(const hs_request *request, const hs_levels *levels)
 {
-    const hs_levels *levels = &by->levels;
-    if (levels->has_queries || !by->plan.steps[0].has_limits) {
+    if (levels->has_queries) {
         return true;
     }
-    for (int32_t l = 0; levels->cutoffs != NULL && l < levels->n; l++) {
+    for (int32_t l = 0; l < levels->n; l++) {
         if (levels->cutoffs[l * levels->n + l] < 0.0) {
             return false;
         }
@@ -108,12 +86,14 @@ has_selves(const hs_request *request, const hs_by_reach *by)
     return request->options->inclusive && request->options->precision == HS_EXACT;
 }
 
-/* Whether rows are those of a single search. */
+/* Whether rows are those of a single search. It goes over all points twice: where pairs have limits
+ * by radii, whose scans take long, sorting them is quicker. */
 static bool
 is_single(const hs_request *request, const hs_by_reach *by)
 {
     return hs_level_plan_is_single(&by->levels, &by->plan) && !meets_itself(by) &&
-           has_selves(request, by);
+           (!by->plan.steps[0].has_limits ||
+            (by->levels.cutoffs != NULL && has_selves(request, &by->levels)));
 }
 
 /* Moves pair `from` to place `to`. */
@@ -148,16 +128,12 @@ drop_selves(hs_output *found)
     found->n_pairs = kept;
 }
 
-/* All pairs, of both orders where rows are wanted of a half list, in an output that is opened. */
+/* All pairs, in an output that is opened. */
 static hs_status
-find(const hs_request *request, const hs_by_reach *by, hs_call *call, unsigned columns,
-     bool as_rows, hs_output *found, hs_failure *failure)
+find(const hs_by_reach *by, hs_call *call, unsigned columns, hs_output *found, hs_failure *failure)
 {
     hs_output_init(&call->account, by->levels.points.ndim, columns, 4, found);
-    hs_status status = record(by, call, found, failure);
-    if (status == HS_OK && as_rows && by->plan.is_half) {
-        status = mirror(found, request->options->want & HS_WANT_SHIFT, failure);
-    }
+    const hs_status status = record(by, call, found, failure);
     if (status == HS_OK && meets_itself(by)) {
         drop_selves(found);
     }
@@ -186,7 +162,7 @@ finish(hs_by_reach *by, hs_pairs *pairs, hs_status status, hs_pairs **result, hs
 {
     hs_by_reach_close(&pairs->call.account, by);
     status = hs_pairs_conclude(&pairs->output, status, failure);
-    hs_by_reach_tell(&pairs->call, status, failure);
+    hs_call_tell_limit(&pairs->call, status, failure);
     return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
 }
 
@@ -196,12 +172,19 @@ count_asking(const hs_by_reach *by)
     return hs_levels_asking(&by->levels)->n;
 }
 
+/* Rows that each pair is in. */
+static double
+ways(const hs_by_reach *by)
+{
+    return by->plan.is_half ? 2.0 : 1.0;
+}
+
 /* Pairs in ascending order. */
 static hs_status
 find_sorted(const hs_request *request, const hs_by_reach *by, hs_pairs *pairs, hs_failure *failure)
 {
     hs_output found;
-    hs_status status = find(request, by, &pairs->call, columns_of(request), false, &found, failure);
+    hs_status status = find(by, &pairs->call, columns_of(request, by), &found, failure);
     if (status == HS_OK) {
         status = hs_sort_pairs(&pairs->call, 0, count_asking(by), &found, &pairs->output);
     }
@@ -226,39 +209,25 @@ hs_by_reach_pairs(const hs_request *request, hs_pairs **result, hs_failure *fail
     return finish(&by, pairs, status, result, failure);
 }
 
-/* Where each row begins, once all pairs are known. */
-static hs_status
-find_offsets(hs_pairs *rows, const hs_output *found, int64_t n)
-{
-    const int32_t *i = hs_output_column(found, HS_WANT_I);
-    hs_output_init(&rows->call.account, found->ndim, HS_WANT_I, 8, &rows->offsets);
-    const hs_status status = hs_output_reserve(&rows->offsets, n + 1, 0.0);
-    if (status != HS_OK) {
-        return status;
-    }
-    rows->offsets.n_pairs = n + 1;
-    int64_t *offsets = hs_output_column(&rows->offsets, HS_WANT_I);
-    memset(offsets, 0, (size_t)(n + 1) * sizeof *offsets);
-    for (int64_t e = 0; e < found->n_pairs; e++) {
-        offsets[i[e] + 1]++;
-    }
-    for (int64_t row = 0; row < n; row++) {
-        offsets[row + 1] += offsets[row];
-    }
-    return HS_OK;
-}
-
 /* Rows of the pairs of several searches. */
 static hs_status
 find_rows(const hs_request *request, const hs_by_reach *by, hs_pairs *rows, hs_failure *failure)
 {
-    hs_output found;
-    hs_status status = find(request, by, &rows->call, columns_of(request), true, &found, failure);
-    if (status == HS_OK) {
-        status = find_offsets(rows, &found, count_asking(by));
+    const int64_t n = count_asking(by);
+    int64_t      *offsets = NULL;
+    hs_output     found;
+    hs_status     status = find(by, &rows->call, columns_of(request, by), &found, failure);
+    if (status == HS_OK && by->plan.is_half && (request->options->want & HS_WANT_SHIFT)) {
+        status = hs_output_check_opposites(&found, failure);
     }
     if (status == HS_OK) {
-        status = hs_sort_pairs(&rows->call, 0, count_asking(by), &found, &rows->output);
+        status = hs_pairs_open_offsets(&rows->call.account, n + 1, rows, &offsets);
+    }
+    if (status == HS_OK) {
+        status = hs_sort_rows(&rows->call, n, &found, by->plan.is_half, offsets, &rows->output);
+    }
+    if (status == HS_ERR_MEMORY) {
+        failure->expected_pairs = fmax(failure->expected_pairs, ways(by) * (double)found.n_pairs);
     }
     hs_output_free(&found);
     return status;
@@ -305,10 +274,11 @@ count_rows(const hs_request *request, const hs_by_reach *by, hs_call *call, int6
            int64_t *n_entries, hs_failure *failure)
 {
     hs_output       found;
-    const unsigned  columns = meets_itself(by) ? columns_of(request) : HS_WANT_I | HS_WANT_J;
-    const hs_status status = find(request, by, call, columns, true, &found, failure);
+    const unsigned  columns = meets_itself(by) ? columns_of(request, by) : HS_WANT_I | HS_WANT_J;
+    const hs_status status = find(by, call, columns, &found, failure);
     if (status == HS_OK) {
         const int32_t *i = hs_output_column(&found, HS_WANT_I);
+        const int32_t *j = hs_output_column(&found, HS_WANT_J);
         const int64_t  n = count_asking(by);
         if (n > 0) { /* otherwise counts may be NULL */
             memset(counts, 0, (size_t)n * sizeof *counts);
@@ -316,7 +286,10 @@ count_rows(const hs_request *request, const hs_by_reach *by, hs_call *call, int6
         for (int64_t e = 0; e < found.n_pairs; e++) {
             counts[i[e]]++;
         }
-        *n_entries = found.n_pairs;
+        for (int64_t e = 0; by->plan.is_half && e < found.n_pairs; e++) {
+            counts[j[e]]++;
+        }
+        *n_entries = (by->plan.is_half ? 2 : 1) * found.n_pairs;
     }
     hs_output_free(&found);
     return status;
@@ -337,7 +310,7 @@ hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *coun
         status = count_rows(request, &by, &call, counts, &n_entries, failure);
     }
     hs_by_reach_close(&call.account, &by);
-    hs_by_reach_tell(&call, status, failure);
+    hs_call_tell_limit(&call, status, failure);
     hs_call_leave(&call, n_entries);
     hs_account_close(&call.account);
     return status;

@@ -4,12 +4,17 @@
 #include "systems_thread.h"
 
 #include "../search/estimate.h"
+#include "../search/form.h"
 #include "../base/poll.h"
+#include "../box/lattice.h"
 #include "../collect/crew.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
+#include "../levels/level_join.h"
+#include "../levels/level_search.h"
 #include "../search/search_open.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Points that a range of systems should have: their pairs fit the backlog of a thread, so that
@@ -26,6 +31,10 @@ typedef struct worker {
     const hs_systems_job *job;
     hs_call               call;   /* with this thread's poll */
     hs_search             search; /* of one system after the other */
+    hs_levels             levels; /* of the present system, where pairs have a reach of their own */
+    hs_level_plan         plan;
+    hs_level_search       step;
+    hs_kept_form          forms[HS_FORMS];
     hs_box                box;    /* of the present system, where each has its own */
     hs_output            *target; /* the job's output, or the backlog's */
     hs_backlog            backlog;
@@ -55,61 +64,48 @@ hs_systems_take(const hs_systems_job *job, int64_t s, hs_points *points, hs_box 
     return own_box;
 }
 
-/* Makes the scene of system s ready; its points keep their numbers among the points of all
+/* Makes the scene of a system ready; its points keep their numbers among the points of all
  * systems. */
 static hs_status
-build_system(worker *me, int64_t s)
+build_system(worker *me, const hs_points *points, const hs_box *box, int64_t first)
 {
-    const hs_systems_job *job = me->job;
-    const hs_systems     *systems = job->systems;
-    const int64_t         first = systems->first[s];
-    hs_points             points;
-    const hs_box         *box = hs_systems_take(job, s, &points, &me->box);
-    if (systems->cutoffs != NULL) {
-        me->call.options.cutoff = systems->cutoffs[s];
-    }
+    hs_failure     *failure = &me->committer.failure;
     const hs_status status =
-        hs_search_build(&(hs_sets){.points = &points}, box, &me->search, &me->committer.failure);
+        hs_search_build(&(hs_sets){.points = points}, box, &me->search, failure);
     if (status == HS_OK) {
-        hs_search_renumber(first, job->points->n, &me->search);
+        hs_search_renumber(first, me->job->points->n, &me->search);
     } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE ||
                status == HS_ERR_ROUNDING) {
-        me->committer.failure.row += first;
+        failure->row += first;
     }
     return status;
 }
 
 static hs_status
-count_system(worker *me, int64_t s)
+count_pairs(worker *me, hs_search *search, int64_t s)
 {
-    hs_search *search = &me->search;
-    hs_walker  walker;
-    hs_status  status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    hs_walker walker;
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
     if (status == HS_OK) {
-        status = hs_walk_or_tell(&walker, 0, (int32_t)search->bins.n, &me->committer.failure);
-        me->job->counts[s] = walker.scanner.n_found;
+        const int64_t n = hs_search_asking(search)->n;
+        status = hs_walk_or_tell(&walker, 0, (int32_t)n, &me->committer.failure);
+        me->job->counts[s] += walker.scanner.n_found;
         hs_walker_close(search, &walker);
     }
     return status;
 }
 
-/* Writes the pairs of the present system in ascending order. */
+/* Adds the pairs to those of the system that are to be sorted. */
 static hs_status
-sort_system(worker *me)
+record_unsorted(worker *me, hs_search *search)
 {
-    hs_search     *search = &me->search;
     hs_output     *found = &me->found;
     const unsigned columns = hs_sort_columns(search);
     if (found->columns != columns) { /* systems with images need more of them */
         hs_output_free(found);
         hs_output_init(&search->call->account, search->scene.ndim, columns, 4, found);
     }
-    found->n_pairs = 0;
-    hs_status status = hs_record_alone(search, found, &me->committer.failure);
-    if (status == HS_OK) {
-        status =
-            hs_sort_pairs(search->call, search->first_point, search->scene.n, found, me->target);
-    }
+    const hs_status status = hs_record_alone(search, found, &me->committer.failure);
     if (status == HS_ERR_MEMORY) {
         me->committer.failure.expected_pairs = (double)found->n_pairs;
     }
@@ -117,43 +113,160 @@ sort_system(worker *me)
 }
 
 static hs_status
-find_system(worker *me)
+find_pairs(worker *me, hs_search *search)
 {
-    hs_status status = hs_estimate_by_sample(&me->search, &me->committer.failure);
+    hs_status status = hs_estimate_by_sample(search, &me->committer.failure);
     if (status != HS_OK) {
         return status;
     }
     if (me->call.options.sorted) {
-        return sort_system(me);
+        return record_unsorted(me, search);
     }
-    return me->job->is_direct
-               ? hs_record_alone(&me->search, me->target, &me->committer.failure)
-               : hs_backlog_record(&me->search, &me->backlog, &me->committer.failure);
+    return me->job->is_direct ? hs_record_alone(search, me->target, &me->committer.failure)
+                              : hs_backlog_record(search, &me->backlog, &me->committer.failure);
+}
+
+/* Pairs of an open search of system s, which may be one of several. */
+static hs_status
+use_search(worker *me, hs_search *search, int64_t s)
+{
+    return me->job->output == NULL ? count_pairs(me, search, s) : find_pairs(me, search);
+}
+
+/* Writes the pairs of the present system in ascending order, where that is wanted. */
+static hs_status
+sort_system(worker *me, int64_t first, int64_t n)
+{
+    hs_output *found = &me->found;
+    if (found->n_pairs == 0) {
+        return HS_OK;
+    }
+    const hs_status status = hs_sort_pairs(&me->call, (int32_t)first, n, found, me->target);
+    if (status == HS_ERR_MEMORY) {
+        me->committer.failure.expected_pairs = (double)found->n_pairs;
+    }
+    return status;
+}
+
+/* What the pairs of a system have as their reach, and the further limit. */
+static hs_status
+reach_of(const worker *me, int64_t s, hs_reach *reach, double *bound, hs_failure *failure)
+{
+    const hs_systems *systems = me->job->systems;
+    const int64_t     first = systems->first[s];
+    *reach = *systems->reach;
+    *bound = systems->cutoffs != NULL ? systems->cutoffs[s] : me->job->total->options.cutoff;
+    const int d = me->job->points->ndim;
+    reach->supports = reach->supports != NULL ? reach->supports + first * d * d : NULL;
+    reach->radii = reach->radii != NULL ? reach->radii + first : NULL;
+    reach->types = reach->types != NULL ? reach->types + first : NULL;
+    if (!(*bound >= 0.0) || (reach->n_types > 0 && !isfinite(*bound))) {
+        failure->value = *bound;
+        return HS_ERR_CUTOFF;
+    }
+    return HS_OK;
+}
+
+/* All searches of the plan, one after the other. */
+static hs_status
+search_steps(worker *me, int64_t s, const hs_box *box)
+{
+    hs_failure *failure = &me->committer.failure;
+    hs_status   status = me->plan.n > 0 ? HS_OK : hs_box_check(box, failure);
+    for (int64_t step = 0; status == HS_OK && step < me->plan.n; step++) {
+        hs_search *search = &me->step.search;
+        status =
+            hs_level_open(&me->levels, &me->plan, step, box, false, &me->call, &me->step, failure);
+        if (status == HS_OK) {
+            search->first_point = me->job->systems->first[s];
+            search->n_in_all = me->job->points->n;
+            status = use_search(me, search, s);
+            hs_level_close(&me->step);
+        }
+    }
+    return status;
+}
+
+/* A system whose pairs have a reach of their own. */
+static hs_status
+search_by_reach(worker *me, int64_t s, const hs_points *points, const hs_box *box)
+{
+    hs_account   *account = &me->call.account;
+    hs_failure   *failure = &me->committer.failure;
+    const int64_t first = me->job->systems->first[s];
+    hs_reach      reach;
+    double        bound;
+    hs_status     status = reach_of(me, s, &reach, &bound, failure);
+    if (status != HS_OK) {
+        return status;
+    }
+    status =
+        hs_levels_divide(account, &me->call.options, points, NULL, &reach, &me->levels, failure);
+    if (status != HS_OK) {
+        failure->row += failure->row >= 0 ? first : 0;
+        return status;
+    }
+    hs_levels_renumber((int32_t)first, &me->levels);
+    status = hs_level_plan_choose(account, &me->call.options, &me->levels, box, bound,
+                                  me->job->total->options.algorithm, &me->plan);
+    if (status == HS_OK) {
+        status = search_steps(me, s, box);
+    }
+    hs_level_plan_free(account, &me->plan);
+    hs_levels_free(account, &me->levels);
+    return status;
+}
+
+static hs_status
+search_plainly(worker *me, int64_t s, const hs_points *points, const hs_box *box)
+{
+    const hs_systems *systems = me->job->systems;
+    if (systems->cutoffs != NULL) {
+        me->call.options.cutoff = systems->cutoffs[s];
+    }
+    hs_status status = build_system(me, points, box, systems->first[s]);
+    if (status == HS_OK) {
+        status = use_search(me, &me->search, s);
+    }
+    hs_search_close(&me->search);
+    return status;
+}
+
+/* After a system: what it took, and sometimes a poll. */
+static hs_status
+count_work(worker *me, int64_t s, int64_t n_candidates)
+{
+    const hs_systems_job *job = me->job;
+    me->work += SYSTEM_WORK + n_candidates;
+    if (me->work <= POLL_WORK) {
+        return HS_OK;
+    }
+    me->work = 0;
+    return hs_poll(&me->call.options, (double)job->systems->first[s + 1] / (double)job->points->n);
 }
 
 static hs_status
 search_system(worker *me, int64_t s)
 {
-    hs_search    *search = &me->search;
-    const int64_t before = me->call.done.candidates;
-    hs_status     status = build_system(me, s);
-    if (status == HS_OK) {
-        status = me->job->output == NULL ? count_system(me, s) : find_system(me);
+    const hs_systems_job *job = me->job;
+    const int64_t         before = me->call.done.candidates;
+    hs_points             points;
+    const hs_box         *box = hs_systems_take(job, s, &points, &me->box);
+    me->found.n_pairs = 0;
+    if (job->output == NULL) {
+        job->counts[s] = 0;
     }
-    hs_search_close(search);
-    hs_account_reset(&search->call->account);
+    hs_status status = job->systems->reach != NULL ? search_by_reach(me, s, &points, box)
+                                                   : search_plainly(me, s, &points, box);
+    if (status == HS_OK && me->call.options.sorted) {
+        status = sort_system(me, job->systems->first[s], points.n);
+    }
+    hs_account_reset(&me->call.account);
     if (status != HS_OK) {
         me->committer.failure.system = s;
         return status;
     }
-    me->work += SYSTEM_WORK + me->call.done.candidates - before;
-    if (me->work > POLL_WORK) {
-        const hs_systems_job *job = me->job;
-        me->work = 0;
-        status = hs_poll(&search->call->options,
-                         (double)job->systems->first[s + 1] / (double)job->points->n);
-    }
-    return status;
+    return count_work(me, s, me->call.done.candidates - before);
 }
 
 /* A hs_range_fn. */
@@ -191,6 +304,7 @@ open_worker(void *context, void *place)
     hs_call_begin(options, &me->call);
     me->call.options = *options; /* their poll counts already, for the whole call */
     hs_search_begin(&me->call, &me->search);
+    me->search.kept_forms = me->forms;
     me->committer.options = &me->call.options;
     if (job->systems->box != NULL) {
         me->box = *job->systems->box;

@@ -84,14 +84,30 @@ hs_smaller(double a, double b)
     return a < b ? a : b;
 }
 
+#define HS_ALIGNMENT 64 /* bytes; a cache line and the widest vector register */
+
+/* The bits of a double; those of numbers that are not negative are in the order of the numbers. */
+HS_ALWAYS_INLINE uint64_t
+hs_bits_of_double(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+HS_ALWAYS_INLINE double
+hs_double_of_bits(uint64_t bits)
+{
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
 /* 2^exponent, a normal number: -1022 <= exponent <= 1023. */
 HS_ALWAYS_INLINE double
 hs_power_of_two(int exponent)
 {
-    const uint64_t bits = (uint64_t)(exponent + 1023) << 52;
-    double         power;
-    memcpy(&power, &bits, sizeof power);
-    return power;
+    return hs_double_of_bits((uint64_t)(exponent + 1023) << 52);
 }
 
 /* The bits of a float; those of numbers that are not negative are in the order of the numbers. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* os_thread.h: the few thread functions that team.c needs, on POSIX and on Windows. */
+/* os_thread.h: the few functions of threads that the core needs, on POSIX and on Windows. */
 #ifndef HS_OS_THREAD_H
 #define HS_OS_THREAD_H
 

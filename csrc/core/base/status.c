@@ -30,6 +30,10 @@ hs_status_text(hs_status status)
     case HS_ERR_WEIGHTS: return "weights must be finite";
     case HS_ERR_INTERRUPTED: return "interrupted";
     case HS_ERR_RADII: return "a radius is negative, not finite, or out of range";
+    case HS_ERR_SUPPORTS: return "a support is not symmetric and positive definite";
+    case HS_ERR_SUPPORT_REACH: return "a support reaches too far";
+    case HS_ERR_EXTENT: return "the extent of supports is negative, NaN or infinite";
+    case HS_ERR_KEY: return "a key is not there, comes twice, or has no position";
     case HS_ERR_ARGUMENT: return "an argument is out of its range, or an array is missing";
     case HS_STATUS_END: break;
     }

@@ -53,13 +53,11 @@ add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
     }
     const double bias = HS_GRID_BIAS * (double)grid->shape[k];
     for (int64_t i = 0; i < n; i++) {
-        const double place = (t[i] - lower) * cells_per_length + bias;
-        const double below = place < last ? place : last;
-        const double cell = (double)(int32_t)(below > 0.0 ? below : 0.0);
-        const double beyond = t[i] - (lower + cell * size);
-        uint64_t     bits;
-        memcpy(&bits, &beyond, sizeof bits);
-        id[i] += (uint32_t)((int32_t)cell - (int32_t)(bits >> 63)) * stride; /* its sign */
+        const double   place = (t[i] - lower) * cells_per_length + bias;
+        const double   below = place < last ? place : last;
+        const double   cell = (double)(int32_t)(below > 0.0 ? below : 0.0);
+        const uint64_t beyond = hs_bits_of_double(t[i] - (lower + cell * size));
+        id[i] += (uint32_t)((int32_t)cell - (int32_t)(beyond >> 63)) * stride; /* its sign */
     }
 }
 

@@ -36,9 +36,9 @@ bound_images(const hs_scene *scene, const double *drift, double *images)
     for (int k = 0; k < scene->ndim; k++) {
         const int r = lattice->row_of_axis[k];
         if (r >= 0) {
-            images[r] = ceil((scene->radius * (1.0 + SLACK) + drift[k] + 2.0 * scene->t_error[k]) /
-                             lattice->period[k]) +
-                        2.0;
+            const double along = hs_scene_radius_along(scene, k) * (1.0 + SLACK);
+            images[r] =
+                ceil((along + drift[k] + 2.0 * scene->t_error[k]) / lattice->period[k]) + 2.0;
         }
     }
 }
@@ -246,9 +246,10 @@ cost_per_point(const hs_scene *scene, const hs_grid *grid)
     return candidates + 8.0 * (rows + 1.0) / group + (grid->n_cells > 1 ? SORTING_COST : 0.0);
 }
 
-/* Chooses one cell, or a grid of cells where that is cheaper. */
+/* Chooses one cell, or a grid of cells where that is cheaper, unless the kind says which. */
 static hs_status
-choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *grid)
+choose_shape(const hs_scene *scene, hs_grid_kind kind, double density, double neighbours,
+             hs_grid *grid)
 {
     double counts[HS_MAX_DIM], parts[HS_MAX_DIM];
     double single_cost = INFINITY;
@@ -258,7 +259,10 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     if (hs_grid_set_shape(scene, counts, grid) == HS_OK) {
         single_cost = cost_per_point(scene, grid);
     }
-    if (single_cost <= SORTING_COST) { /* no grid costs less */
+    if (kind == HS_GRID_SINGLE) {
+        return single_cost < INFINITY ? HS_OK : hs_skew_or_memory(&scene->lattice);
+    }
+    if (kind == HS_GRID_ANY && single_cost <= SORTING_COST) { /* no grid costs less */
         return HS_OK;
     }
     const hs_grid single = *grid;
@@ -277,7 +281,7 @@ choose_shape(const hs_scene *scene, double density, double neighbours, hs_grid *
     }
     /* Axes with several cells reach a few of them, the others as far as in the single one. */
     HS_ASSERT(status == HS_OK || single_cost == INFINITY);
-    if (status == HS_OK && single_cost <= cost_per_point(scene, grid)) {
+    if (status == HS_OK && kind == HS_GRID_ANY && single_cost <= cost_per_point(scene, grid)) {
         *grid = single;
     }
     return status == HS_OK ? HS_OK : hs_skew_or_memory(&scene->lattice);
@@ -312,8 +316,9 @@ set_ranges(const hs_scene *scene, hs_grid *grid)
         return HS_ERR_BOX_SKEWED;
     }
     for (int k = 0; k < scene->ndim; k++) {
-        const int r = scene->lattice.row_of_axis[k];
-        grid->range[k] = (scene->radius + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
+        const int    r = scene->lattice.row_of_axis[k];
+        const double along = hs_scene_radius_along(scene, k);
+        grid->range[k] = (along + drift[k] + 2.0 * scene->t_error[k]) * (1.0 + SLACK);
         if (r >= 0 && !(grid->range[k] / scene->lattice.period[k] + 1.0 <= images[r])) {
             return hs_skew_or_memory(&scene->lattice);
         }
@@ -343,8 +348,8 @@ hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure 
     }
 
     *density = (double)scene->n / volume;
-    grid->expected_pairs =
-        0.5 * (double)scene->n * *density * hs_ball_volume(scene->ndim, scene->cutoff);
+    grid->expected_pairs = 0.5 * (double)scene->n * *density *
+                           hs_scene_volume(scene, hs_ball_volume(scene->ndim, scene->cutoff));
     if (!(volume > 0.0)) { /* points on one spot, cutoff 0 */
         grid->expected_pairs = 0.5 * (double)scene->n * (double)(scene->n - 1);
     }
@@ -357,11 +362,18 @@ hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure 
 hs_status
 hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure)
 {
+    return hs_grid_init_kind(scene, HS_GRID_ANY, grid, failure);
+}
+
+hs_status
+hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure *failure)
+{
     double    density;
     hs_status status = hs_grid_begin(scene, &density, grid, failure);
     if (status == HS_OK) {
-        const double neighbours = density * hs_ball_volume(scene->ndim, scene->cutoff);
-        status = choose_shape(scene, density, neighbours, grid);
+        const double neighbours =
+            density * hs_scene_volume(scene, hs_ball_volume(scene->ndim, scene->cutoff));
+        status = choose_shape(scene, kind, density, neighbours, grid);
         if (status == HS_ERR_MEMORY) {
             tell_endless(failure);
         }

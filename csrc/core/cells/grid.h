@@ -29,8 +29,14 @@ typedef struct hs_grid {
 /* Volume of a ball in ndim dimensions. */
 double hs_ball_volume(int ndim, double radius);
 
-/* HS_ERR_MEMORY when a cutoff spans more than 2^31 images, HS_ERR_BOX_SKEWED when rounding does. */
+/* One cell or as many as are quickest. HS_ERR_MEMORY when a cutoff spans more than 2^31 images,
+ * HS_ERR_BOX_SKEWED when rounding does. */
 hs_status hs_grid_init(const hs_scene *scene, hs_grid *grid, hs_failure *failure);
+
+/* The same, with the choice between one cell and several made by the caller. */
+typedef enum hs_grid_kind { HS_GRID_ANY, HS_GRID_SINGLE, HS_GRID_CELLS } hs_grid_kind;
+hs_status hs_grid_init_kind(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid,
+                            hs_failure *failure);
 
 /*
  * Cells that are at least `width` wide, whatever that costs; wider ones, with *is_wider set, where

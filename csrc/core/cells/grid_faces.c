@@ -44,7 +44,8 @@ hs_grid_cut_by_faces(const hs_scene *scene, const double *parts, double cap, hs_
     double cells = (double)grid->n_cells;
     for (int k = 0; k < scene->ndim; k++) {
         const double extent = scene->upper[k] - scene->lower[k];
-        const double part = scene->radius / parts[k]; /* exact but for thirds */
+        const double along = hs_scene_radius_along(scene, k);
+        const double part = along / parts[k]; /* exact but for thirds */
         const double least = parts[k] == 3.0 ? hs_next_up(part) : part;
         const double count = (double)grid->shape[k] + 1.0;
         const double reach = hs_larger(fabs(scene->lower[k]), fabs(scene->upper[k]));

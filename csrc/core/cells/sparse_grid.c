@@ -69,6 +69,7 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
         const double pitch = choose_pitch(grid, k, extent, width);
         grid->stride[k] = 0;
         grid->skipped[k] = 0;
+        grid->by_faces[k] = false;
         if (scene->lattice.row_of_axis[k] >= 0) {
             const double count = floor(fmin(extent / pitch, MOST_PER_PERIOD));
             /* Cells are range / 4 wide or more, or there is one: then its reach is at most that of
@@ -176,6 +177,13 @@ choose_width(const hs_scene *scene, const hs_grid *dense, double *cost)
         }
     }
     return best;
+}
+
+double
+hs_sparse_width(const hs_scene *scene, const hs_grid *dense)
+{
+    double cost;
+    return scene->n < 2 ? 1.0 : choose_width(scene, dense, &cost);
 }
 
 double

@@ -106,7 +106,8 @@ static double
 slack_along(const hs_scene *scene, const hs_grid *grid, int k)
 {
     const double extent = grid->cell_size[k] * (double)grid->shape[k];
-    return (grid->range[k] - scene->radius) + FRAME_SLACK * scene->radius + 0x1p-50 * extent;
+    return (grid->range[k] - hs_scene_radius_along(scene, k)) + FRAME_SLACK * scene->radius +
+           0x1p-50 * extent;
 }
 
 /* Differences of t_k along the later axes, as far as the radius lets them go. */
@@ -116,11 +117,11 @@ typedef struct spans {
 
 /* Sets the differences that points of the cells at `offset` can have, rounding included. */
 static void
-set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, double radius,
-          spans *t)
+set_spans(const hs_scene *scene, const hs_grid *grid, const int32_t *offset, spans *t)
 {
     for (int k = 1; k < grid->ndim; k++) {
         const double slack = slack_along(scene, grid, k);
+        const double radius = hs_scene_radius_along(scene, k) * (1.0 + FRAME_SLACK);
         t->low[k] = hs_larger((offset[k] - 1) * grid->cell_size[k] - slack, -radius - slack);
         t->high[k] = hs_smaller((offset[k] + 1) * grid->cell_size[k] + slack, radius + slack);
     }
@@ -150,7 +151,7 @@ narrow_by_frame(const hs_scene *scene, const hs_grid *grid, const frame *axes,
     double       left = radius > 0.0 ? 1.0 : 0.0; /* of the square, for the components still open */
     double       least, most;
     spans        t;
-    set_spans(scene, grid, offset, radius, &t);
+    set_spans(scene, grid, offset, &t);
     for (int c = grid->ndim - 1; c >= 1; c--) {
         range_of_component(axes, &t, grid->ndim, c, &least, &most);
         const double gap = hs_larger(hs_larger(least, -most), 0.0) / unit;

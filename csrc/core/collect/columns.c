@@ -57,6 +57,20 @@ hs_output_column(const hs_output *output, unsigned bit)
     return output->columns & bit ? output->column[hs_want_number(bit)].data : NULL;
 }
 
+hs_status
+hs_output_check_opposites(const hs_output *output, hs_failure *failure)
+{
+    const int32_t *shift = hs_output_column(output, HS_WANT_SHIFT);
+    const int32_t *j = hs_output_column(output, HS_WANT_J);
+    for (int64_t e = 0; shift != NULL && e < output->n_pairs * output->ndim; e++) {
+        if (shift[e] == INT32_MIN) {
+            failure->row = j[e / output->ndim];
+            return HS_ERR_SHIFT_RANGE;
+        }
+    }
+    return HS_OK;
+}
+
 void *
 hs_output_next(const hs_output *output, unsigned bit)
 {
@@ -253,18 +267,25 @@ hs_output_take(hs_output *output, unsigned bit)
     return hs_region_detach(column, column->used);
 }
 
+int64_t
+hs_output_charged(const hs_output *output)
+{
+    return output->charged > 0 ? output->charged * hs_output_bytes_per_pair(output) : 0;
+}
+
 void
 hs_output_free(hs_output *output)
 {
+    const unsigned owned = output->fixed ? 0 : output->columns;
     if (output->account != NULL) {
-        hs_account_give(output->account, output->charged * hs_output_bytes_per_pair(output));
+        hs_account_give(output->account, hs_output_charged(output));
     }
-    for (int k = 0; k < HS_QUANTITIES && !output->fixed; k++) {
+    for (int k = 0; k < HS_QUANTITIES; k++) {
         hs_region *column = &output->column[k];
-        if (output->columns >> k & 1u) {
+        if (owned >> k & 1u) {
             column->used = (size_t)output->n_pairs * hs_output_width(output, 1u << k);
+            hs_region_release(column);
         }
-        hs_region_release(column);
     }
     output->columns = 0;
     output->charged = 0;

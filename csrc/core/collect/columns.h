@@ -38,6 +38,10 @@ void hs_output_fix(hs_output *output, const hs_pair_arrays *arrays);
 /* The column of this HS_WANT_ bit; NULL where it is not kept. */
 void *hs_output_column(const hs_output *output, unsigned bit);
 
+/* Whether -S of each pair is an int32, where S is kept, beside i and j of 4 bytes.
+ * HS_ERR_SHIFT_RANGE: failure->row is j of the first pair of which it is not. */
+hs_status hs_output_check_opposites(const hs_output *output, hs_failure *failure);
+
 /* Room in the column of this HS_WANT_ bit for the next pair; NULL where it is not kept. */
 void *hs_output_next(const hs_output *output, unsigned bit);
 
@@ -62,6 +66,9 @@ void hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_
 
 /* Virtual room for about n pairs, before the first: saves growing. Never fails. */
 void hs_output_expect(hs_output *output, double n);
+
+/* Bytes that the account has been charged for. */
+int64_t hs_output_charged(const hs_output *output);
 
 /* Ownership of one column, cut to n_pairs, goes to the caller: hs_buffer_free. NULL where it is not
  * kept. */

@@ -76,7 +76,8 @@ put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
     const hs_scale    unscale = hs_measures_unscale(&search->scene);
     double           *to = hs_output_next(recorder->output, HS_WANT_DISTANCE);
     hs_restore_distances(recorder->distance, n, unscale);
-    if (options->precision == HS_EXACT && search->limits != NULL) {
+    if (options->precision == HS_EXACT && search->limits != NULL &&
+        search->limits->supports == NULL) {
         keep_within_limits(scanner, recorder->distance, unscale);
     } else if (options->precision == HS_EXACT) {
         hs_keep_all_within(recorder->distance, n, options->cutoff, options->inclusive);

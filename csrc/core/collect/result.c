@@ -29,11 +29,27 @@ hs_pairs_open(hs_pairs *pairs, int ndim)
 }
 
 hs_status
+hs_pairs_open_offsets(hs_account *account, int64_t n, hs_pairs *pairs, int64_t **offsets)
+{
+    hs_output_init(account, 1, HS_WANT_I, 8, &pairs->offsets);
+    const hs_status status = hs_output_reserve(&pairs->offsets, n, 0.0);
+    if (status == HS_OK) {
+        pairs->offsets.n_pairs = n;
+        *offsets = hs_output_column(&pairs->offsets, HS_WANT_I);
+    }
+    return status;
+}
+
+hs_status
 hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **result)
 {
+    hs_account *account = &pairs->call.account;
     hs_call_leave(&pairs->call, n_pairs);
     hs_call_detach(&pairs->call);
-    if (status == HS_OK) {
+    if (status == HS_OK) { /* no block is left: the next call may have the arena */
+        HS_ASSERT(account->held ==
+                  hs_output_charged(&pairs->output) + hs_output_charged(&pairs->offsets));
+        hs_account_close(account);
         *result = pairs;
     } else {
         hs_pairs_free(pairs);

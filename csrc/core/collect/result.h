@@ -18,6 +18,10 @@ hs_pairs *hs_pairs_new(void);
 /* An empty output of the columns that the call wants, or the caller's arrays. */
 void hs_pairs_open(hs_pairs *pairs, int ndim);
 
+/* n offsets, of which none is set, charged to `account`; *offsets is their array. HS_OK or
+ * HS_ERR_MEMORY; the output of offsets can be freed either way. */
+hs_status hs_pairs_open_offsets(hs_account *account, int64_t n, hs_pairs *pairs, int64_t **offsets);
+
 /* Leaves the call, which found n_pairs pairs. *result becomes the object, or that is freed. Returns
  * the status. */
 hs_status hs_pairs_finish(hs_pairs *pairs, hs_status status, int64_t n_pairs, hs_pairs **result);

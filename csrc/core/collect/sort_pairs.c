@@ -1,78 +1,36 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S): O(pairs * log(pairs of
- * one point)).
+ * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
+ * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
+ * pair.
  */
 #include "sort_pairs.h"
 
 #include "../base/poll.h"
+#include "../base/sort_numbers.h"
+#include "sort_entries.h"
 
 #include <string.h>
 
 /* Pairs between two calls of poll(). */
 #define POLL_PAIRS (INT64_C(1) << 18)
 
-/* The columns that order pairs; shift is NULL where it is not kept. */
-typedef struct keys {
-    const int32_t *i, *j, *shift;
-} keys;
+/* Pairs that are written at a time. */
+#define PUT 256
 
-static bool
-is_before(const keys *key, int ndim, int64_t a, int64_t b)
-{
-    if (key->j[a] != key->j[b]) {
-        return key->j[a] < key->j[b];
-    }
-    for (int k = 0; key->shift != NULL && k < ndim; k++) {
-        const int32_t sa = key->shift[a * ndim + k], sb = key->shift[b * ndim + k];
-        if (sa != sb) {
-            return sa < sb;
-        }
-    }
-    return false;
-}
+#ifdef HS_TESTING
+static int most_place_bits = 63;
 
-static void
-sift_down(const keys *key, int ndim, int64_t *heap, int64_t root, int64_t n)
+int
+hs_test_sort_place_bits(int bits)
 {
-    const int64_t moving = heap[root];
-    for (int64_t child; (child = 2 * root + 1) < n; root = child) {
-        if (child + 1 < n && is_before(key, ndim, heap[child], heap[child + 1])) {
-            child++;
-        }
-        if (!is_before(key, ndim, moving, heap[child])) {
-            break;
-        }
-        heap[root] = heap[child];
-    }
-    heap[root] = moving;
+    const int before = most_place_bits;
+    most_place_bits = bits;
+    return before;
 }
-
-/* Insertion sort for the usual few, heap sort for a crowd. */
-static void
-sort_row(const keys *key, int ndim, int64_t *row, int64_t n)
-{
-    if (n <= 48) {
-        for (int64_t e = 1; e < n; e++) {
-            const int64_t moving = row[e];
-            int64_t       at = e;
-            for (; at > 0 && is_before(key, ndim, moving, row[at - 1]); at--) {
-                row[at] = row[at - 1];
-            }
-            row[at] = moving;
-        }
-        return;
-    }
-    for (int64_t root = n / 2; root-- > 0;) {
-        sift_down(key, ndim, row, root, n);
-    }
-    for (int64_t end = n - 1; end > 0; end--) {
-        const int64_t largest = row[0];
-        row[0] = row[end];
-        row[end] = largest;
-        sift_down(key, ndim, row, 0, end);
-    }
-}
+#else
+enum { most_place_bits = 63 };
+#endif
 
 /* A pair of points can occur in several images, so that sorting needs to tell these apart. */
 static bool
@@ -94,37 +52,56 @@ hs_sort_columns(const hs_search *search)
     return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(search) ? HS_WANT_SHIFT : 0);
 }
 
-/* What is put in order. */
-typedef struct sorting {
-    hs_call         *call;
-    int32_t          first_point;
-    int64_t          n_points;
-    const hs_output *found;
-    int64_t         *start; /* n_points + 1; start[i - first_point] ends up where row i ends */
-    int64_t         *order; /* places of the pairs, ascending in the end */
-} sorting;
-
-/* order[]: the pairs by ascending i. */
 static hs_status
-sort_by_first(const sorting *all, const int32_t *i)
+poll_for(const hs_sorting *all, int64_t pair)
 {
-    const hs_options *options = &all->call->options;
-    const int64_t     n_points = all->n_points, n_pairs = all->found->n_pairs;
-    const int32_t     first = all->first_point;
-    int64_t          *start = all->start;
-    memset(start, 0, (size_t)(n_points + 1) * sizeof(int64_t));
-    for (int64_t p = 0; p < n_pairs; p++) {
-        start[i[p] - first + 1]++;
-        if (p % POLL_PAIRS == POLL_PAIRS - 1 && hs_poll(options, 1.0) != HS_OK) {
+    const bool is_due = pair % POLL_PAIRS == POLL_PAIRS - 1;
+    return is_due ? hs_poll(&all->call->options, 1.0) : HS_OK;
+}
+
+/* Counts the pairs of each i, and settles where each row begins, which is in `end` for now. */
+static hs_status
+count_rows(hs_sorting *all)
+{
+    int64_t *begin = all->end;
+    int32_t  any = 0;
+    memset(begin, 0, (size_t)(all->n_points + 1) * sizeof *begin);
+    for (int64_t p = 0; p < all->found->n_pairs; p++) {
+        begin[all->i[p] - all->first_point + 1]++;
+        any |= all->j[p];
+        if (all->both_ways) {
+            begin[all->j[p] - all->first_point + 1]++;
+            any |= all->i[p];
+        }
+        if (poll_for(all, p) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
     }
-    for (int64_t k = 0; k < n_points; k++) {
-        start[k + 1] += start[k];
+    for (int64_t row = 0; row < all->n_points; row++) {
+        all->longest = begin[row + 1] > all->longest ? begin[row + 1] : all->longest;
+        begin[row + 1] += begin[row];
     }
-    for (int64_t p = 0; p < n_pairs; p++) {
-        all->order[start[i[p] - first]++] = p;
-        if (p % POLL_PAIRS == POLL_PAIRS - 1 && hs_poll(options, 1.0) != HS_OK) {
+    all->n = begin[all->n_points];
+    all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
+    all->has_j =
+        all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
+    return HS_OK;
+}
+
+/* Puts the entries in rows. */
+static hs_status
+deal_out(const hs_sorting *all)
+{
+    int64_t *next = all->end;
+    for (int64_t p = 0; p < all->found->n_pairs; p++) {
+        const int32_t i = all->i[p], j = all->j[p];
+        if (all->both_ways) {
+            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, 2 * p);
+            all->entries[next[j - all->first_point]++] = hs_entry_of(all, i, 2 * p + 1);
+        } else {
+            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, p);
+        }
+        if (poll_for(all, p) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
     }
@@ -132,16 +109,13 @@ sort_by_first(const sorting *all, const int32_t *i)
 }
 
 static hs_status
-find_order(const sorting *all)
+sort_rows(const hs_sorting *all, uint64_t *spare)
 {
-    const hs_output *found = all->found;
-    const keys       key = {hs_output_column(found, HS_WANT_I), hs_output_column(found, HS_WANT_J),
-                            hs_output_column(found, HS_WANT_SHIFT)};
-    hs_status        status = sort_by_first(all, key.i);
-    for (int64_t i = 0, first = 0, work = 0; i < all->n_points && status == HS_OK;
-         first = all->start[i++]) {
-        const int64_t n = all->start[i] - first;
-        sort_row(&key, found->ndim, all->order + first, n);
+    hs_status status = HS_OK;
+    for (int64_t row = 0, first = 0, work = 0; row < all->n_points && status == HS_OK;
+         first = all->end[row++]) {
+        const int64_t n = all->end[row] - first;
+        hs_sort_row(all, all->entries + first, n, spare);
         work += n;
         if (work > POLL_PAIRS) {
             work = 0;
@@ -151,83 +125,135 @@ find_order(const sorting *all)
     return status;
 }
 
-/* n indices in the given order, to every `stride`-th element. */
+/* n indices to every `stride`-th element. */
 static void
-put_indices(void *to, int index_bytes, int64_t stride, const int32_t *from, const int64_t *order,
-            int64_t n)
+put_indices(void *to, int index_bytes, int64_t stride, const int32_t *from, int64_t n)
 {
-    for (int64_t p = 0; p < n && to != NULL; p++) {
+    for (int64_t e = 0; e < n && to != NULL; e++) {
         if (index_bytes == 8) {
-            ((int64_t *)to)[p * stride] = from[order[p]];
+            ((int64_t *)to)[e * stride] = from[e];
         } else {
-            ((int32_t *)to)[p * stride] = from[order[p]];
+            ((int32_t *)to)[e * stride] = from[e];
         }
     }
 }
 
+/* The other quantities of n entries, at most PUT. */
 static void
-put_rows(const hs_output *found, hs_output *sorted, unsigned bit, const int64_t *order, int64_t n)
+put_measures(const hs_sorting *all, const uint64_t *entries, int64_t n, hs_output *sorted)
 {
-    const size_t size = hs_output_width(sorted, bit);
-    const char  *from = hs_output_column(found, bit);
-    char        *to = hs_output_next(sorted, bit);
-    for (int64_t p = 0; p < n && to != NULL; p++) {
-        memcpy(to + (size_t)p * size, from + (size_t)order[p] * size, size);
+    const int     d = all->found->ndim;
+    const double *distances = hs_output_column(all->found, HS_WANT_DISTANCE);
+    const double *vectors = hs_output_column(all->found, HS_WANT_VECTOR);
+    double       *distance = hs_output_next(sorted, HS_WANT_DISTANCE);
+    double       *vector = hs_output_next(sorted, HS_WANT_VECTOR);
+    int32_t      *shift = hs_output_next(sorted, HS_WANT_SHIFT);
+    for (int64_t e = 0; e < n && distance != NULL; e++) {
+        distance[e] = distances[hs_pair_of(all, entries[e])];
+    }
+    for (int64_t e = 0; e < n && vector != NULL; e++) {
+        const double *from = vectors + hs_pair_of(all, entries[e]) * d;
+        const bool    turned = hs_is_turned(all, entries[e]);
+        for (int k = 0; k < d; k++) {
+            *vector++ = turned ? -from[k] + 0.0 : from[k]; /* a zero has no sign */
+        }
+    }
+    for (int64_t e = 0; e < n && shift != NULL; e++) {
+        for (int k = 0; k < d; k++) {
+            *shift++ = hs_shift_of(all, entries[e], k);
+        }
     }
 }
 
-/* The next n pairs. */
+/* The next n entries, of row *row and those behind it. */
 static void
-put_pairs(const hs_output *found, const int64_t *order, int64_t n, hs_output *sorted)
+put_some(const hs_sorting *all, int64_t first, int64_t n, int64_t *row, hs_output *sorted)
 {
-    const int      bytes = sorted->index_bytes;
-    const int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
-    char          *both = hs_output_next(sorted, HS_WANT_BOTH);
-    put_indices(hs_output_next(sorted, HS_WANT_I), bytes, 1, i, order, n);
-    put_indices(hs_output_next(sorted, HS_WANT_J), bytes, 1, j, order, n);
-    put_indices(both, bytes, 2, i, order, n);
-    put_indices(both == NULL ? NULL : both + bytes, bytes, 2, j, order, n);
-    put_rows(found, sorted, HS_WANT_DISTANCE, order, n);
-    put_rows(found, sorted, HS_WANT_VECTOR, order, n);
-    put_rows(found, sorted, HS_WANT_SHIFT, order, n);
+    const uint64_t *entries = all->entries + first;
+    const int       bytes = sorted->index_bytes;
+    char           *both = hs_output_next(sorted, HS_WANT_BOTH);
+    int32_t         i[PUT], j[PUT];
+    for (int64_t e = 0; e < n; e++) {
+        while (all->end[*row] <= first + e) {
+            ++*row;
+        }
+        i[e] = all->first_point + (int32_t)*row;
+        j[e] = hs_second_of(all, entries[e]);
+    }
+    put_indices(hs_output_next(sorted, HS_WANT_I), bytes, 1, i, n);
+    put_indices(hs_output_next(sorted, HS_WANT_J), bytes, 1, j, n);
+    put_indices(both, bytes, 2, i, n);
+    put_indices(both == NULL ? NULL : both + bytes, bytes, 2, j, n);
+    put_measures(all, entries, n, sorted);
+    sorted->n_pairs += n;
 }
 
 static hs_status
-put_all(const hs_options *options, const hs_output *found, const int64_t *order, hs_output *sorted)
+put_all(const hs_sorting *all, hs_output *sorted)
 {
-    const int64_t n = found->n_pairs;
-    if (sorted->fixed && n > sorted->capacity) {
-        sorted->n_pairs = n; /* tells hs_pairs_conclude that they do not fit */
+    int64_t row = 0;
+    if (sorted->fixed && all->n > sorted->capacity) {
+        sorted->n_pairs = all->n; /* tells hs_pairs_conclude that they do not fit */
         return HS_OK;
     }
-    hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, n, 1.0);
-    for (int64_t first = 0; first < n && status == HS_OK; first += POLL_PAIRS) {
-        const int64_t part = n - first < POLL_PAIRS ? n - first : POLL_PAIRS;
-        put_pairs(found, order + first, part, sorted);
-        sorted->n_pairs += part;
-        status = part == POLL_PAIRS ? hs_poll(options, 1.0) : HS_OK;
+    hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n, 1.0);
+    for (int64_t first = 0; first < all->n && status == HS_OK; first += PUT) {
+        const int64_t n = all->n - first < PUT ? all->n - first : PUT;
+        put_some(all, first, n, &row, sorted);
+        status = poll_for(all, first + n - 1);
     }
     return status;
+}
+
+/* Once the rows are counted. */
+static hs_status
+sort_and_put(hs_sorting *all, hs_output *sorted)
+{
+    hs_account *account = &all->call->account;
+    uint64_t   *spare = hs_alloc(account, HS_FOR_SORTING, all->longest, sizeof *spare);
+    all->entries = hs_alloc(account, HS_FOR_SORTING, all->n, sizeof *all->entries);
+    hs_status status = all->entries != NULL && spare != NULL ? deal_out(all) : HS_ERR_MEMORY;
+    if (status == HS_OK) {
+        status = sort_rows(all, spare);
+    }
+    if (status == HS_OK) {
+        status = put_all(all, sorted);
+    }
+    hs_free(account, all->entries);
+    hs_free(account, spare);
+    return status;
+}
+
+static hs_status
+sort(hs_sorting *all, hs_output *sorted)
+{
+    all->i = hs_output_column(all->found, HS_WANT_I);
+    all->j = hs_output_column(all->found, HS_WANT_J);
+    all->shift = hs_output_column(all->found, HS_WANT_SHIFT);
+    const hs_status status = count_rows(all);
+    return status == HS_OK ? sort_and_put(all, sorted) : status;
 }
 
 hs_status
 hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points, const hs_output *found,
               hs_output *sorted)
 {
-    hs_account *account = &call->account;
-    hs_status   status = HS_ERR_MEMORY;
-    sorting all = {.call = call, .first_point = first_point, .n_points = n_points, .found = found};
-    all.start = hs_alloc(account, HS_FOR_SORTING, n_points + 1, sizeof *all.start);
-    all.order = hs_alloc(account, HS_FOR_SORTING, found->n_pairs, sizeof *all.order);
-    if (all.start != NULL && all.order != NULL) {
-        status = found->n_pairs > 0 ? find_order(&all) : HS_OK;
-        hs_free(account, all.start);
-        all.start = NULL;
-        if (status == HS_OK) {
-            status = put_all(&call->options, found, all.order, sorted);
-        }
-    }
-    hs_free(account, all.start);
-    hs_free(account, all.order);
+    hs_sorting all = {
+        .call = call, .first_point = first_point, .n_points = n_points, .found = found};
+    all.end = hs_alloc(&call->account, HS_FOR_SORTING, n_points + 1, sizeof *all.end);
+    const hs_status status = all.end != NULL ? sort(&all, sorted) : HS_ERR_MEMORY;
+    hs_free(&call->account, all.end);
+    return status;
+}
+
+hs_status
+hs_sort_rows(hs_call *call, int64_t n_rows, const hs_output *found, bool both_ways,
+             int64_t *offsets, hs_output *sorted)
+{
+    hs_sorting all = {
+        .call = call, .n_points = n_rows, .found = found, .both_ways = both_ways, .end = offsets};
+    const hs_status status = sort(&all, sorted);
+    memmove(offsets + 1, offsets, (size_t)n_rows * sizeof *offsets);
+    offsets[0] = 0;
     return status;
 }

@@ -16,4 +16,17 @@ unsigned hs_sort_columns(const hs_search *search);
 hs_status hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points,
                         const hs_output *found, hs_output *sorted);
 
+/*
+ * The same for the rows of a table, of points or queries 0 to n_rows - 1; both_ways: each pair
+ * found is in two rows, as (j, i, -S) too. offsets: receives n_rows + 1 numbers, where each row
+ * begins.
+ */
+hs_status hs_sort_rows(hs_call *call, int64_t n_rows, const hs_output *found, bool both_ways,
+                       int64_t *offsets, hs_output *sorted);
+
+#ifdef HS_TESTING
+/* How many bits a place may have at most. Returns what it was before. */
+int hs_test_sort_place_bits(int bits);
+#endif
+
 #endif

@@ -73,6 +73,16 @@
 #define HS_FILTER_LIMIT_ROUNDINGS 4.51
 #endif
 
+/* Supports in float32: roundings of a term of H (y - q), in units of the term. The entry of H once,
+ * y - q once; and for each axis, the product, and the sums that it goes to, which are one less. The
+ * .01 pays for the products of roundings, and for the float64 rounding of the entry. */
+#ifndef HS_SUPPORT_FILTER_ROUNDINGS
+#define HS_SUPPORT_FILTER_ROUNDINGS 2.01
+#endif
+#ifndef HS_SUPPORT_FILTER_ROUNDINGS_PER_AXIS
+#define HS_SUPPORT_FILTER_ROUNDINGS_PER_AXIS 1.0
+#endif
+
 /* The expanded form. All its roundings together, per square of the number of axes, in units of
  * u m^2 where m bounds every component: d squares, d products of up to 2 m^2, and the partial sums
  * of both, up to (3 d - 2) m^2, but for the last. */
@@ -97,12 +107,28 @@
 #define HS_FLOAT64_ROUNDINGS_PER_AXIS 1.0
 #endif
 
+/* Supports in float64 (metric_support.h): roundings of a term of H D, in units of the term. D once;
+ * and for each axis, the product, and the sums that it goes to, which are one less. The .001 pays
+ * for the products of roundings and for working out the bound. */
+#ifndef HS_SUPPORT_ROUNDINGS
+#define HS_SUPPORT_ROUNDINGS 1.001
+#endif
+#ifndef HS_SUPPORT_ROUNDINGS_PER_AXIS
+#define HS_SUPPORT_ROUNDINGS_PER_AXIS 1.0
+#endif
+
 /* ---- double-word stage (metric_float.h) ---- */
 
 /* v^2 per sum of two double-words, relative to the sum of their magnitudes. The .01 pays for the
  * terms in v^3 and for working out the bound in float64. */
 #ifndef HS_DW_ADD_ERROR
 #define HS_DW_ADD_ERROR 3.01
+#endif
+
+/* v^2 per product of a float64 and a double-word: 1 for that with the low word, and 2 for its sum
+ * with the low word of the other product. */
+#ifndef HS_SUPPORT_DW_ERROR
+#define HS_SUPPORT_DW_ERROR 3.01
 #endif
 
 /* v^2 per square of a double-word. */

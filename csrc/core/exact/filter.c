@@ -139,6 +139,39 @@ hs_limit_form_of(int ndim, double extent, double error)
                                float_above(multiply_up(add_up(multiply_up(a, far), lost), more))};
 }
 
+double
+hs_support_roundings(int ndim, double unit)
+{
+    return multiply_up(HS_SUPPORT_FILTER_ROUNDINGS + HS_SUPPORT_FILTER_ROUNDINGS_PER_AXIS * ndim,
+                       unit);
+}
+
+hs_limit_form
+hs_support_form_of(int ndim, double extent, double error)
+{
+    const double unit = HS_FILTER_UNIT, tiny = HS_FILTER_TINY, axes = ndim;
+    const double largest = multiply_up(hs_next_up(sqrt(axes)), extent); /* |y - q| */
+    const double moved = add_up(input_error(ndim, extent, error, unit, tiny),
+                                multiply_up(hs_support_roundings(ndim, unit), largest));
+    const double roundings = multiply_up(HS_FILTER_SQUARE_ROUNDINGS * axes, unit);
+    const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
+    const double own = multiply_up(HS_FILTER_LIMIT_ROUNDINGS, unit);
+    const double more = hs_next_up(1.0 + own), less = hs_next_down(1.0 - own);
+    /* Flushed to zero: entries, products and sums of each component, and then squares. */
+    const double flushed = multiply_up(multiply_up(axes * axes, tiny), add_up(extent, 2.0));
+    const double lost = hs_next_up(sqrt(multiply_up(HS_FILTER_SQUARE_FLUSHES * axes, tiny)));
+    const double far = hs_next_up(sqrt(1.0 + gamma)), near = sqrt(1.0 - gamma) - unit * unit;
+    if (!(moved <= FLT_MAX) || !(flushed < 0.5)) { /* not for NaN either */
+        return (hs_limit_form){1.0f, INFINITY, 1.0f, INFINITY};
+    }
+    const double in = multiply_down(near, hs_next_down(1.0 - flushed)) - lost;
+    const double out = add_up(multiply_up(far, add_up(1.0, flushed)), lost);
+    return (hs_limit_form){.in_factor = -float_above(multiply_up(moved, more)),
+                           .in_less = -float_below(multiply_down(hs_next_down(in), less)),
+                           .out_factor = float_above(multiply_up(multiply_up(far, moved), more)),
+                           .out_more = float_above(multiply_up(out, more))};
+}
+
 hs_thresholds
 hs_thresholds_of(int ndim, double cutoff, double extent, double error)
 {

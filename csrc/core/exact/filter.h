@@ -52,6 +52,18 @@ typedef struct hs_limit_form {
 /* For radii that are each rounded to float32 once, and flushed to zero perhaps. */
 hs_limit_form hs_limit_form_of(int ndim, double extent, double error);
 
+/*
+ * For supports (support.h) over their extent: N = H / extent, rounded to float32, with which
+ * kernels compute s = sum_k (sum_l N_kl (y_l - q_l))^2. Thresholds for |N D| against 1 are those of
+ * a limit, r being not below the size of N (hs_support_size), nor below HS_LEAST_NEAR_SIZE.
+ */
+#define HS_LEAST_NEAR_SIZE 0x1p-60f
+hs_limit_form hs_support_form_of(int ndim, double extent, double error);
+
+/* The part of a term of that sum, from N and y - q as real numbers, that all its roundings change,
+ * for a unit roundoff. */
+double hs_support_roundings(int ndim, double unit);
+
 /* For points of which no |q_k| passes `largest`: no |y_k| plus |q_k| of a pair within the cutoff
  * passes this. It is an extent for the pairs of candidates that are not known yet. */
 double hs_reach_extent(double cutoff, double largest, double error);

@@ -15,26 +15,70 @@
 /* Steps that a level begins, at most: with itself, with those below it, and these with it. */
 #define MOST_STEPS (1 + 2 * (APART + 1))
 
+/* Times a product of two float64s, less than what its low word is a multiple of. */
+#define LOW_WORD 0x1p-110
+
 /* Radii of points in some levels; nothing where there are none. */
 typedef struct radii_range {
     double smallest, largest, least; /* least: that is not 0 */
 } radii_range;
 
+/* Extremes are found in so many parts, which do not wait for each other. */
+#define PARTS 4
+
+/* The smallest of radii, and of those that are not 0; infinity where there are none. */
+static void
+find_smallest(const double *radii, int64_t n, radii_range *range)
+{
+    double smallest[PARTS], least[PARTS];
+    for (int p = 0; p < PARTS; p++) {
+        smallest[p] = least[p] = HUGE_VAL;
+    }
+    for (int64_t first = 0; first < n; first += PARTS) {
+        for (int p = 0; p < PARTS; p++) {
+            const double radius = radii[first + p < n ? first + p : n - 1];
+            const double positive = radius > 0.0 ? radius : HUGE_VAL;
+            smallest[p] = hs_smaller(smallest[p], radius);
+            least[p] = hs_smaller(least[p], positive);
+        }
+    }
+    for (int p = 0; p < PARTS; p++) {
+        range->smallest = hs_smaller(range->smallest, smallest[p]);
+        range->least = hs_smaller(range->least, least[p]);
+    }
+}
+
+static double
+largest_of(const double *radii, int64_t n)
+{
+    double largest[PARTS] = {0.0};
+    for (int64_t first = 0; first < n; first += PARTS) {
+        for (int p = 0; p < PARTS; p++) {
+            largest[p] = hs_larger(largest[p], radii[first + p < n ? first + p : n - 1]);
+        }
+    }
+    return hs_larger(hs_larger(largest[0], largest[1]), hs_larger(largest[2], largest[3]));
+}
+
+/* Of a slice that has a point. Levels ascend, so that the first ones and the last tell all. */
 static radii_range
 range_of(const hs_level_set *set, hs_slice levels)
 {
+    const int64_t end = set->first[levels.end];
+    int64_t       last = levels.end - 1;
     if (set->radii == NULL) {
         return (radii_range){0.0, 0.0, 0.0};
     }
-    radii_range range = {HUGE_VAL, 0.0, 0.0};
-    for (int64_t i = set->first[levels.first]; i < set->first[levels.end]; i++) {
-        const double radius = set->radii[i];
-        range.smallest = hs_smaller(range.smallest, radius);
-        range.largest = hs_larger(range.largest, radius);
-        if (radius > 0.0 && !(range.least > 0.0 && range.least <= radius)) {
-            range.least = radius;
-        }
+    radii_range range = {.smallest = HUGE_VAL, .least = HUGE_VAL};
+    for (int64_t l = levels.first; l < levels.end && range.least == HUGE_VAL; l++) {
+        const int64_t first = set->first[l];
+        find_smallest(set->radii + first, set->first[l + 1] - first, &range);
     }
+    while (set->first[last] == end) {
+        last--;
+    }
+    range.largest = largest_of(set->radii + set->first[last], end - set->first[last]);
+    range.least = range.least == HUGE_VAL ? 0.0 : range.least;
     return range;
 }
 
@@ -48,6 +92,12 @@ static bool
 is_empty(const hs_level_set *set, hs_slice levels)
 {
     return levels.first >= levels.end || set->first[levels.first] == set->first[levels.end];
+}
+
+static hs_dw
+limit_by(const planning *now, double asking, double other)
+{
+    return hs_limit_by(now->levels->rule, now->levels->factor, asking, other, now->plan->bound);
 }
 
 static void
@@ -70,11 +120,14 @@ add_step(planning *now, hs_slice asking, hs_slice points, bool is_own)
         return;
     }
     const radii_range a = range_of(askers, asking), b = range_of(&levels->points, points);
-    const hs_dw       low = hs_limit_by(levels->rule, a.smallest, b.smallest, plan->bound);
-    const hs_dw       high = hs_limit_by(levels->rule, a.largest, b.largest, plan->bound);
+    const hs_dw       low = limit_by(now, a.smallest, b.smallest);
+    const hs_dw       high = limit_by(now, a.largest, b.largest);
     step.cutoff = high.lo > 0.0 ? hs_next_up(high.hi) : high.hi;
     step.least = a.least > 0.0 && !(b.least > 0.0 && b.least < a.least) ? a.least : b.least;
-    step.has_limits = low.hi != high.hi || low.lo != 0.0 || high.lo != 0.0;
+    if (levels->factor != 1.0) { /* where lengths are scaled, the low words of products count */
+        step.least *= levels->factor * LOW_WORD;
+    }
+    step.has_limits = levels->has_supports || low.hi != high.hi || low.lo != 0.0 || high.lo != 0.0;
     plan->steps[plan->n++] = step;
 }
 
@@ -118,45 +171,50 @@ add_above(planning *now, int32_t l)
  */
 #define SHARE_OF_PAIRED 0.3
 
+/* By how much the candidates of all pairs of types are fewer than those of all at once. */
 static double
-count_of(const hs_level_set *set, int32_t level)
-{
-    return (double)(set->first[level + 1] - set->first[level]);
-}
-
-static bool
-takes_all_types(const hs_levels *levels)
+share_of_paired(const hs_levels *levels)
 {
     const hs_level_set *asking = hs_levels_asking(levels), *points = &levels->points;
     const int32_t       n = levels->n;
     double              largest = 0.0, share = 0.0;
-    if (n > HS_TABLE_TYPES || n < 2) {
-        return false;
-    }
     for (int32_t e = 0; e < n * n; e++) {
         largest = hs_larger(largest, levels->cutoffs[e]);
     }
     const double all = (double)asking->n * (double)points->n;
-    for (int32_t a = 0; a < n && largest > 0.0; a++) {
-        for (int32_t b = 0; b < n; b++) {
-            const double part = hs_larger(levels->cutoffs[a * n + b], 0.0) / largest;
-            const double volume = pow(part, points->ndim);
-            share += count_of(asking, a) * count_of(points, b) / all * volume;
-        }
+    for (int32_t e = 0; e < n * n && largest > 0.0 && all > 0.0; e++) {
+        const double   volume = pow(hs_larger(levels->cutoffs[e], 0.0) / largest, points->ndim);
+        const hs_slice a = {e / n, e / n + 1}, b = {e % n, e % n + 1};
+        share += hs_level_count(asking, a) * hs_level_count(points, b) / all * volume;
     }
-    return share > SHARE_OF_PAIRED;
+    return share;
+}
+
+/* Whether there is one search, as far as that does not depend on where the points are. */
+static bool
+takes_all(const hs_levels *levels, hs_algorithm algorithm)
+{
+    const bool has_types = levels->cutoffs != NULL;
+    if (levels->n < 2 || algorithm == HS_HIERARCHY || (has_types && levels->n > HS_TABLE_TYPES)) {
+        return false;
+    }
+    return algorithm != HS_AUTO || (has_types && share_of_paired(levels) > SHARE_OF_PAIRED);
 }
 
 static void
-add_all_types(planning *now)
+add_all(planning *now)
 {
     const hs_levels *levels = now->levels;
     const hs_slice   all = {0, levels->n};
-    hs_level_step    step = {.asking = all,
-                             .points = all,
-                             .is_own = now->plan->is_half,
-                             .by_table = true,
-                             .has_limits = true};
+    if (levels->cutoffs == NULL) {
+        add_step(now, all, all, now->plan->is_half);
+        return;
+    }
+    hs_level_step step = {.asking = all,
+                          .points = all,
+                          .is_own = now->plan->is_half,
+                          .by_table = true,
+                          .has_limits = true};
     for (int32_t e = 0; e < levels->n * levels->n; e++) {
         const double cutoff = levels->cutoffs[e];
         step.cutoff = hs_larger(step.cutoff, cutoff);
@@ -186,19 +244,21 @@ add_level(planning *now, int32_t l)
 }
 
 hs_status
-hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound, hs_level_plan *plan)
+hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
+                   hs_algorithm algorithm, hs_level_plan *plan)
 {
     const int64_t n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
     const bool    is_directed = levels->cutoffs == NULL &&
                              (levels->rule == HS_RULE_GATHER || levels->rule == HS_RULE_SCATTER);
-    *plan = (hs_level_plan){.is_half = !levels->has_queries && !is_directed, .bound = bound};
+    *plan = (hs_level_plan){
+        .is_half = !levels->has_queries && !is_directed, .bound = bound, .algorithm = algorithm};
     plan->steps = hs_alloc(account, HS_FOR_CELLS, n * most, sizeof *plan->steps);
     if (plan->steps == NULL) {
         return HS_ERR_MEMORY;
     }
     planning now = {.levels = levels, .plan = plan};
-    if (levels->cutoffs != NULL && takes_all_types(levels)) {
-        add_all_types(&now);
+    if (takes_all(levels, algorithm)) {
+        add_all(&now);
         return HS_OK;
     }
     for (int32_t l = 0; l < n; l++) {
@@ -206,6 +266,18 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound, h
     }
     HS_ASSERT(plan->n <= n * most);
     return HS_OK;
+}
+
+hs_level_step
+hs_level_plan_all(const hs_levels *levels, const hs_level_plan *plan)
+{
+    hs_level_step  all = {.is_own = plan->is_half};
+    hs_level_plan  one = {.steps = &all, .is_half = plan->is_half, .bound = plan->bound};
+    planning       now = {.levels = levels, .plan = &one};
+    const hs_slice each = {0, levels->n};
+    add_step(&now, each, each, plan->is_half);
+    HS_ASSERT(one.n == 1);
+    return all;
 }
 
 bool

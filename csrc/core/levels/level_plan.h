@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * level_plan.h: which levels are searched together. A search of two levels costs what its largest
- * reach costs, so levels much smaller than another may join for it, where the reach is about that
- * of the larger one anyway: there are a few searches a level, not one for every two levels.
+ * level_plan.h: which levels are searched together. A search between two levels costs what its
+ * largest reach costs. Where one level is much larger than others, its own size decides the reach,
+ * and these others may be searched against it all at once: so there are a few searches for each
+ * level, and not one for every two levels.
  */
 #ifndef HS_LEVEL_PLAN_H
 #define HS_LEVEL_PLAN_H
@@ -22,15 +23,21 @@ typedef struct hs_level_step {
 typedef struct hs_level_plan {
     hs_level_step *steps; /* owned */
     int64_t        n;
-    bool           is_half; /* each pair of points once, the lower number first. If not, a level
+    bool           is_half;   /* each pair of points once, the lower number first. If not, a level
                              * with itself gives each point all its neighbours */
-    double         bound;   /* no pair is further apart than this; may be infinite */
+    double         bound;     /* no pair is further apart than this; may be infinite */
+    hs_algorithm   algorithm; /* the caller's choice, which level_search.c narrows for each step */
 } hs_level_plan;
 
 /* Without queries, rules that are the same both ways give the half list; else every asking point
- * meets all that it can. HS_OK or HS_ERR_MEMORY. */
+ * meets all that it can. HS_OK or HS_ERR_MEMORY. algorithm: HS_HIERARCHY is levels in any case,
+ * HS_AUTO what is expected to be quickest, and any other one search of all, with the largest reach;
+ * but types are searched in pairs where there are more of them than a table of limits holds. */
 hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
-                             hs_level_plan *plan);
+                             hs_algorithm algorithm, hs_level_plan *plan);
+
+/* One step that is all of a search by radii, in place of those of the plan, which has some. */
+hs_level_step hs_level_plan_all(const hs_levels *levels, const hs_level_plan *plan);
 
 /* Whether one step is all of the search. */
 bool hs_level_plan_is_single(const hs_levels *levels, const hs_level_plan *plan);

@@ -7,15 +7,17 @@
 #define HS_LEVEL_SEARCH_H
 
 #include "../search/limits.h"
+#include "../search/supports.h"
 
 #include "level_plan.h"
 
 /* An open step; it must not move. */
 typedef struct hs_level_search {
-    hs_search search;
-    hs_limits limits;
-    void     *of_asking, *of_points; /* owned: the radii of limits, or the types */
-    void     *table;                 /* owned: that of limits */
+    hs_search   search;
+    hs_limits   limits;
+    hs_supports supports;              /* those of limits, if it has any */
+    void       *of_asking, *of_points; /* owned: the radii of limits, the types, or the supports */
+    void       *table;                 /* owned: that of limits */
 } hs_level_search;
 
 /*

@@ -15,13 +15,20 @@
 #define LARGEST_RADIUS  0x1p1022
 #define SMALLEST_HALVED 0x1p-1021
 
+/* Radii that have an extent, where they are not 0: the two words of the product are float64s, and
+ * no two radii are so different that they could not be told apart by their size. */
+#define SMALLEST_EXTENDED 0x1p-500
+#define LARGEST_EXTENDED  0x1p500
+
 /* What is divided, and by what. */
 typedef struct division {
-    hs_account     *account;
-    const hs_reach *reach;
-    int64_t        *count; /* owned; points of each size or type, in both sets */
-    int32_t         n_sizes;
-    double          largest; /* of all radii */
+    hs_account       *account;
+    const hs_options *options; /* to poll by */
+    const hs_reach   *reach;
+    int64_t          *count; /* owned; points of each size or type, in both sets */
+    int32_t           n_sizes;
+    double            factor;
+    double            largest; /* of all radii */
 } division;
 
 /* A set of points while it is divided. */
@@ -29,11 +36,19 @@ typedef struct division_set {
     const hs_points *points;
     const double    *radii;
     const int32_t   *types;
+    const double    *supports;
     bool             are_queries;
     double          *rows; /* owned, in the caller's order, as are all of these */
-    double          *copy; /* of the radii */
+    double          *copy; /* of the radii, or how far supports reach */
     int32_t         *size; /* of each point */
+    hs_support_set   read; /* of the supports */
 } division_set;
+
+static bool
+has_radii(const division_set *set)
+{
+    return set->radii != NULL || set->supports != NULL;
+}
 
 /* Ascends with the radius: the largest size are radii above half of the largest one, and so on, so
  * that radii which differ little are of one or two sizes. */
@@ -53,59 +68,106 @@ refuse(hs_status status, const division_set *set, int64_t row, double value, hs_
     return status;
 }
 
+/* Passes go over HS_POLL_POINTS at a time and poll in between. The next ones of n; false where
+ * there are none, after a failure, or where the caller wants to stop, which *status says. */
+static bool
+go_on(const division *by, int64_t n, hs_slice *next, hs_status *status)
+{
+    if (*status == HS_OK && next->end > 0 && next->end < n) {
+        *status = hs_poll(by->options, 0.0);
+    }
+    next->first = next->end;
+    next->end = n - next->first < HS_POLL_POINTS ? n : next->first + HS_POLL_POINTS;
+    return *status == HS_OK && next->first < n;
+}
+
 static hs_status
 read_radii(division *by, division_set *set, hs_failure *failure)
 {
-    const bool halves = by->reach->rule == HS_RULE_MEAN;
-    for (int64_t i = 0; set->radii != NULL && i < set->points->n; i++) {
-        const double radius = set->radii[i] + 0.0; /* and no -0 */
-        if (!(radius >= 0.0 && radius <= LARGEST_RADIUS) ||
-            (halves && radius > 0.0 && radius < SMALLEST_HALVED)) {
-            return refuse(HS_ERR_RADII, set, i, radius, failure);
+    const bool    halves = by->reach->rule == HS_RULE_MEAN, extends = by->factor != 1.0;
+    const double  largest = extends ? LARGEST_EXTENDED : LARGEST_RADIUS;
+    const double  smallest = extends ? SMALLEST_EXTENDED : halves ? SMALLEST_HALVED : 0.0;
+    const int64_t n = set->radii != NULL ? set->points->n : 0;
+    hs_slice      next = {0, 0};
+    hs_status     status = HS_OK;
+    while (go_on(by, n, &next, &status)) {
+        for (int64_t i = next.first; i < next.end; i++) {
+            const double radius = set->radii[i] + 0.0; /* and no -0 */
+            if (!(radius >= 0.0 && radius <= largest) || (radius > 0.0 && radius < smallest)) {
+                return refuse(HS_ERR_RADII, set, i, radius, failure);
+            }
+            set->copy[i] = halves ? 0.5 * radius : radius;
+            by->largest = hs_larger(by->largest, set->copy[i]);
         }
-        set->copy[i] = halves ? 0.5 * radius : radius;
+    }
+    return status;
+}
+
+static hs_status
+read_supports(division *by, division_set *set, hs_failure *failure)
+{
+    const int64_t n = set->points->n;
+    hs_status     status = HS_OK;
+    if (set->supports != NULL) {
+        status = hs_support_set_read(by->account, by->options, set->supports, n, set->points->ndim,
+                                     by->reach->extent, &set->read, set->copy, failure);
+        failure->in_queries = set->are_queries;
+    }
+    for (int64_t i = 0; status == HS_OK && set->supports != NULL && i < n; i++) {
         by->largest = hs_larger(by->largest, set->copy[i]);
     }
-    return HS_OK;
+    return status;
 }
 
 /* Once the largest radius is known. Sets without any are of one size. */
-static void
+static hs_status
 find_sizes(const division *by, division_set *set)
 {
-    for (int64_t i = 0; i < set->points->n; i++) {
-        set->size[i] = set->radii != NULL ? size_of(set->copy[i], by->largest) : 0;
-        by->count[set->size[i]]++;
+    hs_slice  next = {0, 0};
+    hs_status status = HS_OK;
+    while (go_on(by, set->points->n, &next, &status)) {
+        for (int64_t i = next.first; i < next.end; i++) {
+            set->size[i] = has_radii(set) ? size_of(set->copy[i], by->largest) : 0;
+            by->count[set->size[i]]++;
+        }
     }
+    return status;
 }
 
 static hs_status
 read_types(const division *by, division_set *set, hs_failure *failure)
 {
-    for (int64_t i = 0; i < set->points->n; i++) {
-        const int32_t type = set->types[i];
-        if (type < 0 || type >= by->reach->n_types) {
-            return refuse(HS_ERR_TYPES, set, i, type, failure);
+    hs_slice  next = {0, 0};
+    hs_status status = HS_OK;
+    while (go_on(by, set->points->n, &next, &status)) {
+        for (int64_t i = next.first; i < next.end; i++) {
+            const int32_t type = set->types[i];
+            if (type < 0 || type >= by->reach->n_types) {
+                return refuse(HS_ERR_TYPES, set, i, type, failure);
+            }
+            set->size[i] = type;
+            by->count[type]++;
         }
-        set->size[i] = type;
-        by->count[type]++;
     }
-    return HS_OK;
+    return status;
 }
 
 static hs_status
-read_rows(division_set *set, hs_failure *failure)
+read_rows(const division *by, division_set *set, hs_failure *failure)
 {
-    const int64_t n = set->points->n;
-    const int     d = set->points->ndim;
-    hs_points_copy(set->points, set->rows);
-    for (int64_t i = 0; i < n * d; i++) {
-        if (!isfinite(set->rows[i])) {
-            failure->column = i % d;
-            return refuse(HS_ERR_NOT_FINITE, set, i / d, set->rows[i], failure);
+    hs_slice  next = {0, 0};
+    hs_status status = HS_OK;
+    while (go_on(by, set->points->n, &next, &status)) {
+        hs_points part = *set->points;
+        part.data = (const char *)part.data + next.first * part.row_stride;
+        part.n = next.end - next.first;
+        status = hs_points_copy_finite(&part, set->rows + next.first * part.ndim, failure);
+        if (status != HS_OK) {
+            failure->row += next.first;
+            failure->in_queries = set->are_queries;
         }
     }
-    return HS_OK;
+    return status;
 }
 
 static hs_status
@@ -118,9 +180,10 @@ read_set(division *by, division_set *set, hs_failure *failure)
     if (set->rows == NULL || set->copy == NULL || set->size == NULL) {
         return HS_ERR_MEMORY;
     }
-    const hs_status status = by->reach->n_types > 0 ? read_types(by, set, failure)
-                                                    : read_radii(by, set, failure);
-    return status == HS_OK ? read_rows(set, failure) : status;
+    const hs_status status = by->reach->has_supports  ? read_supports(by, set, failure)
+                             : by->reach->n_types > 0 ? read_types(by, set, failure)
+                                                      : read_radii(by, set, failure);
+    return status == HS_OK ? read_rows(by, set, failure) : status;
 }
 
 static void
@@ -129,6 +192,7 @@ free_set(hs_account *account, division_set *set)
     hs_free(account, set->rows);
     hs_free(account, set->copy);
     hs_free(account, set->size);
+    hs_support_set_free(account, &set->read);
 }
 
 /* Gives each size that occurs a level, in count; returns how many there are. */
@@ -152,21 +216,23 @@ allocate_set(const division *by, const division_set *from, int32_t n_levels, hs_
     to->number = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *to->number);
     to->first = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n_levels + 1, sizeof *to->first);
     to->radii = NULL;
-    if (from->radii != NULL) {
+    if (has_radii(from)) {
         to->radii = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *to->radii);
     }
     return to->rows != NULL && to->number != NULL && to->first != NULL &&
-           (to->radii != NULL || from->radii == NULL);
+           (to->radii != NULL || !has_radii(from));
 }
 
 /* Puts the points in the order of their levels. */
 static hs_status
-arrange(const division *by, const division_set *from, int32_t n_levels, hs_level_set *to)
+arrange(const division *by, division_set *from, int32_t n_levels, hs_level_set *to)
 {
     if (!allocate_set(by, from, n_levels, to)) {
         return HS_ERR_MEMORY;
     }
     const size_t bytes = (size_t)to->ndim * sizeof(double);
+    hs_slice     part = {0, 0};
+    hs_status    status = HS_OK;
     int64_t *next = to->first; /* where each level goes on; then, where the one before it ends */
     memset(next, 0, ((size_t)n_levels + 1) * sizeof *next);
     for (int64_t i = 0; i < to->n; i++) {
@@ -175,19 +241,23 @@ arrange(const division *by, const division_set *from, int32_t n_levels, hs_level
     for (int32_t l = 0; l < n_levels; l++) {
         next[l + 1] += next[l];
     }
-    for (int64_t i = 0; i < to->n; i++) {
-        const int64_t at = next[by->count[from->size[i]]]++;
-        memcpy(to->rows + at * to->ndim, from->rows + i * to->ndim, bytes);
-        to->number[at] = (int32_t)i;
-        if (to->radii != NULL) {
-            to->radii[at] = from->copy[i];
+    while (go_on(by, to->n, &part, &status)) {
+        for (int64_t i = part.first; i < part.end; i++) {
+            const int64_t at = next[by->count[from->size[i]]]++;
+            memcpy(to->rows + at * to->ndim, from->rows + i * to->ndim, bytes);
+            to->number[at] = (int32_t)i;
+            if (to->radii != NULL) {
+                to->radii[at] = from->copy[i];
+            }
         }
     }
     for (int32_t l = n_levels; l > 0; l--) {
         next[l] = next[l - 1];
     }
     next[0] = 0;
-    return HS_OK;
+    to->supports = from->read;
+    from->read.numbers = NULL;
+    return status;
 }
 
 /* The cutoffs of those types that occur, in the order of their levels. */
@@ -233,13 +303,15 @@ divide(division *by, division_set *points, division_set *queries, hs_levels *lev
         return status;
     }
     if (!has_types) {
-        find_sizes(by, points);
+        status = find_sizes(by, points);
     }
-    if (!has_types && queries->points != NULL) {
-        find_sizes(by, queries);
+    if (status == HS_OK && !has_types && queries->points != NULL) {
+        status = find_sizes(by, queries);
     }
     levels->n = number_levels(by);
-    status = has_types ? read_cutoffs(by, levels, failure) : HS_OK;
+    if (status == HS_OK && has_types) {
+        status = read_cutoffs(by, levels, failure);
+    }
     if (status == HS_OK) {
         status = arrange(by, points, levels->n, &levels->points);
     }
@@ -250,18 +322,28 @@ divide(division *by, division_set *points, division_set *queries, hs_levels *lev
 }
 
 hs_status
-hs_levels_divide(hs_account *account, const hs_points *points, const hs_points *queries,
-                 const hs_reach *reach, hs_levels *levels, hs_failure *failure)
+hs_levels_divide(hs_account *account, const hs_options *options, const hs_points *points,
+                 const hs_points *queries, const hs_reach *reach, hs_levels *levels,
+                 hs_failure *failure)
 {
-    division     by = {.account = account, .reach = reach};
-    const bool   has_types = reach->n_types > 0;
-    division_set of_points = {
-        .points = points, .radii = has_types ? NULL : reach->radii, .types = reach->types};
+    const bool   has_supports = reach->has_supports, has_types = reach->n_types > 0;
+    const bool   has_own = !has_types && !has_supports; /* radii */
+    const double factor = has_own && reach->extent != 0.0 ? reach->extent : 1.0;
+    division     by = {.account = account, .options = options, .reach = reach, .factor = factor};
+    division_set of_points = {.points = points,
+                              .radii = has_own ? reach->radii : NULL,
+                              .types = reach->types,
+                              .supports = has_supports ? reach->supports : NULL};
     division_set of_queries = {.points = queries,
-                               .radii = has_types ? NULL : reach->query_radii,
+                               .radii = has_own ? reach->query_radii : NULL,
                                .types = reach->query_types,
+                               .supports = has_supports ? reach->query_supports : NULL,
                                .are_queries = true};
-    *levels = (hs_levels){.rule = reach->rule, .has_queries = queries != NULL};
+    *levels = (hs_levels){.rule = reach->rule,
+                          .factor = factor,
+                          .has_queries = queries != NULL,
+                          .has_supports = has_supports,
+                          .extent = reach->extent};
     const hs_status status = divide(&by, &of_points, &of_queries, levels, failure);
     free_set(account, &of_points);
     free_set(account, &of_queries);
@@ -279,6 +361,16 @@ free_level_set(hs_account *account, hs_level_set *set)
     hs_free(account, set->number);
     hs_free(account, set->radii);
     hs_free(account, set->first);
+    hs_support_set_free(account, &set->supports);
+}
+
+void
+hs_levels_renumber(int32_t first, hs_levels *levels)
+{
+    for (int64_t at = 0; at < levels->points.n; at++) {
+        levels->points.number[at] += first;
+    }
+    levels->points.supports.first += first;
 }
 
 void

@@ -8,7 +8,7 @@
 #ifndef HS_LEVELS_H
 #define HS_LEVELS_H
 
-#include "../memory/account.h"
+#include "support_set.h"
 
 /* Consecutive levels, or a part of what lies in them. */
 typedef struct hs_slice {
@@ -21,31 +21,48 @@ typedef struct hs_level_set {
     int      ndim;
     double  *rows;   /* n * ndim coordinates */
     int32_t *number; /* n: the caller's number of each */
-    double  *radii;  /* n, halved for HS_RULE_MEAN; NULL where there are none */
-    int64_t *first;  /* of each level, and n */
+    double  *radii; /* n, halved for HS_RULE_MEAN; of supports, how far they reach; NULL where there
+                      * are none */
+    int64_t *first; /* of each level, and n */
+    hs_support_set supports; /* in the caller's order */
 } hs_level_set;
 
 typedef struct hs_levels {
     hs_rule      rule;
+    double       factor; /* radii count so many times; 1 for rules of sums */
     int32_t      n; /* levels, ascending by their radii or types; each has a point of some set */
     hs_level_set points, queries; /* queries: nothing without them */
     bool         has_queries;
     double      *cutoffs; /* owned; of two types, -1 for no pairs; NULL: radii */
+    bool         has_supports;
+    double       extent; /* of supports; their radii have it already */
 } hs_levels;
 
 /*
- * Reads the points, radii and types, each number once, and checks their values: HS_ERR_RADII,
- * HS_ERR_TYPES and HS_ERR_NOT_FINITE name the first row that is wrong, HS_ERR_CUTOFF a table that
- * is not symmetric or not finite. queries may be NULL. On failure holds nothing.
+ * Reads the points, radii, types and supports, each number once, and checks their values:
+ * HS_ERR_RADII, HS_ERR_TYPES, HS_ERR_SUPPORTS, HS_ERR_SUPPORT_REACH and HS_ERR_NOT_FINITE name the
+ * first row that is wrong, HS_ERR_CUTOFF a table that is not symmetric or not finite. queries may
+ * be NULL. HS_ERR_INTERRUPTED where the poll of the options says so. On failure holds nothing.
  */
-hs_status hs_levels_divide(hs_account *account, const hs_points *points, const hs_points *queries,
-                           const hs_reach *reach, hs_levels *levels, hs_failure *failure);
+hs_status hs_levels_divide(hs_account *account, const hs_options *options, const hs_points *points,
+                           const hs_points *queries, const hs_reach *reach, hs_levels *levels,
+                           hs_failure *failure);
+
+/* Counts the points from `first` on: they are part of more. */
+void hs_levels_renumber(int32_t first, hs_levels *levels);
 
 /* Harmless twice. */
 void hs_levels_free(hs_account *account, hs_levels *levels);
 
 /* The points of these levels, borrowed. */
 hs_points hs_level_points(const hs_level_set *set, hs_slice levels);
+
+/* How many these are. */
+HS_ALWAYS_INLINE double
+hs_level_count(const hs_level_set *set, hs_slice levels)
+{
+    return (double)(set->first[levels.end] - set->first[levels.first]);
+}
 
 /* Those that search: queries, or the points. */
 HS_ALWAYS_INLINE const hs_level_set *

@@ -2,8 +2,10 @@
 /* account.c: each block has a header in front of it, which remembers its size. */
 #include "account.h"
 
+#include "chunk.h"
 #include "guard.h"
 #include "pages.h"
+#include "pool.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -68,6 +70,9 @@ hs_test_use_arena(bool on)
 enum { arena_is_used = 1 };
 #endif
 
+/* Larger blocks fill an arena too soon. */
+#define LARGEST_IN_ARENA (HS_POOL_SCRATCH / 2)
+
 /* How far one block of the arena is from the next: that one's header lies between them. */
 HS_ALWAYS_INLINE size_t
 arena_step(size_t bytes)
@@ -119,14 +124,46 @@ hs_account_give(hs_account *account, int64_t bytes)
     account->held -= bytes;
 }
 
+static void
+give_arena(void *data)
+{
+    if (!hs_pool_give(data)) { /* it is switched off, or in use */
+        hs_chunk_free(data);
+    }
+}
+
+/* Leaves an arena in the pool that the next call may have room enough in. */
+static void
+leave_larger_arena(void)
+{
+    void *data = hs_chunk_new(HS_POOL_SCRATCH), *other = hs_chunk_new(HS_POOL_SCRATCH);
+    if (other != NULL) {
+        /* From then on glibc keeps twice as much free memory at the top of the heap, where results
+         * are copied to arrays, instead of giving that back to the system each time. */
+        hs_chunk_free(other);
+    }
+    if (data != NULL) {
+        hs_chunk_of(data)->is_arena = true;
+        give_arena(data);
+    }
+}
+
 void
 hs_account_close(hs_account *account)
 {
 #ifdef HS_TESTING
     live_blocks -= account->arena != NULL;
 #endif
-    free(account->arena);
-    account->arena = account->arena_next = NULL;
+    if (account->arena_is_pooled) {
+        give_arena(account->arena);
+    } else {
+        free(account->arena);
+    }
+    if (account->arena_was_small) {
+        leave_larger_arena();
+    }
+    account->arena = account->arena_next = account->arena_end = NULL;
+    account->arena_is_pooled = account->arena_was_small = false;
 }
 
 void
@@ -137,22 +174,37 @@ hs_account_reset(hs_account *account)
     }
 }
 
+/* An arena, of the pool if it has one. */
+static bool
+take_arena(hs_account *account)
+{
+    account->arena = account->is_kept ? NULL : hs_pool_take_arena();
+    account->arena_is_pooled = account->arena != NULL;
+    if (account->arena == NULL) {
+        account->arena = malloc(HS_ARENA_BYTES);
+    }
+    if (account->arena == NULL) {
+        return false;
+    }
+    account->arena_end =
+        account->arena + (account->arena_is_pooled ? HS_POOL_SCRATCH : (size_t)HS_ARENA_BYTES);
+    account->arena_next = align(account->arena + sizeof(block_header));
+#ifdef HS_TESTING
+    live_blocks++;
+#endif
+    return true;
+}
+
 /* The next block of the arena, or NULL when it has no room for that. */
 static void *
 take_from_arena(hs_account *account, size_t bytes)
 {
-    if (account->arena == NULL) {
-        account->arena = malloc(HS_ARENA_BYTES);
-        if (account->arena == NULL) {
-            return NULL;
-        }
-        account->arena_next = align(account->arena + sizeof(block_header));
-#ifdef HS_TESTING
-        live_blocks++;
-#endif
+    if (account->arena == NULL && !take_arena(account)) {
+        return NULL;
     }
     char *block = account->arena_next;
-    if (arena_step(bytes) > (size_t)(account->arena + HS_ARENA_BYTES - block)) {
+    if (arena_step(bytes) > (size_t)(account->arena_end - block)) {
+        account->arena_was_small = !account->arena_is_pooled && !account->is_kept;
         return NULL;
     }
     account->arena_next = block + arena_step(bytes);
@@ -166,7 +218,7 @@ take_block(hs_account *account, size_t bytes)
 {
     void  *raw;
     size_t length;
-    if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < HS_ARENA_BYTES) {
+    if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < LARGEST_IN_ARENA) {
         void *block = take_from_arena(account, bytes);
         if (block != NULL) {
             return block;

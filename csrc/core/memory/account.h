@@ -10,12 +10,13 @@
 #include "../../halfshell.h"
 #include "../base/base.h"
 
-#define HS_ALIGNMENT 64 /* bytes; a cache line and the widest vector register */
-
 /*
- * Small blocks of a call are cut from one larger one, its arena: a small search takes some twenty
- * blocks, and that many calls of malloc cost more than the search. Not where tools watch over each
- * block: sanitizers, and the tests, which switch it on where they mean it.
+ * Small blocks of a call are cut from one larger one, its arena: a small search takes a dozen
+ * blocks, and that many calls of malloc cost more than the search. Calls that find it too small
+ * leave a larger one in the pool, for the next: else the C library may give the memory of each call
+ * back to the system, and have it cleared for the next one, which takes several times as long as a
+ * search of 1000 points. Not where tools watch over each block: sanitizers, and the tests, which
+ * switch it on where they mean it.
  */
 #if defined(__SANITIZE_ADDRESS__)
 #define HS_HAVE_ARENA 0
@@ -28,7 +29,8 @@
 #define HS_HAVE_ARENA 1
 #endif
 
-#define HS_ARENA_BYTES (32 << 10) /* what 64 points with a few hundred pairs take */
+#define HS_ARENA_BYTES \
+    (32 << 10) /* what 64 points with a few hundred pairs take; without the pool */
 
 /* What one call holds. The limit is looked up only when it could matter: finding out what the
  * machine has left costs more than a small search. */
@@ -40,6 +42,10 @@ typedef struct hs_account {
     void       *find_context;
     char       *arena;      /* owned, taken with the first small block; or NULL */
     char       *arena_next; /* where its next block begins */
+    char       *arena_end;
+    bool        is_kept;         /* for long: its arena is a small one */
+    bool        arena_is_pooled; /* a chunk of the pool, or else from malloc */
+    bool        arena_was_small; /* for a block that one of the pool would have had room for */
 } hs_account;
 
 #define HS_LIMIT_FREE (64 << 20) /* bytes that are handed out before the limit is looked up */

@@ -3,7 +3,6 @@
  * copied from the first to the second. */
 #include "chunk.h"
 
-#include "account.h"
 #include "pages.h"
 
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 /*
  * chunk.h: one chunk of memory that can grow, shrink and be told how far it will be filled. Large
  * ones are reservations of pages (pages.h) where there are such, the others come from malloc. Only
- * region.c and pool.c use chunks directly.
+ * region.c, pool.c and account.c use chunks directly.
  *
  * A chunk is known by its data pointer: 64-byte aligned, with this header right in front of it.
  */
@@ -18,6 +18,7 @@ typedef struct hs_chunk {
     size_t capacity; /* bytes of data that may be written */
     size_t touched;  /* bytes of data that are taken to be resident */
     size_t huge;     /* bytes of data advised for huge pages; small ones follow */
+    bool   is_arena; /* of a call that has ended (account.h): no result takes it */
 } hs_chunk;
 
 /* The header of a chunk. */

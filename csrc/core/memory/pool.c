@@ -185,8 +185,9 @@ hs_pool_clear(void)
 static bool
 suits(const hs_chunk *chunk, size_t expected)
 {
-    return chunk->length > 0 || (chunk->capacity >= expected &&
-                                 (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected));
+    return !chunk->is_arena && (chunk->length > 0 ||
+                                (chunk->capacity >= expected &&
+                                 (expected <= HS_POOL_SCRATCH || chunk->capacity / 2 <= expected)));
 }
 
 /* Bytes that a request would waste, or twice those that it would lack. Lists are expected to be a
@@ -216,6 +217,22 @@ hs_pool_take(size_t expected)
         }
     }
     void *data = best >= 0 ? remove_entry(best) : NULL;
+    unlock();
+    return data;
+}
+
+void *
+hs_pool_take_arena(void)
+{
+    void *data = NULL;
+    if (!try_lock()) {
+        return NULL;
+    }
+    for (int k = pool.n - 1; k >= 0 && data == NULL; k--) { /* the last one is still in caches */
+        if (hs_chunk_of(pool.data[k])->is_arena) {
+            data = remove_entry(k);
+        }
+    }
     unlock();
     return data;
 }

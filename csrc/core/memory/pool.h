@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * pool.h: memory of results that are gone, kept for the next ones: writing to memory that the
- * process already has is several times faster than writing to new pages.
+ * pool.h: memory of results that are gone, kept for the next ones, and that in which calls have
+ * worked (account.h): writing to memory that the process already has is several times faster than
+ * writing to new pages.
  *
  * This is the one exception to the rule that nothing here keeps state between calls (halfshell.h).
  * No answer depends on it. It is bounded by a limit that the caller can set, 0 switches it off, and
@@ -32,6 +33,9 @@ enum { HS_POOL_CHUNKS = 16 }; /* chunks kept; few, since all are looked at for e
  * caller. It may have less room than that if it can be grown. NULL: there is none.
  */
 void *hs_pool_take(size_t expected);
+
+/* A chunk that is an arena; owned by the caller. NULL: there is none. */
+void *hs_pool_take_arena(void);
 
 /* Keeps a chunk; the least recently kept ones make room. False: the caller still owns it. */
 bool hs_pool_give(void *data);

@@ -19,7 +19,7 @@
 /* The walk and what it leaves. */
 typedef struct once {
     hs_table *table;
-    hs_filler fill;
+    hs_filler fill;  /* not opened: hs_keep_numbers needs no more than table and to */
     hs_output kept;  /* its numbers j lie in the entries' column i */
     int64_t  *where; /* owned; for each asking point: where in `kept` its row begins */
 } once;
@@ -129,13 +129,10 @@ hs_once_find(hs_table *table, hs_failure *failure)
 {
     hs_search    *search = table->search;
     const int64_t n = hs_search_asking(search)->n;
-    once          doing = {.table = table};
+    once          doing = {.table = table, .fill.table = table, .fill.to = &doing.kept};
     hs_output_init(NULL, search->scene.ndim, HS_WANT_J, 4, &doing.kept);
     doing.where = hs_alloc(&search->call->account, HS_FOR_CANDIDATES, n + 1, sizeof *doing.where);
-    hs_status status = hs_filler_open(table, &doing.kept, &doing.fill);
-    if (status == HS_OK) {
-        status = doing.where != NULL ? HS_OK : HS_ERR_MEMORY;
-    }
+    hs_status status = doing.where != NULL ? HS_OK : HS_ERR_MEMORY;
     if (status == HS_OK) {
         memset(doing.where, 0, (size_t)n * sizeof *doing.where);
         status = walk_once(&doing, failure);
@@ -147,7 +144,6 @@ hs_once_find(hs_table *table, hs_failure *failure)
     if (status == HS_OK) {
         status = write_column(&doing, HS_WANT_I, &search->call->options);
     }
-    hs_filler_close(&doing.fill);
     hs_free(&search->call->account, doing.where);
     if (status == HS_ERR_MEMORY) {
         give_up(table->entries);

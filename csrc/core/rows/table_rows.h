@@ -42,7 +42,8 @@ hs_status hs_fill_rows(void *filler, hs_scanner *scanner, int32_t first, const h
 hs_status hs_keep_rows(void *filler, hs_scanner *scanner, int32_t first, const hs_hits *hits);
 
 /* The rows of a visit with HS_BLOCK_LISTS_IDS, one behind another, in fill->to, which has room for
- * them: to table->offsets the lengths, and to `where` the entry that each begins with. */
+ * them: to table->offsets the lengths, and to `where` the entry that each begins with. Of `fill`
+ * only table and to are looked at. */
 void hs_keep_numbers(hs_filler *fill, const hs_scanner *scanner, const hs_hits *hits,
                      int64_t *where);
 

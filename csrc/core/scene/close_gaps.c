@@ -155,21 +155,11 @@ wrap_far(const condensing *doing, int set, int k, double length, hs_failure *fai
     return HS_OK;
 }
 
+/* Of the magnitude, which orders like the number. */
 static int64_t
 bits_of(double x)
 {
-    const double size = fabs(x); /* its bits order like the number */
-    int64_t      bits;
-    memcpy(&bits, &size, sizeof bits);
-    return bits;
-}
-
-static double
-number_of(int64_t bits)
-{
-    double x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return (int64_t)hs_bits_of_double(fabs(x));
 }
 
 /* The magnitudes of a column, ascending, in units. */
@@ -246,7 +236,7 @@ condense_numbers(condensing *doing, int k, double from, double *half)
     *half = placed(doing, hs_scale_apply(doing->to_units, *half)); /* unless it is far */
     for (int64_t e = 0; e < found && status == HS_OK; e++) {
         if (e == 0 || keys->keys[e] != keys->keys[e - 1]) {
-            const double size = number_of(keys->keys[e]);
+            const double size = hs_double_of_bits((uint64_t)keys->keys[e]);
             const bool   is_coarse = size > doing->coarse;
             const double x_units = is_coarse ? at.last : hs_scale_apply(doing->to_units, size);
             place = placed(doing, next_place(&at, x_units, is_coarse));
@@ -354,12 +344,12 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
 {
     condensed->box = condensed->given_box = box;
     condensed->is_scaled = condensed->has_turns = false;
-    memset(condensed->turns, 0, sizeof condensed->turns);
-    memset(condensed->given, 0, sizeof condensed->given);
     if (cloud->n == 0 || (asking != NULL && asking->n == 0) ||
         !anything_is_far(cloud, box, unit, powers)) {
         return HS_OK;
     }
+    memset(condensed->turns, 0, sizeof condensed->turns);
+    memset(condensed->given, 0, sizeof condensed->given);
     condensing doing = {.account = account,
                         .options = options,
                         .of = {cloud, asking},
@@ -389,7 +379,7 @@ hs_condense(hs_account *account, const hs_options *options, const hs_box *box, i
 void
 hs_condensed_free(hs_account *account, hs_condensed *condensed)
 {
-    for (int set = 0; set < HS_CONDENSED_SETS; set++) {
+    for (int set = 0; condensed->has_turns && set < HS_CONDENSED_SETS; set++) {
         for (int k = 0; k < HS_MAX_DIM; k++) {
             hs_free(account, condensed->turns[set][k]);
             hs_free(account, condensed->given[set][k]);

@@ -19,7 +19,8 @@ typedef struct hs_condensed {
     hs_box        rows;
     bool          is_scaled; /* points and box vectors are in units of 2^unit now */
     bool          has_turns; /* something was wrapped into the box, and S is wanted: */
-    /* Owned, of points and of queries; n each for a column where some were, else NULL. */
+    /* Both set where has_turns says so. Owned, of points and of queries; n each for a column where
+     * some were, else NULL. */
     int64_t *turns[HS_CONDENSED_SETS][HS_MAX_DIM];
     /* Owned; where scaling may lose digits: the columns that have turns, of both sets, as they were
      * given. S with all its turns belongs to these numbers and to the box as given. */

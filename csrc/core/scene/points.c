@@ -34,10 +34,15 @@ typedef struct range {
     double poison[LANES]; /* 0, or NaN once an entry was infinite or NaN */
 } range;
 
+/* Range of one column, of all lanes. */
+typedef struct joined_range {
+    double lower, upper, poison;
+} joined_range;
+
 typedef struct loading {
     const hs_points *points;
     hs_cloud        *cloud;
-    range            found[HS_SLABS][HS_MAX_DIM];
+    joined_range     found[HS_SLABS][HS_MAX_DIM]; /* of slabs that have points */
 } loading;
 
 HS_ALWAYS_INLINE void
@@ -97,12 +102,30 @@ find_range(const double *x, int64_t n, range *found)
     }
 }
 
+static void
+join_lanes(const range *found, joined_range *joined)
+{
+    for (int lane = 0; lane < LANES; lane++) {
+        joined->lower = hs_smaller(found->lower[lane], joined->lower);
+        joined->upper = hs_larger(found->upper[lane], joined->upper);
+        joined->poison += found->poison[lane];
+    }
+}
+
 static hs_status
 load_slab(void *context, int slab, int64_t first, int64_t last)
 {
     loading         *load = context;
     const hs_points *points = load->points;
     double *const   *x = load->cloud->x;
+    range            found[HS_MAX_DIM];
+    for (int k = 0; k < points->ndim; k++) {
+        for (int lane = 0; lane < LANES; lane++) {
+            found[k].lower[lane] = INFINITY;
+            found[k].upper[lane] = -INFINITY;
+            found[k].poison[lane] = 0.0;
+        }
+    }
     for (int64_t begin = first; begin < last; begin += TILE) {
         const int64_t end = last - begin < TILE ? last : begin + TILE;
         if (points->real == HS_FLOAT32) {
@@ -111,8 +134,11 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
             load_rows_f64(points, begin, end, x);
         }
         for (int k = 0; k < points->ndim; k++) {
-            find_range(x[k] + begin, end - begin, &load->found[slab][k]);
+            find_range(x[k] + begin, end - begin, &found[k]);
         }
+    }
+    for (int k = 0; k < points->ndim; k++) {
+        join_lanes(&found[k], &load->found[slab][k]);
     }
     return HS_OK;
 }
@@ -126,11 +152,11 @@ join_ranges(const loading *load, int n_slabs)
     for (int k = 0; k < cloud->ndim; k++) {
         cloud->lower[k] = INFINITY;
         cloud->upper[k] = -INFINITY;
-        for (int entry = 0; entry < n_slabs * LANES; entry++) {
-            const range *found = &load->found[entry / LANES][k];
-            cloud->lower[k] = hs_smaller(found->lower[entry % LANES], cloud->lower[k]);
-            cloud->upper[k] = hs_larger(found->upper[entry % LANES], cloud->upper[k]);
-            poison += found->poison[entry % LANES];
+        for (int slab = 0; slab < n_slabs; slab++) {
+            const joined_range *found = &load->found[slab][k];
+            cloud->lower[k] = hs_smaller(found->lower, cloud->lower[k]);
+            cloud->upper[k] = hs_larger(found->upper, cloud->upper[k]);
+            poison += found->poison;
         }
         if (cloud->n > 0) {
             cloud->largest = fmax(cloud->largest, fmax(-cloud->lower[k], cloud->upper[k]));
@@ -189,11 +215,10 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
     }
     load.points = points;
     load.cloud = cloud;
-    for (int entry = 0; entry < n_slabs * cloud->ndim * LANES; entry++) {
-        range *found = &load.found[entry / LANES / cloud->ndim][entry / LANES % cloud->ndim];
-        found->lower[entry % LANES] = INFINITY;
-        found->upper[entry % LANES] = -INFINITY;
-        found->poison[entry % LANES] = 0.0;
+    for (int slab = 0; slab < n_slabs; slab++) {
+        for (int k = 0; k < cloud->ndim; k++) {
+            load.found[slab][k] = (joined_range){INFINITY, -INFINITY, 0.0};
+        }
     }
     hs_status status = hs_walk_slabs(team, options, points->n, load_slab, &load);
     if (status == HS_OK && !join_ranges(&load, n_slabs)) {
@@ -232,6 +257,21 @@ hs_points_copy(const hs_points *points, double *rows)
     }
 }
 
+hs_status
+hs_points_copy_finite(const hs_points *points, double *rows, hs_failure *failure)
+{
+    hs_points_copy(points, rows);
+    for (int64_t e = 0; e < points->n * points->ndim; e++) {
+        if (!isfinite(rows[e])) {
+            failure->row = e / points->ndim;
+            failure->column = e % points->ndim;
+            failure->value = rows[e];
+            return HS_ERR_NOT_FINITE;
+        }
+    }
+    return HS_OK;
+}
+
 void
 hs_points_range(const hs_points *points, double *lower, double *upper)
 {
@@ -252,21 +292,13 @@ hs_cloud_smallest(const hs_cloud *cloud)
     /* Magnitudes as bit patterns, which order like numbers. Zero minus one wraps to the largest
      * integer, so zeros never win the minimum. */
     uint64_t smallest = UINT64_MAX;
-    double   found;
     for (int k = 0; k < cloud->ndim; k++) {
         for (int64_t i = 0; i < cloud->n; i++) {
-            uint64_t bits;
-            memcpy(&bits, &cloud->x[k][i], sizeof bits);
-            const uint64_t below = (bits & MAGNITUDE_BITS) - 1;
+            const uint64_t below = (hs_bits_of_double(cloud->x[k][i]) & MAGNITUDE_BITS) - 1;
             smallest = below < smallest ? below : smallest;
         }
     }
-    if (smallest == UINT64_MAX) {
-        return INFINITY;
-    }
-    smallest++;
-    memcpy(&found, &smallest, sizeof found);
-    return found;
+    return smallest < UINT64_MAX ? hs_double_of_bits(smallest + 1) : INFINITY;
 }
 
 void

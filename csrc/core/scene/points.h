@@ -49,6 +49,9 @@ hs_status hs_cloud_load(hs_account *account, hs_team *team, const hs_points *poi
 /* All coordinates in float64, one point behind another; they need not be finite. */
 void hs_points_copy(const hs_points *points, double *rows);
 
+/* hs_points_copy, where all must be finite: HS_ERR_NOT_FINITE names the first that is not. */
+hs_status hs_points_copy_finite(const hs_points *points, double *rows, hs_failure *failure);
+
 /* Range of each coordinate, from the caller's numbers, which need not be finite. */
 void hs_points_range(const hs_points *points, double *lower, double *upper);
 

@@ -294,10 +294,12 @@ static hs_status
 scale_scene(hs_account *account, hs_team *team, const hs_options *options, const hs_box *box,
             hs_scene *scene, hs_scene *asking, hs_failure *failure)
 {
-    hs_condensed      condensed = {.box = box, .given_box = box};
+    hs_condensed      condensed; /* large, and seldom used: not cleared */
     hs_cloud         *cloud = &scene->cloud;
     const hs_box_size size = hs_box_size_of(box);
     hs_status         status = HS_OK;
+    condensed.box = condensed.given_box = box;
+    condensed.is_scaled = condensed.has_turns = false;
     scene->sought = hs_scene_settle_cutoff(scene, &size, options->cutoff);
     const int unit = hs_unit_exponent(cloud, &size, scene->sought);
     if (hs_scene_may_condense(scene, asking, &size, unit)) {

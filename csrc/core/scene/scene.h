@@ -23,35 +23,36 @@ typedef struct hs_scene {
     hs_scale   unscale; /* the way back */
     hs_scale   pending; /* scale, less what closing gaps has already scaled */
     hs_lattice lattice;
-    double     sought;          /* the caller's cutoff, not scaled; less if no two points are so far
+    double     sought;         /* the caller's cutoff, not scaled; less if no two points are so far
                                * apart */
-    double     cutoff;          /* scaled; the true one, or an upper bound when `extreme` */
-    double     cutoff_low;      /* at most the true one */
-    double     radius;          /* candidates are sought up to here; cutoff, or a little more */
-    bool       extreme;         /* scaling lost digits: pairs are decided on the originals */
-    hs_metric  metric;          /* decides on X, or on the originals if there are any */
-    hs_cloud   cloud;           /* its columns are X, in the caller's order, once that is known */
-    bool       keeps_originals; /* X does not hold every digit */
-    double    *originals[HS_MAX_DIM]; /* n each: the points as given */
-    bool       x_is_beside;           /* the originals stayed in cloud.block, X is in `beside` */
-    hs_turns   turns;                 /* known if shifts or originals need them */
-    void      *beside; /* owned; the columns of originals and turns, one behind another */
-    double     lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
-    double     upper[HS_MAX_DIM];
-    double     x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
-    double     x_error;               /* each component of X is within this of r - w B */
-    double     t_error[HS_MAX_DIM];   /* and each computed t_k of the true one, clamping included */
-    double     formula_error;         /* precision="double": its |D| against the true one */
-    bool       is_asked;              /* there are queries: the bounds above hold for these too */
-    bool       is_kept;               /* and for queries that come later */
-    bool       in_one_cell;           /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
-    bool       is_untested;           /* only cells are wanted: bounds for these alone will do */
-    bool       is_plain;              /* the cutoff is taken as it is; gaps are closed only if
+    double     cutoff;         /* scaled; the true one, or an upper bound when `extreme` */
+    double     cutoff_low;     /* at most the true one */
+    double     radius;         /* candidates are sought up to here; cutoff, or a little more */
+    double less[HS_MAX_DIM];   /* so much less than the radius can t_k of a pair differ; mostly 0 */
+    bool   extreme;            /* scaling lost digits: pairs are decided on the originals */
+    hs_metric metric;          /* decides on X, or on the originals if there are any */
+    hs_cloud  cloud;           /* its columns are X, in the caller's order, once that is known */
+    bool      keeps_originals; /* X does not hold every digit */
+    double   *originals[HS_MAX_DIM]; /* n each: the points as given */
+    bool      x_is_beside;           /* the originals stayed in cloud.block, X is in `beside` */
+    hs_turns  turns;                 /* known if shifts or originals need them */
+    void     *beside;            /* owned; the columns of originals and turns, one behind another */
+    double    lower[HS_MAX_DIM]; /* range of t_k that the grid covers: the points, the period */
+    double    upper[HS_MAX_DIM];
+    double    x_largest[HS_MAX_DIM]; /* at least the largest |X_k| */
+    double    x_error;               /* each component of X is within this of r - w B */
+    double    t_error[HS_MAX_DIM];   /* and each computed t_k of the true one, clamping included */
+    double    formula_error;         /* precision="double": its |D| against the true one */
+    bool      is_asked;              /* there are queries: the bounds above hold for these too */
+    bool      is_kept;               /* and for queries that come later */
+    bool      in_one_cell;           /* kept, but no scale holds it (hs_scene_put_in_one_cell) */
+    bool      is_untested;           /* only cells are wanted: bounds for these alone will do */
+    bool      is_plain;              /* the cutoff is taken as it is; gaps are closed only if
                                        * need be */
-    bool       is_wide;               /* X is not made float32 */
-    double     least_cutoff;          /* smallest positive length that pairs are compared with;
+    bool      is_wide;               /* X is not made float32 */
+    double    least_cutoff;          /* smallest positive length that pairs are compared with;
                                        * 0: the cutoff */
-    double     within;                /* where is_wide: farther pairs do not matter; 0: all pairs
+    double    within;                /* where is_wide: farther pairs do not matter; 0: all pairs
                                        * do */
 } hs_scene;
 
@@ -72,7 +73,30 @@ typedef struct hs_sets {
     double least_cutoff; /* the smallest positive length that pairs are compared with,
                                     * where there are several; 0: the cutoff alone */
     double within;       /* where is_wide: no pair further apart than this matters; 0: any */
+    const struct hs_narrowing *narrowing; /* NULL: pairs lie within a ball, and fill it */
 } hs_sets;
+
+/* For pairs that lie within less than a ball: how far normal . D of a pair can be from 0, in the
+ * caller's unit, for a normal of a grid axis; any larger number where it is `enough` or more. HS_OK
+ * or HS_ERR_INTERRUPTED. */
+typedef struct hs_narrowing {
+    hs_status (*find)(const void *context, const double *normal, double enough, double *width);
+    const void *context; /* borrowed */
+} hs_narrowing;
+
+/* How far apart t_k of a pair can be. */
+HS_ALWAYS_INLINE double
+hs_scene_radius_along(const hs_scene *scene, int k)
+{
+    return scene->radius - scene->less[k];
+}
+
+/* The volume that neighbours of a point lie in: of a ball, or less where they are narrower. */
+double hs_scene_volume(const hs_scene *scene, double ball);
+
+/* Sets scene->less, for a scene whose radius is known; the status is that of narrowing. In
+ * scene_bounds.c. */
+hs_status hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing);
 
 /*
  * Reads the points, checks everything that has a value, wraps. On failure the scene holds nothing

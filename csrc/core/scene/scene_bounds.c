@@ -4,8 +4,15 @@
 #include "scene.h"
 
 #include <math.h>
+#include <string.h>
 
-#define UNIT 0x1p-53 /* unit roundoff of float64 */
+#include "../exact/doubleword.h"
+
+/* Part of the radius above which the width of pairs along an axis counts as that of a ball. */
+#define WORTH_NARROWING 0.8
+/* Far more than the roundings of the difference of radius and width. */
+#define NARROWING_SLACK 0x1p-40
+#define UNIT            0x1p-53 /* unit roundoff of float64 */
 /* Error of precision="double", in heights of the box, up to which candidates are few. */
 #define NOISE 0x1p-6
 
@@ -89,6 +96,35 @@ hs_scene_set_radius(hs_scene *scene, const hs_options *options, double largest)
 {
     scene->formula_error = options->precision == HS_DOUBLE ? bound_formula(scene, largest) : 0.0;
     scene->radius = scene->cutoff + scene->formula_error;
+    memset(scene->less, 0, sizeof scene->less);
+}
+
+hs_status
+hs_scene_narrow(hs_scene *scene, const hs_narrowing *narrowing)
+{
+    /* Less than this is not worth it. */
+    const double enough = WORTH_NARROWING * hs_scale_apply(scene->unscale, scene->radius);
+    for (int k = 0; narrowing != NULL && k < scene->ndim; k++) {
+        double          width;
+        const hs_status status =
+            narrowing->find(narrowing->context, scene->lattice.normal[k], enough, &width);
+        if (status != HS_OK) {
+            return status;
+        }
+        const double near = hs_next_up(hs_scale_apply(scene->scale, width)) + scene->formula_error;
+        const double less = (scene->radius - near) * (1.0 - NARROWING_SLACK);
+        scene->less[k] = width < enough && less > 0.0 ? less : 0.0;
+    }
+    return HS_OK;
+}
+
+double
+hs_scene_volume(const hs_scene *scene, double ball)
+{
+    for (int k = 0; k < scene->ndim; k++) {
+        ball *= scene->less[k] > 0.0 ? hs_scene_radius_along(scene, k) / scene->radius : 1.0;
+    }
+    return ball;
 }
 
 void

@@ -37,6 +37,7 @@ hs_scene_share(const hs_scene *scene, hs_scene *asking)
     asking->cutoff = scene->cutoff;
     asking->cutoff_low = scene->cutoff_low;
     asking->radius = scene->radius;
+    memcpy(asking->less, scene->less, sizeof asking->less);
     asking->extreme = scene->extreme;
     asking->formula_error = scene->formula_error;
 }
@@ -69,6 +70,7 @@ hs_scene_put_in_one_cell(hs_scene *scene)
     scene->scale = scene->unscale = scene->pending = hs_scale_of(0);
     scene->cutoff = scene->cutoff_low = scene->radius = 1.0;
     scene->formula_error = 0.0;
+    memset(scene->less, 0, sizeof scene->less);
     scene->extreme = false;
     scene->in_one_cell = true;
     hs_lattice_init(NULL, scene->ndim, scene->pending, &scene->lattice);

@@ -127,10 +127,15 @@ hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double 
     wrap.n_slabs = scene->n < HS_SLABS * HS_SLAB_POINTS
                        ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
                        : HS_SLABS;
-    for (int slab = 0; slab < wrap.n_slabs; slab++) {
-        wrap.folded[slab] = hs_folded_none();
+    hs_status status = HS_OK;
+    if (scene->lattice.n_periodic == 0) {
+        wrap.n_slabs = 0; /* no point moves, and coordinates are those along the axes */
+    } else {
+        for (int slab = 0; slab < wrap.n_slabs; slab++) {
+            wrap.folded[slab] = hs_folded_none();
+        }
+        status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
     }
-    hs_status       status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
     const hs_folded folded = join_slabs(&wrap);
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = folded.failed;

@@ -4,6 +4,7 @@
 
 #include "../exact/metric_float.h"
 #include "limits.h"
+#include "supports.h"
 
 #include <math.h>
 #include <string.h>
@@ -152,6 +153,30 @@ decide_by_limits(hs_scanner *scanner, uint8_t *within)
     }
 }
 
+/* Whether each pair of the batch is within its supports, and within the cutoff where these reach
+ * further. Supports of no extent hold nothing but D = 0. */
+static void
+decide_by_supports(hs_scanner *scanner, uint8_t *within)
+{
+    const hs_supports *supports = scanner->search->limits->supports;
+    hs_metric          ball = scanner->search->scene.metric;
+    uint8_t            in_ball[HS_BATCH];
+    if (supports->metric.limit.cutoff == 0.0) {
+        hs_metric_set_cutoff(0.0, &ball);
+        hs_decide_traced(scanner, &ball, within);
+        return;
+    }
+    hs_supports_decide(scanner, within);
+    if (supports->is_bounded) {
+        const hs_stages counted = scanner->stages;
+        hs_decide_traced(scanner, &ball, in_ball);
+        scanner->stages = counted; /* a pair counts once */
+        for (int32_t e = 0; e < scanner->trace.n; e++) {
+            within[e] = within[e] && in_ball[e];
+        }
+    }
+}
+
 /* Traces unsure hits from `u` on, as many as fit a batch; *next: the first that did not. */
 static hs_status
 trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
@@ -181,7 +206,9 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         if (status != HS_OK) {
             return status;
         }
-        if (scanner->search->limits != NULL) {
+        if (scanner->search->limits != NULL && scanner->search->limits->supports != NULL) {
+            decide_by_supports(scanner, within);
+        } else if (scanner->search->limits != NULL) {
             decide_by_limits(scanner, within);
         } else {
             hs_decide_traced(scanner, &scanner->search->scene.metric, within);

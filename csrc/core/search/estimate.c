@@ -13,8 +13,11 @@
 #define BYTES_PER_POINT      24.0
 #define BYTES_PER_COORDINATE 8.0
 #define BYTES_OF_WALK        4e5
-#define SAMPLES              64     /* points that are counted: an error of some per cent */
-#define SAMPLE_WORK          4.0e6  /* candidates and rows that sampling may cost: milliseconds */
+#define SAMPLES              64    /* points that are counted: an error of some per cent */
+#define SAMPLE_WORK          4.0e6 /* candidates and rows that sampling may cost: milliseconds */
+#define MANY_SAMPLES         1024  /* a power of two; more of them, for a number that is told */
+#define SAMPLE_STEP          633   /* odd: they are taken here and there, for work may end early */
+#define WORK_OF_ROW          8.0
 #define MOST_PAIRS           0x1p62 /* close to the most that int64 counts */
 #define ROUNDING             1e-9   /* relative; far more than coordinates along axes are rounded */
 #define SURE_ERRORS          3.0    /* standard errors below the mean: sure enough to refuse */
@@ -211,7 +214,7 @@ static hs_status
 take_sample(hs_walker *walker, int64_t n, sample *taken)
 {
     const int64_t samples = n < SAMPLES ? n : SAMPLES;
-    const double  row_work = 8.0 * (double)walker->search->stencil.n_rows;
+    const double  row_work = WORK_OF_ROW * (double)walker->search->stencil.n_rows;
     double        work = 0.0;
     *taken = (sample){0.0, 0.0, 0};
     for (; taken->taken < samples && work < SAMPLE_WORK; taken->taken++) {
@@ -228,6 +231,40 @@ take_sample(hs_walker *walker, int64_t n, sample *taken)
         work += (double)(walker->scanner.n_candidates - before) + row_work;
     }
     return HS_OK;
+}
+
+hs_status
+hs_estimate_pairs(hs_search *search, double *pairs)
+{
+    const int64_t n = hs_search_asking(search)->n;
+    const int64_t samples = n < MANY_SAMPLES ? n : MANY_SAMPLES;
+    const double  by_density = search->grid.expected_pairs * search->pairs_per_half;
+    double        work = 0.0, sum = 0.0;
+    int64_t       taken = 0;
+    hs_walker     walker;
+    *pairs = 0.0;
+    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    if (status != HS_OK) {
+        return status;
+    }
+    for (; status == HS_OK && taken < samples && work < SAMPLE_WORK; taken++) {
+        const int64_t s = samples == n ? taken : taken * SAMPLE_STEP % samples;
+        const int64_t before = walker.scanner.n_candidates;
+        walker.scanner.n_found = 0;
+        walker.scanner.candidate_limit = before + (int64_t)SAMPLE_WORK;
+        status = hs_walk_point(&walker, (int32_t)((2 * s + 1) * n / (2 * samples)));
+        sum += (double)walker.scanner.n_found;
+        work += (double)(walker.scanner.n_candidates - before) +
+                WORK_OF_ROW * (double)search->stencil.n_rows;
+    }
+    hs_walker_close(search, &walker);
+    if (taken > 0) {
+        *pairs = sum / (double)taken * (double)n;
+    }
+    if (status == HS_STOPPED || taken < samples) {
+        *pairs = hs_larger(*pairs, by_density);
+    }
+    return status == HS_STOPPED ? HS_OK : status;
 }
 
 hs_status

@@ -36,4 +36,9 @@ hs_status hs_estimate_by_density(hs_search *search, hs_failure *failure);
  */
 hs_status hs_estimate_by_sample(hs_search *search, hs_failure *failure);
 
+/* How many pairs there are, about, from a larger sample: all of them for some hundred points. Where
+ * they cannot be counted in some milliseconds, no less than the density of the points says. HS_OK
+ * or HS_ERR_MEMORY. */
+hs_status hs_estimate_pairs(hs_search *search, double *pairs);
+
 #endif

@@ -2,7 +2,20 @@
 /* form.c: thresholds for rounded extents, so that there are few of them, each computed once. */
 #include "form.h"
 
+#include "limits.h"
+
 #include <math.h>
+
+/* Candidates from which on those are left out that are far from the whole group: with fewer that
+ * costs what it saves. Fewer will do for a group whose pairs reach less far than the cutoff. */
+#ifdef HS_TESTING
+#define WORTH_PRUNING      24 /* so that small scenes have both */
+#define WORTH_PRUNING_MORE 8
+#else
+#define WORTH_PRUNING      300
+#define WORTH_PRUNING_MORE 64
+#endif
+#define SHORTER 0.85 /* of the cutoff: half of its ball, about */
 
 /* Thresholds of one float32 comparison: no hit is unsure. */
 static void
@@ -22,13 +35,55 @@ set_thresholds(const hs_scanner *scanner, hs_form *form)
     const hs_scene *scene = &scanner->search->scene;
     const double    extent = form->extent, error = scanner->search->filter_error;
     form->direct = hs_thresholds_of(scene->ndim, scene->cutoff, extent, error);
-    form->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
     if (scene->extreme) {
         const double low = scene->cutoff_low;
         form->direct.in = low > 0.0 ? hs_thresholds_of(scene->ndim, low, extent, error).in : -1.0f;
+    }
+}
+
+static void
+set_expanded(const hs_scanner *scanner, hs_form *form)
+{
+    const hs_scene *scene = &scanner->search->scene;
+    const double    extent = form->extent, error = scanner->search->filter_error;
+    form->expanded = hs_expanded_of(scene->ndim, scene->cutoff, extent, error);
+    if (scene->extreme) {
+        const double low = scene->cutoff_low;
         form->expanded.in = low > 0.0 ? hs_expanded_of(scene->ndim, low, extent, error).in
                                       : -INFINITY;
     }
+}
+
+/* As in all precisions: what the filter leaves is decided by a fixed formula. */
+static void
+set_support_form(const hs_scanner *scanner, hs_form *form)
+{
+    const hs_kernel *kernel = scanner->search->call->kernel;
+    const bool       counts = scanner->use == HS_BLOCK_COUNTS;
+    form->scan = counts ? kernel->count_supports : kernel->list_supports;
+    set_thresholds(scanner, form);
+    form->limits = hs_support_form_of(scanner->search->scene.ndim, form->extent,
+                                      scanner->search->filter_error);
+}
+
+/* Takes thresholds that were kept, or computes and keeps them. */
+static void
+set_kept(const hs_scanner *scanner, hs_form *form, hs_kept_form *kept)
+{
+    const hs_search *search = scanner->search;
+    if (!kept->is_set || kept->extent != form->extent || kept->cutoff != search->scene.cutoff ||
+        kept->error != search->filter_error) {
+        set_thresholds(scanner, form);
+        set_expanded(scanner, form);
+        *kept = (hs_kept_form){.is_set = true,
+                               .cutoff = search->scene.cutoff,
+                               .extent = form->extent,
+                               .error = search->filter_error,
+                               .direct = form->direct,
+                               .expanded = form->expanded};
+    }
+    form->direct = kept->direct;
+    form->expanded = kept->expanded;
 }
 
 static void
@@ -36,6 +91,11 @@ set_form(const hs_scanner *scanner, hs_form *form)
 {
     const hs_kernel *kernel = scanner->search->call->kernel;
     const bool       counts = scanner->use == HS_BLOCK_COUNTS;
+    form->expanded = (hs_expanded){0.0, 0.0}; /* unless it pays */
+    if (scanner->search->limits != NULL && scanner->search->limits->supports != NULL) {
+        set_support_form(scanner, form);
+        return;
+    }
     form->scan = counts ? kernel->count_direct : kernel->list_direct;
     if (scanner->search->limits != NULL) {
         form->scan = counts ? kernel->count_limits : kernel->list_limits;
@@ -44,7 +104,12 @@ set_form(const hs_scanner *scanner, hs_form *form)
         set_single(scanner, form);
         return;
     }
-    set_thresholds(scanner, form);
+    hs_kept_form *kept = scanner->search->kept_forms;
+    if (kept != NULL && !scanner->search->scene.extreme) {
+        set_kept(scanner, form, &kept[form - scanner->forms]);
+    } else {
+        set_thresholds(scanner, form);
+    }
     if (scanner->search->limits != NULL) {
         form->limits = hs_limit_form_of(scanner->search->scene.ndim, form->extent,
                                         scanner->search->filter_error);
@@ -52,6 +117,9 @@ set_form(const hs_scanner *scanner, hs_form *form)
         form->scan = kernel->squares;
     } else if (hs_expanded_pays(scanner->search->scene.cutoff, form->extent)) {
         form->scan = counts ? kernel->count : kernel->list;
+        if (kept == NULL || scanner->search->scene.extreme) {
+            set_expanded(scanner, form);
+        }
     }
 }
 
@@ -83,16 +151,46 @@ hs_form_set(hs_scanner *scanner)
     scanner->form = form_of(scanner, scanner->group.largest);
 }
 
+/* A length that no pair of the group is compared with more than: that of its radii, where those of
+ * all points do not make it as long as the cutoff. */
+static double
+group_cutoff(const hs_scanner *scanner)
+{
+    const hs_limits *limits = scanner->search->limits;
+    const double     cutoff = scanner->search->scene.cutoff;
+    if (limits == NULL || (limits->of_asking.near == NULL && limits->of_points.near == NULL)) {
+        return cutoff;
+    }
+    float asking = 0.0f;
+    for (int32_t si = scanner->group.first;
+         limits->of_asking.near != NULL && si < scanner->group.last; si++) {
+        asking = fmaxf(asking, limits->of_asking.near[si]);
+    }
+    const hs_dw limit = hs_limit_by(limits->rule, 1.0, (double)asking,
+                                    (double)limits->of_points.most, (double)limits->near_bound);
+    /* More than what float32 and a sum have lost. */
+    return hs_smaller((limit.hi + 0x1p-20 * cutoff) * (1.0 + 0x1p-20), cutoff);
+}
+
 void
 hs_form_prune(hs_scanner *scanner)
 {
     const hs_search *search = scanner->search;
     hs_group        *group = &scanner->group;
-    const double     largest = (double)hs_group_bound(hs_search_asking(search), group);
-    const double     extent = hs_reach_extent(search->scene.cutoff, largest, search->filter_error);
-    const float      half = (float)(0.5 * extent * (1.0 + 0x1p-23)); /* no less, when rounded */
+    const double     cutoff = group_cutoff(scanner), error = search->filter_error;
+    const bool       is_shorter = cutoff < SHORTER * search->scene.cutoff;
+    if (scanner->block.n < (is_shorter ? WORTH_PRUNING_MORE : WORTH_PRUNING)) {
+        return;
+    }
+    const double largest = (double)hs_group_bound(hs_search_asking(search), group);
+    const double extent = hs_reach_extent(search->scene.cutoff, largest, error);
+    const float  half = (float)(0.5 * extent * (1.0 + 0x1p-23)); /* no less, when rounded */
     /* Otherwise y might not be a float. Own points are kept whatever the threshold is. */
     if (half < 0x1p100f) {
-        group->near.out = fmaxf(form_of(scanner, hs_bits_of_float(half))->direct.out, 0.0f);
+        const hs_form *form = form_of(scanner, hs_bits_of_float(half));
+        const float    out =
+            is_shorter ? hs_thresholds_of(search->scene.ndim, cutoff, form->extent, error).out
+                          : form->direct.out;
+        group->near.out = fmaxf(out, 0.0f);
     }
 }

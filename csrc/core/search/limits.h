@@ -15,7 +15,9 @@
 /* The radii of a set in the order of its cells; borrowed. */
 typedef struct hs_radii {
     const double *exact; /* in the unit of the scene's metric; NULL where the rule needs none */
-    const float  *near;  /* in the unit that is scanned in, rounded; HS_PADDING more can be read */
+    const float  *near;  /* times the factor, in the unit that is scanned in, rounded; HS_PADDING
+                          * more can be read */
+    float         most;  /* the largest of these */
 } hs_radii;
 
 /* Most types of a table whose limits are laid out for the candidates of each block. */
@@ -31,16 +33,27 @@ typedef struct hs_limit_table {
 
 typedef struct hs_limits {
     hs_rule        rule;
+    double         factor;     /* radii count so many times */
     double         bound;      /* no pair is further apart than this; infinity: there is no bound */
     float          near_bound; /* in the unit that is scanned in */
     hs_radii       of_asking, of_points;
     hs_limit_table table;
+    const struct hs_supports *supports; /* borrowed, in place of all this; or NULL */
 } hs_limits;
 
+/* Numbers that scans need of each candidate, for a search that has limits. */
+int32_t hs_limits_rows(const hs_search *search);
+
+/* The radii of the present group and block, or what a table has in their place, for a scan with
+ * thresholds of this form. */
+void hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_scan *scan);
+
 /* The length that a pair is compared with, for the radii of the asking point and of the other one:
- * exactly, hi being the nearest float64. With HS_RULE_MEAN radii are halved already. */
+ * exactly, hi being the nearest float64. With HS_RULE_MEAN radii are halved already; rules of sums
+ * have the factor 1. Levels see to it that the product with another one neither over- nor
+ * underflows. */
 HS_ALWAYS_INLINE hs_dw
-hs_limit_by(hs_rule rule, double asking, double other, double bound)
+hs_limit_by(hs_rule rule, double factor, double asking, double other, double bound)
 {
     hs_dw limit = {0.0, 0.0};
     switch (rule) {
@@ -49,6 +62,9 @@ hs_limit_by(hs_rule rule, double asking, double other, double bound)
     case HS_RULE_GATHER: limit.hi = asking; break;
     case HS_RULE_SCATTER: limit.hi = other; break;
     default: limit = hs_two_sum(asking, other);
+    }
+    if (factor != 1.0) {
+        limit = hs_two_product(factor, limit.hi);
     }
     return limit.hi > bound || (limit.hi == bound && limit.lo > 0.0) ? (hs_dw){bound, 0.0} : limit;
 }
@@ -63,7 +79,7 @@ hs_limit_of(const hs_limits *limits, int32_t si, int32_t sj)
         const int32_t         row = table->of_asking[si], column = table->of_points[sj];
         return (hs_dw){hs_smaller(table->exact[row * table->n_types + column], limits->bound), 0.0};
     }
-    return hs_limit_by(limits->rule, asking != NULL ? asking[si] : 0.0,
+    return hs_limit_by(limits->rule, limits->factor, asking != NULL ? asking[si] : 0.0,
                        points != NULL ? points[sj] : 0.0, limits->bound);
 }
 

@@ -4,12 +4,10 @@
 #include "neighbourhood.h"
 
 #include "../base/poll.h"
+#include "../memory/parts.h"
 
 #include <math.h>
 #include <string.h>
-
-/* Every array begins on a cache line. */
-#define FLOATS_PER_LINE (HS_ALIGNMENT / (int64_t)sizeof(float))
 
 int32_t
 hs_block_most_hits(int32_t capacity)
@@ -22,43 +20,35 @@ hs_status
 hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int32_t most_runs,
               hs_block *block)
 {
+    const int64_t capacity = (int64_t)most + HS_PADDING;
+    const int64_t hits = (int64_t)hs_block_most_hits(most) + HS_PADDING;
+    const bool    has_squares = use == HS_BLOCK_LISTS_SQUARES;
+    hs_parts      parts;
     *block = (hs_block){.capacity = most, .most_runs = most_runs};
     block->most_hits = hs_block_most_hits(most);
-    const int64_t capacity = (int64_t)most + HS_PADDING;
-    const int64_t room = (capacity + FLOATS_PER_LINE - 1) / FLOATS_PER_LINE * FLOATS_PER_LINE;
-    block->y[0] = hs_alloc(account, HS_FOR_CANDIDATES, room * (ndim + 1), sizeof(float));
-    bool complete = block->y[0] != NULL;
-    for (int k = 1; k < ndim && complete; k++) {
-        block->y[k] = block->y[0] + k * room;
+    hs_parts_begin(&parts);
+    for (int k = 0; k < ndim; k++) {
+        hs_parts_add(&parts, (void **)&block->y[k], capacity, sizeof(float));
     }
-    block->norm = complete ? block->y[0] + ndim * room : NULL;
-    block->id = hs_alloc(account, HS_FOR_CANDIDATES, 2 * room, sizeof(int32_t));
-    block->number = block->id != NULL ? block->id + room : NULL;
-    block->unsure = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(hs_unsure));
-    block->runs = hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)most_runs + 1, sizeof(hs_run));
-    complete = complete && block->id != NULL && block->unsure != NULL && block->runs != NULL;
+    hs_parts_add(&parts, (void **)&block->norm, capacity, sizeof(float));
+    hs_parts_add(&parts, (void **)&block->id, capacity, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&block->number, capacity, sizeof(int32_t));
+    hs_parts_add(&parts, (void **)&block->unsure, capacity, sizeof(hs_unsure));
+    hs_parts_add(&parts, (void **)&block->runs, (int64_t)most_runs + 1, sizeof(hs_run));
     if (use != HS_BLOCK_COUNTS) {
-        block->hits = hs_alloc(account, HS_FOR_CANDIDATES, (int64_t)block->most_hits + HS_PADDING,
-                               sizeof(int32_t));
-        complete = complete && block->hits != NULL;
+        hs_parts_add(&parts, (void **)&block->hits, hits, sizeof(int32_t));
     }
-    if (use == HS_BLOCK_LISTS_SQUARES) {
-        block->squares = hs_alloc(account, HS_FOR_CANDIDATES,
-                                  (int64_t)block->most_hits + HS_PADDING, sizeof(float));
-        complete = complete && block->squares != NULL;
+    if (has_squares) {
+        hs_parts_add(&parts, (void **)&block->squares, hits, sizeof(float));
     }
-    if (use == HS_BLOCK_LISTS_PLACES || use == HS_BLOCK_LISTS_SQUARES) {
-        block->place = hs_alloc(account, HS_FOR_CANDIDATES, capacity, sizeof(int32_t));
-        complete = complete && block->place != NULL;
+    if (has_squares || use == HS_BLOCK_LISTS_PLACES) {
+        hs_parts_add(&parts, (void **)&block->place, capacity, sizeof(int32_t));
     }
-    if (!complete) {
-        hs_block_free(account, block);
-        return HS_ERR_MEMORY;
-    }
+    block->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
     for (int32_t c = 0; block->place != NULL && c < capacity; c++) {
         block->place[c] = c;
     }
-    return HS_OK;
+    return block->memory != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
 hs_status
@@ -72,15 +62,10 @@ hs_block_add_radii(hs_account *account, int32_t n_rows, hs_block *block)
 void
 hs_block_free(hs_account *account, hs_block *block)
 {
-    hs_free(account, block->y[0]);
-    hs_free(account, block->id);
-    hs_free(account, block->place);
-    hs_free(account, block->hits);
-    hs_free(account, block->squares);
     hs_free(account, block->radius);
-    hs_free(account, block->unsure);
-    hs_free(account, block->runs);
-    *block = (hs_block){0};
+    block->radius = NULL;
+    hs_free(account, block->memory);
+    block->memory = NULL;
 }
 
 void

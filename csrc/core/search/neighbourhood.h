@@ -18,9 +18,9 @@
 #define HS_HITS_PER_CANDIDATE 2
 
 /* One block of candidates at a time, and what scans say about it. The arrays have capacity +
- * HS_PADDING entries where nothing else is said, and are owned: y and norm as one block, by
- * y[0], id and number by id. */
+ * HS_PADDING entries where nothing else is said. */
 typedef struct hs_block {
+    void      *memory; /* owned: of all arrays but radius and origin, which have their own */
     float     *y[HS_MAX_DIM];
     float     *norm;    /* sum of y_k^2 */
     int32_t   *id;      /* point numbers of the candidates */
@@ -30,7 +30,7 @@ typedef struct hs_block {
                         * when it did not */
     int32_t   *hits;    /* most_hits + HS_PADDING; NULL when only counting */
     float     *squares; /* of the hits, as many; NULL without HS_BLOCK_LISTS_SQUARES */
-    float     *radius;  /* rows of the candidates' radii; NULL until hs_block_add_radii */
+    float     *radius;  /* rows of the candidates' radii, owned; NULL until hs_block_add_radii */
     int64_t    pitch;   /* from one row to the next */
     hs_unsure *unsure;  /* capacity */
     hs_run    *runs;    /* most_runs + 1; runs[n_runs].at is the number of candidates */

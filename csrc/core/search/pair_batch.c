@@ -3,6 +3,8 @@
  * kernels want them, or for few pairs from the points themselves. */
 #include "pair_batch.h"
 
+#include "../memory/parts.h"
+
 #include <string.h>
 
 /* Integers up to here are float64 numbers, and what the batch kernels take. */
@@ -12,16 +14,12 @@
 #define FEW_OF_BLOCK 8
 
 /* n arrays of `length` entries. */
-static bool
-new_arrays(hs_account *account, int n, int64_t length, size_t size, void **arrays)
+static void
+add_arrays(hs_parts *parts, int n, int64_t length, size_t size, void **arrays)
 {
     for (int k = 0; k < n; k++) {
-        arrays[k] = hs_alloc(account, HS_FOR_CANDIDATES, length, size);
-        if (arrays[k] == NULL) {
-            return false;
-        }
+        hs_parts_add(parts, &arrays[k], length, size);
     }
-    return true;
 }
 
 static bool
@@ -32,14 +30,18 @@ allocate(hs_account *account, hs_trace *trace)
     const int     m_given = trace->of.needs_given && (as_given || !narrow) ? m : 0;
     const int     m_narrow = trace->of.needs_given && narrow ? m : 0;
     const int64_t batch = HS_BATCH + HS_BATCH_PADDING;
-    return new_arrays(account, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->place) &&
-           new_arrays(account, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->si) &&
-           new_arrays(account, d, batch, sizeof(double), (void **)trace->p) &&
-           new_arrays(account, d, batch, sizeof(double), (void **)trace->q) &&
-           new_arrays(account, m, batch, sizeof(double), (void **)trace->times) &&
-           new_arrays(account, m, HS_BATCH, sizeof(int64_t), (void **)trace->image) &&
-           new_arrays(account, m_given, HS_BATCH, sizeof(int64_t), (void **)trace->given) &&
-           new_arrays(account, m_narrow, HS_BATCH, sizeof(int32_t), (void **)trace->shift);
+    hs_parts      parts;
+    hs_parts_begin(&parts);
+    add_arrays(&parts, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->place);
+    add_arrays(&parts, 1, HS_BATCH, sizeof(int32_t), (void **)&trace->si);
+    add_arrays(&parts, d, batch, sizeof(double), (void **)trace->p);
+    add_arrays(&parts, d, batch, sizeof(double), (void **)trace->q);
+    add_arrays(&parts, m, batch, sizeof(double), (void **)trace->times);
+    add_arrays(&parts, m, HS_BATCH, sizeof(int64_t), (void **)trace->image);
+    add_arrays(&parts, m_given, HS_BATCH, sizeof(int64_t), (void **)trace->given);
+    add_arrays(&parts, m_narrow, HS_BATCH, sizeof(int32_t), (void **)trace->shift);
+    trace->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
+    return trace->memory != NULL;
 }
 
 hs_status
@@ -47,7 +49,11 @@ hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls,
               hs_trace *trace)
 {
     hs_account *account = &search->call->account;
-    *trace = (hs_trace){.search = search, .is_plain = hs_has_plain_shifts(&search->scene.lattice)};
+    trace->search = search;
+    trace->memory = NULL;
+    trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
+    trace->has_zeros = false;
+    hs_trace_clear(trace);
     hs_status status = hs_records_init(search, block, polls, needs_given, &trace->of);
     if (status == HS_OK && !allocate(account, trace)) {
         status = HS_ERR_MEMORY;
@@ -61,19 +67,9 @@ hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls,
 void
 hs_trace_free(hs_account *account, hs_trace *trace)
 {
-    const int ndim = trace->search != NULL ? trace->search->scene.ndim : 0;
+    hs_free(account, trace->memory);
+    trace->memory = NULL;
     hs_records_free(account, &trace->of);
-    for (int k = ndim - 1; k >= 0; k--) {
-        hs_free(account, trace->shift[k]);
-        hs_free(account, trace->given[k]);
-        hs_free(account, trace->image[k]);
-        hs_free(account, trace->times[k]);
-        hs_free(account, trace->q[k]);
-        hs_free(account, trace->p[k]);
-    }
-    hs_free(account, trace->si);
-    hs_free(account, trace->place);
-    *trace = (hs_trace){0};
 }
 
 /* Rows of B that point si was wrapped by; 0 where that is known to cancel or not needed. */

@@ -8,10 +8,11 @@
 
 #include "records.h"
 
-/* A batch of pairs. Arrays are owned, one entry for each pair, HS_BATCH and some more of doubles;
- * those of shifts are one for each row of B. */
+/* A batch of pairs. Arrays have one entry for each pair, HS_BATCH and some more of doubles; those
+ * of shifts are one for each row of B. */
 typedef struct hs_trace {
     const hs_search *search;   /* borrowed */
+    void            *memory;   /* owned: of the arrays */
     hs_records       of;       /* the candidates */
     bool             is_plain; /* shifts over B are those over the box vectors as given */
     int32_t          n;

@@ -5,6 +5,7 @@
 #include "records.h"
 
 #include "../base/poll.h"
+#include "../memory/parts.h"
 
 #include <string.h>
 
@@ -40,14 +41,6 @@ is_narrow(const hs_search *search)
             hs_fold_turns(&scene->lattice, scene->cloud.largest) < MOST_FEW);
 }
 
-/* An array, if it is needed. */
-static bool
-new_array(hs_account *account, bool needed, int64_t length, size_t size, void **array)
-{
-    *array = needed ? hs_alloc(account, HS_FOR_CANDIDATES, length, size) : NULL;
-    return !needed || *array != NULL;
-}
-
 hs_status
 hs_records_init(hs_search *search, const hs_block *block, const hs_options *polls, bool needs_given,
                 hs_records *records)
@@ -56,30 +49,29 @@ hs_records_init(hs_search *search, const hs_block *block, const hs_options *poll
     const bool    has_rows = search->scene.lattice.n_periodic > 0;
     const int     width = search->scene.ndim <= HS_RECORD ? HS_RECORD : 2 * HS_RECORD;
     const int64_t n = (int64_t)block->capacity * width;
+    hs_parts      parts;
     *records = (hs_records){.search = search, .block = block, .polls = polls, .width = width};
     records->needs_given = needs_given || search->bins.keeps_originals;
     records->is_narrow = is_narrow(search);
-    const bool shifts = has_rows && records->needs_given;
-    if (!new_array(account, true, n, sizeof(double), (void **)&records->q) ||
-        !new_array(account, has_rows, n, sizeof(int32_t), (void **)&records->image) ||
-        !new_array(account, shifts && records->is_narrow, n, sizeof(int32_t),
-                   (void **)&records->few) ||
-        !new_array(account, shifts && !records->is_narrow, n, sizeof(int64_t),
-                   (void **)&records->turned)) {
-        hs_records_free(account, records);
-        return HS_ERR_MEMORY;
+    hs_parts_begin(&parts);
+    hs_parts_add(&parts, (void **)&records->q, n, sizeof(double));
+    if (has_rows) {
+        hs_parts_add(&parts, (void **)&records->image, n, sizeof(int32_t));
     }
-    return HS_OK;
+    if (has_rows && records->needs_given && records->is_narrow) {
+        hs_parts_add(&parts, (void **)&records->few, n, sizeof(int32_t));
+    } else if (has_rows && records->needs_given) {
+        hs_parts_add(&parts, (void **)&records->turned, n, sizeof(int64_t));
+    }
+    records->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
+    return records->memory != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
 void
 hs_records_free(hs_account *account, hs_records *records)
 {
-    hs_free(account, records->turned);
-    hs_free(account, records->few);
-    hs_free(account, records->image);
-    hs_free(account, records->q);
-    *records = (hs_records){0};
+    hs_free(account, records->memory);
+    records->memory = NULL;
 }
 
 /* Whether these are all of the points from the first to the last. */
@@ -258,6 +250,6 @@ hs_records_load(hs_records *records, bool metric)
         }
     }
     records->has_given = records->needs_given;
-    records->has_metric = records->has_metric || metric;
+    records->has_metric = metric;
     return HS_OK;
 }

@@ -10,9 +10,10 @@
 #include "neighbourhood.h"
 #include "search.h"
 
-/* Arrays have `width` entries for each place of the block, and are owned. */
+/* Arrays have `width` entries for each place of the block. */
 typedef struct hs_records {
     const hs_search  *search; /* borrowed */
+    void             *memory; /* owned: of the arrays */
     const hs_block   *block;  /* borrowed */
     const hs_options *polls;  /* borrowed; polled while a large block is loaded */
     int               width;  /* HS_RECORD, or twice that where a record does not hold all axes */

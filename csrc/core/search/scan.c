@@ -5,23 +5,17 @@
 #include "decide.h"
 #include "form.h"
 #include "limits.h"
+#include "supports.h"
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK   (INT64_C(1) << 21)
 #define WORK_OF_RUN 32 /* candidates that could be tested while a run of them is found */
-
-/* Candidates from which on those are left out that are far from the whole group: with fewer that
- * costs what it saves. */
-#ifdef HS_TESTING
-#define WORTH_PRUNING 24 /* so that small scenes have both */
-#else
-#define WORTH_PRUNING 300
-#endif
 
 /* Work of a block beside that of its candidates, in candidates. */
 #define WORK_OF_BLOCK 64
@@ -36,70 +30,13 @@
  */
 #define BURST 256
 
-/* The number in cell order of candidate c, which was put in order or not. */
-HS_ALWAYS_INLINE int32_t
-number_of(const hs_scanner *scanner, int32_t c)
-{
-    const hs_block *block = &scanner->block;
-    return block->number[scanner->is_ordered ? block->origin[c] : c];
-}
-
-/* The limits of each type with the candidates, a row a type. */
-static void
-lay_out_table(const hs_limit_table *table, const hs_scanner *scanner)
-{
-    const hs_block *block = &scanner->block;
-    for (int32_t row = 0; row < table->n_types; row++) {
-        const float *limits = table->near + row * table->n_types;
-        float       *to = block->radius + row * block->pitch;
-        for (int32_t c = 0; c < block->n; c++) {
-            to[c] = limits[table->of_points[number_of(scanner, c)]];
-        }
-        hs_pad_lanes(to, block->n);
-    }
-}
-
-static void
-lay_out_radii(const float *of_points, const hs_scanner *scanner)
-{
-    const hs_block *block = &scanner->block;
-    for (int32_t c = 0; c < block->n; c++) {
-        block->radius[c] = of_points[number_of(scanner, c)];
-    }
-    hs_pad_lanes(block->radius, block->n);
-}
-
-/* The radii of the group and of the block, or what a table has in their place. */
-static void
-set_limits(const hs_scanner *scanner, hs_limit_scan *scan)
-{
-    const hs_limits      *limits = scanner->search->limits;
-    const hs_limit_table *table = &limits->table;
-    const float          *of_asking = limits->of_asking.near, *of_points = limits->of_points.near;
-    const hs_block       *block = &scanner->block;
-    const bool            has_table = table->near != NULL;
-    *scan = (hs_limit_scan){
-        .rule = limits->rule,
-        .bound = limits->near_bound,
-        .form = scanner->form->limits,
-        .of_point = of_asking != NULL ? of_asking + scanner->group.first : NULL,
-        .of_block = of_points != NULL || has_table ? block->radius : NULL,
-        .row = has_table ? table->of_asking + scanner->group.first : NULL,
-        .stride = block->pitch,
-    };
-    if (has_table) {
-        lay_out_table(table, scanner);
-    } else if (of_points != NULL) {
-        lay_out_radii(of_points, scanner);
-    }
-}
-
 /* The present block and group as a kernel sees them. */
 static void
 set_scan(const hs_scanner *scanner, hs_scan *scan)
 {
-    const hs_block *block = &scanner->block;
-    const bool      lists_places = scanner->use == HS_BLOCK_LISTS_PLACES;
+    const hs_limits *limits = scanner->search->limits;
+    const hs_block  *block = &scanner->block;
+    const bool       lists_places = scanner->use == HS_BLOCK_LISTS_PLACES;
     scan->ndim = scanner->search->scene.ndim;
     for (int k = 0; k < scan->ndim; k++) {
         scan->y[k] = block->y[k];
@@ -115,8 +52,10 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->direct = scanner->form->direct;
     scan->expanded = scanner->form->expanded;
     scan->hits = block->hits;
-    if (scanner->search->limits != NULL) {
-        set_limits(scanner, &scan->limits);
+    if (limits != NULL && limits->supports != NULL) {
+        hs_supports_set(scanner, scan);
+    } else if (limits != NULL) {
+        hs_limits_set(scanner, &scanner->form->limits, &scan->limits);
     }
     scan->squares = block->squares;
     scan->unsure = block->unsure;
@@ -175,7 +114,7 @@ fill_block(hs_scanner *scanner)
     hs_block *block = &scanner->block;
     scanner->n_blocks++;
     scanner->work_since_poll += WORK_OF_BLOCK + block->n;
-    if (block->n >= WORTH_PRUNING && !(scanner->group.near.out < INFINITY)) {
+    if (!(scanner->group.near.out < INFINITY)) {
         hs_form_prune(scanner);
     }
     set_flushing(scanner, true);
@@ -354,7 +293,9 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
                 bool is_ordered, hs_scanner *scanner)
 {
     hs_account *account = &search->call->account;
-    memset(scanner, 0, sizeof *scanner);
+    memset((char *)scanner + offsetof(hs_scanner, search), 0,
+           sizeof *scanner - offsetof(hs_scanner, search));
+    scanner->trace.memory = scanner->trace.of.memory = NULL; /* freed also when never set */
     scanner->search = search;
     scanner->options = search->call->options;
     scanner->use = use;
@@ -364,8 +305,7 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     hs_status status =
         hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);
     if (status == HS_OK && search->limits != NULL) {
-        const int32_t n_types = search->limits->table.n_types;
-        status = hs_block_add_radii(account, n_types > 1 ? n_types : 1, &scanner->block);
+        status = hs_block_add_radii(account, hs_limits_rows(search), &scanner->block);
     }
     if (status == HS_OK) {
         status = hs_trace_init(search, &scanner->block, &scanner->options,
@@ -390,6 +330,6 @@ hs_scanner_close(hs_search *search, hs_scanner *scanner)
     scanner->n_groups = scanner->n_candidates = scanner->n_ambiguous = 0;
     scanner->stages = (hs_stages){0};
     hs_order_free(&search->call->account, &scanner->block, &scanner->order);
-    hs_block_free(&search->call->account, &scanner->block);
     hs_trace_free(&search->call->account, &scanner->trace);
+    hs_block_free(&search->call->account, &scanner->block);
 }

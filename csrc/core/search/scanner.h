@@ -41,20 +41,22 @@ typedef struct hs_form {
 
 /* Belongs to one thread. */
 struct hs_scanner {
+    /* Large, and filled before they are read: not cleared at first. */
+    hs_form  forms[HS_FORMS]; /* by the last bits of the extent */
+    hs_group group;
+    hs_block block;
+    hs_trace trace;
+    /* From here on all begins as zero. */
     const hs_search *search;  /* borrowed, read only */
     hs_options       options; /* the call's, with a poll only for the caller's own thread */
-    hs_block         block;
     hs_block_use     use;
     bool             is_ordered; /* candidates are put in order before they are tested */
     hs_order         order;
-    hs_group         group;
-    hs_trace         trace;
     hs_visit_fn      visit; /* NULL when counting */
     void            *visit_context;
-    hs_form          forms[HS_FORMS]; /* by the last bits of the extent */
-    const hs_form   *form;            /* of the present group and block */
-    int64_t          n_subnormal;     /* blocks in which subnormal numbers were met */
-    bool             flushes; /* too many: only gathering and scanning flush them from now on */
+    const hs_form   *form;        /* of the present group and block */
+    int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
+    bool             flushes;     /* too many: only gathering and scanning flush them from now on */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */
     hs_neighbourhood of_group, most; /* of the present group, of any so far */
     int64_t          n_found;

@@ -8,30 +8,54 @@
 
 #include "estimate.h"
 
+/* Stores occupied cells only, in place of the grid that was chosen; nothing for a width of 0. */
+static void
+make_sparse(hs_search *search, double width)
+{
+    search->is_sparse = width > 0.0;
+    if (search->is_sparse) {
+        const hs_grid dense = search->grid;
+        hs_sparse_grid(&search->scene, &dense, width, &search->grid);
+    }
+}
+
+/* The grid of an algorithm of the caller's choice. */
+static hs_status
+choose_single_or_sparse(hs_search *search, bool is_sparse, hs_failure *failure)
+{
+    const hs_status status =
+        hs_grid_init_kind(&search->scene, HS_GRID_SINGLE, &search->grid, failure);
+    if (status == HS_OK && is_sparse) {
+        make_sparse(search, hs_sparse_width(&search->scene, &search->grid));
+    }
+    return status;
+}
+
 /* Chooses the dense grid, with cells as wide as the caller wants them or as is quickest. Where
  * points crowd in few of its cells, one that stores occupied cells only, unless the dense one has
- * the caller's width. */
+ * the caller's width, or the caller wants all cells. */
 static hs_status
 choose_grid(hs_search *search, hs_failure *failure)
 {
-    const double wanted = search->call->options.cell_size;
-    hs_status    status = HS_TOO_MUCH;
-    bool         may_be_sparse = true;
-    if (wanted > 0.0) {
-        status = hs_grid_init_wide(&search->scene, hs_scale_apply(search->scene.scale, wanted),
-                                   &search->grid, &may_be_sparse, failure);
+    const hs_options  *options = &search->call->options;
+    const hs_algorithm algorithm = options->algorithm;
+    const bool         is_dense = algorithm == HS_GRID;
+    hs_status          status = HS_TOO_MUCH;
+    bool               may_be_sparse = true;
+    search->is_sparse = false; /* another system may have been searched before */
+    if (algorithm == HS_ALL_PAIRS || algorithm == HS_HASH) {
+        return choose_single_or_sparse(search, algorithm == HS_HASH, failure);
+    }
+    if (options->cell_size > 0.0) {
+        const double width = hs_scale_apply(search->scene.scale, options->cell_size);
+        status = hs_grid_init_wide(&search->scene, width, &search->grid, &may_be_sparse, failure);
     }
     if (status == HS_TOO_MUCH) {
-        status = hs_grid_init(&search->scene, &search->grid, failure);
+        status = hs_grid_init_kind(&search->scene, is_dense ? HS_GRID_CELLS : HS_GRID_ANY,
+                                   &search->grid, failure);
     }
-    search->is_sparse = false; /* another system may have been searched before */
-    if (status == HS_OK && may_be_sparse) {
-        const double  width = hs_sparse_choose(&search->scene, &search->grid);
-        const hs_grid dense = search->grid;
-        search->is_sparse = width > 0.0;
-        if (search->is_sparse) {
-            hs_sparse_grid(&search->scene, &dense, width, &search->grid);
-        }
+    if (status == HS_OK && may_be_sparse && !is_dense) {
+        make_sparse(search, hs_sparse_choose(&search->scene, &search->grid));
     }
     return status;
 }
@@ -91,7 +115,8 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
     hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
                                           options, &search->scene, asking, failure);
     if (status == HS_OK) {
-        status = build_cells(search, asking, failure);
+        status = hs_scene_narrow(&search->scene, sets->narrowing);
+        status = status == HS_OK ? build_cells(search, asking, failure) : status;
         if (asking != NULL) {
             hs_scene_free(&search->call->account, asking);
         }

@@ -4,14 +4,12 @@
 
 #include "../base/outcome.h"
 
-/* Records the limit for the MemoryError message. */
-static hs_status
-tell_limit(const hs_call *call, hs_status status, hs_failure *failure)
+/* Threads for the walk, where points alone were not worth them. */
+static void
+gather(hs_search *search)
 {
-    if (status == HS_ERR_MEMORY) {
-        failure->limit_bytes = call->account.limit;
-    }
-    return status;
+    hs_call_gather_for(search->call, hs_search_asking(search)->n,
+                       search->grid.expected_pairs * search->pairs_per_half);
 }
 
 hs_status
@@ -20,8 +18,12 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
 {
     if (sets->built != NULL) {
         const hs_status status = hs_search_reuse(sets, call, search, failure);
+        if (status == HS_OK) {
+            gather(search);
+        }
         if (status != HS_UNSERVED) {
-            return tell_limit(call, status, failure);
+            hs_call_tell_limit(call, status, failure);
+            return status;
         }
     }
     const int64_t n_queries = sets->queries != NULL ? sets->queries->n : 0;
@@ -30,6 +32,9 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
     const hs_status status = hs_search_build(sets, box, search, failure);
     if (status != HS_OK) {
         hs_search_close(search);
+    } else {
+        gather(search);
     }
-    return tell_limit(call, status, failure);
+    hs_call_tell_limit(call, status, failure);
+    return status;
 }

@@ -255,9 +255,11 @@ hs_status
 hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                hs_walker *walker)
 {
-    const int32_t   capacity = hs_walker_capacity(search);
-    const int32_t   most_runs = capacity < HS_BLOCK_RUNS ? capacity : HS_BLOCK_RUNS;
-    const hs_status status = init_walker(search, use, capacity, most_runs, false, walker);
+    hs_neighbourhood most;
+    (void)hs_walker_bound(search, &most);
+    const int32_t   runs = most.runs < HS_BLOCK_RUNS ? (int32_t)most.runs + 1 : HS_BLOCK_RUNS;
+    const hs_status status =
+        init_walker(search, use, hs_walker_capacity(search), runs, false, walker);
     return settle_walker(search, status, visit, context, walker);
 }
 
@@ -278,9 +280,10 @@ hs_walker_init_ordered(hs_search *search, hs_block_use use, const hs_neighbourho
 void
 hs_walker_close(hs_search *search, hs_walker *walker)
 {
-    hs_scanner_close(search, &walker->scanner);
-    hs_free(&search->call->account, walker->cursor.links);
-    walker->cursor.links = NULL;
-    hs_free(&search->call->account, walker->cursor.hints);
+    hs_account *account = &search->call->account;
+    hs_free(account, walker->cursor.hints); /* the last block first: the arena has it again */
     walker->cursor.hints = NULL;
+    hs_free(account, walker->cursor.links);
+    walker->cursor.links = NULL;
+    hs_scanner_close(search, &walker->scanner);
 }

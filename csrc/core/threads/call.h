@@ -49,11 +49,21 @@ void hs_call_leave(hs_call *call, int64_t n_pairs);
 /* Calls this in place of the options' poll; NULL: nothing. */
 void hs_call_set_poll(hs_poll_fn poll, void *context, hs_call *call);
 
-/* How many threads these options mean for so many points. */
-int hs_call_threads(int64_t n_points, const hs_options *options);
+/* How many threads these options mean for so many points, or for work that takes as long. */
+int hs_call_threads(double n_points, const hs_options *options);
 
 /* Starts the threads that so many points are worth, unless they run already. */
 void hs_call_gather(hs_call *call, int64_t n_points);
+
+/* The same once it is known about how many pairs these points have, for options that name a number
+ * of threads: the others go by points alone. */
+void hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs);
+
+#ifdef HS_TESTING
+/* From how many points on threads are worth starting that the options name; in tests 0 at first.
+ * Returns what it was before. */
+double hs_test_worth_threads(double n_points);
+#endif
 
 /* Ends them. Harmless twice. */
 void hs_call_dismiss(hs_call *call);
@@ -63,6 +73,9 @@ void hs_call_note(hs_call *call, const hs_counters *done);
 
 /* Writes the counters, if the options want them. */
 void hs_call_report(const hs_call *call, int64_t n_pairs);
+
+/* How much memory the call was allowed, if the lack of it is the failure. */
+void hs_call_tell_limit(const hs_call *call, hs_status status, hs_failure *failure);
 
 /* Forgets what has been done and held, except polls and the limit that was found. Nothing may be
  * held any more. */

@@ -44,6 +44,7 @@ options_of_build(const hs_options *options, double radius, int m)
     searching.precision = HS_EXACT;
     searching.sorted = false;
     searching.cell_size = 0.0;
+    searching.algorithm = HS_AUTO;
     searching.out = NULL;
     searching.counters = NULL;
     searching.want = HS_WANT_I | HS_WANT_J | (m > 0 ? HS_WANT_SHIFT : 0);
@@ -281,8 +282,8 @@ build(const hs_frame *frame, building *built, hs_failure *failure)
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)built->listing->n_pairs);
-        failure->limit_bytes = call->account.limit;
     }
+    hs_call_tell_limit(call, status, failure);
     if (opened) {
         hs_pieces_free(&call->account, &built->pieces);
         hs_search_close(&built->search);

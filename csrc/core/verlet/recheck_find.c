@@ -47,8 +47,8 @@ find_pairs(hs_recheck *recheck, hs_output *output, hs_failure *failure)
     }
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = fmax(failure->expected_pairs, (double)output->n_pairs);
-        failure->limit_bytes = call->account.limit;
     }
+    hs_call_tell_limit(call, status, failure);
     return hs_pairs_conclude(output, status, failure);
 }
 

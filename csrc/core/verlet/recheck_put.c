@@ -108,13 +108,14 @@ put_of_bundle(const hs_recheck *recheck, const hs_sifted *slab, int32_t t, const
     return beyond != 0;
 }
 
-/* The first point of a pair of the bundle whose S does not fit. */
+/* The first point of the first pair of the bundle whose S does not fit; there is one. */
 static int64_t
 first_beyond(const hs_recheck *recheck, const hs_sifted *slab, int32_t t)
 {
     const hs_listing *listing = &recheck->list->listing;
     const int64_t     a = slab->bundles[t].point;
-    for (int32_t h = begin_of(slab, t); h < slab->hits_end[t]; h++) {
+    for (int32_t h = begin_of(slab, t);; h++) {
+        HS_ASSERT(h < slab->hits_end[t]);
         const int64_t b = slab->hits[h];
         const bool    turned = listing->order[a] > listing->order[b];
         int64_t       shift[HS_MAX_DIM];
@@ -126,7 +127,6 @@ first_beyond(const hs_recheck *recheck, const hs_sifted *slab, int32_t t)
             }
         }
     }
-    return -1;
 }
 
 /* S, zero over open box vectors; where only sorting needs it, the images alone, which sort as S

@@ -37,7 +37,7 @@ are_small(const int64_t *shifts, int64_t n)
 {
     uint64_t any = 0;
     for (int64_t e = 0; e < n; e++) {
-        any |= (uint64_t)(shifts[e] + MOST_SHIFT);
+        any |= (uint64_t)shifts[e] + (uint64_t)MOST_SHIFT;
     }
     return any < 2 * (uint64_t)MOST_SHIFT;
 }

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._check.reference import exact_square, reach_by_radii
-from halfshell._convert.reach import DIRECTED, RULES
+from halfshell._convert.rules import DIRECTED, RULES
 from halfshell._functions.between import pairs_between as find_between
 from halfshell._functions.pairs import pairs as find_pairs
 
@@ -47,7 +47,7 @@ class ByReach:
         reach: Reach,
         how: dict[str, Any],
     ) -> None:
-        rule, radii, query_radii, types, query_types, self.table = reach
+        rule, radii, query_radii, types, query_types, self.table = reach[:6]
         self.points = points
         self.asking = points if queries is None else queries
         self.is_one_set = queries is None

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from halfshell._convert.arrays import as_array
 from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag
-from halfshell._convert.reach import DIRECTED
-from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.rules import DIRECTED
+from halfshell._convert.search import as_rest, as_search_of_each, refuse_indefinite
 from halfshell._convert.types import (
     ArrayLike,
     BoxLike,
@@ -86,6 +86,9 @@ def verify(
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    query_supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
@@ -106,7 +109,7 @@ def verify(
     queries : array_like of float, shape (q, d), optional
         The list is one of two sets, with i in `queries` and j in `points`, as from `pairs_between`
         or from `neighbors` with queries.
-    radii, query_radii, rule, types, query_types
+    radii, query_radii, rule, types, query_types, supports, query_supports, extent
         As in `neighbors`. A list for the rules "gather" or "scatter" has a direction, as one of two
         sets has.
     full : bool, default False
@@ -143,11 +146,15 @@ def verify(
     correct: 4 pairs
     """
     full = as_flag(full, "full")
-    given = Given(radii, query_radii, rule, types, query_types)
+    given = Given(
+        radii, query_radii, rule, types, query_types, supports, query_supports, extent
+    )
     rest = as_rest(inclusive, "exact", None, None, None, None)
     search, asking, reach = as_search_of_each(
         points, cutoff, box, periodic, rest, given, queries, directed=True
     )
+    if reach is not None:
+        refuse_indefinite(search, reach)
     array, bound, vectors, bits = search[:4]
     flags = [bool(bits >> axis & 1) for axis in range(array.shape[1])]
     how: Any = {
@@ -330,6 +337,10 @@ def _right(
     """The right list, for one cutoff or for a reach of each pair."""
     if reach is None:
         return _ByCutoff(points, queries, bound, how)
+    if reach[-1] is not None:
+        from halfshell._check.by_supports import BySupports
+
+        return BySupports(points, queries, bound, reach, how)
     from halfshell._check.by_reach import ByReach  # here, as it imports fractions
 
     return ByReach(points, queries, bound, reach, how)

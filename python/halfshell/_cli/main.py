@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell._cli.files import InputError, one_line
+from halfshell._convert.options import LETTERS, are_letters
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
@@ -209,8 +210,10 @@ def _periodic(text: str) -> tuple[bool, ...]:
 
 
 def _quantities(text: str) -> str:
-    if not text or set(text) - set("ijdDSP") or len(set(text)) < len(text):
-        raise argparse.ArgumentTypeError(f"{text!r} is not made of the letters i j d D S P")
+    if not are_letters(text):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not some of the letters {' '.join(LETTERS)}, each at most once"
+        )
     return text
 
 

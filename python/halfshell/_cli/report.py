@@ -27,6 +27,7 @@ QUICK = (
     "uniform", "fcc-shell", "silicon-shell", "fcc-rotated", "near-ties", "hair-ties",
     "float32-ulp", "half-box", "offset-1e9", "many-boxes", "needle", "angle-5", "sheared-1000",
     "slab", "lognormal", "coincident", "subnormal", "plane-2d", "head-on", "stiff-chain",
+    "balls-decades", "balls-ties", "balls-rounded", "balls-giant", "needles",
 )  # fmt: skip
 _DETAILED = 4  # scenes at most whose tables are printed unasked
 
@@ -119,10 +120,10 @@ def _require() -> None:
 
 def _list() -> int:
     from halfshell import scenes
-    from halfshell._report.measure.run import PEERS
+    from halfshell._report.measure.run import PEERS, SCENES
 
     print("scenes")
-    for name in scenes.names():
+    for name in SCENES:
         print(f"  {name:<22}{scenes.load(name, size='small').title}")
     print("libraries\n  " + "  ".join(PEERS))
     return 0

@@ -100,6 +100,17 @@ def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.N
         ) from error
 
 
+def one_each(name: str, n: int) -> Callable[[tuple[int, ...]], None]:
+    """A check that refuses shapes but (n,): a number for each point, or query if it is of these."""
+
+    def check(shape: tuple[int, ...]) -> None:
+        if shape != (n,):
+            whom = "query" if name.startswith("query_") else "point"
+            raise ValueError(f"{name} must have shape ({n},), one a {whom}, got {shape}")
+
+    return check
+
+
 def in_order(array: npt.NDArray[Any], dtype: type[Any]) -> npt.NDArray[Any]:
     """The array as the core takes small ones: of this type, C-contiguous and aligned."""
     array = np.ascontiguousarray(array, dtype)

@@ -3,19 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a
+from halfshell._convert.given import Given, Sets
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.scene import MAX_DIM, as_points, as_scene, brings_its_box, vectors_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import FloatArray, PointArray
+    from halfshell._convert.types import FloatArray, PointArray, Reach
 
     # What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
     # shape; periodic bits.
@@ -92,16 +94,34 @@ def _as_cutoffs(value: Any) -> tuple[float, FloatArray | None]:
     return 0.0, in_order(array, np.float64)
 
 
+def _as_limits(
+    cutoff: Any, given: Given, points: Any, n: int, ndim: int
+) -> tuple[float, FloatArray | None, Reach | None]:
+    """The cutoff of all systems, or one a system; and the reach of each pair, or None."""
+    if given.is_nothing and not is_a(cutoff, Mapping):
+        return *_as_cutoffs(cutoff), None
+    from halfshell._convert.reach import as_reach  # here: plain searches do without
+
+    sets = Sets(points, None, n, None, ndim)
+    has_own = given.radii is not None or given.supports is not None or given.extent is not None
+    if cutoff is None or not has_own:
+        largest, reach = as_reach(cutoff, given, sets, directed=False)
+        return largest, None, reach
+    one, cutoffs = _as_cutoffs(cutoff)
+    largest, reach = as_reach(one if cutoffs is None else None, given, sets, directed=False)
+    return largest, cutoffs, reach
+
+
 def as_systems(
-    points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any
-) -> tuple[Scene, Systems]:
+    points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any, given: Given
+) -> tuple[Scene, Systems, Reach | None]:
     """Everything that makes up the systems, in the order of the core's arguments."""
     array, vectors, bits, boxes = _scene(points, box, periodic)
     numbers = as_numbers(batch, array.shape[0])
-    one, cutoffs = _as_cutoffs(cutoff)
+    one, cutoffs, reach = _as_limits(cutoff, given, points, *array.shape)
     if boxes is not None and cutoffs is not None and len(boxes) != len(cutoffs):
         raise ValueError(
             "box and cutoff must be given for the same number of systems, got "
             f"{len(boxes)} and {len(cutoffs)}"
         )
-    return (array, one, vectors, bits), (numbers, cutoffs, boxes)
+    return (array, one, vectors, bits), (numbers, cutoffs, boxes), reach

@@ -14,16 +14,13 @@ class Given(NamedTuple):
     rule: Any = None
     types: Any = None
     query_types: Any = None
+    supports: Any = None
+    query_supports: Any = None
+    extent: Any = None
 
     @property
     def is_nothing(self) -> bool:
         return all(value is None for value in self)
-
-    def refuse_with(self, other: str) -> None:
-        """ValueError for a reach of each pair beside an argument that it does not go with."""
-        for name, value in self._asdict().items():
-            if value is not None:
-                raise ValueError(f"{other} and {name} cannot be given together")
 
 
 class Sets(NamedTuple):
@@ -33,3 +30,4 @@ class Sets(NamedTuple):
     queries: Any
     n: int
     q: int | None
+    ndim: int

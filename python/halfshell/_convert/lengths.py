@@ -46,6 +46,12 @@ def as_cutoff(value: Any) -> float:
     return as_number(value, "cutoff")
 
 
+def refuse_none(cutoff: Any) -> None:
+    """TypeError for None, where nothing else says how far pairs reach but might have."""
+    if cutoff is None:
+        raise TypeError("cutoff must be a number, got NoneType: None goes with radii or supports")
+
+
 def as_cutoffs(value: Any) -> float | FloatArray:
     """One cutoff, or several in ascending order, which are finite and not negative."""
     if is_a(value, float):
@@ -115,3 +121,17 @@ def check_ascending(array: FloatArray, name: str, all_of_them: str) -> None:
             f"{all_of_them} must be ascending, got {name}[{k}] = {array[k]} before "
             f"{name}[{k + 1}] = {array[k + 1]}"
         )
+
+
+def as_length(value: float, name: str) -> float:
+    """A number that is finite and not negative."""
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(f"{name} must be finite and not negative, got {value!r}")
+    return value
+
+
+def as_skin(value: Any) -> float:
+    """A plain number, or "auto", which is no number and is settled before."""
+    if isinstance(value, str):
+        raise ValueError(f'skin must be a number or "auto", got {value!r}')
+    return as_length(as_number(value, "skin", 'be a number or "auto"'), "skin")

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.arrays import as_array, as_real_array
+from halfshell._convert.arrays import as_array, as_real_array, one_each
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.types import FloatArray, PointArray, Search
+from halfshell._convert.types import Algorithm, FloatArray, PointArray, Search
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
 _COPIES = 4
@@ -33,8 +33,7 @@ class Marks(NamedTuple):
 def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
     """The type of each of n points, from 0 on."""
     array = as_array(values, name, "hold integers")
-    if array.shape != (n,):
-        raise ValueError(f"{name} must have shape ({n},), one a point, got {array.shape}")
+    one_each(name, n)(array.shape)
     if array.dtype.kind not in "iu" and n > 0:
         raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
     for k in np.flatnonzero((array < 0) | (array >= 2**31 - 1)):
@@ -45,11 +44,7 @@ def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
 
 
 def _as_weights(values: npt.ArrayLike, name: str, n: int) -> FloatArray:
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (n,):
-            raise ValueError(f"{name} must have shape ({n},), one a point, got {shape}")
-
-    array = as_real_array(values, name, check_shape=check)
+    array = as_real_array(values, name, check_shape=one_each(name, n))
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
@@ -86,6 +81,7 @@ def binned(
     queries: PointArray | None,
     marks: Marks,
     name: str = "edges[-1]",
+    algorithm: Algorithm = "auto",
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of points or cells, given as the first arguments of every search.
 
@@ -96,6 +92,6 @@ def binned(
         f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
     )
     with of_argument(name):
-        found = _core.histogram(*search, edges, True, queries, *marks)
+        found = _core.histogram(*search, edges, True, queries, *marks, algorithm)
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])

@@ -39,7 +39,7 @@ class CacheInfo(NamedTuple):
     Attributes
     ----------
     held : int
-        Bytes of deleted results that are kept for the next ones.
+        Bytes of deleted results, and of what calls have worked in, that are kept for the next ones.
     limit : int
         Bytes that may be kept: what `set_cache_limit` said last, 256 MB at first.
 
@@ -57,7 +57,7 @@ class CacheInfo(NamedTuple):
 
 
 def cache_info() -> CacheInfo:
-    """Say how much memory of deleted results is kept for the next ones, and how much may be.
+    """Say how much memory of deleted results and finished calls is kept, and how much may be.
 
     Returns
     -------

@@ -10,6 +10,12 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
 
+# The default of `algorithm`: what is this string itself needs no conversion.
+AUTO = "auto"
+
+#: The letters of quantities, in the order in which arrays come.
+LETTERS = "ijdDSP"
+
 # Blocks are counted by int64, and two of them must be.
 _MOST_PAIRS = 2**62
 
@@ -36,11 +42,17 @@ def as_flag(value: Any, name: str) -> bool:
     raise TypeError(f"{name} must be True or False, got {shown(value)}")
 
 
-def as_count(value: Any, name: str) -> int:
-    """A whole number from 1 on."""
+def as_whole(value: Any, name: str) -> int:
+    """A whole number; no bool."""
     number = exact_number(value)
     if isinstance(number, bool) or not isinstance(number, int):
         raise TypeError(f"{name} must be a whole number, got {shown(value)}")
+    return number
+
+
+def as_count(value: Any, name: str) -> int:
+    """A whole number from 1 on."""
+    number = as_whole(value, name)
     if number < 1:
         raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
     return number
@@ -49,6 +61,13 @@ def as_count(value: Any, name: str) -> int:
 def most_pairs(max_pairs: Any) -> int:
     """A number of pairs from 1 on, as the core takes it."""
     return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
+
+
+def as_list(value: Any, name: str, of_what: str) -> list[Any]:
+    """What a sequence has."""
+    if not hasattr(type(value), "__iter__"):
+        raise TypeError(f"{name} must be a sequence of {of_what}, got {kind_of(value)}")
+    return list(value)
 
 
 def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
@@ -60,6 +79,22 @@ def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
         words = " or ".join(map(repr, choices)) if few else f"one of {' '.join(choices)}"
         raise ValueError(f"{name} must be {words}, got {shown(value)}")
     return value
+
+
+def are_letters(text: str) -> bool:
+    """Whether these are some of the letters of quantities, each at most once."""
+    return bool(text) and set(text) <= set(LETTERS) and len(set(text)) == len(text)
+
+
+def check_letters(quantities: Any) -> None:
+    """Raise unless these are some of the letters that `pairs` knows, each at most once."""
+    if not isinstance(quantities, str):
+        raise TypeError(f"quantities must be a string, got {kind_of(quantities)}")
+    if not are_letters(quantities):
+        raise ValueError(
+            f"quantities must be some of the letters {' '.join(LETTERS)}, each at most once, got "
+            f"{quantities!r}"
+        )
 
 
 def as_index_bytes(index_dtype: Any) -> int:

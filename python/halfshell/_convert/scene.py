@@ -87,6 +87,15 @@ def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
     return sum(1 << axis for axis in range(ndim) if array[axis])
 
 
+def as_own_box(box: Any, periodic: Any, ndim: int) -> OwnBox:
+    """Box vectors, or None, and periodic bits, which need a box."""
+    if box is not None:
+        return as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
+    if as_periodic_bits(periodic, ndim, default=False):
+        raise ValueError("periodic needs a box: give box, or leave periodic out")
+    return None, 0
+
+
 def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
     """Dimensions, box vectors and periodic bits for points that come later.
 
@@ -148,12 +157,7 @@ def as_scene(
             )
         return _own_scene(points, ndim=ndim)
     array = as_points(points, ndim=ndim)
-    ndim = array.shape[1]
-    if box is None:
-        if as_periodic_bits(periodic, ndim, default=False):
-            raise ValueError("periodic needs a box: give box, or leave periodic out")
-        return array, None, 0
-    return array, as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
+    return array, *as_own_box(box, periodic, array.shape[1])
 
 
 def as_queries(

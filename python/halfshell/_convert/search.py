@@ -11,14 +11,22 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.foreign import is_a
 from halfshell._convert.given import Given, Sets
-from halfshell._convert.lengths import as_cutoff
+from halfshell._convert.lengths import as_cutoff, refuse_none
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_sets
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import FloatArray, PointArray, Precision, Reach, Rest, Search
+    from halfshell._convert.types import (
+        Algorithm,
+        FloatArray,
+        PointArray,
+        Precision,
+        Reach,
+        Rest,
+        Search,
+    )
 
 
 def as_search(
@@ -57,11 +65,13 @@ def as_search_of_each(
     asking, array, vectors, bits = as_sets(queries, points, box, periodic)
     reach = None
     if given.is_nothing and not is_a(cutoff, Mapping):
+        refuse_none(cutoff)
         largest = as_cutoff(cutoff)
     else:
         from halfshell._convert.reach import as_reach  # here: plain searches do without
 
-        sets = Sets(points, queries, len(array), None if asking is None else len(asking))
+        n_queries = None if asking is None else len(asking)
+        sets = Sets(points, queries, len(array), n_queries, array.shape[1])
         largest, reach = as_reach(cutoff, given, sets, directed)
     return (array, largest, vectors, bits, *rest), asking, reach
 
@@ -80,6 +90,27 @@ def as_rest(
     return as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress, threads
 
 
+def refuse_indefinite(search: Search, reach: Reach) -> None:
+    """What a search says of supports that are not positive definite or reach too far, without one.
+
+    The core looks at them before it looks for pairs, of which no queries have none.
+    """
+    from halfshell._convert.rules import reach_by_supports  # here: plain searches do without
+
+    supports, query_supports, extent = reach[6:]
+    if extent is None:
+        return
+    ndim = search[0].shape[1]
+    no_points, no_matrices = np.empty((0, ndim)), np.empty((0, ndim, ndim))
+    if supports is not None:
+        reach = reach_by_supports("max", supports, no_matrices, extent)  # looks at all
+        _core.count_between(search[0], np.inf, *search[2:], no_points, reach, "auto")
+    if query_supports is not None:
+        reach = reach_by_supports("max", no_matrices, query_supports, extent)
+        queries = np.zeros((len(query_supports), ndim))
+        _core.count_between(no_points, np.inf, *search[2:], queries, reach, "auto")
+
+
 def count_within(
     cutoffs: float | FloatArray,
     points: Any,
@@ -88,6 +119,7 @@ def count_within(
     rest: Rest,
     queries: PointArray | None = None,
     reach: Reach | None = None,
+    algorithm: Algorithm = "auto",
 ) -> int | npt.NDArray[np.int64]:
     """How many pairs are within a cutoff, or within each of some, which ascend and are at least 0.
 
@@ -96,8 +128,8 @@ def count_within(
 
     def count(one: float) -> int:
         if queries is None:
-            return _core.count_pairs(points, one, box, bits, *rest, reach)
-        return _core.count_between(points, one, box, bits, *rest, queries, reach)
+            return _core.count_pairs(points, one, box, bits, *rest, reach, algorithm)
+        return _core.count_between(points, one, box, bits, *rest, queries, reach, algorithm)
 
     if isinstance(cutoffs, float):
         return count(cutoffs)
@@ -105,7 +137,8 @@ def count_within(
     if is_exact and len(cutoffs) > 1 and reach is None:
         edges = np.ascontiguousarray(cutoffs)
         between: npt.NDArray[np.int64] = _core.histogram(
-            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None
+            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None,
+            algorithm,
         )
         return np.cumsum(between[0, 0])
     # Without any, all else is checked as ever.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_array
+from halfshell._convert.arrays import as_array, one_each
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown, told, whole_number
 from halfshell._convert.lengths import as_number
 from halfshell._convert.marks import as_types
@@ -91,8 +91,7 @@ def _kinds(values: Any, name: str, owner: Any, owners: str, n: int) -> _Kinds:
         ):
             array = array.astype(np.str_)
         kinds = _Kinds(array if array.dtype.kind == "U" else as_types(array, name, n))
-    if kinds.values.shape != (n,):
-        raise ValueError(f"{name} must have shape ({n},), one a point, got {kinds.values.shape}")
+    one_each(name, n)(kinds.values.shape)
     return kinds
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 Precision = Literal["exact", "double", "single"]
+Algorithm = Literal["auto", "all-pairs", "grid", "hash", "hierarchy"]
 
 FloatArray = npt.NDArray[np.float64]
 PointArray = npt.NDArray[np.float32] | FloatArray
@@ -27,11 +28,13 @@ Progress = Callable[[float], object] | None
 Rule = Literal["sum", "mean", "max", "min", "gather", "scatter"]
 
 # What the core takes last for a reach of each pair: number of the rule, radii of the points and of
-# the queries, types of both, table of cutoffs by types. Of radii or types one are None.
+# the queries, types of both, table of cutoffs by types, supports of both, extent. Of radii, types
+# and supports two are None.
 _Ints = npt.NDArray[np.int32]
 Reach = tuple[
-    int, FloatArray | None, FloatArray | None, _Ints | None, _Ints | None, FloatArray | None
-]
+    int, FloatArray | None, FloatArray | None, _Ints | None, _Ints | None, FloatArray | None,
+    FloatArray | None, FloatArray | None, float | None,
+]  # fmt: skip
 
 # What the core takes from `inclusive` to `threads`.
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
@@ -89,6 +92,7 @@ class SearchOptions(TypedDict, total=False):
     periodic: PeriodicLike | None
     inclusive: bool
     precision: Precision
+    algorithm: Algorithm
     kernel: str | None
     threads: int | None
     memory_limit: float | None
@@ -100,6 +104,8 @@ class ReachOptions(SearchOptions, total=False):
     radii: ArrayLike | None
     rule: Rule | None
     types: npt.ArrayLike | None
+    supports: ArrayLike | None
+    extent: float | None
 
 
 class PairOptions(ReachOptions, total=False):
@@ -117,6 +123,7 @@ class BetweenOptions(ReachOptions, total=False):
 
     query_radii: ArrayLike | None
     query_types: npt.ArrayLike | None
+    query_supports: ArrayLike | None
     index_dtype: npt.DTypeLike
     out: Out | None
 
@@ -129,6 +136,9 @@ class CountOptions(SearchOptions, total=False):
     query_radii: ArrayLike | None
     rule: Rule | None
     query_types: npt.ArrayLike | None
+    supports: ArrayLike | None
+    query_supports: ArrayLike | None
+    extent: float | None
     batch: None
 
 

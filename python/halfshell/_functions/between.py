@@ -9,7 +9,7 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.given import Given
-from halfshell._convert.options import as_index_bytes
+from halfshell._convert.options import AUTO, as_index_bytes
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from halfshell._convert.types import (
+        Algorithm,
         ArrayLike,
         Arrays,
         BetweenOptions,
@@ -71,6 +72,9 @@ def pairs_between(
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    query_supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -78,6 +82,7 @@ def pairs_between(
     index_dtype: npt.DTypeLike = np.int64,
     out: Out | None = None,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -93,7 +98,9 @@ def pairs_between(
     points : array_like of float, shape (n, d)
         Coordinates of the points to find, as in `pairs`. An object such as ``ase.Atoms`` brings
         its box; `queries` may be another one with the same box.
-    cutoff, box, periodic, inclusive, index_dtype, out, precision, kernel, threads, memory_limit
+    cutoff, box, periodic, inclusive, index_dtype, out, precision, algorithm, kernel
+        As in `pairs`.
+    threads, memory_limit
         As in `pairs`.
     radii, query_radii : array_like of float, shape (n,) and (q,), optional
         A radius for each point and for each query, as in `pairs`. Both, but for rules that go by
@@ -103,6 +110,11 @@ def pairs_between(
         the point. Then `query_radii` or `radii` are given alone.
     types, query_types : array_like of int or str, shape (n,) and (q,), optional
         Types of points and queries, as in `pairs`; both are numbers, or both are names.
+    supports, query_supports : array_like of float, shape (n, d, d) and (q, d, d), optional
+        A support for each point and for each query, as in `pairs`; given as `radii` are, with the
+        rules "max", "min", "gather" and "scatter".
+    extent : float, optional
+        How far supports reach, as in `pairs`.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once, as in `pairs`.
 
@@ -151,7 +163,8 @@ def pairs_between(
         box = box.vectors
     if (
         radii is None and query_radii is None and rule is None
-        and types is None and query_types is None
+        and types is None and query_types is None and algorithm is AUTO
+        and supports is None and query_supports is None and extent is None
     ):  # fmt: skip
         result: Any = _core.plain(
             _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -159,12 +172,14 @@ def pairs_between(
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
-    given = Given(radii, query_radii, rule, types, query_types)
+    given = Given(
+        radii, query_radii, rule, types, query_types, supports, query_supports, extent
+    )
     check_apart(out, queries=queries, points=points, box=box, cutoff=cutoff, **given._asdict())
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
     search, asking, reach = as_search_of_each(
         points, cutoff, box, periodic, rest, given, queries, directed=True
     )
     return _core.pairs_between(
-        *search, quantities, True, as_index_bytes(index_dtype), out, asking, reach
+        *search, quantities, True, as_index_bytes(index_dtype), out, asking, reach, algorithm
     )

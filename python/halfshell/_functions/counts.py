@@ -12,6 +12,7 @@ from halfshell._convert.foreign import is_a
 from halfshell._convert.given import Given
 from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.options import AUTO
 from halfshell._convert.search import as_rest, as_search_of_each, count_within
 from halfshell._objects.box import Box
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from halfshell._convert.types import (
+        Algorithm,
         ArrayLike,
         BoxLike,
         CountOptions,
@@ -32,8 +34,8 @@ if TYPE_CHECKING:
         PeriodicLike,
         PointsLike,
         Precision,
+        ReachOptions,
         Rule,
-        SearchOptions,
     )
 
 _MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
@@ -66,10 +68,10 @@ def count_pairs(
 @overload
 def count_pairs(
     points: PointsLike,
-    cutoff: npt.ArrayLike,
+    cutoff: npt.ArrayLike | PairCutoff,
     *,
     batch: npt.ArrayLike,
-    **options: Unpack[SearchOptions],
+    **options: Unpack[ReachOptions],
 ) -> npt.NDArray[np.int64]: ...
 @overload
 def count_pairs(
@@ -89,10 +91,14 @@ def count_pairs(
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    query_supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -102,22 +108,22 @@ def count_pairs(
 
     Parameters
     ----------
-    points, box, periodic, inclusive, precision, kernel, threads
+    points, box, periodic, inclusive, precision, algorithm, kernel, threads
         As in `pairs`.
     cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
         One cutoff, or several in ascending order, for which there is one search up to the largest
-        (k searches where `precision` is not "exact", or with `radii`). With `batch`: one for all
-        systems, or one for each. With `radii`, None is no further limit; with `types` a table or a
-        dict, as in `pairs`.
+        (k searches where `precision` is not "exact", or with `radii` or `supports`). With `batch`:
+        one for all systems, or one for each. With `radii` or `supports`, None is no further limit;
+        with `types` a table or a dict, as in `pairs`.
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
         finds them.
-    radii, query_radii, rule, types, query_types
+    radii, query_radii, rule, types, query_types, supports, query_supports, extent
         As in `pairs`, and with `queries` as in `pairs_between`.
     memory_limit : float, optional
         Bytes that the search may take.
     batch : array_like of int, shape (n,), optional
-        Count many systems in one call, as in `pairs`; not with `queries`, `radii` or `types`.
+        Count many systems in one call, as in `pairs`; not with `queries`.
 
     Returns
     -------
@@ -157,7 +163,8 @@ def count_pairs(
         box = box.vectors
     if batch is None and (
         radii is None and query_radii is None and rule is None
-        and types is None and query_types is None
+        and types is None and query_types is None and algorithm is AUTO
+        and supports is None and query_supports is None and extent is None
     ):  # fmt: skip
         result: Any = (
             _core.plain(
@@ -171,14 +178,15 @@ def count_pairs(
         if result is not NotImplemented:
             return cast("int", result)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
-    given = Given(radii, query_radii, rule, types, query_types)
+    given = Given(
+        radii, query_radii, rule, types, query_types, supports, query_supports, extent
+    )
     if batch is not None:
         if queries is not None:
             raise ValueError("batch and queries cannot be given together")
-        given.refuse_with("batch")
-        scene, own = as_systems(points, cutoff, box, periodic, batch)
+        scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
         _refuse_systems(*own)
-        return _core.batch_count(*(*scene, *rest, *own))
+        return _core.batch_count(*(*scene, *rest, *own, reach, algorithm))
     several = _several(cutoff, given)
     one = cutoff if several is None else 0.0
     search, asking, reach = as_search_of_each(
@@ -186,7 +194,7 @@ def count_pairs(
     )
     array, largest, vectors, bits = search[:4]
     within = largest if several is None else several
-    return count_within(within, array, vectors, bits, rest, asking, reach)
+    return count_within(within, array, vectors, bits, rest, asking, reach, algorithm)
 
 
 def _several(cutoff: Any, given: Given) -> FloatArray | None:

@@ -14,12 +14,14 @@ from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
+    Algorithm,
     ArrayLike,
     BoxLike,
     PairCutoff,
     PeriodicLike,
     PointsLike,
     Precision,
+    Reach,
     Rule,
 )
 from halfshell._functions.parts import parts_of
@@ -31,21 +33,26 @@ class Explanation:
 
     Attributes
     ----------
-    algorithm : {"all-pairs", "grid", "sparse", "hierarchy"}
-        One cell, a grid of cells, or a grid of which only the occupied cells are stored; with radii
-        or types several searches, and then what follows is about the one with the largest reach.
+    algorithm : {"all-pairs", "grid", "hash", "hierarchy"}
+        One cell, a grid of cells, or a grid of which only the occupied cells are stored; with
+        radii, types or supports several searches, as a rule, and then cells and images are those
+        of the search with the largest reach.
+        The one that was asked for, or what "auto" takes.
     reason : str
         Why.
     n, ndim : int
         Number of points and dimensions.
     shape : tuple of int
-        Cells along each grid axis.
+        Cells along each grid axis; with "hash" most of them hold no point and are not stored.
+    n_cells : int
+        Cells that are stored.
     cell_sizes : tuple of float
         Their extents, in the unit of the points.
     images : tuple of int
         How many periods a pair can be apart along each grid axis; 0 where none are needed.
     expected_pairs : float
-        From the density; points that are not spread evenly have more.
+        From the pairs of up to 1024 points. Where these have more than can be counted in some
+        milliseconds, at least what the density says.
     expected_bytes : float
         What these pairs take in the returned arrays.
     kernel : str
@@ -72,6 +79,7 @@ class Explanation:
     n: int
     ndim: int
     shape: tuple[int, ...]
+    n_cells: int
     cell_sizes: tuple[float, ...]
     images: tuple[int, ...]
     expected_pairs: float
@@ -83,6 +91,8 @@ class Explanation:
 
     def __str__(self) -> str:
         cells = " x ".join(str(k) for k in self.shape)
+        if self.algorithm == "hash":
+            cells = f"{self.n_cells} that hold points"
         sizes = " x ".join(f"{k:.4g}" for k in self.cell_sizes)
         lines = [
             f"{self.n} points in {self.ndim} dimension{'s' if self.ndim > 1 else ''}",
@@ -109,6 +119,8 @@ def explain(
     radii: ArrayLike | None = None,
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -116,6 +128,7 @@ def explain(
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -125,13 +138,15 @@ def explain(
 
     Parameters
     ----------
-    points, cutoff, radii, rule, types, box, periodic, quantities, inclusive, sort
+    points, cutoff, radii, rule, types, supports, extent, box, periodic
         As in `pairs`.
-    index_dtype, precision, kernel, threads, memory_limit
+    quantities, inclusive, sort
+        As in `pairs`.
+    index_dtype, precision, algorithm, kernel, threads, memory_limit
         As in `pairs`.
     measure : bool, default False
         Run the search too, and report its own counters: bytes allocated by purpose, candidates
-        tested, and how many decisions each stage took. Not with radii or types.
+        tested, and how many decisions each stage took.
 
     Returns
     -------
@@ -140,7 +155,7 @@ def explain(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`; ValueError also for `measure` with radii or types.
+        As `pairs`.
 
     Examples
     --------
@@ -150,27 +165,23 @@ def explain(
     ('all-pairs', (1, 1), 1)
     """
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
-    given = Given(radii, None, rule, types)
+    given = Given(radii, None, rule, types, None, supports, None, extent)
     search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
-    parts = None
-    if reach is not None:
-        if as_flag(measure, "measure"):
-            raise ValueError("measure is for one cutoff: leave it out, or radii and types")
-        parts = parts_of(reach, search[1])
-        search = (search[0], parts.largest, *search[2:])
     sort, index_bytes = as_flag(sort, "sort"), as_index_bytes(index_dtype)
-    plan = _core.explain(*search, quantities, sort, index_bytes, as_flag(measure, "measure"))
+    plan = _core.explain(
+        *search, quantities, sort, index_bytes, as_flag(measure, "measure"), reach, algorithm
+    )
     ndim = plan["ndim"]
-    algorithm, reason = _algorithm(plan), _reason(plan)
-    if parts is not None:
-        algorithm, reason = "hierarchy", parts.reason
-        plan["expected_pairs"] *= parts.share(ndim)
+    reason = _reason(plan, algorithm == "auto")
+    if reach is not None:
+        reason = _reason_of_reach(plan, reach, reason)
     return Explanation(
-        algorithm=algorithm,
+        algorithm=plan["algorithm"],
         reason=reason,
         n=len(search[0]),
         ndim=ndim,
         shape=plan["shape"],
+        n_cells=plan["n_cells"],
         cell_sizes=plan["cell_sizes"],
         images=plan["images"],
         expected_pairs=plan["expected_pairs"],
@@ -195,19 +206,31 @@ _MEASURED = (
 )
 
 
-def _algorithm(plan: dict[str, Any]) -> str:
-    return "all-pairs" if plan["all_pairs"] else "sparse" if plan["sparse"] else "grid"
-
-
-def _reason(plan: dict[str, Any]) -> str:
-    if plan["all_pairs"]:
-        return "testing every pair costs less than sorting into cells"
+def _reason(plan: dict[str, Any], is_choice: bool) -> str:
     n_rows = plan["stencil_rows"]
     rows = "row" if n_rows == 1 else "rows"
     compared = f"each point is compared with {n_rows} {rows} of cells (forward half)"
+    if plan["algorithm"] == "hierarchy" and plan["n_searches"] == 1:
+        kind = "only those that hold points" if plan["sparse"] else "all stored"
+        return f"one level, for one cutoff holds for all pairs; cells: {kind}; {compared}"
     if plan["sparse"]:
-        return f"points fill few of the cells, only those are stored; {compared}"
+        few = "points fill few of the cells, only those" if is_choice else "cells that hold points"
+        return f"{few} are stored; {compared}"
+    if plan["algorithm"] == "all-pairs":
+        if is_choice:
+            return "testing every pair costs less than sorting into cells"
+        return "each point is compared with all others"
     return compared
+
+
+def _reason_of_reach(plan: dict[str, Any], reach: Reach, reason: str) -> str:
+    """Of one search in which pairs have a reach each, or of several."""
+    if plan["n_searches"] == 0:
+        return "no two points can be a pair"
+    if plan["n_searches"] == 1 and plan["algorithm"] != "hierarchy":
+        return f"one search with the largest reach; {reason}"
+    n = plan["n_searches"]
+    return f"{parts_of(reach)}, in {n} {'search' if n == 1 else 'searches'}"
 
 
 def _bytes_per_pair(quantities: str, ndim: int, index_bytes: int) -> int:

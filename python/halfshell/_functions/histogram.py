@@ -9,7 +9,7 @@ import numpy.typing as npt
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.marks import as_marks, binned
 from halfshell._convert.search import as_search
-from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike
+from halfshell._convert.types import Algorithm, BoxLike, PeriodicLike, PointsLike
 
 
 def pair_histogram(
@@ -23,6 +23,7 @@ def pair_histogram(
     query_weights: npt.ArrayLike | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -31,7 +32,7 @@ def pair_histogram(
 
     Parameters
     ----------
-    points, box, periodic, kernel, threads
+    points, box, periodic, algorithm, kernel, threads
         As in `pairs`.
     edges : array_like of float, shape (bins + 1,)
         Limits of the bins in ascending order, in the unit of `points`; finite, not negative, any
@@ -101,4 +102,4 @@ def pair_histogram(
         points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
     marks = as_marks(len(search[0]), asking, types, query_types, weights, query_weights)
-    return binned(search, as_edges(edges), asking, marks)
+    return binned(search, as_edges(edges), asking, marks, algorithm=algorithm)

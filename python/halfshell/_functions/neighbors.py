@@ -10,9 +10,11 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.given import Given
-from halfshell._convert.options import as_index_bytes
+from halfshell._convert.options import AUTO, as_index_bytes
+from halfshell._convert.rules import DIRECTED
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
+    Algorithm,
     ArrayLike,
     BoxLike,
     PairCutoff,
@@ -36,12 +38,16 @@ def neighbors(
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    query_supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "j",
     inclusive: bool = True,
     index_dtype: npt.DTypeLike = np.int64,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -54,7 +60,8 @@ def neighbors(
         Coordinates, as in `pairs`; an object such as ``ase.Atoms`` brings its own box.
     cutoff : float, array_like of float, shape (t, t), dict or None
         Largest distance of a neighbour, in the unit of `points`; finite, not negative. With `radii`
-        a further limit, or None; with `types` one for each pair of types, as in `pairs`.
+        or `supports` a further limit, or None; with `types` one for each pair of types, as in
+        `pairs`.
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries, in the unit of `points`; they may lie anywhere. The table then has
         a row for each query, with the neighbours that `pairs_between` finds. Default: a row for
@@ -68,10 +75,14 @@ def neighbors(
         "scatter", those within whose radius i is.
     types, query_types : array_like of int or str, shape (n,) and (q,), optional
         As in `pairs_between`.
+    supports, query_supports : array_like of float, shape (n, d, d) and (q, d, d), optional
+        As in `pairs_between`; "gather": row i holds all within the support of i.
+    extent : float, optional
+        How far supports reach, as in `pairs`.
     quantities : str, default "j"
         Any of the letters ``j d D S``, each at most once: numbers of the neighbours, distances,
         vectors, shifts. Only these are computed, and the table has no others.
-    box, periodic, inclusive, index_dtype, precision, kernel, threads, memory_limit
+    box, periodic, inclusive, index_dtype, precision, algorithm, kernel, threads, memory_limit
         As in `pairs`.
 
     Returns
@@ -135,7 +146,8 @@ def neighbors(
     reach = None
     if (
         radii is None and query_radii is None and rule is None
-        and types is None and query_types is None
+        and types is None and query_types is None and algorithm is AUTO
+        and supports is None and query_supports is None and extent is None
     ):  # fmt: skip
         arrays = _core.plain(
             _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -145,15 +157,20 @@ def neighbors(
         search, asking, reach = as_search_of_each(
             points, cutoff, box, periodic,
             as_rest(inclusive, precision, kernel, memory_limit, None, threads),
-            Given(radii, query_radii, rule, types, query_types), queries, directed=True,
+            Given(
+                radii, query_radii, rule, types, query_types, supports, query_supports, extent
+            ),
+            queries, directed=True,
         )  # fmt: skip
-        arrays = _core.neighbors(*search, quantities, as_index_bytes(index_dtype), asking, reach)
+        arrays = _core.neighbors(
+            *search, quantities, as_index_bytes(index_dtype), asking, reach, algorithm
+        )
         found, largest, vectors, periods = search[:4]
     origin = None
     if "d" in quantities and "j" in quantities:  # else it cannot be sorted
         find_shifts = shifts_of_search(largest, inclusive, precision, threads, reach)
         origin = Origin(found, asking, vectors, periods, find_shifts)
-    is_full = queries is None and rule not in ("gather", "scatter")
+    is_full = queries is None and rule not in DIRECTED
     return NeighborTable(arrays, quantities, len(found), is_full, origin=origin)
 
 
@@ -167,10 +184,14 @@ def coordination(
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    query_supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -181,7 +202,9 @@ def coordination(
     ----------
     points, cutoff, queries, radii, query_radii, rule, types, query_types
         As in `neighbors`.
-    box, periodic, inclusive, precision, kernel, threads
+    supports, query_supports, extent
+        As in `neighbors`.
+    box, periodic, inclusive, precision, algorithm, kernel, threads
         As in `neighbors`.
     memory_limit : float, optional
         Bytes that the search may take.
@@ -213,7 +236,8 @@ def coordination(
         box = box.vectors
     if (
         radii is None and query_radii is None and rule is None
-        and types is None and query_types is None
+        and types is None and query_types is None and algorithm is AUTO
+        and supports is None and query_supports is None and extent is None
     ):  # fmt: skip
         counts: Any = _core.plain(
             _core.coordination, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -224,6 +248,9 @@ def coordination(
     search, asking, reach = as_search_of_each(
         points, cutoff, box, periodic,
         as_rest(inclusive, precision, kernel, memory_limit, None, threads),
-        Given(radii, query_radii, rule, types, query_types), queries, directed=True,
+        Given(
+                radii, query_radii, rule, types, query_types, supports, query_supports, extent
+            ),
+            queries, directed=True,
     )  # fmt: skip
-    return _core.coordination(*search, asking, reach)
+    return _core.coordination(*search, asking, reach, algorithm)

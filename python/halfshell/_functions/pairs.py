@@ -10,7 +10,7 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Given
-from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from halfshell._convert.types import (
+        Algorithm,
         ArrayLike,
         Arrays,
         BoxLike,
@@ -67,6 +68,8 @@ def pairs(
     radii: ArrayLike | None = None,
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -75,6 +78,7 @@ def pairs(
     index_dtype: npt.DTypeLike = np.int64,
     out: Out | None = None,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -93,19 +97,26 @@ def pairs(
         periodicity.
     cutoff : float, array_like of float, shape (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
-        larger than the box. With `radii` a further limit, or None; with `types` one for each pair
-        of types.
+        larger than the box. With `radii` or `supports` a further limit, or None; with `types` one
+        for each pair of types.
     radii : array_like of float, shape (n,), optional
         A radius for each point, in the unit of `points`; finite, not negative, at most 2**1022. A
         pair then counts within what `rule` makes of the two radii, and within `cutoff`, if any.
     rule : {"sum", "mean", "max", "min"}, optional
         How far a pair of `radii` reaches: their sum, half of it, the larger or the smaller one.
-        Default: "sum", by which balls touch.
+        Default: "sum", by which balls touch. With `supports` "max", the default: within one of the
+        two, or "min": within both.
     types : array_like of int or str, shape (n,), optional
         The type of each point. `cutoff` is then a symmetric table with a row for each type from 0
         on, or a dict such as ``{(0, 1): 1.5}`` or ``{("H", "O"): 1.2}``, where a key counts both
         ways and types that it does not pair are no pairs. With a dict, an object such as
         ``ase.Atoms`` brings its elements as types.
+    supports : array_like of float, shape (n, d, d), optional
+        The ellipsoid that each point reaches, as a symmetric positive definite matrix H, in the
+        inverse unit of `points`; d <= 3. A pair counts if ``|H[i] @ D| <= extent`` or
+        ``|H[j] @ D| <= extent``, D being its vector; `rule` "min": if both hold.
+    extent : float, optional
+        How far `supports` reach, without a unit; finite, not negative.
     box : float, array_like of float, shape (d,) or (d, d), or Box, optional
         The length of all edges, their lengths, or edge vectors as rows, in the unit of `points`;
         finite. None: open space. Rows of axes that are not periodic may be anything finite, such
@@ -116,7 +127,8 @@ def pairs(
         Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
         both indices. Only these are computed.
     inclusive : bool, default True
-        Whether a pair at exactly `cutoff`, or at exactly its reach by radii or types, counts.
+        Whether a pair at exactly `cutoff`, or at exactly its reach by radii, types or supports,
+        counts.
     sort : bool, default False
         Ascending (i, j, S). Otherwise the order is fixed by the scene but not specified.
     index_dtype : numpy.int64 or numpy.int32, default numpy.int64
@@ -131,14 +143,23 @@ def pairs(
         formula in float64; "single" in float32 relative to the centre of a group of neighbouring
         points, so that its answer near the cutoff also depends on the other points and their
         order.
+    algorithm : {"auto", "all-pairs", "grid", "hash", "hierarchy"}, default "auto"
+        How the pairs are looked for, which may change time, memory and, without `sort`, the order,
+        but not the pairs. "all-pairs" tests every pair; "grid" sorts the points into cells, whose
+        number is in proportion to that of the points, so that they are large where the points
+        are far apart; "hash" stores only cells that hold points, of any number; "hierarchy"
+        divides the points by the size of their radius, or by type, and searches each two parts
+        with cells of their own: one part, where neither is given. With `radii` or `types` the
+        first three search once, with the largest reach; but more than 8 types in pairs.
+        "auto" takes what is expected to be quickest; `explain` says which, and why.
     kernel : str, optional
         One of ``kernels()``; for tests and timing. All give identical arrays. Default: what the
         environment variable HALFSHELL_KERNEL said when halfshell was imported, otherwise the best.
     threads : int, optional
-        Threads to use, at most four for each core. Default: one for small scenes, else the number
-        in the environment variable ``OMP_NUM_THREADS``, or as many as there are cores that this
-        process may run on. The arrays are the same for any number. Threads end before the call
-        returns.
+        The most threads to use, at most four for each core; work of less than about half a
+        millisecond has one. Default: one for small scenes, else the number in the environment
+        variable ``OMP_NUM_THREADS``, or as many as there are cores that this process may run on.
+        The arrays are the same for any number. Threads end before the call returns.
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
@@ -153,7 +174,8 @@ def pairs(
         else hold for every system, but `box` may have shape (s, d, d), one a system, and `cutoff`
         shape (s,); then every number in `batch` is less than s. A `box` with two axes is one box
         for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
-        systems out. Not with `radii` or `types`.
+        systems out. With `radii`, `types` or `supports`, one for each point of all systems,
+        `cutoff` is a further limit, of all or one a system, or the table or dict of all.
 
     Returns
     -------
@@ -190,8 +212,9 @@ def pairs(
         radius is negative, not finite, above 2**1022 or, not being 0, below 2**-1021 with `rule`
         "mean", as its half may be no float64; if `rule` is given without `radii`, or has a
         direction, as those of `neighbors` may; if a table of cutoffs is not symmetric, a dict is in
-        contradiction or names no element, or a type is none of the table; if `radii`, `types` and
-        `batch` are given together.
+        contradiction or names no element, or a type is none of the table; if a support is not
+        finite, not symmetric or, decided exactly, not positive definite, or reaches further than
+        2**1022; if two of `radii`, `types` and `supports` are given together.
     CapacityError
         If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
         then.
@@ -249,16 +272,30 @@ def pairs(
     >>> i.tolist(), j.tolist()
     ([1], [2])
 
+    Ellipsoids, twice as long along y as along x: the second point is above the first.
+
+    >>> long = [[[2.0, 0.0], [0.0, 1.0]]] * 3
+    >>> i, j = hs.pairs([[0.0, 0.0], [0.0, 1.5], [1.5, 0.0]], None, supports=long, extent=2.0)
+    >>> i.tolist(), j.tolist()
+    ([0], [1])
+
     Two systems in one call, which do not see each other:
 
     >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
     ...                 batch=[0, 0, 1, 1])
     >>> i.tolist(), j.tolist()
     ([0, 2], [1, 3])
+    >>> i, j = hs.pairs([[0.0], [1.0], [0.0], [1.0]], None, radii=[0.5, 0.5, 0.25, 0.5],
+    ...                 batch=[0, 0, 1, 1])
+    >>> i.tolist(), j.tolist()
+    ([0], [1])
     """
     if type(box) is Box:
         box = box.vectors
-    if batch is None and radii is None and types is None and rule is None:
+    if batch is None and (
+        radii is None and types is None and rule is None and supports is None and extent is None
+        and algorithm is AUTO
+    ):
         # A small search takes as long as a handful of Python operations: none are made where the
         # arguments need no conversion.
         result: Any = _core.plain(
@@ -267,16 +304,18 @@ def pairs(
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
-    check_apart(out, points=points, cutoff=cutoff, box=box, batch=batch, radii=radii, types=types)
+    check_apart(
+        out, points=points, cutoff=cutoff, box=box, batch=batch, radii=radii, types=types,
+        supports=supports,
+    )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
-    given = Given(radii, None, rule, types)
+    given = Given(radii, None, rule, types, None, supports, None, extent)
     if batch is None:
         search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
         return _core.pairs(
-            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach
-        )
-    given.refuse_with("batch")
-    scene, own = as_systems(points, cutoff, box, periodic, batch)
-    return _core.batch_pairs(
-        *(*scene, *rest, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, *own)
-    )
+            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach,
+            algorithm,
+        )  # fmt: skip
+    scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
+    wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
+    return _core.batch_pairs(*(*scene, *rest, *wanted, *own, reach, algorithm))

@@ -32,7 +32,8 @@ def report(
     Parameters
     ----------
     scenes : sequence of str, optional
-        Names from `halfshell.scenes.names`. Default: all.
+        Names from `halfshell.scenes.names`, of any kind: one cutoff, a radius for each point, or
+        a support for each. Default: all.
     methods : sequence of str, optional
         Any of "exact", "double" and "single" (the precisions of `pairs`), "float32" (points
         rounded to float32 first), "verlet" and "stale" (on scenes that move: a `VerletList`,
@@ -40,7 +41,8 @@ def report(
     peers : sequence of str or None, default ()
         Other libraries to run beside ours, each in a process of its own: any of "vesin",
         "cKDTree", "neighborlist-rs", "matscipy-neighbours", "matscipy", "MDAnalysis", "freud",
-        "pymatgen", "ase". None: all. One that is not installed gets rows that say so.
+        "pymatgen", "ase", "NumPy" (all pairs in float64, where points have supports). None: all.
+        One that is not installed gets rows that say so.
     size : {"quick", "full", "small"}, default "quick"
         Size of the scenes, as in `halfshell.scenes.load`, and care in timing.
     patience : float, optional

@@ -14,6 +14,7 @@ from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
+    Algorithm,
     ArrayLike,
     Arrays,
     BoxLike,
@@ -59,6 +60,8 @@ def iter_pairs(
     radii: ArrayLike | None = None,
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     quantities: str = "ij",
@@ -66,6 +69,7 @@ def iter_pairs(
     inclusive: bool = True,
     index_dtype: npt.DTypeLike = np.int64,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -75,10 +79,10 @@ def iter_pairs(
 
     Parameters
     ----------
-    points, cutoff, radii, rule, types, box, periodic
+    points, cutoff, radii, rule, types, supports, extent, box, periodic
         As in `pairs`. They are checked and copied when `iter_pairs` is called: what happens to
         them afterwards changes nothing.
-    quantities, inclusive, index_dtype, precision, kernel
+    quantities, inclusive, index_dtype, precision, algorithm, kernel
         As in `pairs`.
     max_pairs : int, default 2**20
         Pairs in each block but the last, which has what is left; at least 1. Blocks of fewer than
@@ -139,9 +143,11 @@ def iter_pairs(
     """
     most = most_pairs(max_pairs)
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
-    given = Given(radii, None, rule, types)
+    given = Given(radii, None, rule, types, None, supports, None, extent)
     search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
-    blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most, reach)
+    blocks = _core.iter_pairs(
+        *search, quantities, as_index_bytes(index_dtype), most, reach, algorithm
+    )
     return cast("PairBlocks[Any]", blocks)
 
 
@@ -154,10 +160,13 @@ def for_each_pair(
     radii: ArrayLike | None = None,
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
+    supports: ArrayLike | None = None,
+    extent: float | None = None,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     precision: Precision = "exact",
+    algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
@@ -167,7 +176,9 @@ def for_each_pair(
 
     Parameters
     ----------
-    points, cutoff, radii, rule, types, box, periodic, inclusive, precision, kernel
+    points, cutoff, radii, rule, types, supports, extent, box, periodic
+        As in `pairs`.
+    inclusive, precision, algorithm, kernel
         As in `pairs`.
     callback : scipy.LowLevelCallable, numba cfunc, ctypes or cffi function pointer, or callable
         What to call. A compiled function has the C signature ::
@@ -242,8 +253,9 @@ def for_each_pair(
 
     target = target_of(callback, user_data)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
-    given = Given(radii, None, rule, types)
+    given = Given(radii, None, rule, types, None, supports, None, extent)
     search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
     return _core.for_each_pair(
-        *search, target.function, target.user, as_flag(thread_safe, "thread_safe"), reach
+        *search, target.function, target.user, as_flag(thread_safe, "thread_safe"), reach,
+        algorithm,
     )

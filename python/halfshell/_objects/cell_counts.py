@@ -12,6 +12,7 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.lengths import as_cutoffs, as_edges
 from halfshell._convert.marks import as_marks, binned
+from halfshell._convert.options import AUTO
 from halfshell._convert.search import count_within
 from halfshell._convert.types import Number, PointsLike
 from halfshell._objects.kept_cells import KeptCells
@@ -83,8 +84,8 @@ class CellCounts(KeptCells):
         if not isinstance(cutoffs, float):
             return count_within(cutoffs, self._cells, None, 0, search[4:], asking)
         if asking is None:
-            return _core.count_pairs(*search, None)
-        return _core.count_between(*search, asking, None)
+            return _core.count_pairs(*search, None, AUTO)
+        return _core.count_between(*search, asking, None, AUTO)
 
     def coordination(
         self,
@@ -117,7 +118,7 @@ class CellCounts(KeptCells):
         """
         asking = None if queries is None else self._queries(queries)
         options = inclusive, kernel, threads, memory_limit
-        return _core.coordination(*self._arguments(cutoff, options), asking, None)
+        return _core.coordination(*self._arguments(cutoff, options), asking, None, AUTO)
 
     def pair_histogram(
         self,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
-from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes, most_pairs
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
 
@@ -61,7 +61,7 @@ class CellPairs(KeptCells):
         options = inclusive, kernel, threads, memory_limit
         return _core.pairs(
             *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
-            as_index_bytes(index_dtype), out, None,
+            as_index_bytes(index_dtype), out, None, AUTO,
         )
 
     def iter_pairs(
@@ -105,7 +105,8 @@ class CellPairs(KeptCells):
         search = self._arguments(
             cutoff, (inclusive, kernel, threads, memory_limit), progress
         )
-        blocks = _core.iter_pairs(*search, quantities, as_index_bytes(index_dtype), most, None)
+        index_bytes = as_index_bytes(index_dtype)
+        blocks = _core.iter_pairs(*search, quantities, index_bytes, most, None, AUTO)
         return cast("PairBlocks[Any]", blocks)
 
     def for_each_pair(
@@ -149,5 +150,5 @@ class CellPairs(KeptCells):
         options = inclusive, kernel, threads, memory_limit
         return _core.for_each_pair(
             *self._arguments(cutoff, options), target.function, target.user,
-            as_flag(thread_safe, "thread_safe"), None,
+            as_flag(thread_safe, "thread_safe"), None, AUTO,
         )

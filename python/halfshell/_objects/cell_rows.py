@@ -13,8 +13,8 @@ from halfshell import _core
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_radii
 from halfshell._convert.nearest import as_k, as_max_distance, in_rows
-from halfshell._convert.options import as_index_bytes
-from halfshell._convert.reach import RULES
+from halfshell._convert.options import AUTO, as_index_bytes
+from halfshell._convert.rules import reach_by_radii
 from halfshell._convert.types import Arrays, Number, PointArray, PointsLike
 from halfshell._objects.kept_cells import KeptCells, Options
 from halfshell._objects.neighbor_table import NeighborTable
@@ -187,7 +187,8 @@ class CellRows(KeptCells):
     ) -> tuple[npt.NDArray[Any], ...]:
         """Offsets of the rows and an array for each quantity."""
         return _core.neighbors(
-            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype), asking, None
+            *self._arguments(cutoff, options), quantities, as_index_bytes(index_dtype), asking,
+            None, AUTO,
         )
 
     def _rows(
@@ -255,8 +256,8 @@ class _EachRadius:
         """All at once, among the points as they were given."""
         points, vectors, bits = self._cells._origin.scene()
         rest = self._cells._arguments(None, self._options)[4:]
-        reach = (RULES.index("gather"), None, self._radii, None, None, None)
+        reach = reach_by_radii("gather", None, self._radii)
         return _core.neighbors(
             points, np.inf, vectors, bits, *rest, quantities, as_index_bytes(self._index_dtype),
-            queries, reach,
+            queries, reach, AUTO,
         )

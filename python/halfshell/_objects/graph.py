@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Graph", "check_letters", "turned"]
+__all__ = ["Graph", "check_complete", "turned"]
 
 
 class Graph(NamedTuple):
@@ -40,7 +40,7 @@ class Graph(NamedTuple):
     distances: npt.NDArray[np.float64] | None
 
 
-def check_letters(quantities: str) -> None:
+def check_complete(quantities: str) -> None:
     """Raise unless a table of these has what a graph needs."""
     if lacking := "".join(letter for letter in "jDS" if letter not in quantities):
         raise AttributeError(

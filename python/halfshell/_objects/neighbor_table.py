@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.options import as_choice, as_flag
+from halfshell._convert.options import as_choice, as_flag, check_letters
 from halfshell._objects import table_forms
-from halfshell._objects.graph import Graph, check_letters, turned
+from halfshell._objects.graph import Graph, check_complete, turned
 from halfshell._objects.table_rows import Array, Row, TableRows
 
 
@@ -197,7 +197,7 @@ class NeighborTable(TableRows):
         >>> i.tolist(), j.tolist()
         ([0, 1], [1, 2])
         """
-        table_forms.check_letters(quantities)
+        check_letters(quantities)
         half = as_flag(half, "half")
         rows = self._row_numbers()
         columns = {"i": rows}
@@ -360,7 +360,7 @@ class NeighborTable(TableRows):
         >>> np.array_equal(points[edge_index[1]] - points[edge_index[0]] + shifts @ box, vectors)
         True
         """
-        check_letters(self._quantities)
+        check_complete(self._quantities)
         distances = self.distances if "d" in self._quantities else None
         return turned(self.edge_index(), self.shifts, self.vectors, distances)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.lengths import as_cutoff
-from halfshell._convert.options import as_flag
+from halfshell._convert.options import AUTO, as_flag
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import PointArray, Reach
 
@@ -161,7 +161,7 @@ def shifts_of_search(
         points, vectors, bits = origin.scene()
         found = _core.neighbors(
             points, largest, vectors, bits, includes_cutoff, precision, None, None, None, threads,
-            "S", 8, origin.queries, own,
+            "S", 8, origin.queries, own, AUTO,
         )
         return found[1]
 

@@ -27,17 +27,6 @@ def rows_of(offsets: Array, dtype: npt.DTypeLike = np.int64) -> Array:
     return np.repeat(np.arange(len(offsets) - 1, dtype=dtype), np.diff(offsets))
 
 
-def check_letters(quantities: Any) -> None:
-    """Raise unless these are some of the letters that `pairs` knows, each at most once."""
-    if not isinstance(quantities, str):
-        raise TypeError(f"quantities must be a string, got {type(quantities).__name__}")
-    if not quantities or set(quantities) - set("ijdDSP") or len(set(quantities)) < len(quantities):
-        raise ValueError(
-            "quantities must be some of the letters i j d D S P, each at most once, got "
-            f"{quantities!r}"
-        )
-
-
 def as_mask(mask: npt.ArrayLike, n_entries: int) -> npt.NDArray[np.bool_]:
     """One bool for each entry."""
     array = as_array(mask, "mask", "hold bools")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from contextlib import suppress
 from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
@@ -13,11 +12,14 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.foreign import of_argument
-from halfshell._convert.lengths import as_cutoff, as_number
-from halfshell._convert.options import as_flag, as_index_bytes
+from halfshell._convert.lengths import as_cutoff, as_length, as_skin
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes
 from halfshell._convert.scene import as_box_alone, as_scene
 from halfshell._convert.types import Arrays, BoxLike, Letter, Number, Out, PeriodicLike, PointsLike
+from halfshell._objects.alone import Alone
+from halfshell._objects.pair_changes import PairChanges, Step
 from halfshell._objects.skin import AutoSkin
+from halfshell._objects.tracked_steps import TrackedSteps
 
 
 class _PairOptions(TypedDict, total=False):
@@ -49,6 +51,8 @@ class VerletList:
         As in `pairs`; `update` may give others.
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
+    track_changes : bool, default False
+        Whether `changes` is wanted. The points of the step before are kept for it, too.
     kernel, threads, memory_limit : optional
         As in `pairs`.
 
@@ -98,16 +102,18 @@ class VerletList:
         box: BoxLike | None = None,
         periodic: PeriodicLike | None = None,
         inclusive: bool = True,
+        track_changes: bool = False,
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
     ) -> None:
-        self._cutoff = _as_length(as_cutoff(cutoff), "cutoff")
+        self._cutoff = as_length(as_cutoff(cutoff), "cutoff")
         self._auto = AutoSkin(self._cutoff) if isinstance(skin, str) and skin == "auto" else None
-        self._skin = self._auto.skin if self._auto is not None else _as_skin(skin)
+        self._skin = self._auto.skin if self._auto is not None else as_skin(skin)
         self._box = box
         self._periodic = periodic
         self._inclusive = as_flag(inclusive, "inclusive")
+        self._tracked = TrackedSteps() if as_flag(track_changes, "track_changes") else None
         self._threads = threads
         self._kernel = kernel
         self._memory_limit = memory_limit
@@ -115,7 +121,7 @@ class VerletList:
         self._list = _core.verlet_new()
         self._lock = threading.RLock()
         self._is_busy = False
-        self._searched: tuple[Any, ...] | None = None  # the last step's scene, if it has no list
+        self._searched: Step | None = None  # the last step's scene, if it has no list
         self._n_builds = 0
         self._n_updates = 0
 
@@ -126,7 +132,7 @@ class VerletList:
             _core.count_pairs(
                 np.empty((0, ndim)), 0.0, vectors, 0 if vectors is None else bits,
                 self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
-                None,
+                None, AUTO,
             )
 
     def update(
@@ -167,18 +173,20 @@ class VerletList:
         >>> pair_list.pairs(quantities="d").tolist()
         [0.95]
         """
-        with _Alone(self):
+        with Alone(self):
             return self._update(points, box, periodic)
 
     def _update(self, points: Any, box: Any, periodic: Any) -> bool:
         box = self._box if box is None else box
         periodic = self._periodic if periodic is None else periodic
         array, vectors, bits = as_scene(points, box, periodic)
+        if self._tracked is not None:
+            array = array.copy()
         auto = self._auto
         if auto is not None and auto.searches:
             self._take(array, vectors, bits)
             self._box, self._periodic = box, periodic
-            self._n_updates += 1
+            self._taken(array, vectors, bits)
             auto.searched()
             return True
         change = auto is not None and auto.wants_change(array.shape[1])
@@ -190,7 +198,7 @@ class VerletList:
             )
         self._searched = None
         self._box, self._periodic = box, periodic
-        self._n_updates += 1
+        self._taken(array, vectors, bits)
         self._n_builds += rebuilt
         if rebuilt:
             self._skin = skin
@@ -205,17 +213,24 @@ class VerletList:
         """Keep the points of a step that has no list. What `pairs` refuses is refused here."""
         points = np.array(array)
         checked = points[:0] if np.isfinite(points).all() else points
-        self._search((checked, vectors, bits), "ij", False, 8, None)
-        self._searched = (points, vectors, bits)
+        self._search(Step(checked, vectors, bits), "ij", False, 8, None)
+        self._searched = Step(points, vectors, bits)
         self._list = _core.verlet_new()  # its memory may be large
 
+    def _taken(self, points: Any, vectors: Any, bits: int) -> None:
+        """A step has been taken; its points are a copy where changes are tracked."""
+        self._n_updates += 1
+        if self._tracked is not None:
+            self._tracked.take(Step(points, None if vectors is None else vectors.copy(), bits))
+
     def _search(
-        self, scene: tuple[Any, ...], quantities: str, sort: bool, index_bytes: int, out: Any
+        self, scene: Step, quantities: str, sort: bool, index_bytes: int, out: Any
     ) -> Arrays:
         points, vectors, bits = scene
         return _core.pairs(
             points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
             self._memory_limit, None, self._threads, quantities, sort, index_bytes, out, None,
+            AUTO,
         )
 
     @overload
@@ -270,15 +285,66 @@ class VerletList:
         >>> i.tolist(), j.tolist(), S.tolist()
         ([0, 0], [1, 2], [[0, 0], [-1, 0]])
         """
-        with _Alone(self):
-            wanted = (quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out)
-            if self._searched is not None:
-                return self._search(self._searched, *wanted)
-            return _core.verlet_pairs(
-                self._list, np.empty((0, self._state()["ndim"])), self._cutoff, None, 0,
-                self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
-                *wanted,
-            )
+        with Alone(self):
+            return self._find(quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out)
+
+    def _find(self, quantities: str, sort: bool, index_bytes: int, out: Any) -> Arrays:
+        """The pairs of the last step."""
+        if self._searched is not None:
+            return self._search(self._searched, quantities, sort, index_bytes, out)
+        return _core.verlet_pairs(
+            self._list, np.empty((0, self._state()["ndim"])), self._cutoff, None, 0,
+            self._inclusive, "exact", self._kernel, self._memory_limit, None, self._threads,
+            quantities, sort, index_bytes, out,
+        )
+
+    def changes(
+        self, *, quantities: str = "ij", index_dtype: npt.DTypeLike = np.int64
+    ) -> PairChanges:
+        """The pairs that came and went between the step before and the last one, each once.
+
+        Parameters
+        ----------
+        quantities, index_dtype
+            As in `pairs`.
+
+        Returns
+        -------
+        PairChanges
+            Named tuple (formed, broken) of what `pairs` returns: `formed` are the rows of the last
+            step whose pair was none in the step before, `broken` those of the step before whose
+            pair is none any more, with the d, D and S that they had then. Both ascend by
+            (i, j, S). In the first step every pair is formed.
+
+            Each image of a point counts for itself. A point that is wrapped into the box breaks
+            nothing, although its S change, nor does another basis of the lattice, as in a sheared
+            box that is flipped back: a pair goes on as the one whose vector, in units of the box
+            vectors, has changed by less than a half along each. Points are told by their numbers;
+            pairs of those at the end that only one step has form or break.
+
+        Raises
+        ------
+        RuntimeError
+            Before the first `update`, or if the list was made without `track_changes`.
+        TypeError, ValueError, OverflowError, MemoryError
+            As `pairs` with S.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> pair_list = hs.VerletList(1.0, box=[5.0], track_changes=True)
+        >>> for x in ([0.2, 1.5, 4.5], [0.0, 0.9, 4.2], [4.9, 0.7, 3.8]):
+        ...     rebuilt = pair_list.update([[value] for value in x])
+        ...     print(*([k.tolist() for k in pairs] for pairs in pair_list.changes()))
+        [[0], [2]] [[], []]
+        [[0], [1]] [[], []]
+        [[], []] [[0], [2]]
+        """
+        with Alone(self):
+            if self._tracked is None:
+                raise RuntimeError("changes are not tracked: make it with track_changes=True")
+            index_bytes = as_index_bytes(index_dtype)
+            return self._tracked.changes(quantities, index_bytes, self._find, self._search)
 
     @property
     def cutoff(self) -> float:
@@ -332,35 +398,3 @@ class VerletList:
             f"VerletList({self._cutoff!r}, skin={self._skin!r}): {self.n_points} points, "
             f"{self._n_builds} builds in {self._n_updates} updates"
         )
-
-
-class _Alone:
-    """One call at a time: other threads wait, a call from within a call is an error."""
-
-    def __init__(self, owner: VerletList) -> None:
-        self._owner = owner
-
-    def __enter__(self) -> None:
-        owner = self._owner
-        owner._lock.acquire()
-        if owner._is_busy:  # a signal handler, called while the core looks for signals
-            owner._lock.release()
-            raise RuntimeError("this VerletList is in the middle of another call")
-        owner._is_busy = True
-
-    def __exit__(self, *ignored: object) -> None:
-        self._owner._is_busy = False
-        self._owner._lock.release()
-
-
-def _as_length(value: float, name: str) -> float:
-    if not (math.isfinite(value) and value >= 0.0):
-        raise ValueError(f"{name} must be finite and not negative, got {value!r}")
-    return value
-
-
-def _as_skin(value: Any) -> float:
-    """A plain number, or "auto", which is no number and is settled before."""
-    if isinstance(value, str):
-        raise ValueError(f'skin must be a number or "auto", got {value!r}')
-    return _as_length(as_number(value, "skin", 'be a number or "auto"'), "skin")

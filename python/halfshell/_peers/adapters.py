@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._peers.float64 import all_reached, reached
 from halfshell._peers.library import Call, Floats, Library, in_space
 
 __all__ = ["LIBRARIES"]
@@ -49,6 +50,12 @@ class CKDTree(Library):
     triclinic = False
     images = False
     inside = True
+    radii = True
+    remark_on_radii = (
+        "all pairs within the largest reach, then distances in float64 against rounded sums"
+    )
+    supports = True
+    remark_on_supports = "all pairs within the largest reach, then |H D| in float64"
 
     def prepare(self, question: Any) -> Call:
         """Build the cheaper, unbalanced tree and query it."""
@@ -66,7 +73,11 @@ class CKDTree(Library):
                 return int(built.count_neighbors(built, question.cutoff) - question.n) // 2
 
             return count
-        return lambda: build().query_pairs(question.cutoff, output_type="ndarray")
+        if question.radii is None and question.supports is None:
+            return lambda: build().query_pairs(question.cutoff, output_type="ndarray")
+        return lambda: reached(
+            question, build().query_pairs(question.cutoff, output_type="ndarray")
+        )
 
     def indices(self, result: Any) -> tuple[Any, Any]:
         """Return the columns of its (m, 2) array."""
@@ -112,6 +123,7 @@ class MatscipyNeighbours(Library):
     full = True
     quantities = "ijdDS"
     flat = True
+    radii = True
 
     def prepare(self, question: Any) -> Call:
         """Return its call on explicit arrays."""
@@ -119,7 +131,7 @@ class MatscipyNeighbours(Library):
         points, rows, periodic = in_space(question)
         return partial(
             library.neighbour_list, question.quantities, positions=points, cell=rows,
-            pbc=periodic, cutoff=question.cutoff,
+            pbc=periodic, cutoff=question.cutoff if question.radii is None else question.radii,
         )  # fmt: skip
 
 
@@ -137,6 +149,7 @@ class Ase(Library):
     full = True
     quantities = "ijdDS"
     flat = True
+    radii = True
 
     def prepare(self, question: Any) -> Call:
         """Return its call on explicit arrays, without an Atoms object."""
@@ -145,7 +158,7 @@ class Ase(Library):
         rows = np.zeros((3, 3)) if rows is None else rows
         return partial(
             library.primitive_neighbor_list, question.quantities, periodic, rows, points,
-            question.cutoff,
+            question.cutoff if question.radii is None else question.radii,
         )  # fmt: skip
 
 
@@ -293,6 +306,38 @@ class Pymatgen(Library):
         return result[3][self._others(result)]
 
 
+class NumPy(Library):
+    """NumPy: |H D| of all pairs in float64, where points have supports; inclusive; one image."""
+
+    name = "NumPy"
+    distribution = module = "numpy"
+    inclusive = True
+    dims = (1, 2, 3)
+    triclinic = False
+    images = False
+    radii = True
+    supports = True
+    remark_on_supports = "|H D| of all pairs in float64"
+    most_points = 10_000
+
+    def refuses(self, question: Any) -> str | None:
+        """Refuse what cKDTree does with the same arithmetic, and what would take minutes."""
+        if question.supports is None:
+            return "distances, for which cKDTree stands"
+        if question.n > self.most_points:
+            return f"more than {self.most_points:,} points, of which it looks at all pairs"
+        return super().refuses(question)
+
+    def prepare(self, question: Any) -> Call:
+        """Return what looks at the points row by row."""
+        found = partial(all_reached, question)
+        return found if question.task == "pairs" else lambda: len(found())
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return the columns of its (m, 2) array."""
+        return result[:, 0], result[:, 1]
+
+
 LIBRARIES: dict[str, Library] = {
     library.name: library
     for library in (
@@ -305,5 +350,6 @@ LIBRARIES: dict[str, Library] = {
         Freud(),
         Pymatgen(),
         Ase(),
+        NumPy(),
     )
 }

@@ -31,7 +31,10 @@ Floats = NDArray[np.float64]
 class Question:
     """The pairs of which points, in which box. Other classes with these attributes will do.
 
-    `task` is "pairs" or "count"; `batch` numbers the system of each point, or is None.
+    `task` is "pairs" or "count"; `batch` numbers the system of each point, or is None. With
+    `radii`, one a point, pairs are those of balls that touch; with `supports` H, a matrix a point,
+    those with ``|H D| <= extent`` for either point, or by the `rule` "min" for both. No reach
+    passes the cutoff.
     """
 
     points: Floats  # (n, d)
@@ -41,6 +44,10 @@ class Question:
     quantities: str = "ij"
     task: str = "pairs"
     batch: Any = None
+    radii: Floats | None = None
+    supports: Floats | None = None
+    extent: float | None = None
+    rule: str | None = None
 
     @property
     def n(self) -> int:
@@ -97,11 +104,15 @@ class Library(ABC):
     some_axes: ClassVar[bool] = True  # whether only some axes may repeat
     triclinic: ClassVar[bool] = True
     images: ClassVar[bool] = True
+    radii: ClassVar[bool] = False  # whether points may have one each, and touch by their sum
+    supports: ClassVar[bool] = False  # whether points may have one each
     inside: ClassVar[bool] = False  # whether points must lie in the box
     counts_alone: ClassVar[bool] = False  # no list of pairs at all
     float_bits: ClassVar[int] = 53
     tolerance: ClassVar[float] = 0.0  # relative, beyond rounding
     remark: ClassVar[str] = ""  # what a reader of its errors should know
+    remark_on_radii: ClassVar[str] = ""  # and of those where points have radii
+    remark_on_supports: ClassVar[str] = ""  # or supports
 
     def version(self) -> str | None:
         """Return the installed version, None where it is missing or cannot be imported."""
@@ -123,6 +134,10 @@ class Library(ABC):
             return "triclinic box"
         if question.has_images and not self.images:
             return "several images of one pair"
+        if question.radii is not None and not self.radii:
+            return "a radius for each point"
+        if question.supports is not None and not self.supports:
+            return "a support for each point"
         if question.task == "count":
             return None
         lacking = set(question.quantities) - set(self.quantities)

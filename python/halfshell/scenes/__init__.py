@@ -30,8 +30,10 @@ from halfshell.scenes import (  # noqa: F401, I001
     _density,
     _steps,
     _balls,
+    _needles,
+    _updates,
 )
 from halfshell.scenes._catalogue import load, names
-from halfshell.scenes._scene import SIZES, Motion, Scene, Size
+from halfshell.scenes._scene import SIZES, Motion, Scene, Size, Updates
 
-__all__ = ["SIZES", "Motion", "Scene", "Size", "load", "names"]
+__all__ = ["SIZES", "Motion", "Scene", "Size", "Updates", "load", "names"]

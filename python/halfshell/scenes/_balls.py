@@ -20,7 +20,7 @@ from halfshell.scenes._scene import Floats, Scene, Size, pick
 
 @add(
     {"balls-decades": ("balls of six decades of size, each touching a larger one",)},
-    has_radii=True,
+    kind="radii",
 )
 def decades(size: Size) -> Scene:
     """Sizes from 1 to 1e-6 in one scene, and nearly as many contacts at exactly the sum as balls.
@@ -51,7 +51,7 @@ def decades(size: Size) -> Scene:
         "balls-ties": ("whole radii at whole places: sums that are distances", True),
         "balls-ties-strict": ("the same, balls that only touch left out", False),
     },
-    has_radii=True,
+    kind="radii",
 )
 def ties(size: Size, inclusive: bool) -> Scene:
     """Many of the pairs touch in exactly one point: 1 + 2 = 3 = |(1, 2, 2)|, 2 + 3 = |(0, 3, 4)|.
@@ -67,7 +67,7 @@ def ties(size: Size, inclusive: bool) -> Scene:
 
 @add(
     {"balls-rounded": ("pairs of balls at the distance that rounding makes of their sum",)},
-    has_radii=True,
+    kind="radii",
 )
 def rounded(size: Size) -> Scene:
     """Sums that are no float64, and points as far apart as their rounded values.
@@ -83,7 +83,7 @@ def rounded(size: Size) -> Scene:
     return Scene(points.reshape(-1, 3), None, radii=radii.reshape(-1), rule="sum")
 
 
-@add({"balls-giant": ("one ball that holds a quarter of the box, among dwarfs",)}, has_radii=True)
+@add({"balls-giant": ("one ball that holds a quarter of the box, among dwarfs",)}, kind="radii")
 def giant(size: Size) -> Scene:
     """One large radius: a grid as wide as the largest reach is no grid, and tests all pairs.
 
@@ -96,7 +96,7 @@ def giant(size: Size) -> Scene:
     return Scene(draw((n, 3)) * edge, None, np.full(3, edge), CUBE, radii=radii, rule="sum")
 
 
-@add({"balls-equal": ("fcc crystal of equal balls that reach the eighth shell",)}, has_radii=True)
+@add({"balls-equal": ("fcc crystal of equal balls that reach the eighth shell",)}, kind="radii")
 def equal(size: Size) -> Scene:
     """All sizes the same: what one cutoff does, down to the ties, and no slower."""
     repeats = (pick(size, 3, 8, 20),) * 3
@@ -107,7 +107,7 @@ def equal(size: Size) -> Scene:
     )  # fmt: skip
 
 
-@add({"balls-zero": ("points of radius 0 on, in and outside balls",)}, has_radii=True)
+@add({"balls-zero": ("points of radius 0 on, in and outside balls",)}, kind="radii")
 def zero(size: Size) -> Scene:
     """A size of 0 has no octave, and no cell as wide as it; it meets balls, and its own kind at 0.
 

@@ -7,12 +7,14 @@ import difflib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from halfshell.scenes._scene import SIZES, Scene, Size
 
 __all__ = ["add", "load", "names"]
 
+# What says how far two points reach: one cutoff, a radius each, or a support each.
+Kind = Literal["cutoff", "radii", "supports", "updates"]
 _Make = TypeVar("_Make", bound=Callable[..., Scene])
 
 
@@ -21,15 +23,13 @@ class _Entry:
     title: str
     make: Callable[..., Scene]
     arguments: tuple[Any, ...]
-    has_radii: bool
+    kind: Kind
 
 
 _ENTRIES: dict[str, _Entry] = {}
 
 
-def add(
-    entries: Mapping[str, tuple[Any, ...]], has_radii: bool = False
-) -> Callable[[_Make], _Make]:
+def add(entries: Mapping[str, tuple[Any, ...]], kind: Kind = "cutoff") -> Callable[[_Make], _Make]:
     """Register a function that makes scenes; its docstring says what they stress.
 
     `entries` holds for each name the title and what the function is called with after the size.
@@ -39,19 +39,24 @@ def add(
         for name, (title, *arguments) in entries.items():
             if name in _ENTRIES:
                 raise ValueError(f"there are two scenes {name!r}")
-            _ENTRIES[name] = _Entry(title, make, tuple(arguments), has_radii)
+            _ENTRIES[name] = _Entry(title, make, tuple(arguments), kind)
         return make
 
     return keep
 
 
-def names(*, radii: bool = False) -> tuple[str, ...]:
+def names(*, radii: bool = False, supports: bool = False, updates: bool = False) -> tuple[str, ...]:
     """Return the names of all scenes, in the order in which they are meant to be run.
 
     Parameters
     ----------
     radii : bool, default False
         Those with a radius for each point instead of those with one cutoff.
+    supports : bool, default False
+        Those with a support for each point instead.
+    updates : bool, default False
+        Those whose points come, go and move one at a time. With several of these, scenes of all
+        these kinds.
 
     Examples
     --------
@@ -60,8 +65,11 @@ def names(*, radii: bool = False) -> tuple[str, ...]:
     ('uniform', 'order-random', 'order-sorted')
     >>> scenes.names(radii=True)[0]
     'balls-decades'
+    >>> scenes.names(supports=True)
+    ('needles', 'needles-strict')
     """
-    return tuple(name for name, entry in _ENTRIES.items() if entry.has_radii == radii)
+    asked = ("radii",) * radii + ("supports",) * supports + ("updates",) * updates or ("cutoff",)
+    return tuple(name for name, entry in _ENTRIES.items() if entry.kind in asked)
 
 
 def load(name: str, size: Size = "full") -> Scene:
@@ -70,7 +78,7 @@ def load(name: str, size: Size = "full") -> Scene:
     Parameters
     ----------
     name : str
-        One of `names`, of either kind.
+        One of `names`, of any kind.
     size : {"full", "quick", "small"}, default "full"
         "full": about 1e5 points, more or fewer where that shows more. "quick": some thousand,
         for a look. "small": at most 300, so that every pair can be checked in rational numbers.

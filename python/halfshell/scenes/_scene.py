@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SIZES", "Floats", "Motion", "Rule", "Scene", "Size", "pick"]
+__all__ = ["SIZES", "Floats", "Motion", "Rule", "Scene", "Size", "Updates", "pick"]
 
 Floats = NDArray[np.float64]
 Size = Literal["small", "quick", "full"]
@@ -78,6 +78,35 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
+class Updates:
+    """Points that are put and removed one after another, for `halfshell.DynamicCellList`.
+
+    At first row i of the points of the scene has the key i. The cutoff of the scene is the radius
+    to ask for around each position.
+
+    Attributes
+    ----------
+    keys : ndarray of int64, shape (m,)
+        The key that is put or removed; it may or may not be there.
+    positions : ndarray of float64, shape (m, d)
+        Where it is put.
+    removed : ndarray of bool, shape (m,)
+        Whether it is removed instead.
+
+    Examples
+    --------
+    >>> from halfshell import scenes
+    >>> updates = scenes.load("disks-touching", size="small").updates
+    >>> len(updates.keys), int(updates.removed.sum())
+    (300, 35)
+    """
+
+    keys: NDArray[np.int64]
+    positions: Floats
+    removed: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """One input of a search and why it is hard.
 
@@ -86,7 +115,7 @@ class Scene:
     points : ndarray of float64 or float32, shape (n, d)
         Coordinates.
     cutoff : float or None
-        Largest distance of a pair; None where radii say it.
+        Largest distance of a pair; None where radii or supports say it.
     box : ndarray of float64, shape (d,) or (d, d), or None
         Edge lengths, or edge vectors as rows; None: open space.
     periodic : tuple of bool, length d
@@ -98,7 +127,14 @@ class Scene:
     radii : ndarray of float64, shape (n,), or None
         The radius of each point, for scenes without a cutoff.
     rule : {"sum", "mean", "max", "min"} or None
-        What is made of two radii.
+        What is made of two radii, or of two supports ("max": either, "min": both).
+    supports : ndarray of float64, shape (n, d, d), or None
+        The support of each point: a symmetric positive definite matrix H. D is within it where
+        ``|H D| <= extent``.
+    extent : float or None
+        Of the supports.
+    updates : Updates or None
+        For scenes whose points come, go and move one at a time.
     name, title, stresses : str
         What `load` knows it by, one line that says what it is, and what it is hard for.
 
@@ -116,13 +152,16 @@ class Scene:
     """
 
     points: NDArray[Any]
-    cutoff: Any  # a float; None with radii
+    cutoff: Any  # a float; None with radii or supports
     box: Floats | None = None
     periodic: tuple[bool, ...] = ()
     inclusive: bool = True
     motion: Motion | None = None
     radii: Floats | None = None
     rule: Rule | None = None
+    supports: Floats | None = None
+    extent: float | None = None
+    updates: Updates | None = None
     name: str = ""
     title: str = ""
     stresses: str = ""
@@ -147,6 +186,13 @@ class Scene:
             "periodic": self.periodic,
             "inclusive": self.inclusive,
         }
-        return arguments if self.radii is None else arguments | {
-            "radii": self.radii, "rule": self.rule,
-        }  # fmt: skip
+        return arguments | self.reach
+
+    @property
+    def reach(self) -> dict[str, Any]:
+        """Those of them that give each pair a reach of its own; none where the cutoff does."""
+        if self.radii is not None:
+            return {"radii": self.radii, "rule": self.rule}
+        if self.supports is not None:
+            return {"supports": self.supports, "extent": self.extent, "rule": self.rule}
+        return {}

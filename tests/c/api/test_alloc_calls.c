@@ -60,18 +60,25 @@ fail_each(const scene_of_calls *kind, const call_kind *function)
     return n_failed;
 }
 
+/* A scene for the function; false: it has no call of this kind. */
+static bool
+make_call_of(const scene_of_calls *kind, const call_kind *function)
+{
+    make_call(kind);
+    /* Cells of such numbers keep no bounds for queries that come later. */
+    if (function->run == call_cells_candidates && kind->exponent > 0)
+        s.c.queries = NULL;
+    return !(function->uses & NEEDS_BOX) || s.c.box != NULL;
+}
+
 static void
 every_function_fails_cleanly(void)
 {
     for (int k = 0; k < KINDS; k++) {
         for (int f = 0; f < CALL_KINDS; f++) {
             const call_kind *function = &call_kinds[f];
-            make_call(&kinds[k]);
-            if ((function->uses & NEEDS_BOX) && s.c.box == NULL)
+            if (!make_call_of(&kinds[k], function))
                 continue;
-            /* Cells of such numbers keep no bounds for queries that come later. */
-            if (function->run == call_cells_candidates && kinds[k].exponent > 0)
-                s.c.queries = NULL;
             const int n_failed = fail_each(&kinds[k], function);
             if (kinds[k].grows && function->run == call_stream) { /* two blocks in all */
                 s.c.max_pairs = 2000;
@@ -84,6 +91,28 @@ every_function_fails_cleanly(void)
                 s.c.queries = NULL;
                 CHECK(fail_each(&kinds[k], function) > 0);
             }
+        }
+    }
+}
+
+/* Small blocks cut from an arena, which each call and each of its threads has: the same answers, and
+ * all arenas are given back, also when the call is ended early. */
+static void
+arenas_are_given_back(void)
+{
+    for (int k = 0; k < KINDS; k++) {
+        for (int f = 0; f < CALL_KINDS; f++) {
+            int n_failed = 0;
+            if (!make_call_of(&kinds[k], &call_kinds[f]))
+                continue;
+            (void)attempt(&call_kinds[f], 0, 0, &n_failed);
+            const uint64_t expected = s.c.answer;
+            hs_test_use_arena(true);
+            s.c.answer = ~expected;
+            for (int nth = 0; nth < 12; nth += 3) /* at first none fails */
+                (void)attempt(&call_kinds[f], nth, expected, &n_failed);
+            hs_test_use_arena(false);
+            CHECK(s.c.answer == expected);
         }
     }
 }
@@ -209,5 +238,6 @@ test_alloc_calls(void)
 {
     RUN(large_tables_fail_cleanly);
     RUN(lists_stay_as_they_were);
+    RUN(arenas_are_given_back);
     RUN(every_function_fails_cleanly);
 }

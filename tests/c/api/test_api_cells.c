@@ -8,6 +8,7 @@
 #include "../support/random_scenes.h"
 #include "../support/range_checks.h"
 #include "../support/among.h"
+#include "../support/poll_checks.h"
 
 #include "../../../csrc/core/memory/account.h"
 
@@ -310,6 +311,41 @@ failures_leave_nothing_behind(void)
     CHECK(status == HS_OK);
 }
 
+/* Whichever allocation is refused: cells that were made have all that a search in them needs. */
+static hs_status
+build_and_use(void *context)
+{
+    const hs_points *points = context;
+    hs_options       options = hs_options_default();
+    hs_cells        *cells = NULL;
+    hs_pairs        *rows = NULL;
+    options.cutoff = INFINITY;
+    options.threads = 1;
+    hs_options of_cells = options;
+    of_cells.cutoff = 0.5;
+    const hs_status built = hs_cells_build(points, NULL, &of_cells, &cells, NULL);
+    CHECK((built == HS_OK) == (cells != NULL));
+    CHECK(built == HS_OK || built == HS_ERR_MEMORY);
+    if (built == HS_OK && hs_test_failure_is_due()) { /* nothing was refused, nor is from now on */
+        hs_test_fail_allocation(0);
+        CHECK(hs_nearest_find(IN_CELLS(cells), 2, &options, &rows, NULL) == HS_OK);
+        hs_test_fail_allocation(INT64_MAX);
+    } else {
+        CHECK(built == HS_ERR_MEMORY);
+    }
+    hs_pairs_free(rows);
+    hs_cells_free(cells);
+    return built;
+}
+
+static void
+cells_are_whole_or_refused(void)
+{
+    const double x[4] = {0.0, 0.25, 0.5, 0.75};
+    hs_points    points = {x, 4, 1, HS_FLOAT64, 8, 8};
+    CHECK(fail_each_allocation(build_and_use, &points, 100) > 3);
+}
+
 /* Cells keep no pairs: as many as there are need not fit the limit. */
 static void
 cells_are_built_where_their_pairs_would_not_fit(void)
@@ -337,6 +373,7 @@ test_api_cells(void)
 {
     RUN(cells_are_built_where_their_pairs_would_not_fit);
     RUN(any_cutoff_and_any_queries);
+    RUN(cells_are_whole_or_refused);
     RUN(cells_that_are_few_and_far_between);
     RUN(the_layout_is_visible_and_holds_all_neighbours);
     RUN(cells_are_as_wide_as_wanted);

@@ -204,11 +204,13 @@ rows_are_the_half_list_both_ways(void)
         const int ndim = 1 + trial / SCENE_KINDS % HS_MAX_DIM;
         const int n = random_below(&random, ndim <= 3 ? 60 : ndim <= 5 ? 12 : 6);
         kernel_to_check = names[random_below(&random, n_names)];
+        algorithm_to_check = (hs_algorithm)(trial / 3 % HS_ALGORITHM_END);
         make_scene(&random, trial % SCENE_KINDS, ndim, n, trial % 7 ? 4.0 : 400.0,
                    trial % 11 ? 0 : -400, &s);
         found += compare_rows(&s.scene, -1, 1 + trial % 2);
     }
     kernel_to_check = NULL;
+    algorithm_to_check = HS_AUTO;
     CHECK(found > (IS_SLOW ? 10000 : 100000));
 }
 

@@ -16,16 +16,20 @@ compare_scene(const brute_scene *scene, double budget, int64_t stride)
     const char           *names[16];
     brute_list            expected;
     kernel_to_check = names[random_below(&turn, hs_kernel_names(names, 16))];
+    algorithm_to_check = (hs_algorithm)random_below(&turn, HS_ALGORITHM_END);
     if (!brute_find(scene, budget, &expected))
         return -1;
     const char   *difference = pairs_difference(scene, &expected, stride);
     const int64_t n = expected.n;
     CHECK(difference == NULL);
     if (difference != NULL)
-        fprintf(stderr, "  %s: d = %d, n = %d, cutoff %a, %d pairs expected, kernel %s\n",
-                difference, scene->ndim, (int)scene->n, scene->cutoff, (int)n, kernel_to_check);
+        fprintf(stderr,
+                "  %s: d = %d, n = %d, cutoff %a, %d pairs expected, kernel %s, algorithm %d\n",
+                difference, scene->ndim, (int)scene->n, scene->cutoff, (int)n, kernel_to_check,
+                (int)algorithm_to_check);
     brute_free(&expected);
     kernel_to_check = NULL;
+    algorithm_to_check = HS_AUTO;
     return n;
 }
 

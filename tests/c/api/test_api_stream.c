@@ -225,6 +225,34 @@ memory_is_bounded(void)
     free(x);
 }
 
+/* A box that must have more pairs than fit the limit is refused by a search that keeps them all. */
+static void
+boxes_of_more_pairs_than_fit_are_streamed(void)
+{
+    const hs_box      box = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0}, {0, 1}}};
+    double           *x = random_points(20, 2, 1.0);
+    const brute_scene scene = {
+        .ndim = 2, .n = 20, .x = x, .box = &box, .inclusive = true, .cutoff = 40.0};
+    const hs_points points = points_of(&scene);
+    hs_options      options = options_of(&scene);
+    hs_pairs       *block = NULL;
+    hs_stream      *stream = NULL;
+    hs_failure      failure;
+    int64_t         count = 0, found = 0;
+    CHECK(hs_pairs_count(AMONG(&points, &box), &options, &count, NULL) == HS_OK);
+    options.memory_limit = 8.0 * (double)count; /* half of what they take */
+    CHECK(hs_pairs_find(AMONG(&points, &box), &options, &block, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs > 0.9 * (double)count && failure.search_bytes == 0.0);
+    CHECK(hs_stream_open(AMONG(&points, &box), &options, 10000, &stream, &failure) == HS_OK);
+    while (hs_stream_next(stream, NULL, NULL, &block, NULL) == HS_OK && block != NULL) {
+        found += hs_pairs_length(block);
+        hs_pairs_free(block);
+    }
+    CHECK(found == count && count > 900000);
+    hs_stream_free(stream);
+    free(x);
+}
+
 static void
 failures_are_told_and_leave_nothing(void)
 {
@@ -364,6 +392,7 @@ test_api_stream(void)
     RUN(points_may_change_after_the_call);
     RUN(interrupted_calls_can_be_made_again);
     RUN(memory_is_bounded);
+    RUN(boxes_of_more_pairs_than_fit_are_streamed);
     RUN(failures_are_told_and_leave_nothing);
     RUN(any_allocation_may_fail);
     RUN(cells_stream_too);

@@ -5,6 +5,7 @@
 #include "../support/among.h"
 
 #include "../../../csrc/core/api/arguments.h"
+#include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/base/want.h"
 
 #include <limits.h>
@@ -290,9 +291,25 @@ entries_are_within_the_addresses(void)
     }
 }
 
+/* As many as int32 counts, and no more: then they are read, up to the first that descends. */
+static void
+systems_are_as_many_as_can_be_counted(void)
+{
+    const int64_t first[2] = {0, -1};
+    hs_systems    systems = {.n = INT32_MAX, .first = first};
+    hs_failure    failure = HS_NO_FAILURE;
+    CHECK(hs_check_systems(&systems, 3, &failure) == HS_ERR_ARGUMENT);
+    CHECK(failure.system == 0 && failure.value == 0.0);
+    systems.n++;
+    failure = HS_NO_FAILURE;
+    CHECK(hs_check_systems(&systems, 3, &failure) == HS_ERR_TOO_MANY);
+    CHECK(failure.system == -1 && failure.value == 0x1p31);
+}
+
 void
 test_arguments(void)
 {
+    RUN(systems_are_as_many_as_can_be_counted);
     RUN(each_array_that_is_wanted_must_be_there);
     RUN(nothing_at_all_is_refused);
     RUN(entries_are_within_the_addresses);

@@ -73,6 +73,8 @@ typedef struct fault {
     F(cell_size_below, USES_CELL_SIZE, HS_ERR_ARGUMENT, s->options.cell_size = -1.0)              \
     F(precision_none, USES_PRECISION, HS_ERR_ARGUMENT, s->options.precision = (hs_precision)3)    \
     F(precision_below, USES_PRECISION, HS_ERR_ARGUMENT, s->options.precision = (hs_precision)-1)  \
+    F(algorithm_none, USES_CELL_SIZE, HS_ERR_ARGUMENT, s->options.algorithm = HS_ALGORITHM_END)   \
+    F(algorithm_below, USES_CELL_SIZE, HS_ERR_ARGUMENT, s->options.algorithm = (hs_algorithm)-1)  \
     F(want_more, USES_WANT, HS_ERR_ARGUMENT, s->options.want |= 64)                               \
     F(want_all_bits, USES_WANT, HS_ERR_ARGUMENT, s->options.want = UINT_MAX)                      \
     F(index_bytes_0, USES_INDEX_BYTES, HS_ERR_ARGUMENT, s->options.index_bytes = 0)               \

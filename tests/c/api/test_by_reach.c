@@ -113,6 +113,42 @@ cells_and_arrays_of_the_caller_serve(void)
     }
 }
 
+/* However many searches it takes, the counters are of all of them. */
+static void
+counters_have_all_pairs(void)
+{
+    static int64_t counts[SCENE_POINTS];
+    harness_random random = {30306};
+    int64_t        sum = 0;
+    for (int trial = 0; trial < TRIALS(120); trial++) {
+        const hs_rule rule = (hs_rule)(trial % (HS_RULE_END + 1));
+        hs_counters   counters = {.pairs = -1};
+        hs_pairs     *rows = NULL, *pairs = NULL;
+        int64_t       count = 0, n = 0;
+        reach_make(&random, (scene_kind)(trial % SCENE_KINDS), 2, 40, trial % 3 ? -1 : 20, rule, 0,
+                   &scene);
+        hs_options options = reach_options(&scene);
+        options.algorithm = trial % 2 ? HS_HIERARCHY : HS_AUTO;
+        options.counters = &counters;
+        CHECK(hs_neighbors_count(&scene.among, &options, counts, NULL) == HS_OK);
+        for (int64_t i = 0; i < (scene.has_queries ? scene.n_queries : scene.n); i++)
+            n += counts[i];
+        CHECK(counters.pairs == n);
+        CHECK(hs_neighbors_find(&scene.among, &options, &rows, NULL) == HS_OK);
+        CHECK(hs_pairs_length(rows) == n && counters.pairs == n);
+        if (scene.has_queries) {
+            CHECK(hs_pairs_count(&scene.among, &options, &count, NULL) == HS_OK);
+            CHECK(count == n && counters.pairs == n);
+        } else if (hs_pairs_find(&scene.among, &options, &pairs, NULL) == HS_OK) {
+            CHECK(counters.pairs == hs_pairs_length(pairs) && 2 * counters.pairs == n);
+        }
+        hs_pairs_free(rows);
+        hs_pairs_free(pairs);
+        sum += n;
+    }
+    CHECK(sum > TRIALS(1000));
+}
+
 /* ---- many points ---- */
 
 enum { MANY = 40000 };
@@ -272,6 +308,7 @@ test_by_reach(void)
 {
     RUN(streams_and_visits_are_the_pairs_in_their_order);
     RUN(cells_and_arrays_of_the_caller_serve);
+    RUN(counters_have_all_pairs);
     RUN(threads_make_no_difference);
     RUN(one_refusal_ends_any_entry);
     RUN(limits_of_memory_are_kept);

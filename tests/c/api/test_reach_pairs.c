@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_reach_pairs.c: pairs, rows and counts of searches in which each pair has a reach of its own,
  * against a brute force: every rule, tables of types, all boxes, one set and two. */
+#include "../../../csrc/core/levels/level_join.h"
 #include "../support/block_checks.h"
 #include "../support/reach_brute.h"
 
@@ -116,15 +117,18 @@ rows_are_right(int threads)
     return right;
 }
 
+/* By several searches or, in every other eleven trials, by one. */
 static void
 check_scene(int trial, const char *what)
 {
-    const int threads = trial % 4 == 3 ? 3 : 1;
-    const int before = harness_failures;
+    const int  threads = trial % 4 == 3 ? 3 : 1;
+    const int  before = harness_failures;
+    const bool joins = hs_test_join_levels(trial / 11 % 2);
     if (has_half_list()) {
         CHECK(half_list_is_right(threads));
     }
     CHECK(rows_are_right(threads));
+    (void)hs_test_join_levels(joins);
     if (harness_failures != before) {
         fprintf(stderr, "%s %d: rule %d, %d types\n", what, trial, (int)s.reach.rule,
                 (int)s.reach.n_types);

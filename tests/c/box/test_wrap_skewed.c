@@ -168,6 +168,58 @@ in_any_box(void)
     CHECK(moved > 100000);
 }
 
+/* Turns over the rows of B, and over the box vectors as given, of points this far out: no more than
+ * are told, which are as many as the largest of both may be. The lattice is set as far as the box
+ * has vectors, and nothing behind that counts. */
+static void
+turns_are_bounded(void)
+{
+    static const double skews[] = {0.5, 30.0, 1e6};
+    harness_random      random = {271828};
+    int                 skewed = 0;
+    for (int trial = 0; trial < 600; trial++) {
+        const int    ndim = 1 + trial % 4;
+        const double skew = skews[trial / 4 % 3], largest = ldexp(1.0, trial % 20);
+        hs_box       box = {.ndim = ndim};
+        hs_lattice   lattice;
+        double       most = 4.0, over_given = 0.0, sums = 0.0;
+        for (int l = 0; l < ndim; l++) { /* each vector in turn is the long one */
+            box.periodic[l] = ndim < 3 || l != trial % 5;
+            box.rows[l][l] = 0.5 + random_unit(&random);
+            if (l == trial / 12 % ndim)
+                box.rows[l][(l + 1) % ndim] += ndim > 1 ? skew * random_unit(&random) : 0.0;
+        }
+        memset(&lattice, 0x7b, sizeof lattice);
+        hs_lattice_init(&box, ndim, hs_scale_of(0), &lattice);
+        for (int r = 0; r < lattice.n_periodic; r++) {
+            for (int l = 0; l < lattice.n_periodic; l++) {
+                sums = fmax(sums, fabs((double)lattice.U[r][l]));
+            }
+        }
+        const double told = hs_fold_turns(&lattice, largest);
+        for (int p = 0; p < 50 && lattice.n_periodic > 0; p++) {
+            double  x[HS_MAX_DIM], inside[HS_MAX_DIM], magnitude = 0.0;
+            int64_t turns[HS_MAX_DIM], of_given[HS_MAX_DIM];
+            for (int k = 0; k < ndim; k++)
+                x[k] = p == 0 ? largest : largest * (2.0 * random_unit(&random) - 1.0);
+            CHECK(hs_wrap_point(&lattice, x, inside, turns, &magnitude));
+            CHECK(hs_lattice_shift(&lattice, turns, of_given));
+            for (int r = 0; r < lattice.n_periodic; r++) {
+                CHECK(fabs((double)turns[r]) <= told && fabs((double)of_given[r]) <= told);
+                over_given = fmax(over_given, fabs((double)of_given[r]));
+            }
+        }
+        for (int k = 0; k < ndim; k++) {
+            if (lattice.row_of_axis[k] >= 0)
+                most = fmax(most, ndim * largest / lattice.period[k] + 4.0);
+        }
+        CHECK(told <= most * fmax(1.0, sums) * ndim);
+        CHECK(lattice.n_periodic > 0 || told == 0.0);
+        skewed += over_given > 100.0 * most;
+    }
+    CHECK(skewed > 50);
+}
+
 /* The range of both, and the lowest point that failed in either. */
 static void
 what_is_found_is_joined(void)
@@ -224,6 +276,7 @@ test_wrap_skewed(void)
 {
     RUN(what_is_found_is_joined);
     RUN(coordinates_are_summed_in_one_order);
+    RUN(turns_are_bounded);
     RUN(along_an_axis);
     RUN(in_any_box);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_columns.c: options.out, pairs written into arrays of the caller, and nothing beyond them. */
+#include "../../../csrc/core/base/want.h"
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/memory/pool.h"
@@ -81,7 +82,7 @@ static void
 every_quantity_goes_to_the_callers_arrays(void)
 {
     for (int sorted = 0; sorted < 2; sorted++) {
-        for (unsigned want = 1; want < 64; want++) {
+        for (unsigned want = 1; want <= HS_WANT_ALL; want++) {
             const brute_scene *scene = scene_of((int)want % SCENE_KINDS, false);
             hs_options         options = options_of(scene);
             options.want = want;
@@ -293,6 +294,32 @@ columns_grow_together_or_not_at_all(void)
     }
 }
 
+static void
+opposites_of_shifts_are_numbers(void)
+{
+    hs_failure failure = {.row = -1};
+    for (int with = 0; with <= 1; with++) {
+        hs_output output;
+        hs_output_init(NULL, 2, HS_WANT_I | HS_WANT_J | (with ? HS_WANT_SHIFT : 0u), 4, &output);
+        CHECK(hs_output_reserve(&output, 3, 0.0) == HS_OK);
+        output.n_pairs = 3;
+        int32_t *shift = hs_output_column(&output, HS_WANT_SHIFT);
+        for (int32_t e = 0; e < 3; e++) {
+            ((int32_t *)hs_output_column(&output, HS_WANT_J))[e] = 10 + e;
+            for (int k = 0; with && k < 2; k++) {
+                shift[2 * e + k] = e == 1 ? -INT32_MAX : INT32_MAX;
+            }
+        }
+        CHECK(hs_output_check_opposites(&output, &failure) == HS_OK && failure.row == -1);
+        if (with) {
+            shift[5] = INT32_MIN;
+            CHECK(hs_output_check_opposites(&output, &failure) == HS_ERR_SHIFT_RANGE);
+            CHECK(failure.row == 12);
+        }
+        hs_output_free(&output);
+    }
+}
+
 void
 test_columns(void)
 {
@@ -305,4 +332,5 @@ test_columns(void)
     RUN(endless_outputs_are_refused);
     RUN(a_result_that_is_freed_is_held_with_all_it_wrote);
     RUN(columns_grow_together_or_not_at_all);
+    RUN(opposites_of_shifts_are_numbers);
 }

@@ -103,13 +103,15 @@ huge_pages_are_written_to_where_they_begin(void)
     enum { HUGE_PAGE = 2 << 20, IN_PAGE = HUGE_PAGE / 4, FIRST = 100, END = 2 * IN_PAGE + 5 };
     static _Alignas(64) int32_t column[4 * IN_PAGE];
     const uintptr_t             begin = (uintptr_t)column;
-    for (int has_room = 0; has_room < 2; has_room++) {
+    for (int trial = 0; trial < 4; trial++) {
+        const bool           has_room = trial / 2;
+        const unsigned       bit = trial % 2 ? HS_WANT_J : HS_WANT_I;
         hs_output            output;
         const int            end = has_room ? END : END - IN_PAGE;
         int64_t              wrong = 0;
         const size_t         n_bytes = sizeof column;
-        const hs_pair_arrays arrays = {.capacity = end, .index_bytes = 4, .j = column};
-        hs_output_init(NULL, 3, HS_WANT_J, 4, &output);
+        const hs_pair_arrays arrays = {.capacity = end, .index_bytes = 4, .i = column, .j = column};
+        hs_output_init(NULL, 3, bit, 4, &output);
         hs_output_fix(&output, &arrays);
         memset(column, 0x5a, n_bytes);
         hs_output_touch(&output, FIRST, END - FIRST);

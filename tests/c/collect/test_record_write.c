@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_record_write.c: what is written at once is what is recorded in batches; what cannot be is
  * left alone. */
+#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/collect/record_write.h"
+#include "../support/poll_checks.h"
 #include "../support/record_unit.h"
 
 void test_record_write(void);
@@ -145,9 +147,58 @@ what_cannot_be_written_is_left_alone(void)
     oddity = ORDINARY;
 }
 
+/* Records a visit whose block is so large that the caller is asked while it is laid out, and says
+ * no. */
+static hs_status
+record_unwanted(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    hs_recorder      *recorder = context;
+    const hs_options *polls = scanner->trace.of.polls;
+    refusal           once = {.nth = 1};
+    hs_options        refusing = *polls;
+    refusing.poll = refuse_once;
+    refusing.poll_context = &once;
+    CHECK(scanner->block.n > HS_POLL_CANDIDATES);
+    CHECK(hs_output_reserve(recorder->output, hits->end[hits->n - 1], 0.0) == HS_OK);
+    scanner->trace.of.polls = &refusing;
+    hs_records_reset(&scanner->trace.of); /* as if float32 had told all pairs */
+    const hs_status status = hs_record_places(recorder, scanner, first, hits);
+    scanner->trace.of.polls = polls;
+    CHECK(status == HS_ERR_INTERRUPTED && once.n == 1 && recorder->output->n_pairs == 0);
+    n_visits++;
+    return HS_ERR_INTERRUPTED;
+}
+
+/* Whole neighbourhoods of many images. */
+static void
+large_blocks_can_be_stopped(void)
+{
+    const hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    hs_neighbourhood most;
+    hs_walker        walker;
+    n_visits = 0;
+    search_unit_points(41, N, 2, 1.0, &unit);
+    search_unit_open(&box, 22.0, true, HS_WANT_DISTANCE, &unit);
+    CHECK(hs_walker_init(&unit.search, HS_BLOCK_SIZES, NULL, NULL, &walker) == HS_OK);
+    CHECK(hs_walk(&walker, 0, N) == HS_OK);
+    most = walker.scanner.most;
+    hs_walker_close(&unit.search, &walker);
+    CHECK(most.candidates > HS_POLL_CANDIDATES);
+    hs_output_init(&unit.call.account, 2, HS_WANT_DISTANCE, 8, &at_once.output);
+    CHECK(hs_walker_init_ordered(&unit.search, HS_BLOCK_LISTS_PLACES, &most, record_unwanted,
+                                 &at_once.recorder, &walker) == HS_OK);
+    CHECK(hs_recorder_init(&unit.call.account, &at_once.output, walker.scanner.block.most_hits,
+                           &at_once.recorder) == HS_OK);
+    CHECK(hs_walk(&walker, 0, N) == HS_ERR_INTERRUPTED && n_visits == 1);
+    hs_walker_close(&unit.search, &walker);
+    record_unit_free(&unit, &at_once);
+    search_unit_close(&unit);
+}
+
 void
 test_record_write(void)
 {
     RUN(what_is_written_is_what_is_recorded);
     RUN(what_cannot_be_written_is_left_alone);
+    RUN(large_blocks_can_be_stopped);
 }

@@ -3,6 +3,7 @@
  * test_result.c: how points come in and pairs go out: strides, wants, widths, order, polls,
  * refusals.
  */
+#include "../../../csrc/core/base/want.h"
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/collect/result.h"
 #include "../support/harness.h"
@@ -142,7 +143,7 @@ each_want_returns_the_same_numbers(void)
         CHECK(search_pairs(&points, scene->box, &options, &all, NULL) == HS_OK);
         const size_t n = (size_t)all.n;
         char        *i = array_of(all.n, 8), *j = array_of(all.n, 8), *both = array_of(all.n, 16);
-        for (unsigned want = 0; want < 64; want++) {
+        for (unsigned want = 0; want <= HS_WANT_ALL; want++) {
             hs_pairs *pairs;
             options.index_bytes = want % 3 ? 4 : 8;
             options.want = want;

@@ -11,6 +11,14 @@ enum { POINTS = 20, MOST = 3000 };
 
 static search_unit unit;
 
+/* Mostly small, now and then as far away as can be. */
+static int32_t
+some_shift(harness_random *random)
+{
+    const uint64_t bits = random_bits(random);
+    return bits % 512 == 0 ? INT32_MAX : bits % 512 == 1 ? -INT32_MAX : (int32_t)(bits % 3) - 1;
+}
+
 /* Random pairs, many of them several times, with a distance that tells where each was. */
 static void
 fill_pairs(harness_random *random, int64_t n, int most_j, bool has_shift, hs_output *found)
@@ -26,7 +34,7 @@ fill_pairs(harness_random *random, int64_t n, int most_j, bool has_shift, hs_out
         j[p] = (int32_t)(random_bits(random) % (uint64_t)most_j);
         d[p] = (double)p;
         for (int k = 0; has_shift && k < 2; k++)
-            shift[2 * p + k] = (int32_t)(random_bits(random) % 3) - 1;
+            shift[2 * p + k] = some_shift(random);
     }
     found->n_pairs = n;
 }
@@ -60,8 +68,10 @@ all_pairs_are_there_in_order(void)
         hs_output     found, sorted;
         bool          right = true;
         fill_pairs(&random, n, trial % 3 == 0 ? 2 : 1000, has_shift, &found);
+        const int bits = hs_test_sort_place_bits(trial % 4 < 2 ? 63 : 3); /* too few for j */
         hs_output_init(&unit.call.account, 2, found.columns, 8, &sorted);
         CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, &sorted) == HS_OK);
+        CHECK(hs_test_sort_place_bits(bits) == (trial % 4 < 2 ? 63 : 3));
         CHECK(sorted.n_pairs == n);
         const int64_t *i = hs_output_column(&sorted, HS_WANT_I);
         const int64_t *j = hs_output_column(&sorted, HS_WANT_J);
@@ -81,6 +91,65 @@ all_pairs_are_there_in_order(void)
         }
         CHECK(right);
         hs_output_free(&found);
+        hs_output_free(&sorted);
+    }
+    search_unit_close(&unit);
+}
+
+/* Rows of pairs both ways are those of the pairs and of their mirror images, sorted as pairs. */
+static void
+rows_have_each_pair_both_ways(void)
+{
+    harness_random random = {366};
+    search_unit_points(6, POINTS, 2, 1.0, &unit);
+    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+    for (int trial = 0; trial < 24; trial++) {
+        const int64_t n = trial < 4 ? trial : 1 + (int64_t)(random_bits(&random) % MOST / 2);
+        const bool    has_shift = trial % 2;
+        int64_t       offsets[POINTS + 1], pairs_of[POINTS + 1] = {0};
+        hs_output     found, twice, rows, sorted;
+        fill_pairs(&random, n, POINTS, has_shift, &found);
+        fill_pairs(&random, 2 * n, POINTS, has_shift, &twice);
+        int32_t *i = hs_output_column(&found, HS_WANT_I), *j = hs_output_column(&found, HS_WANT_J);
+        int32_t *shift = hs_output_column(&found, HS_WANT_SHIFT);
+        double  *d = hs_output_column(&found, HS_WANT_DISTANCE);
+        int32_t *i2 = hs_output_column(&twice, HS_WANT_I),
+                *j2 = hs_output_column(&twice, HS_WANT_J);
+        int32_t *shift2 = hs_output_column(&twice, HS_WANT_SHIFT);
+        double  *d2 = hs_output_column(&twice, HS_WANT_DISTANCE);
+        for (int64_t p = 0; p < n; p++) {
+            i2[2 * p] = j2[2 * p + 1] = i[p];
+            j2[2 * p] = i2[2 * p + 1] = j[p];
+            d2[2 * p] = d2[2 * p + 1] = d[p];
+            for (int k = 0; has_shift && k < 2; k++) {
+                shift2[4 * p + k] = shift[2 * p + k];
+                shift2[4 * p + 2 + k] = -shift[2 * p + k];
+            }
+            pairs_of[i[p] + 1]++;
+            pairs_of[j[p] + 1]++;
+        }
+        const int bits = hs_test_sort_place_bits(trial % 4 < 2 ? 63 : 3);
+        hs_output_init(&unit.call.account, 2, found.columns, 4, &rows);
+        hs_output_init(&unit.call.account, 2, found.columns, 4, &sorted);
+        CHECK(hs_sort_rows(&unit.call, POINTS, &found, true, offsets, &rows) == HS_OK);
+        (void)hs_test_sort_place_bits(bits);
+        CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &twice, &sorted) == HS_OK);
+        CHECK(rows.n_pairs == 2 * n && offsets[0] == 0);
+        for (int row = 0; row < POINTS; row++) {
+            pairs_of[row + 1] += pairs_of[row];
+            CHECK(offsets[row + 1] == pairs_of[row + 1]);
+        }
+        const size_t size = (size_t)n * 2 * sizeof(int32_t);
+        CHECK(n == 0 || memcmp(hs_output_column(&rows, HS_WANT_I),
+                               hs_output_column(&sorted, HS_WANT_I), size) == 0);
+        CHECK(n == 0 || memcmp(hs_output_column(&rows, HS_WANT_J),
+                               hs_output_column(&sorted, HS_WANT_J), size) == 0);
+        CHECK(n == 0 || !has_shift ||
+              memcmp(hs_output_column(&rows, HS_WANT_SHIFT),
+                     hs_output_column(&sorted, HS_WANT_SHIFT), 2 * size) == 0);
+        hs_output_free(&found);
+        hs_output_free(&twice);
+        hs_output_free(&rows);
         hs_output_free(&sorted);
     }
     search_unit_close(&unit);
@@ -128,5 +197,6 @@ void
 test_sort_pairs(void)
 {
     RUN(all_pairs_are_there_in_order);
+    RUN(rows_have_each_pair_both_ways);
     RUN(each_pass_is_polled);
 }

@@ -34,6 +34,22 @@ nothing_is_as_long_as_nothing(void)
     CHECK(value[0].lo == 0.0 && value[1].lo == 0.0);
 }
 
+/* Of shifts and rows there are as many as the metric has; what lies behind them is not looked at. */
+static void
+only_rows_that_there_are_count(void)
+{
+    const double  p[8] = {0.0, 0.0}, q[8] = {1.0, 0.0}, rows[1][8] = {{4.0, 0.0}};
+    const int64_t shift[8] = {-1, 1, 1, 1, 1, 1, 1, 1};
+    hs_metric     metric = metric_of(2, 1, rows, 3.0);
+    hs_dw         value[8];
+    int           exponent;
+    for (int l = 1; l < 8; l++)
+        metric.rows[l][0] = metric.rows[l][1] = 64.0;
+    CHECK(hs_integer_compare(&metric, p, q, shift) == 0); /* 1 - 4 */
+    hs_integer_difference(&metric, p, q, shift, value, &exponent);
+    CHECK(ldexp(value[0].hi, exponent) == -3.0 && value[1].hi == 0.0);
+}
+
 /* Two points at one spot, of numbers that need one limb and many: D is 0, the cutoff is not. */
 static void
 equal_points_are_within_any_cutoff(void)
@@ -199,6 +215,7 @@ void
 test_metric_integer(void)
 {
     RUN(nothing_is_as_long_as_nothing);
+    RUN(only_rows_that_there_are_count);
     RUN(equal_points_are_within_any_cutoff);
     RUN(signs_are_right_at_every_width);
     RUN(differences_hold_a_hundred_bits);

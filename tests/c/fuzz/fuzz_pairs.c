@@ -231,7 +231,7 @@ may_refuse(const fuzz_scene *f, const brute_list *expected, const char *differen
            most_periods(f, false) > 0x1p850L;
 }
 
-/* Another kernel for each length of the input; its contents mean what they always meant. */
+/* Another kernel, and algorithm, for each length of the input; its contents mean what they always meant. */
 static const char *
 kernel_for(size_t size)
 {
@@ -245,6 +245,7 @@ LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     input in = {data, data + size};
     kernel_to_check = kernel_for(size);
+    algorithm_to_check = (hs_algorithm)(size / 8 % HS_ALGORITHM_END);
     fuzz_scene f;
     brute_list expected;
     take_scene(&in, &f);

@@ -187,9 +187,31 @@ tables_need_memory(void)
     }
 }
 
+/* In a scene whose scaled numbers may be off, an edge lies between bounds around what it scales to;
+ * an edge of 0 is 0. */
+static void
+edges_that_scaling_loses_have_bounds(void)
+{
+    const double       given[3] = {0.0, 0x1p-1060, 3.0};
+    const hs_histogram histogram = {.n_edges = 3, .edges = given, .inclusive = true};
+    for (int extreme = 0; extreme < 2; extreme++) {
+        hs_edges edges;
+        hs_scene scene = {.ndim = 3, .extreme = extreme, .scale = hs_scale_of(-3)};
+        CHECK(hs_edges_init(NULL, &scene, 0x1p-30, &histogram, &edges) == HS_OK);
+        for (int k = 0; k < 3; k++) {
+            const double scaled = hs_scale_apply(scene.scale, given[k]);
+            const double loss = extreme && k > 0 ? HS_SCALING_LOSS : 0.0;
+            CHECK(edges.at[k] == (extreme ? given[k] : scaled));
+            CHECK(edges.lower[k] == scaled - loss && edges.upper[k] == scaled + loss);
+        }
+        hs_edges_free(NULL, &edges);
+    }
+}
+
 void
 test_edges(void)
 {
+    RUN(edges_that_scaling_loses_have_bounds);
     RUN(slots_are_those_of_the_bands);
     RUN(nothing_is_below_zero);
     RUN(large_extents_have_no_table);

@@ -160,6 +160,21 @@ the_last_bit_breaks_ties(void)
     hs_weights_free(NULL, &of);
 }
 
+/* Weights of 0 have no bits, and the lowest exponent is as good as any. */
+static void
+zeros_take_no_bits(void)
+{
+    const double zeros[N] = {0.0, -0.0};
+    for (int n = 0; n <= N; n += N / 2) {
+        hs_weights taken = weights_of(zeros, n);
+        CHECK(taken.exponent == 0 && taken.bits == 0 && taken.most_place == 0);
+        CHECK(taken.place == NULL);
+        for (int i = 0; i < n; i++)
+            CHECK(taken.value[i] == 0);
+        hs_weights_free(NULL, &taken);
+    }
+}
+
 static void
 weights_must_be_finite(void)
 {
@@ -202,6 +217,7 @@ test_weights(void)
     RUN(sums_are_rounded_once);
     RUN(limbs_do_not_overflow);
     RUN(the_last_bit_breaks_ties);
+    RUN(zeros_take_no_bits);
     RUN(weights_must_be_finite);
     RUN(sums_need_memory);
 }

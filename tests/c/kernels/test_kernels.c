@@ -150,7 +150,7 @@ kernels_differ_between_the_thresholds_only(void)
             scene.triangular = false;
             scene.direct = hs_thresholds_of(ndim, sqrt(square), 8.0, 0.0);
             scene.expanded = hs_expanded_of(ndim, sqrt(square), 8.0, 0.0);
-            expect(&scene, expanded ? HS_SCAN_EXPANDED : HS_SCAN_DIRECT, true, 0);
+            expect(&scene, expanded ? by_expansion : by_cutoff, true, 0);
             scalar = expected;
             hs_scan    scan = place_scan(&scene, trial & 4);
             hs_scan_fn list = expanded ? kernel->list : kernel->list_direct;

@@ -43,16 +43,10 @@ fill_radii(harness_random *random, bool odd, numbers *s)
     }
 }
 
-/* Both scans, against the guard before and the one after. Returns the calls. */
 static int
 check_limits(const hs_kernel *kernel, const numbers *s)
 {
-    int calls = 0;
-    for (int variant = 0; variant < 2; variant++) {
-        calls += check_form(kernel->list_limits, s, HS_SCAN_LIMITS, true, variant);
-        calls += check_form(kernel->count_limits, s, HS_SCAN_LIMITS, false, variant);
-    }
-    return calls;
+    return check_both((scan_pair){kernel->list_limits, kernel->count_limits, by_limits}, s, NULL);
 }
 
 static void
@@ -90,31 +84,17 @@ every_rule_takes_what_radii_there_are(void)
     }
 }
 
-/* Blocks up to capacity, full groups, many hits or many unsure ones, ample room and little. */
+static void
+fill_for_room(harness_random *random, int trial, numbers *s)
+{
+    (void)trial;
+    fill_radii(random, false, s);
+}
+
 static void
 scans_stop_before_hits_might_not_fit(void)
 {
-    static const int32_t sizes[] = {1, 127, 1000, HS_BLOCK_CANDIDATES - 1, HS_BLOCK_CANDIDATES};
-    harness_random       random = {223606};
-    const hs_kernel     *kernel;
-    int                  most = 0, least = 1000;
-    for (int k = 0; (kernel = kernel_number(k)) != NULL; k++) {
-        for (int trial = 0; trial < 20; trial++) {
-            const int32_t n = sizes[trial % 5], n_points = n == 1 ? 1 : HS_GROUP_POINTS - trial % 3;
-            fill_with_integers(&random, 1 + trial % 3, n, n_points, &scene);
-            fill_radii(&random, false, &scene);
-            scene.triangular = trial >= 10 && n >= n_points;
-            if (trial / 5 % 2) {
-                scene.most_hits = MOST_HITS; /* what a large scene has */
-                scene.most_unsure = HS_BLOCK_CANDIDATES;
-            }
-            const int calls = check_limits(kernel, &scene);
-            most = calls > most ? calls : most;
-            least = calls < least ? calls : least;
-        }
-    }
-    CHECK(least == 4); /* one call of each of the two functions, twice */
-    CHECK(most > HS_GROUP_POINTS);
+    check_room(223606, fill_for_room, check_limits, &scene);
 }
 
 /* Coordinates of any kind, radii that are infinite, forms that make nothing sure. */

@@ -16,7 +16,11 @@ each_pair_is_in_one_step(void)
         const hs_rule  rule = (hs_rule)(trial / 2 % HS_RULE_END);
         const int      spread = trial / 12 % 5; /* no subnormal ones, which cannot be halved */
         const double   bound = trial % 5 ? HUGE_VAL : 0.3 * random_unit(&random);
-        const hs_reach reach = {.rule = rule, .radii = points.radii, .query_radii = queries.radii};
+        const bool     takes_one = rule != HS_RULE_SUM && rule != HS_RULE_MEAN;
+        const hs_reach reach = {.rule = rule,
+                                .radii = points.radii,
+                                .query_radii = queries.radii,
+                                .extent = takes_one && trial % 4 < 2 ? 0.8 : 0.0};
         planned        made;
         reach_fill(&random, trial % 10 ? 60 : trial % 20, 1, 1.0, spread, 0.7, &points);
         reach_fill(&random, trial % 7 ? 40 : 0, 1, 1.0, trial % 4 ? spread : 0, 0.7, &queries);
@@ -61,7 +65,7 @@ each_pair_of_types_is_in_one_step(void)
                                 .cutoffs = table};
         const double   bound = trial % 3 ? HUGE_VAL : 0.5;
         planned        made;
-        reach_fill(&random, trial % 10 ? 50 : trial % 7, 1, 1.0, 0, 1.0, &points);
+        reach_fill(&random, trial % 9 ? 50 : trial % 7, 1, 1.0, 0, 1.0, &points);
         reach_fill(&random, 30, 1, 1.0, 0, 1.0, &queries);
         for (int a = 0; a < REACH_TYPES; a++) {
             for (int b = 0; b <= a; b++)
@@ -130,7 +134,7 @@ sums_that_round_to_one_are_not_one(void)
     queries.radii[5] = 0.1875;
     queries.radii[1] = queries.radii[3] = less;
     CHECK(1.0 + less == 1.0 + least);
-    make_plan(&reach, true, HUGE_VAL, &made);
+    make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
     CHECK(covers_each_once(&made));
     CHECK(made.levels.n == 5);
     for (int64_t s = 0; s < made.plan.n; s++) {
@@ -158,7 +162,7 @@ sums_above_an_exact_one_are_not_it(void)
     queries.radii[1] = 0x1p-60;
     queries.radii[3] = 0.375;
     queries.radii[4] = 0.1875;
-    make_plan(&reach, true, HUGE_VAL, &made);
+    make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
     CHECK(covers_each_once(&made));
     for (int64_t s = 0; s < made.plan.n; s++) {
         const hs_level_step *step = &made.plan.steps[s];
@@ -169,6 +173,35 @@ sums_above_an_exact_one_are_not_it(void)
     }
     CHECK(joined == 1);
     free_plan(&made);
+}
+
+/* All types are searched at once where two by two they would test nearly as many candidates: as the
+ * products of their numbers and the lengths of their cutoffs say. */
+static void
+types_are_searched_at_once_where_that_costs_as_little(void)
+{
+    static const struct {
+        int    n_first; /* points of type 0, of 90 */
+        double table[4];
+        bool   at_once;
+    } cases[] = {
+        {45, {1.0, 0.5, 0.5, -1.0}, true},    {45, {1.0, -1.0, -1.0, -1.0}, false},
+        {45, {-1.0, -1.0, -1.0, 1.0}, false}, {45, {0.5, 0.1, 0.1, 1.0}, true},
+        {81, {1.0, -1.0, -1.0, 0.5}, true},   {81, {0.25, 0.125, 0.125, 1.0}, false},
+        {9, {1.0, 0.125, 0.125, 0.5}, true},  {9, {1.0, 0.125, 0.125, -1.0}, false},
+        {45, {0.0, 0.0, 0.0, 0.0}, false},
+    };
+    harness_random random = {79};
+    reach_fill(&random, 90, 1, 1.0, 0, 1.0, &points);
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = cases[c].table};
+        planned        made;
+        for (int i = 0; i < 90; i++)
+            points.types[i] = i >= cases[c].n_first;
+        make_plan(&reach, false, HUGE_VAL, &made);
+        CHECK((made.plan.n == 1 && made.plan.steps[0].by_table) == cases[c].at_once);
+        free_plan(&made);
+    }
 }
 
 /* More types than a table of limits is laid out for are searched two by two. A plan is single where
@@ -192,12 +225,14 @@ many_types_are_searched_in_pairs(void)
         CHECK(hs_level_plan_is_single(&made.levels, &made.plan) == (n_types <= 8));
         free_plan(&made);
     }
-    for (int lone = 0; lone < 2; lone++) { /* type 0 with itself, or with type 1, alone */
-        const double table_of_two[] = {lone ? -1.0 : 0.1, lone ? 0.1 : -1.0, lone ? 0.1 : -1.0,
-                                       -1.0};
-        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = table_of_two};
+    static const double alone[3][4] = {/* type 0 with itself, with type 1, or that with itself */
+                                       {0.1, -1.0, -1.0, -1.0},
+                                       {-1.0, 0.1, 0.1, -1.0},
+                                       {-1.0, -1.0, -1.0, 0.1}};
+    for (int lone = 0; lone < 3; lone++) {
+        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = alone[lone]};
         for (int i = 0; i < 90; i++)
-            points.types[i] = lone ? i % 2 : i % 9 != 0;
+            points.types[i] = lone == 0 ? i % 9 != 0 : lone == 1 ? i % 2 : i % 9 == 0;
         make_plan(&reach, false, HUGE_VAL, &made);
         const bool by_table = made.plan.steps[0].by_table;
         CHECK(made.plan.n == 1);
@@ -217,10 +252,14 @@ a_level_of_two_is_not_all(void)
     reach_fill(&random, 10, 1, 1.0, 0, 0.1, &points);
     reach_fill(&random, 10, 1, 1.0, 0, 0.1, &queries);
     points.radii[4] = 0.9;
-    make_plan(&reach, true, HUGE_VAL, &made);
-    CHECK(made.levels.n == 2 && made.plan.n == 1);
-    CHECK(!hs_level_plan_is_single(&made.levels, &made.plan));
-    free_plan(&made);
+    for (int upper = 0; upper < 2; upper++) {
+        for (int i = 0; i < 10; i++)
+            queries.radii[i] = upper ? 0.9 : 0.1;
+        make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
+        CHECK(made.levels.n == 2 && made.plan.n == 1 && made.plan.steps[0].asking.first == upper);
+        CHECK(!hs_level_plan_is_single(&made.levels, &made.plan));
+        free_plan(&made);
+    }
 }
 
 /* Small levels join for the search with a far larger one: a few steps a level. */
@@ -240,12 +279,50 @@ far_smaller_levels_join(void)
     free_plan(&made);
 }
 
+/* Without a hierarchy all is one search with the largest reach, but for many types; with one, types
+ * are never searched together. */
+static void
+algorithms_divide_or_do_not(void)
+{
+    const hs_reach by_sum = {.rule = HS_RULE_SUM, .radii = points.radii};
+    hs_reach       by_type = {.types = points.types, .cutoffs = table};
+    harness_random random = {77};
+    planned        made;
+    reach_fill(&random, 200, 1, 1.0, 0, 1.0, &points);
+    for (int i = 0; i < 200; i++)
+        points.radii[i] = ldexp(0.75, -(i % 12));
+    for (hs_algorithm a = HS_ALL_PAIRS; a < HS_HIERARCHY; a++) {
+        make_plan_as(&by_sum, false, HUGE_VAL, a, &made);
+        CHECK(made.plan.n == 1 && made.plan.steps[0].is_own && made.plan.steps[0].has_limits);
+        CHECK(made.plan.steps[0].cutoff == 1.5 && made.plan.steps[0].least == ldexp(0.75, -11));
+        CHECK(hs_level_plan_is_single(&made.levels, &made.plan) && covers_each_once(&made));
+        free_plan(&made);
+    }
+    make_plan_as(&by_sum, false, HUGE_VAL, HS_HIERARCHY, &made);
+    CHECK(made.plan.n > 12 && covers_each_once(&made));
+    free_plan(&made);
+    for (int n = 3; n <= 12; n += 9) {
+        for (int i = 0; i < 200; i++)
+            points.types[i] = i % n;
+        for (int e = 0; e < n * n; e++)
+            table[e] = 1.0;
+        by_type.n_types = n;
+        make_plan_as(&by_type, false, HUGE_VAL, HS_HASH, &made);
+        CHECK(made.plan.n == (n == 3 ? 1 : 78) && made.plan.steps[0].by_table == (n == 3));
+        CHECK(covers_each_once(&made));
+        free_plan(&made);
+        make_plan_as(&by_type, false, HUGE_VAL, HS_HIERARCHY, &made);
+        CHECK(made.plan.n == n * (n + 1) / 2 && covers_each_once(&made));
+        free_plan(&made);
+    }
+}
+
 static hs_status
 plan_once(void *context)
 {
     planned        *made = context;
     const hs_status status =
-        hs_level_plan_make(&made->account, &made->levels, HUGE_VAL, &made->plan);
+        hs_level_plan_make(&made->account, &made->levels, HUGE_VAL, HS_AUTO, &made->plan);
     CHECK((status == HS_OK) == (made->plan.steps != NULL));
     hs_level_plan_free(&made->account, &made->plan);
     return status;
@@ -272,8 +349,10 @@ test_level_plan(void)
     RUN(equal_limits_are_one_cutoff);
     RUN(sums_that_round_to_one_are_not_one);
     RUN(sums_above_an_exact_one_are_not_it);
+    RUN(types_are_searched_at_once_where_that_costs_as_little);
     RUN(many_types_are_searched_in_pairs);
     RUN(a_level_of_two_is_not_all);
     RUN(far_smaller_levels_join);
+    RUN(algorithms_divide_or_do_not);
     RUN(nothing_leaks_when_memory_is_short);
 }

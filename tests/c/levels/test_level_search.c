@@ -29,9 +29,9 @@ make_plan(const hs_reach *reach, bool has_queries, double bound, const hs_box *b
     made->box = box;
     hs_call_begin(&options, &made->call);
     hs_account *account = &made->call.account;
-    CHECK(hs_levels_divide(account, &p, has_queries ? &q : NULL, reach, &made->levels, &failure) ==
-          HS_OK);
-    CHECK(hs_level_plan_make(account, &made->levels, bound, &made->plan) == HS_OK);
+    CHECK(hs_levels_divide(account, &options, &p, has_queries ? &q : NULL, reach, &made->levels,
+                           &failure) == HS_OK);
+    CHECK(hs_level_plan_make(account, &made->levels, bound, HS_AUTO, &made->plan) == HS_OK);
 }
 
 static void
@@ -253,6 +253,60 @@ extreme_radii_stay_as_they_are(void)
     }
     CHECK(kept > 10);
     free_plan(&made);
+    static const double ends[] = {0x1p1010, 0x1p-1060, 0x1p-1060, -1.0}; /* of two types */
+    const hs_reach      by_type = {.n_types = 2, .types = points.types, .cutoffs = ends};
+    hs_level_search     open;
+    hs_failure          failure;
+    for (int i = 0; i < 40; i++)
+        points.types[i] = i == 1;
+    make_plan(&by_type, false, HUGE_VAL, NULL, &made);
+    CHECK(made.plan.n == 1 && made.plan.steps[0].by_table);
+    CHECK(open_step(&made, 0, &open, &failure) == HS_OK && open.search.scene.extreme);
+    CHECK(memcmp(open.limits.table.exact, ends, sizeof ends) == 0);
+    CHECK(open.limits.table.near[3] == -1.0f && open.limits.table.near[0] <= 0x1p100f);
+    hs_level_close(&open);
+    free_plan(&made);
+}
+
+/* Few asking points meet all others without cells, unless the caller has said how. A level with
+ * itself is searched both ways where the plan is none of half lists. */
+static void
+steps_are_searched_as_the_plan_says(void)
+{
+    static const struct {
+        hs_algorithm asked, few;
+    } cases[] = {{HS_AUTO, HS_ALL_PAIRS},
+                 {HS_HIERARCHY, HS_ALL_PAIRS},
+                 {HS_ALL_PAIRS, HS_ALL_PAIRS},
+                 {HS_HASH, HS_HASH}};
+    const hs_reach reach = {.rule = HS_RULE_GATHER, .query_radii = queries.radii};
+    const hs_reach own = {.rule = HS_RULE_MAX, .radii = points.radii};
+    harness_random random = {96};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        for (int n_queries = 4; n_queries <= 5; n_queries++) {
+            planned         made;
+            hs_level_search open;
+            hs_failure      failure;
+            reach_fill(&random, 60, 2, 4.0, 0, 0.5, &points);
+            reach_fill(&random, n_queries, 2, 4.0, 0, 0.5, &queries);
+            make_plan(&reach, true, HUGE_VAL, NULL, &made);
+            made.plan.algorithm = cases[c].asked;
+            CHECK(made.plan.n == 1 && open_step(&made, 0, &open, &failure) == HS_OK);
+            CHECK(made.call.options.algorithm == (n_queries == 4 ? cases[c].few : cases[c].asked));
+            hs_level_close(&open);
+            free_plan(&made);
+            make_plan(&own, false, HUGE_VAL, NULL, &made);
+            made.plan.algorithm = cases[c].asked;
+            made.plan.is_half = n_queries == 4;
+            CHECK(made.plan.n == 1 && made.plan.steps[0].is_own);
+            CHECK(open_step(&made, 0, &open, &failure) == HS_OK);
+            CHECK(made.call.options.algorithm == cases[c].asked);
+            CHECK(open.search.is_half == made.plan.is_half && !open.search.has_queries);
+            CHECK(open.search.is_full == !made.plan.is_half);
+            hs_level_close(&open);
+            free_plan(&made);
+        }
+    }
 }
 
 /* A point too far for its box: the row is the caller's, of the set that it belongs to. */
@@ -309,12 +363,67 @@ nothing_leaks_when_memory_is_short(void)
     }
 }
 
+/* Supports are looked at for the width of cells, and laid out for kernels: both poll. */
+static void
+opening_a_step_of_many_supports_can_be_stopped(void)
+{
+    enum { MANY = 2 * HS_POLL_SUPPORTS + 9 };
+    static double   x[MANY], numbers[MANY];
+    const hs_points p = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
+    for (int64_t i = 0; i < MANY; i++) {
+        x[i] = (double)i;
+        numbers[i] = i == MANY - 1 ? 1.0 : 1.5; /* the last is as wide as the ball */
+    }
+    for (int rule = HS_RULE_MAX; rule < HS_RULE_END; rule++) {
+        for (int has_queries = 0; has_queries < 2; has_queries++) {
+            const bool      asks = rule != HS_RULE_SCATTER, meets = rule != HS_RULE_GATHER;
+            const hs_reach  reach = {.rule = (hs_rule)rule,
+                                     .has_supports = true,
+                                     .extent = 1.0,
+                                     .supports = meets || !has_queries ? numbers : NULL,
+                                     .query_supports = asks && has_queries ? numbers : NULL};
+            refusal         once = {0, 0};
+            hs_options      options = hs_options_default();
+            hs_failure      failure = HS_NO_FAILURE;
+            hs_levels       levels;
+            hs_level_plan   plan;
+            hs_level_search open;
+            hs_call         call;
+            options.cutoff = HUGE_VAL;
+            options.poll = refuse_once;
+            options.poll_context = &once;
+            hs_call_begin(&options, &call);
+            CHECK(hs_levels_divide(&call.account, &options, &p, has_queries ? &p : NULL, &reach,
+                                   &levels, &failure) == HS_OK);
+            CHECK(hs_level_plan_make(&call.account, &levels, HUGE_VAL, HS_AUTO, &plan) == HS_OK);
+            const int64_t held = call.account.held;
+            once = (refusal){0, 0};
+            CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) == HS_OK);
+            hs_level_close(&open);
+            const int64_t n = once.n;
+            CHECK(n >= 4); /* the width of one side at least, and what is laid out */
+            for (int64_t nth = 1; nth <= n; nth++) {
+                once = (refusal){0, nth};
+                CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) ==
+                      HS_ERR_INTERRUPTED);
+                CHECK(once.n == nth && call.account.held == held);
+            }
+            hs_level_plan_free(&call.account, &plan);
+            hs_levels_free(&call.account, &levels);
+            hs_call_dismiss(&call);
+            hs_account_close(&call.account);
+        }
+    }
+}
+
 void
 test_level_search(void)
 {
+    RUN(opening_a_step_of_many_supports_can_be_stopped);
     RUN(steps_have_the_callers_numbers);
     RUN(tables_are_those_of_the_types);
     RUN(extreme_radii_stay_as_they_are);
+    RUN(steps_are_searched_as_the_plan_says);
     RUN(failures_name_the_callers_row);
     RUN(nothing_leaks_when_memory_is_short);
 }

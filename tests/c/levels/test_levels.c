@@ -2,6 +2,7 @@
 /* test_levels.c: each point is in one level, in the caller's order there, and levels ascend; what is
  * no radius, type or table is refused with its first row, and nothing is left. */
 #include "../../../csrc/core/base/outcome.h"
+#include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/levels/levels.h"
 #include "../support/poll_checks.h"
 #include "../support/reach_sets.h"
@@ -70,9 +71,10 @@ static hs_status
 divide(const hs_reach *reach, bool has_queries, hs_account *account, hs_levels *levels,
        hs_failure *failure)
 {
-    const hs_points p = reach_points(&points), q = reach_points(&queries);
+    const hs_points  p = reach_points(&points), q = reach_points(&queries);
+    const hs_options options = hs_options_default();
     *failure = HS_NO_FAILURE;
-    return hs_levels_divide(account, &p, has_queries ? &q : NULL, reach, levels, failure);
+    return hs_levels_divide(account, &options, &p, has_queries ? &q : NULL, reach, levels, failure);
 }
 
 static void
@@ -111,6 +113,29 @@ points_are_divided_by_their_radii(void)
         close_account(&account);
     }
     CHECK(most > 8);
+}
+
+/* Of which the rule needs no radii, all are of the smallest size. */
+static void
+sets_without_radii_are_of_one_level(void)
+{
+    const hs_reach reach = {.rule = HS_RULE_GATHER, .query_radii = queries.radii};
+    hs_account     account = new_account();
+    hs_levels      levels;
+    hs_failure     failure;
+    harness_random random = {39};
+    reach_fill(&random, 70, 2, 3.0, 0, 0.7, &points);
+    reach_fill(&random, 50, 2, 3.0, 2, 0.7, &queries);
+    CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK && levels.n > 3);
+    CHECK(levels.points.radii == NULL && levels.points.first[1] == 70);
+    CHECK(has_each_point(&levels.points, levels.n, &points));
+    CHECK(radii_ascend(&levels.queries, levels.n, &queries, false));
+    hs_levels_renumber(1000, &levels);
+    for (int i = 0; i < 70; i++)
+        CHECK(levels.points.number[i] == 1000 + i);
+    CHECK(levels.queries.number[0] < 50);
+    hs_levels_free(&account, &levels);
+    close_account(&account);
 }
 
 /* All of one order are in two levels at most; the largest and the smallest numbers are in order. */
@@ -220,6 +245,41 @@ bad_numbers_are_refused(void)
     is_refused(&reach, HS_ERR_NOT_FINITE, 0, false);
 }
 
+/* With an extent, which is the factor then, the bounds of radii are narrower; 0 is none. */
+static void
+radii_that_have_an_extent_are_moderate(void)
+{
+    static const double fits[] = {0.0, 0x1p-500, 0x1p500}, bad[] = {0x1p-501, 0x1.8p500, 5e-324};
+    harness_random      random = {38};
+    hs_account          account = new_account();
+    hs_levels           levels;
+    hs_failure          failure;
+    reach_fill(&random, 50, 2, 1.0, 1, 1.0, &points);
+    reach_fill(&random, 30, 2, 1.0, 1, 1.0, &queries);
+    hs_reach reach = {
+        .rule = HS_RULE_MAX, .radii = points.radii, .query_radii = queries.radii, .extent = 0.625};
+    for (int e = 0; e < 3; e++) {
+        points.radii[9] = fits[e];
+        CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK);
+        CHECK(levels.factor == 0.625 && radii_ascend(&levels.points, levels.n, &points, false));
+        hs_levels_free(&account, &levels);
+    }
+    for (int e = 0; e < 3; e++) {
+        points.radii[9] = bad[e];
+        reach.extent = 0.625;
+        is_refused(&reach, HS_ERR_RADII, 9, false);
+        reach.extent = e; /* 0 is as 1, which bounds nothing; 2 does */
+        if (e == 2) {
+            is_refused(&reach, HS_ERR_RADII, 9, false);
+        } else {
+            CHECK(divide(&reach, true, &account, &levels, &failure) == HS_OK);
+            CHECK(levels.factor == 1.0);
+            hs_levels_free(&account, &levels);
+        }
+    }
+    close_account(&account);
+}
+
 static void
 bad_types_and_tables_are_refused(void)
 {
@@ -299,13 +359,64 @@ slices_are_points_in_place(void)
     close_account(&account);
 }
 
+/* Every poll of a division of many points: the one that says no ends it, and nothing is left. */
+static void
+a_division_can_be_stopped(void)
+{
+    enum { MANY = 2 * HS_POLL_POINTS + 9 };
+    static double   x[MANY], numbers[MANY];
+    static int32_t  types[MANY];
+    const double    cutoff = 1.0;
+    const hs_points p = {x, MANY, 1, HS_FLOAT64, sizeof *x, sizeof *x};
+    const hs_reach  reaches[] = {
+         {.rule = HS_RULE_SUM, .radii = numbers, .query_radii = numbers},
+         {.n_types = 1, .types = types, .query_types = types, .cutoffs = &cutoff},
+         {.rule = HS_RULE_MAX,
+          .has_supports = true,
+          .extent = 1.0,
+          .supports = numbers,
+          .query_supports = numbers},
+    };
+    for (int64_t i = 0; i < MANY; i++) {
+        x[i] = (double)i;
+        numbers[i] = 1.0;
+    }
+    for (int kind = 0; kind < 3; kind++) {
+        refusal    once = {0, 0};
+        hs_options options = hs_options_default();
+        hs_levels  levels;
+        options.poll = refuse_once;
+        options.poll_context = &once;
+        for (int has_queries = 0; has_queries < 2; has_queries++) {
+            hs_account account = new_account();
+            hs_failure failure = HS_NO_FAILURE;
+            once = (refusal){0, 0};
+            CHECK(hs_levels_divide(&account, &options, &p, has_queries ? &p : NULL, &reaches[kind],
+                                   &levels, &failure) == HS_OK);
+            hs_levels_free(&account, &levels);
+            const int64_t n = once.n;
+            CHECK(n >= (kind == 1 ? 6 : 8) * (has_queries + 1));
+            for (int64_t nth = 1; nth <= n; nth += n > 40 && nth > 2 && nth < n - 12 ? 9 : 1) {
+                once = (refusal){0, nth};
+                CHECK(hs_levels_divide(&account, &options, &p, has_queries ? &p : NULL,
+                                       &reaches[kind], &levels, &failure) == HS_ERR_INTERRUPTED);
+                CHECK(once.n == nth && account.held == 0 && levels.n == 0);
+            }
+            close_account(&account);
+        }
+    }
+}
+
 void
 test_levels(void)
 {
+    RUN(a_division_can_be_stopped);
     RUN(points_are_divided_by_their_radii);
+    RUN(sets_without_radii_are_of_one_level);
     RUN(levels_are_binary_orders);
     RUN(points_are_divided_by_their_types);
     RUN(bad_numbers_are_refused);
+    RUN(radii_that_have_an_extent_are_moderate);
     RUN(bad_types_and_tables_are_refused);
     RUN(nothing_leaks_when_memory_is_short);
     RUN(slices_are_points_in_place);

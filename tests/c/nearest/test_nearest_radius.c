@@ -166,6 +166,32 @@ flat_points_have_the_density_of_their_plane(void)
     }
 }
 
+/* Few points in open space: all their sides count, in one dimension or eight, and those of other
+ * points asked before do not. A ball at a corner makes room for what is outside, on every axis. */
+static void
+few_points_have_the_density_of_all_of_them(void)
+{
+    enum { FEW = 50 };
+    static const double ball[] = {2.0, 3.1416, 4.1888, 4.9348, 5.2638, 5.1677, 4.7248, 4.0587};
+    harness_random      random = {340};
+    for (int trial = 0; trial < 2 * HS_MAX_DIM; trial++) {
+        const int        d = 1 + trial / 2;
+        const double     side = trial % 2 ? 1e6 : 1.0, wanted = 2.0 + 3.5 * sqrt(2.0) + 1.0;
+        const hs_points  points = points_in(FEW, d);
+        const double     radius = side * pow(wanted / FEW / ball[d - 1], 1.0 / d);
+        hs_nearest_group group;
+        for (int e = 0; e < d * FEW; e++)
+            x[e] = e < d ? 0.0 : e < 2 * d ? side : side * random_unit(&random);
+        nearest_unit_open(&points, NULL, NULL, 1, HS_WANT_J, INFINITY, &unit);
+        for (int32_t si = 0; si < FEW; si++) {
+            hs_nearest_group_set(&unit.near, si, si + 1, &group);
+            hs_nearest_guess(&unit.near, &group);
+            CHECK(group.radius > 0.999 * radius && group.radius < 2.001 * radius);
+        }
+        nearest_unit_close(&unit);
+    }
+}
+
 /* Few points, all in one corner: the box counts. The ball of as many points as are wanted, in
  * periodic boxes of 1000 times 30 points. */
 static void
@@ -270,6 +296,7 @@ test_nearest_radius(void)
     RUN(nothing_is_farther_than_all_points_or_the_largest_distance);
     RUN(first_radii_hold_what_is_wanted);
     RUN(flat_points_have_the_density_of_their_plane);
+    RUN(few_points_have_the_density_of_all_of_them);
     RUN(few_points_have_the_density_of_their_box);
     RUN(layers_are_as_thick_as_their_points);
     RUN(queries_outside_look_as_far_as_the_points_are);

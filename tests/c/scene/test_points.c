@@ -98,9 +98,29 @@ precisions_agree_where_nothing_is_rounded(void)
     CHECK(n_pairs > 10000);
 }
 
+static void
+copies_of_finite_points_name_the_first_that_is_not(void)
+{
+    double          rows[6], given[6] = {0.0, 1.0, 2.0, 3.0, 4.0, 5.0};
+    const hs_points points = {.data = given,
+                              .n = 3,
+                              .ndim = 2,
+                              .real = HS_FLOAT64,
+                              .row_stride = 2 * (ptrdiff_t)sizeof(double),
+                              .column_stride = sizeof(double)};
+    hs_failure      failure = {.row = -1, .column = -1};
+    CHECK(hs_points_copy_finite(&points, rows, &failure) == HS_OK);
+    CHECK(failure.row == -1 && memcmp(rows, given, sizeof rows) == 0);
+    given[3] = -INFINITY;
+    given[4] = NAN;
+    CHECK(hs_points_copy_finite(&points, rows, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.row == 1 && failure.column == 1 && failure.value == -INFINITY);
+}
+
 void
 test_points(void)
 {
     RUN(every_layout_is_the_same_points);
     RUN(precisions_agree_where_nothing_is_rounded);
+    RUN(copies_of_finite_points_name_the_first_that_is_not);
 }

@@ -167,6 +167,54 @@ another_cutoff_changes_radius_and_metric(void)
     CHECK(scene.formula_error == 4.0 * 0x1p-53 * 3.0 * 2.0);
 }
 
+static double widths[2], asked_enough;
+
+static hs_status
+width_along(const void *context, const double *normal, double enough, double *width)
+{
+    CHECK(context == widths && normal[0] + normal[1] == 1.0);
+    asked_enough = enough;
+    *width = widths[normal[1] > 0.5];
+    return *width == HUGE_VAL ? HS_ERR_INTERRUPTED : HS_OK;
+}
+
+/* Where pairs are surely narrower, by a fifth at least: in the scene's unit, which is half of the
+ * caller's, and less of what the formula may err by. */
+static void
+scenes_are_narrowed_by_what_is_sure(void)
+{
+    static const struct {
+        double formula_error, width[2], less[2];
+    } cases[] = {{0.0, {0.1, 0.45}, {0.8, 0.0}},
+                 {0.5, {0.3, 0.1}, {0.0, 0.3}},
+                 {0.0, {0.39, 0.4}, {0.22, 0.0}},
+                 {0.0, {0.0, 1.0}, {1.0, 0.0}}};
+    const hs_narrowing narrowing = {width_along, widths};
+    hs_scene           scene;
+    put_scene(&scene);
+    scene.radius = 1.0;
+    scene.scale = hs_scale_of(-1);
+    scene.unscale = hs_scale_of(1);
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        scene.formula_error = cases[c].formula_error;
+        memcpy(widths, cases[c].width, sizeof widths);
+        CHECK(hs_scene_narrow(&scene, &narrowing) == HS_OK);
+        CHECK(asked_enough == 0.8 * 0.5);
+        for (int k = 0; k < 2; k++) {
+            const double less = cases[c].less[k];
+            CHECK(less == 0.0 ? scene.less[k] == 0.0
+                              : scene.less[k] < less && scene.less[k] > less - 1e-9);
+            CHECK(hs_scene_radius_along(&scene, k) == 1.0 - scene.less[k]);
+        }
+        const double volume = hs_scene_volume(&scene, 3.0);
+        CHECK(volume == 3.0 * (1.0 - scene.less[0]) * (1.0 - scene.less[1]));
+    }
+    CHECK(hs_scene_narrow(&scene, NULL) == HS_OK);
+    CHECK(scene.less[0] > 0.9);
+    widths[1] = HUGE_VAL;
+    CHECK(hs_scene_narrow(&scene, &narrowing) == HS_ERR_INTERRUPTED);
+}
+
 /* The first of those that are farthest, among points before queries. */
 static void
 the_farthest_is_named(void)
@@ -222,6 +270,7 @@ test_scene_bounds(void)
     RUN(skewed_scenes_err_component_by_component);
     RUN(the_metric_has_the_rows_that_pairs_are_decided_on);
     RUN(another_cutoff_changes_radius_and_metric);
+    RUN(scenes_are_narrowed_by_what_is_sure);
     RUN(the_farthest_is_named);
     RUN(drowned_scenes_err_by_more_than_their_cutoff);
 }

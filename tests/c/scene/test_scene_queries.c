@@ -318,6 +318,30 @@ queries_share_what_is_settled(void)
     CHECK(asking.x_largest[1] == 5.0 && asking.cloud.lower[0] == -3.0);
 }
 
+/* Turns that cannot be counted are those of the set that is named. */
+static void
+turns_that_cannot_be_counted_name_their_set(void)
+{
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{1.0}, {0.0, 1.0}}};
+    for (int in_queries = 0; in_queries < 2; in_queries++) {
+        double          x[6] = {0.25, 0.5, 0.5, 0.5, 0.75, 0.5};
+        double          q[6] = {0.25, 0.5, 0.5, 0.5, 0.75, 0.5};
+        const hs_points points = points_in(x, 3, 2), queries = points_in(q, 3, 2);
+        const hs_sets   sets = {.points = &points, .queries = &queries, .is_full = true};
+        hs_options      options = hs_options_default();
+        hs_failure      failure = HS_NO_FAILURE;
+        hs_scene        scene, asking;
+        options.cutoff = 0.25;
+        options.want = HS_WANT_SHIFT;
+        (in_queries ? q : x)[4] = 0x1p60;
+        hs_account_init(&account, &options);
+        CHECK(hs_scene_init_sets(&account, NULL, &sets, &box, &options, &scene, &asking,
+                                 &failure) == HS_ERR_SHIFT_RANGE);
+        CHECK(failure.row == 2 && failure.in_queries == in_queries && account.held == 0);
+        hs_account_close(&account);
+    }
+}
+
 void
 test_scene_queries(void)
 {
@@ -331,4 +355,5 @@ test_scene_queries(void)
     RUN(what_is_refused_is_named);
     RUN(queries_too_far_to_count_get_another_scene);
     RUN(scenes_that_hold_nothing_take_nothing);
+    RUN(turns_that_cannot_be_counted_name_their_set);
 }

@@ -3,11 +3,15 @@
  * group are left out, and none that a point of it needs. */
 #include "../../../csrc/core/search/form.h"
 #include "../../../csrc/core/search/scan.h"
+#include "../../../csrc/core/search/limits.h"
 #include "../support/search_unit.h"
 
 #include <math.h>
 
 void test_form(void);
+
+/* Candidates that are worth leaving some out, and fewer that are where limits are short. */
+enum { MANY = 300, FEWER = 64 };
 
 static search_unit unit;
 
@@ -45,14 +49,74 @@ forms_are_those_of_their_extent(void)
         const hs_expanded   expanded = hs_expanded_of(3, cutoff, extent, error);
         CHECK(extent >= 2.0 * (double)size && extent <= 2.0 * (double)size * (1.0 + 1.0 / 32.0));
         CHECK(form->direct.in == direct.in && form->direct.out == direct.out);
-        CHECK(form->expanded.in == expanded.in && form->expanded.out == expanded.out);
-        CHECK(form->scan == (hs_expanded_pays(cutoff, extent) ? unit.call.kernel->count
-                                                              : unit.call.kernel->count_direct));
+        const bool pays = hs_expanded_pays(cutoff, extent);
+        CHECK(form->expanded.in == (pays ? expanded.in : 0.0));
+        CHECK(form->expanded.out == (pays ? expanded.out : 0.0));
+        CHECK(form->scan == (pays ? unit.call.kernel->count : unit.call.kernel->count_direct));
     }
     scanner->group.largest = UINT32_C(0x7fc00000);
     hs_form_set(scanner);
     CHECK(scanner->form->direct.in == -1.0f && scanner->form->direct.out == INFINITY);
     close_walker(&walker);
+}
+
+/* In a scene whose scaled numbers may be off, only what is within a shorter cutoff is surely in. */
+static void
+what_is_surely_in_is_so_for_the_low_cutoff(void)
+{
+    hs_walker walker;
+    int       n_expanded = 0;
+    open_walker(8.0, 1.0, &walker);
+    hs_scanner *scanner = &walker.scanner;
+    hs_scene   *scene = &unit.search.scene;
+    scene->extreme = true;
+    for (int trial = 0; trial < 8; trial++) {
+        const double low = trial % 2 ? 0.75 : 0.0, error = unit.search.filter_error;
+        const double cutoff = scene->cutoff;
+        scene->cutoff_low = low;
+        scanner->group.largest = hs_bits_of_float(ldexpf(1.5f, trial - 3));
+        hs_form_set(scanner);
+        const hs_form *form = scanner->form;
+        const double   extent = form->extent;
+        CHECK(form->direct.out == hs_thresholds_of(3, cutoff, extent, error).out);
+        CHECK(form->direct.in == (low > 0.0 ? hs_thresholds_of(3, low, extent, error).in : -1.0f));
+        if (hs_expanded_pays(cutoff, extent)) {
+            const hs_expanded of_low = hs_expanded_of(3, low, extent, error);
+            CHECK(form->expanded.out == hs_expanded_of(3, cutoff, extent, error).out);
+            CHECK(form->expanded.in == (low > 0.0 ? of_low.in : -INFINITY));
+            n_expanded++;
+        }
+    }
+    CHECK(n_expanded >= 2);
+    close_walker(&walker);
+}
+
+/* What one walker has found out serves the next one, for the same cutoff and errors only. */
+static void
+thresholds_are_kept_for_the_next_search(void)
+{
+    hs_kept_form  kept[HS_FORMS] = {{.is_set = false}};
+    hs_walker     walker;
+    hs_thresholds direct = {0.0f, 0.0f};
+    hs_expanded   expanded = {0.0, 0.0};
+    for (int turn = 0; turn < 4; turn++) {
+        open_walker(8.0, turn == 3 ? 1.25 : 1.0, &walker);
+        unit.search.kept_forms = kept;
+        walker.scanner.group.largest = hs_bits_of_float(1.5f);
+        hs_form_set(&walker.scanner);
+        const hs_form *form = walker.scanner.form;
+        const double   cutoff = unit.search.scene.cutoff, error = unit.search.filter_error;
+        if (turn == 0 || turn == 3) {
+            direct = hs_thresholds_of(3, cutoff, form->extent, error);
+            expanded = hs_expanded_of(3, cutoff, form->extent, error);
+        }
+        CHECK(form->direct.in == direct.in && form->direct.out == direct.out);
+        CHECK(form->expanded.in == expanded.in && form->expanded.out == expanded.out);
+        for (int f = 0; f < HS_FORMS && turn == 1; f++)
+            kept[f].direct.in = direct.in = 0.5f; /* it is taken from here */
+        unit.search.kept_forms = NULL;
+        close_walker(&walker);
+    }
 }
 
 /* The box is that of the points, and a candidate is near if it is within the cutoff of one. */
@@ -66,6 +130,9 @@ groups_know_what_is_near(void)
     const int32_t last = 20;
     hs_group_start(&unit.search.bins, 0, last, group);
     CHECK(group->near.out == INFINITY);
+    hs_form_prune(scanner); /* few candidates are not worth it */
+    CHECK(group->near.out == INFINITY);
+    scanner->block.n = MANY;
     hs_form_prune(scanner);
     const double cutoff = unit.search.scene.cutoff;
     CHECK((double)group->near.out > cutoff * cutoff);
@@ -79,6 +146,44 @@ groups_know_what_is_near(void)
         }
         CHECK(is_low && is_high);
     }
+    close_walker(&walker);
+}
+
+/* With radii, within what the group's largest makes of the largest of all; no further than the
+ * cutoff, and for fewer candidates where that is much shorter. */
+static void
+groups_of_small_radii_reach_less_far(void)
+{
+    static float radii[100];
+    hs_walker    walker;
+    open_walker(8.0, 1.0, &walker);
+    const double cutoff = unit.search.scene.cutoff;
+    for (int trial = 0; trial < 6 * 8; trial++) {
+        const hs_rule rule = (hs_rule)(trial % 6);
+        const double  asking = cutoff * (1 + trial / 6) / 8.0, most = 0.25 * cutoff;
+        const double  sum = asking + most, larger = fmax(asking, most);
+        const double  limits_are[] = {
+             [HS_RULE_SUM] = sum,       [HS_RULE_MAX] = larger,   [HS_RULE_MIN] = fmin(asking, most),
+             [HS_RULE_GATHER] = asking, [HS_RULE_SCATTER] = most, [HS_RULE_MEAN] = sum};
+        const double limit = fmin(limits_are[rule], cutoff);
+        hs_limits    limits = {.rule = rule,
+                               .bound = HUGE_VAL,
+                               .near_bound = INFINITY,
+                               .of_asking = {.near = radii},
+                               .of_points = {.near = radii, .most = (float)most}};
+        hs_group    *group = &walker.scanner.group;
+        for (int i = 0; i < 100; i++)
+            radii[i] = (float)(i == 5 ? asking : i < 20 ? 0.5 * asking : cutoff);
+        unit.search.limits = &limits;
+        hs_group_start(&unit.search.bins, 0, 20, group);
+        walker.scanner.block.n = limit < 0.8 * cutoff ? FEWER : MANY;
+        hs_form_prune(&walker.scanner);
+        CHECK((double)group->near.out > limit * limit);
+        CHECK((double)group->near.out <
+              (limit < 0.8 * cutoff ? limit * limit : cutoff * cutoff) * (1.0 + 1e-4) +
+                  1e-4 * cutoff * cutoff);
+    }
+    unit.search.limits = NULL;
     close_walker(&walker);
 }
 
@@ -120,6 +225,9 @@ void
 test_form(void)
 {
     RUN(forms_are_those_of_their_extent);
+    RUN(what_is_surely_in_is_so_for_the_low_cutoff);
+    RUN(thresholds_are_kept_for_the_next_search);
     RUN(groups_know_what_is_near);
+    RUN(groups_of_small_radii_reach_less_far);
     RUN(far_candidates_are_not_tested);
 }

@@ -49,11 +49,13 @@ crowds_are_in_occupied_cells_only(void)
         for (int k = 0; k < 3; k++)
             unit.x[3 * i + k] = 0.1 * unit.x[3 * i + k] + (i % 2 ? 1e4 : 0.0);
     }
+    const hs_sets sets = {.points = &unit.points};
     CHECK(build(NULL, NULL, &options, &failure) == HS_OK && unit.search.is_sparse);
     CHECK(unit.search.grid.n_cells <= N);
-    search_unit_close(&unit);
-    options.cell_size = 2000.0;
-    CHECK(build(NULL, NULL, &options, &failure) == HS_OK && !unit.search.is_sparse);
+    hs_search_close(&unit.search);
+    unit.search.is_sparse = true; /* as another system left it */
+    unit.call.options.cell_size = 2000.0;
+    CHECK(hs_search_build(&sets, NULL, &unit.search, &failure) == HS_OK && !unit.search.is_sparse);
     CHECK(unit.search.grid.cell_size[0] >= 2000.0);
     search_unit_close(&unit);
 }
@@ -74,6 +76,44 @@ cells_have_the_width_that_is_wanted(void)
     CHECK(build(NULL, NULL, &options, &failure) == HS_OK);
     CHECK(unit.search.grid.cell_size[0] > 1e-4);
     search_unit_close(&unit);
+}
+
+/* An algorithm of the caller's choice, where another one would have been chosen; one cell may be all
+ * that there is of each. */
+static void
+the_algorithm_is_the_callers(void)
+{
+    static const struct {
+        hs_algorithm algorithm;
+        bool         is_sparse;
+    } cases[] = {{HS_ALL_PAIRS, false}, {HS_GRID, false}, {HS_HASH, true}};
+    hs_options options = options_for(0.1);
+    hs_failure failure;
+    for (int n = 0; n <= N; n = n < 3 ? n + 1 : n == 3 ? 30 : n == 30 ? N : N + 1) {
+        for (int c = 0; c < 3; c++) {
+            search_unit_points(86, n, 2, 1.0, &unit);
+            options.algorithm = cases[c].algorithm;
+            CHECK(build(NULL, NULL, &options, &failure) == HS_OK);
+            const hs_grid *grid = &unit.search.grid;
+            CHECK(unit.search.is_sparse == cases[c].is_sparse && unit.search.bins.n == n);
+            CHECK(c != 0 || (grid->n_cells == 1 && grid->shape[0] == 1 && grid->shape[1] == 1));
+            CHECK(c != 1 || n < N || grid->n_cells > 20);
+            CHECK(c != 1 || n != 30 || grid->n_cells > 1); /* no quicker than all pairs */
+            CHECK(c != 2 || grid->n_cells <= n);
+            search_unit_close(&unit);
+        }
+    }
+    options.cell_size = 0.5;
+    options.algorithm = HS_GRID;
+    CHECK(build(NULL, NULL, &options, &failure) == HS_OK && unit.search.grid.cell_size[0] >= 0.4);
+    search_unit_close(&unit);
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{0x1p-40}, {0.0, 1.0}}};
+    for (int c = 0; c < 3; c++) {
+        options.algorithm = cases[c].algorithm;
+        options.want = 0;
+        CHECK(build(NULL, &box, &options, &failure) == HS_ERR_MEMORY); /* of images */
+        search_unit_close(&unit);
+    }
 }
 
 /* Points first, then queries, in cells of their own of one grid. */
@@ -174,6 +214,7 @@ test_search_build(void)
 {
     RUN(crowds_are_in_occupied_cells_only);
     RUN(cells_have_the_width_that_is_wanted);
+    RUN(the_algorithm_is_the_callers);
     RUN(queries_are_in_the_cells_of_the_points);
     RUN(what_cannot_be_built_is_told);
     RUN(any_allocation_may_be_refused);

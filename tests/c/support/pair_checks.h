@@ -30,6 +30,9 @@ points_of(const brute_scene *scene)
 /* The kernel that is checked; NULL: the best of this CPU. */
 static const char *kernel_to_check;
 
+/* And the algorithm. */
+static hs_algorithm algorithm_to_check;
+
 static inline hs_options
 options_of(const brute_scene *scene)
 {
@@ -37,6 +40,7 @@ options_of(const brute_scene *scene)
     options.cutoff = scene->cutoff;
     options.inclusive = scene->inclusive;
     options.kernel = kernel_to_check;
+    options.algorithm = algorithm_to_check;
     return options;
 }
 

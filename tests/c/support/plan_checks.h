@@ -9,7 +9,7 @@
 #include "reach_sets.h"
 
 static reach_set points, queries;
-static double    table[REACH_TYPES * REACH_TYPES];
+static double    table[12 * 12]; /* of up to 12 types */
 
 /* A division and a plan of it. */
 typedef struct planned {
@@ -19,15 +19,23 @@ typedef struct planned {
 } planned;
 
 static inline void
-make_plan(const hs_reach *reach, bool has_queries, double bound, planned *made)
+make_plan_as(const hs_reach *reach, bool has_queries, double bound, hs_algorithm algorithm,
+             planned *made)
 {
     const hs_options options = hs_options_default();
     const hs_points  p = reach_points(&points), q = reach_points(&queries);
     hs_failure       failure = HS_NO_FAILURE;
     hs_account_init(&made->account, &options);
-    CHECK(hs_levels_divide(&made->account, &p, has_queries ? &q : NULL, reach, &made->levels,
-                           &failure) == HS_OK);
-    CHECK(hs_level_plan_make(&made->account, &made->levels, bound, &made->plan) == HS_OK);
+    CHECK(hs_levels_divide(&made->account, &options, &p, has_queries ? &q : NULL, reach,
+                           &made->levels, &failure) == HS_OK);
+    CHECK(hs_level_plan_make(&made->account, &made->levels, bound, algorithm, &made->plan) ==
+          HS_OK);
+}
+
+static inline void
+make_plan(const hs_reach *reach, bool has_queries, double bound, planned *made)
+{
+    make_plan_as(reach, has_queries, bound, HS_AUTO, made);
 }
 
 static inline void
@@ -60,7 +68,7 @@ static inline hs_dw
 limit_at(const planned *made, int64_t a, int64_t b)
 {
     const hs_levels *levels = &made->levels;
-    return hs_limit_by(levels->rule, radius_at(hs_levels_asking(levels), a),
+    return hs_limit_by(levels->rule, levels->factor, radius_at(hs_levels_asking(levels), a),
                        radius_at(&levels->points, b), made->plan.bound);
 }
 
@@ -115,7 +123,8 @@ cover(const planned *made, const hs_level_step *step, int *covered, int64_t n_po
     const double        least = fmin(least_of(asking, askers), least_of(among, step->points));
     bool                right = true, reaches = false, all_equal = true;
     if (made->levels.cutoffs == NULL) {
-        right = step->least == (least < HUGE_VAL ? least : 0.0) && !step->by_table;
+        const double factor = made->levels.factor, part = factor != 1.0 ? factor * 0x1p-110 : 1.0;
+        right = step->least == (least < HUGE_VAL ? least * part : 0.0) && !step->by_table;
     }
     right = right && asking->first[askers.first] < asking->first[askers.end];
     right = right && among->first[step->points.first] < among->first[step->points.end];

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* poll_checks.h: polls that stop a search, and a call whose allocations are refused one by one. */
+/* poll_checks.h: polls that stop a search, a call whose allocations are refused one by one, and one
+ * under limits of memory. */
 #ifndef HS_POLL_CHECKS_H
 #define HS_POLL_CHECKS_H
 
 #include "../../../csrc/core/memory/account.h"
 #include "harness.h"
+
+#include <math.h>
 
 /* The context is how many polls there may still be. */
 static inline bool
@@ -46,6 +49,25 @@ fail_each_allocation(hs_status (*run)(void *), void *context, int most)
     }
     CHECK(!"an allocation was left");
     return 0;
+}
+
+/* Calls the function, which frees what it is given and heeds *limit, under limits of memory from 0
+ * bytes on until one is enough: each call before says that memory is short, and nothing is left.
+ * Returns how many there were. */
+static inline int
+raise_memory_limit(hs_status (*run)(void *), void *context, double *limit)
+{
+    const int64_t before = hs_test_live_blocks();
+    hs_status     status = HS_ERR_MEMORY;
+    int           refused = -1;
+    for (*limit = 0.0; status == HS_ERR_MEMORY; *limit = 1.02 * *limit + 16.0) {
+        status = run(context);
+        refused++;
+        CHECK(hs_test_live_blocks() == before);
+    }
+    CHECK(status == HS_OK);
+    *limit = HUGE_VAL;
+    return refused;
 }
 
 #endif

@@ -114,7 +114,32 @@ threads_come_and_go(void)
     hs_call_dismiss(&call);
     CHECK(call.team == NULL);
     options.threads = HS_MOST_THREADS + 1;
-    CHECK(hs_call_threads(0, &options) == HS_MOST_THREADS);
+    CHECK(hs_call_threads(0.0, &options) == HS_MOST_THREADS);
+}
+
+/* A number of threads is the most that are started: little work has one. */
+static void
+threads_are_started_where_they_are_worth_it(void)
+{
+    hs_options options = hs_options_default();
+    hs_call    call;
+    options.threads = 2;
+    CHECK(hs_test_worth_threads(1000.0) == 0.0);
+    CHECK(hs_call_threads(999.0, &options) == 1 && hs_call_threads(1000.0, &options) == 2);
+    hs_call_begin(&options, &call);
+    hs_call_gather(&call, 900);
+    hs_call_gather_for(&call, 900, 900.0);
+    CHECK(call.team == NULL);
+    hs_call_gather_for(&call, 900, 9000.0);
+    CHECK(call.team != NULL);
+    hs_call_dismiss(&call);
+    call.options.want = 0; /* less is written */
+    hs_call_gather_for(&call, 900, 4000.0);
+    CHECK(call.team == NULL);
+    call.options.threads = -2; /* by points alone */
+    hs_call_gather_for(&call, 900, 1e9);
+    CHECK(call.team == NULL);
+    CHECK(hs_test_worth_threads(0.0) == 1000.0);
 }
 
 static void
@@ -141,6 +166,22 @@ a_call_that_is_kept_lets_go_of_the_callers_memory(void)
     CHECK(call.kernel == NULL);
 }
 
+static void
+a_limit_is_told_where_memory_was_short(void)
+{
+    hs_failure failure = {.limit_bytes = -1.0};
+    hs_options options = hs_options_default();
+    hs_call    call;
+    options.memory_limit = 5e6;
+    hs_call_begin(&options, &call);
+    hs_call_tell_limit(&call, HS_OK, &failure);
+    hs_call_tell_limit(&call, HS_ERR_CUTOFF, &failure);
+    CHECK(failure.limit_bytes == -1.0);
+    hs_call_tell_limit(&call, HS_ERR_MEMORY, &failure);
+    CHECK(failure.limit_bytes == 5e6);
+    hs_account_close(&call.account);
+}
+
 void
 test_call(void)
 {
@@ -148,5 +189,7 @@ test_call(void)
     RUN(what_was_done_adds_up);
     RUN(the_callers_environment_comes_back);
     RUN(threads_come_and_go);
+    RUN(threads_are_started_where_they_are_worth_it);
     RUN(a_call_that_is_kept_lets_go_of_the_callers_memory);
+    RUN(a_limit_is_told_where_memory_was_short);
 }

@@ -169,6 +169,76 @@ shifts_may_be_as_large_as_jumps_are(void)
     }
 }
 
+/* Of several pairs of a point, the one whose shift does not fit is named by its lower number:
+ * -2^31 fits, 2^31 does not. */
+static void
+the_pair_that_does_not_fit_is_named(void)
+{
+    enum { N = 5 };
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{2.0}, {0.0, 2.0}}};
+    for (int trial = 0; trial < N * 2 * 2 * 2; trial++) {
+        const int  jumper = trial % N, axis = trial / N % 2;
+        const bool backwards = trial / N / 2 % 2, is_down = trial / N / 4;
+        /* S of pairs with higher numbers is the jump, of those with lower ones its negative. */
+        const int  beyond = is_down ? 0 : jumper;
+        const bool is_told = is_down ? jumper > 0 : jumper < N - 1;
+        double     x[2 * N];
+        hs_points  points = {x, N, 2, HS_FLOAT64, 16, 8};
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        hs_pairs  *pairs = NULL;
+        hs_failure failure;
+        bool       rebuilt;
+        options.cutoff = 0.5;
+        options.threads = 1;
+        for (int i = 0; i < N; i++) {
+            x[2 * i] = 0.5 + 0.0625 * (backwards ? N - i : i);
+            x[2 * i + 1] = 0.5;
+        }
+        CHECK(hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL) ==
+              HS_OK);
+        x[2 * jumper + axis] += is_down ? -0x1p32 : 0x1p32;
+        CHECK(hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL) ==
+              HS_OK);
+        CHECK(!rebuilt);
+        options.want = HS_WANT_SHIFT;
+        CHECK(hs_verlet_find(list, &options, &pairs, &failure) ==
+              (is_told ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(is_told ? failure.row >= beyond && failure.row <= (is_down ? jumper - 1 : jumper)
+                      : hs_pairs_length(pairs) == N * (N - 1) / 2);
+        CHECK((pairs == NULL) == is_told);
+        hs_pairs_free(pairs);
+        hs_verlet_free(list);
+    }
+}
+
+/* A strict limit of 0 has no pairs; any other has those that are nearer. */
+static void
+strict_limits_have_what_is_nearer(void)
+{
+    static const double cutoffs[] = {0.0, 0.5, 1.0, 2.0};
+    double              x[6] = {0.0, 0.25, 0.25, 1.25, 2.0, 2.0};
+    const hs_points     points = {x, 6, 1, HS_FLOAT64, 8, 8};
+    for (int c = 0; c < 4; c++) {
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        hs_pairs  *pairs = NULL;
+        int64_t    n = 0;
+        bool       rebuilt;
+        options.cutoff = cutoffs[c];
+        options.inclusive = false;
+        options.want = HS_WANT_I | HS_WANT_J;
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < i; j++)
+                n += x[i] - x[j] < cutoffs[c];
+        CHECK(hs_verlet_update(list, &points, NULL, &options, 0.5, false, &rebuilt, NULL) == HS_OK);
+        CHECK(hs_verlet_find(list, &options, &pairs, NULL) == HS_OK);
+        CHECK(hs_pairs_length(pairs) == n && (n > 0) == (c > 0));
+        hs_pairs_free(pairs);
+        hs_verlet_free(list);
+    }
+}
+
 /* Box vectors along the axes but for so many times the one before: shifts over the upright box are
  * found modulo 2^64. */
 static void
@@ -283,5 +353,7 @@ test_recheck(void)
     RUN(every_type_and_dimension_gives_the_pairs_of_a_search);
     RUN(digits_that_scaling_would_lose_are_kept);
     RUN(shifts_may_be_as_large_as_jumps_are);
+    RUN(the_pair_that_does_not_fit_is_named);
+    RUN(strict_limits_have_what_is_nearer);
     RUN(box_vectors_may_be_any_sum_of_shorter_ones);
 }

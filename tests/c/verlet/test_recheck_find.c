@@ -3,6 +3,7 @@
  * not fit is told. */
 #include "../support/harness.h"
 #include "../support/list_checks.h"
+#include "../support/poll_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
 
@@ -69,6 +70,103 @@ what_does_not_fit_is_told(void)
     hs_verlet_free(list);
 }
 
+/* A pair whose S passes int32 by jumps of one of its points, where numbers descend from cell to cell,
+ * so that most pairs are found the other way round: its lower number is named, of a neighbour by
+ * brute force. */
+static void
+shifts_that_do_not_fit_are_named(void)
+{
+    enum { N = 200 };
+    const hs_box   box = {.ndim = 2, .periodic = {true, true}, .rows = {{16.0}, {0.0, 16.0}}};
+    harness_random random = {9};
+    int            n_told = 0;
+    for (int trial = 0; trial < 40; trial++) {
+        const int  jumper = 5 * trial;
+        const bool is_down = trial & 1;
+        bool       lower[N] = {false}, is_told = false, rebuilt;
+        double     x[2 * N];
+        hs_points  points = {x, N, 2, HS_FLOAT64, 16, 8};
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        hs_pairs  *pairs = NULL;
+        hs_failure failure;
+        options.cutoff = 1.0;
+        for (int i = 0; i < N; i++) {
+            x[2 * i] = 15.5 - i / 16.0;
+            x[2 * i + 1] = (double)(1 + random_bits(&random) % 14);
+        }
+        for (int i = 0; i < N; i++) {
+            const double along = x[2 * i] - x[2 * jumper], up = x[2 * i + 1] - x[2 * jumper + 1];
+            lower[i] = along * along + up * up <= 1.0 && (is_down ? i < jumper : i == jumper);
+            is_told = is_told ||
+                      (along * along + up * up <= 1.0 && (is_down ? i < jumper : i > jumper));
+        }
+        for (int step = 0; step < 2; step++) {
+            CHECK(hs_verlet_update(list, &points, &box, &options, 0.25, false, &rebuilt, NULL) ==
+                  HS_OK);
+            CHECK(rebuilt == (step == 0));
+            x[2 * jumper] += step > 0 ? 0.0 : is_down ? -0x1p35 : 0x1p35; /* 2^31 periods */
+        }
+        options.want = HS_WANT_SHIFT;
+        CHECK(hs_verlet_find(list, &options, &pairs, &failure) ==
+              (is_told ? HS_ERR_SHIFT_RANGE : HS_OK));
+        CHECK(!is_told || (failure.row >= 0 && failure.row < N && lower[failure.row]));
+        n_told += is_told;
+        hs_pairs_free(pairs);
+        hs_verlet_free(list);
+    }
+    CHECK(n_told > 20);
+}
+
+/* A list whose points have jumped, and what is wanted of it. */
+typedef struct jumped {
+    hs_verlet *list;
+    unsigned   want;
+    int64_t    n;
+} jumped;
+
+static hs_status
+find_once(void *context)
+{
+    const jumped *of = context;
+    hs_options    options = options_of(&shared.scene);
+    hs_pairs     *pairs = NULL;
+    options.threads = 1;
+    options.want = of->want;
+    const hs_status status = hs_verlet_find(of->list, &options, &pairs, NULL);
+    CHECK((status == HS_OK) == (pairs != NULL));
+    CHECK(pairs == NULL || hs_pairs_length(pairs) == of->n);
+    hs_pairs_free(pairs);
+    return status;
+}
+
+static void
+any_allocation_may_be_refused(void)
+{
+    harness_random random = {9};
+    make_scene(&random, SCENE_TRICLINIC, 3, 100, 4.0, 0, &shared);
+    shared.scene.cutoff = 1.0;
+    const hs_points points = points_of(&shared.scene);
+    hs_options      options = options_of(&shared.scene);
+    bool            rebuilt;
+    jumped          of = {.list = hs_verlet_new()};
+    CHECK(hs_verlet_update(of.list, &points, shared.scene.box, &options, 0.25, false, &rebuilt,
+                           NULL) == HS_OK);
+    for (int i = 0; i < 100; i += 3) {
+        for (int k = 0; k < 3; k++)
+            shared.x[3 * i + k] += shared.box.rows[0][k] + shared.box.rows[2][k];
+    }
+    CHECK(hs_verlet_update(of.list, &points, shared.scene.box, &options, 0.25, false, &rebuilt,
+                           NULL) == HS_OK);
+    CHECK(!rebuilt);
+    CHECK(hs_pairs_count(AMONG(&points, shared.scene.box), &options, &of.n, NULL) == HS_OK);
+    of.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+    CHECK(fail_each_allocation(find_once, &of, 100) > 8);
+    of.want = HS_WANT_BOTH;
+    CHECK(fail_each_allocation(find_once, &of, 100) > 4);
+    hs_verlet_free(of.list);
+}
+
 /* Sorted pairs are those of a search, whichever quantities are wanted, with images and without. */
 static void
 sorted_pairs_are_those_of_a_search(void)
@@ -103,5 +201,7 @@ void
 test_recheck_find(void)
 {
     RUN(what_does_not_fit_is_told);
+    RUN(shifts_that_do_not_fit_are_named);
+    RUN(any_allocation_may_be_refused);
     RUN(sorted_pairs_are_those_of_a_search);
 }

@@ -121,7 +121,8 @@ def test_pair_numbers_of_small_scenes_are_those_of_brute_force(
      "clusters-1e5", "narrow-1e4", "plane-1e5-k8", "plane-1e5-k30", "packing-131k", "slab-1e5",
      "droplet-1e5", "two-clusters-open", "two-clusters-periodic", "lognormal-1e5", "plummer-1e5",
      "equal-2000", "one-cell-2000", "outlier-1e5", "batch-30", "growth-1e4-sorted", "rows-1e4-k52",
-     "between-1e5", "between-few", "between-halves"],
+     "between-1e5", "between-few", "between-halves", "balls-equal-1e5", "balls-1to10-1e5",
+     "types-3-1e5", "graded-1e5"],
 )  # fmt: skip
 def test_pair_numbers_of_larger_scenes_are_those_of_a_tree(
     bench: SimpleNamespace, name: str
@@ -129,6 +130,33 @@ def test_pair_numbers_of_larger_scenes_are_those_of_a_tree(
     pytest.importorskip("scipy")
     scene = bench.scenes.load(name)
     assert bench.check_scenes.count_pairs(scene) == scene.n_pairs
+
+
+def test_a_reach_belongs_to_each_pair(bench: SimpleNamespace) -> None:
+    for name in bench.scenes.GROUPS["S16"]:
+        scene = bench.scenes.load(name)
+        assert scene.has_reach and (scene.radii is None) != (scene.types is None)
+        if scene.types is not None:
+            assert scene.table.max() == scene.cutoff and np.array_equal(scene.table, scene.table.T)
+            assert set(scene.types.tolist()) == set(range(len(scene.table)))
+            continue
+        assert len(scene.radii) == scene.n and scene.radii.min() > 0.0
+        both = np.sort(scene.radii)[-2:]
+        assert scene.cutoff >= (both.sum() if scene.rule == "sum" else both[1])
+    graded = bench.scenes.load("graded-1e5")
+    x = np.maximum(np.linalg.norm(graded.points, axis=1), 1e-4)
+    rho = graded.n / (8.0 * np.pi * x**2.5)
+    assert np.allclose(graded.radii, (150.0 / (4.0 * np.pi * rho)) ** (1.0 / 3.0), rtol=1e-12)
+
+
+def test_pairs_are_judged_by_their_own_reach(bench: SimpleNamespace) -> None:
+    scene = bench.scenes.Scene(
+        "s", "", np.array([[0.0], [0.3], [3.0]]), 2.1, radii=np.array([0.1, 0.2, 2.0])
+    )
+    is_pair = bench.agreement.is_pair
+    # The real sum of 0.1 and 0.2 is more than 0.3, as float64 has them.
+    assert is_pair(scene, 0, 1, None, True)[0] and not is_pair(scene, 1, 2, None, True)[0]
+    assert is_pair(scene, 1, 2, None, True)[1] == pytest.approx((2.7**2 / 2.2**2 - 1) * 1.1 / 2.1)
 
 
 @pytest.mark.parametrize("name", ["batch-1e4-open", "batch-1e4-periodic"])

@@ -46,10 +46,14 @@ RAISED = {
     "HS_ERR_FAR": (ValueError, "queries[3, 1] = 0.5 lies too far from the points and the box"),
     "HS_ERR_CAPACITY": (hs.CapacityError, "out is too small: there are 7 pairs"),
     "HS_ERR_EDGES": (ValueError, "edges must be finite, not negative and ascending, got edges[3]"),
-    "HS_ERR_TYPES": (ValueError, "types must be from 0 on, got types[3] = 0.5"),
+    "HS_ERR_TYPES": (ValueError, "types must be from 0 on and below the number of types"),
     "HS_ERR_WEIGHTS": (ValueError, "weights must be finite, got weights[3] = 0.5"),
     "HS_ERR_RADII": (ValueError, "radii must be finite, not negative, and of ordinary size, got"),
+    "HS_ERR_SUPPORTS": (ValueError, "supports must be finite, symmetric and positive definite"),
+    "HS_ERR_SUPPORT_REACH": (ValueError, "supports must reach at most 2**1022"),
+    "HS_ERR_EXTENT": (ValueError, "extent must be finite and not negative, got 0.5"),
     "HS_ERR_ARGUMENT": (ValueError, "an argument is out of its range, or an array is missing"),
+    "HS_ERR_KEY": (KeyError, "'a key is not there, comes twice, or has no position'"),
 }
 
 

@@ -107,7 +107,7 @@ def test_the_choice_to_store_occupied_cells_only_is_named(rng):
     cloud = rng.random((4000, 3))
     crowded = np.concatenate([cloud, cloud + 1e9])
     plan = hs.explain(crowded, 0.1)
-    assert plan.algorithm == "sparse" and "only those are stored" in plan.reason
+    assert plan.algorithm == "hash" and "only those are stored" in plan.reason
     assert np.prod(np.array(plan.shape, float)) > 1e20
     assert "empty cells: only occupied ones are stored" in plan.leaves_out
     assert hs.CellList(crowded, 0.1).cell_ids is not None

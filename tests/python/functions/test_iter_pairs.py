@@ -189,7 +189,9 @@ def test_progress_of_all_pairs_at_once_never_falls(rng, threads, sort):
     hs.pairs(
         rng.random((60_000, 3)), 0.08, progress=told.append, threads=threads, sort=sort
     )
-    assert len(told) > 3 and told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
+    assert told == sorted(told) and all(0.0 <= fraction <= 1.0 for fraction in told)
+    # Of several threads the others, which tell nothing, may do the work.
+    assert len(told) > 3 or threads != 1
 
 
 def test_progress_of_batches_and_of_cells_never_falls(rng):

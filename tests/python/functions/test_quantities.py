@@ -4,6 +4,7 @@
 import itertools
 import math
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import given
 
 import halfshell as hs
 from halfshell._check.reference import exact_square, exact_vector, ulp_error
+from halfshell._convert.options import LETTERS
+from halfshell._convert.types import Letter
 from oracles import BOX_KINDS, as_set, lattice, random_scene, rotation, same_arrays
 from scene_strategies import scenes
 
@@ -32,6 +35,14 @@ def assert_last_place(points, cutoff, box, found, inclusive=True):
         unit = Fraction(math.ulp(d))
         for got, true in zip(D, exact_vector(points, i, j, S, box)):
             assert abs(Fraction(got) - true) <= unit, (i, j, S, D)
+
+
+def test_the_letters_of_types_messages_and_arrays_are_the_same(scene):
+    points, cutoff, box = scene
+    assert "".join(get_args(Letter)) == LETTERS == "".join(DTYPES)
+    assert len(hs.pairs(points, cutoff, box=box, quantities=LETTERS)) == len(LETTERS)
+    with pytest.raises(ValueError, match=f"some of the letters {' '.join(LETTERS)}, each"):
+        hs.pairs(points, cutoff, box=box, quantities=f"{LETTERS}x")
 
 
 @pytest.mark.parametrize("letter", "ijdDSP")

@@ -119,6 +119,25 @@ def test_radii_that_are_no_lengths(value, fragments):
         )  # fmt: skip
 
 
+@pytest.mark.parametrize("row", [5, 140_000, 299_999])
+def test_the_first_wrong_row_of_many(row):
+    n = 300_000  # the caller's numbers are read in stretches, with a look for signals in between
+    points, types = np.zeros((n, 1)), np.zeros(n, np.int32)
+    points[:, 0] = np.arange(n)
+    radii, table = with_radius(row, NAN, n), [[0.25]]
+
+    def count(cutoff, **how):
+        return lambda: hs.count_pairs(points, cutoff, **how)
+
+    assert_refused(count(None, radii=radii), ValueError, rf"radii\[{row}\]")
+    types[row] = 7
+    assert_refused(count(table, types=types), ValueError, rf"types\[{row}\]")
+    points[row] = NAN
+    radii[row], types[row] = 0.01, 0
+    assert_refused(count(None, radii=radii), ValueError, rf"points\[{row}")
+    assert_refused(count(table, types=types), ValueError, rf"points\[{row}")
+
+
 def test_radii_that_cannot_be_halved():
     small = np.nextafter(2.0**-1021, 0.0)
     for call in calls(radii=with_radius(7, small), rule="mean"):
@@ -250,13 +269,13 @@ def test_radii_of_two_sets():
         )  # fmt: skip
 
 
-def test_radii_go_with_no_types_and_no_batch():
-    for given in ({"types": [0] * 30}, {"batch": [0] * 30}):
-        for call in (hs.pairs, hs.count_pairs):
-            assert_refused(
-                lambda call=call, given=given: call(POINTS, 1.0, radii=RADII, **given), ValueError,
-                "radii", "together", *given,
-            )  # fmt: skip
+@pytest.mark.parametrize("batch", [{}, {"batch": [0] * 30}], ids=["", "batch"])
+def test_radii_go_with_no_types(batch):
+    for call in (hs.pairs, hs.count_pairs):
+        assert_refused(
+            lambda call=call: call(POINTS, 1.0, radii=RADII, types=[0] * 30, **batch), ValueError,
+            "radii", "together", "types",
+        )  # fmt: skip
 
 
 def test_out_is_apart_from_radii():

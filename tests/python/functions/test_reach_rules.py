@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A radius for each point: every rule, in every box, against rational arithmetic."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 import halfshell as hs
+from halfshell._convert import rules
+from halfshell._convert.types import Rule
 from reach_scenes import BOXES, RULES, SYMMETRIC, Reaching, boxed, check, spread_radii
+
+
+def test_rules_of_types_and_messages_are_the_same():
+    assert get_args(Rule) == rules.RULES
+    assert set(rules.DIRECTED) < set(rules.RULES_OF_SUPPORTS) < set(rules.RULES)
+    with pytest.raises(ValueError, match=f"rule must be one of {' '.join(rules.RULES)}, got 'add'"):
+        hs.pairs([[0.0]], None, radii=[1.0], rule="add")
 
 
 @pytest.mark.parametrize("kind", BOXES)

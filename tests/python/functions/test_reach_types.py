@@ -199,15 +199,11 @@ def test_types_of_two_sets_go_together():
 
 
 def test_types_with_other_arguments():
-    for given in ({"radii": np.ones(20)}, {"batch": np.zeros(20, int)}, {"rule": "sum"}):
+    for given in ({"radii": np.ones(20)}, {"rule": "sum"}):
         assert_refused(
             lambda given=given: hs.pairs(POINTS, TABLE, types=TYPES, **given), ValueError,
             *given, "together|needs radii",
         )  # fmt: skip
-    assert_refused(
-        lambda: hs.count_pairs(POINTS, {(0, 1): 1.0}, types=TYPES, batch=np.zeros(20, int)),
-        ValueError, "batch and types",
-    )  # fmt: skip
 
 
 def test_a_table_of_no_types_holds_for_no_points():

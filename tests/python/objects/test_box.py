@@ -356,6 +356,18 @@ def steps(points, cutoff, box):
     return (*first, *pair_list.pairs(quantities="ijS"))
 
 
+def balls(points, radius, box):
+    cells = hs.DynamicCellList(points.shape[1], radius, box=box)
+    cells.insert_many(np.arange(len(points)), points)
+    return cells.within_many(points, radius, shifts=True)
+
+
+def links(points, box):
+    """Rows of a connectivity."""
+    c = hs.Connectivity([hs.NodeList("a", points, np.full(len(points), 0.25))], box=box)
+    return c.offsets, c.indices, c.shifts
+
+
 WITH_BOX = {
     "pairs": lambda p, box: hs.pairs(p, 0.5, box=box, quantities="ijdDS"),
     "batch": lambda p, box: hs.pairs(p, 0.5, box=box, batch=np.arange(len(p)) // 20),
@@ -372,6 +384,8 @@ WITH_BOX = {
     "verify": lambda p, box: hs.verify(p, 0.5, [0], [1], [[0] * p.shape[1]], box=box),
     "explain": lambda p, box: hs.explain(p, 0.5, box=box),
     "CellList": lambda p, box: hs.CellList(p, 0.5, box=box).pairs(quantities="ijd"),
+    "DynamicCellList": lambda p, box: balls(p, 0.5, box),
+    "Connectivity": lambda p, box: links(p, box),
     "VerletList": lambda p, box: steps(p, 0.5, box),
 }
 

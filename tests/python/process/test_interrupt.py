@@ -20,6 +20,10 @@ SEARCHES = {
     "pairs of balls": "hs.pairs(points, None, radii=sizes, sort=True, memory_limit=1e13)",
     "count of balls": "hs.count_pairs(points, None, radii=4 * sizes)",
     "rows of balls": "hs.neighbors(points, None, radii=sizes, rule='max', memory_limit=1e13)",
+    "count of ellipsoids": "hs.count_pairs(points, None, supports=tensors, extent=4.0)",
+    "batch of ellipsoids": """hs.pairs(
+        points, None, supports=tensors, extent=4.0, batch=kinds_ascending, memory_limit=1e13
+    )""",
     "pairs by type": "hs.pairs(points, np.eye(9) * 0.3, types=kinds, memory_limit=1e13)",
     "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
     "nearest": "hs.nearest(points, 100, memory_limit=1e13)",
@@ -29,6 +33,21 @@ SEARCHES = {
     "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
     "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
     "wrap": "hs.Box([[1, 0, 0], [0.4, 1, 0], [0.3, 0.2, 1]]).wrap(np.concatenate([points] * 16))",
+    "connectivity": "hs.Connectivity(lists(0.08), memory_limit=1e13)",
+    "overlap": "hs.Connectivity(lists(0.02), overlap=True, memory_limit=1e13)",
+    "intersection": "hs.Connectivity(lists(0.02), intersection=True, memory_limit=1e13)",
+    "intersection by threads": """hs.Connectivity(
+        lists(0.02), intersection=True, memory_limit=1e13, threads=2
+    )""",
+    "rebuild": """c = hs.Connectivity(lists(0.001))
+    c.rebuild(lists(0.08))""",
+    "patches": """c = hs.Connectivity(lists(0.015))
+    keep = [np.ones(n, bool) for n in c.n_nodes]
+    while True:
+        c.patch(keep)""",
+    "removal": """c = hs.Connectivity(lists(0.01))
+    while True:
+        c.remove(np.zeros(len(c.pairs), bool))""",
     "count of exact ties": "hs.count_pairs(grid, 40.0, box=[60.0] * 3)",
 }
 
@@ -48,8 +67,17 @@ import halfshell as hs
 rng = np.random.default_rng(1)
 points = rng.random((400_000, 3))
 sizes, kinds = 0.08 * 2.0 ** -rng.random(len(points)), np.arange(len(points)) % 9
+tensors = np.eye(3) / sizes[:, None, None]
+kinds_ascending = np.sort(kinds)
 grid = np.stack(np.meshgrid(*[np.arange(60.0)] * 3), axis=-1).reshape(-1, 3)
 small = points[:500]
+
+def lists(h):
+    return [
+        hs.NodeList(str(k), part, np.full(len(part), h))
+        for k, part in enumerate(np.array_split(points, 3))
+    ]
+
 expected = hs.count_pairs(small, 0.2)
 hs.count_pairs(points, 0.001)
 gc.collect()
@@ -68,6 +96,7 @@ except KeyboardInterrupt:
     outcome = "interrupted"
 begun, begun_by_clock = sent or [0.0, 0.0]
 delay, by_clock = time.process_time() - begun, time.perf_counter() - begun_by_clock
+c = None
 hs.clear_cache()
 gc.collect()
 is_right = hs.count_pairs(small, 0.2) == expected

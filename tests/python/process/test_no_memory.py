@@ -49,10 +49,10 @@ def check(results):
 def test_the_interpreter_may_have_no_memory():
     results = call_all("python")
     check(results)
-    # Whatever a function returns takes memory, but for small numbers; of these Python code is
-    # left out on interpreters that crash then.
-    unaffected = [name for name, (failed, _) in results.items() if failed == 0]
-    assert unaffected in ([], NUMBERS)
+    # Whatever a function returns takes memory, but for small numbers. What Python code takes on the
+    # way may be there already, and is left out on interpreters that crash then.
+    unaffected = {name for name, (failed, _) in results.items() if failed == 0}
+    assert unaffected <= set(NUMBERS)
 
 
 @needs_c

@@ -69,11 +69,12 @@ def test_the_callers_arrays_are_filled_in_the_same_order(threads):
 
 def test_small_scenes_use_one_thread_and_large_ones_what_is_allowed(monkeypatch):
     assert hs.explain(CLOUD, 2.0).threads == 1
-    assert hs.explain(CLOUD, 2.0, threads=3).threads == 3
+    assert hs.explain(CLOUD, 2.0, threads=3).threads == 1
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     large = RNG.rand(30000, 3) * 40.0
     assert hs.explain(large, 1.0).threads == 3
     assert hs.explain(large, 1.0, threads=1).threads == 1
+    assert hs.explain(large[:12000], 1.0, threads=2).threads == 2
     monkeypatch.setenv("OMP_NUM_THREADS", "nonsense")
     assert hs.explain(large, 1.0).threads >= 1
 

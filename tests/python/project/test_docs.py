@@ -64,6 +64,7 @@ def test_readme_notebook_example_runs(capsys):
     exec(compile(ast.parse(code), "README.md", "exec"), names)
     assert len(names["i"]) == len(names["S"]) > 200_000
     assert names["i"].dtype == np.int64
+    assert min(len(names["touching"][0]), len(names["near"][0]), len(names["links"].pairs)) > 0
     assert "algorithm" in capsys.readouterr().out
 
 
@@ -97,7 +98,8 @@ def test_examples_of_streaming_run():
 
 def test_examples_of_supports_run():
     text = (ROOT / "docs/supports.md").read_text()
-    balls, bonds, types, smoothing = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    balls, bonds, types, many, smoothing, ellipsoids = blocks
     names = {}
     exec(compile(ast.parse(balls), "supports.md", "exec"), names)
     assert len(names["i"]) > 100 and (names["overlap"] >= 0.0).all()
@@ -108,10 +110,81 @@ def test_examples_of_supports_run():
     for one, other in zip(names["pairs_by_type"], names["same"]):
         assert len(one) > 100 and np.array_equal(np.sort(one), np.sort(other))
     assert set(names["named"][names["ions"][0]]) == {"ion"}
+    exec(compile(ast.parse(many), "supports.md", "exec"), names)
+    i, j = names["in_each"]
+    assert len(i) > 10_000 and (names["molecule"][i] == names["molecule"][j]).all()
     exec(compile(ast.parse(smoothing), "supports.md", "exec"), names)
     counts = names["gathered"].counts
     assert ((counts == 31) | (counts == 32)).all()
     assert len(names["mutual"][0]) < counts.sum() / 2 < len(names["either"][0])
+    exec(compile(ast.parse(ellipsoids), "supports.md", "exec"), names)
+    assert len(names["i"]) > 1000 and (names["eta"] <= 1.0).sum() > len(names["i"]) / 2
+
+
+def test_bonds_of_the_page_are_those_of_ase():
+    neighborlist = pytest.importorskip("ase.neighborlist")
+    text = (ROOT / "docs/supports.md").read_text()
+    bonds = re.findall(r"```python\n(.*?)```", text, re.DOTALL)[1]
+    names = {"hs": hs}
+    exec(compile(ast.parse(bonds), "supports.md", "exec"), names)
+    cutoffs = neighborlist.natural_cutoffs(names["ethanol"], mult=1.1)
+    i, j = neighborlist.neighbor_list("ij", names["ethanol"], cutoffs)
+    found = set(zip(*(column.tolist() for column in names["bonds"])))
+    assert found == {(a, b) for a, b in zip(i.tolist(), j.tolist()) if a < b}
+
+
+def test_the_picture_of_levels_is_right():
+    text = (ROOT / "docs/supports.md").read_text()
+    rows = re.search(r"width of cells.*?\n.*?\n(.*?)\n\n", text, re.DOTALL).group(1).splitlines()
+    largest = [8.0, 4.0, 2.0, 1.0, 0.5]
+    n = 0
+    for level, row in enumerate(rows):
+        widths = [float(x) for x in re.findall(r"[\d.]+", row[20:])]
+        others = range(level == 4, level + 1)  # 3 and 4 are one search for 0
+        assert widths == [largest[other] + largest[level] for other in others]
+        n += len(widths)
+    radii = np.array([8.0, 3.9, 1.9, 0.9, 0.4])[np.arange(500) % 5]
+    points = np.random.default_rng(0).random((500, 3)) * 30.0
+    reason = hs.explain(points, None, radii=radii, algorithm="hierarchy").reason
+    assert f"in {n} searches" in reason and reason.startswith("5 octaves")
+    for rule in ("max", "min"):
+        reason = hs.explain(points, None, radii=radii, rule=rule, algorithm="hierarchy").reason
+        assert "in 9 searches" in reason  # with itself, and with all below or above it
+
+
+def test_rules_of_the_page_are_symmetric_where_it_says_so():
+    text = (ROOT / "docs/supports.md").read_text()
+    rows = re.findall(r'^\| `"(\w+)"`.*\| (all|rows and two sets) \|$', text, re.MULTILINE)
+    assert len(rows) == 6 + 4  # of radii and of supports
+    rng = np.random.default_rng(3)
+    points, radii = rng.random((200, 2)), 0.1 * rng.random(200)
+    by_radii = {"radii": radii}
+    by_supports = {"supports": np.eye(2) / (radii + 0.01)[:, None, None], "extent": 1.0}
+    for k, (rule, lists) in enumerate(rows):
+        reach = by_radii if k < 6 else by_supports
+        rows_of = hs.neighbors(points, None, rule=rule, **reach).to_pairs(quantities="ij")
+        found = set(zip(*(column.tolist() for column in rows_of)))
+        assert (found == {(j, i) for i, j in found}) == (lists == "all")
+        if lists == "all":
+            assert hs.count_pairs(points, None, rule=rule, **reach) == len(found) / 2
+        else:
+            with pytest.raises(ValueError, match="neighbors"):
+                hs.pairs(points, None, rule=rule, **reach)
+
+
+def test_what_the_page_says_is_compared():
+    a, b = 0.1, 0.2
+    for x, touches in ((0.3, True), (0.30000000000000004, False)):
+        found = hs.count_pairs([[0.0], [x]], None, radii=[a, b])
+        assert found == touches and 0.30000000000000004 == a + b
+
+
+def test_example_of_node_lists_runs():
+    text = (ROOT / "docs/systems/spheral.md").read_text()
+    (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(example), "spheral.md", "exec"), names)
+    assert len(names["of_water"]) > 3 and names["c"].nbytes["intersection"] > 0
 
 
 def test_example_of_histograms_runs():
@@ -135,6 +208,14 @@ def test_examples_of_nearest_run():
     assert not hs.verify(points, 0.03, i, j, queries=points, box=1.0).spurious.size
     exec(compile(ast.parse(cells), "nearest.md", "exec"), names)
     assert names["j"].shape == (10, 3) and (np.diff(names["d"]) >= 0.0).all()
+
+
+def test_example_of_dynamic_lists_runs():
+    text = (ROOT / "docs/dynamic.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "dynamic.md", "exec"), names)
+    assert 0 < names["accepted"] < 1000 and len(names["disks"]) == 100
 
 
 def test_readme_commands_create_what_they_need():

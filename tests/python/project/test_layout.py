@@ -14,8 +14,10 @@ FILES = sorted(CSRC.rglob("*.[ch]"))
 # consumers of a search, which never include each other.
 ORDER = [
     {"base"}, {"memory"}, {"exact"}, {"kernels"}, {"threads"}, {"box"}, {"scene"}, {"cells"},
-    {"search"}, {"levels"}, {"collect"}, {"rows", "histogram", "nearest", "verlet"}, {"api"},
+    {"search"}, {"levels"}, {"collect"},
+    {"rows", "histogram", "nearest", "verlet", "connectivity", "dynamic"}, {"api"},
 ]  # fmt: skip
+PUBLIC = ("halfshell.h", "halfshell_dynamic.h", "halfshell_nodes.h")
 PLACE = {folder: place for place, folders in enumerate(ORDER) for folder in folders}
 
 
@@ -33,7 +35,7 @@ def quoted_includes(path):
 def may_include(path, target):
     here, there = layer(path), layer(target)
     if there == "public":
-        return here == "binding" or target.name == "halfshell.h"
+        return here == "binding" or target.name in PUBLIC
     if here == "public" or "binding" in (here, there):
         return here == there == "binding"
     return here == there or PLACE[there] < PLACE[here]
@@ -91,7 +93,7 @@ def test_files_stay_readable(path):
     lines = path.read_text().splitlines()
     assert lines[0] == "/* SPDX-License-Identifier: BSD-3-Clause */"
     # The public interface is one file, which is mostly words.
-    assert len(lines) <= (700 if path.name == "halfshell.h" else 400)
+    assert len(lines) <= (800 if path.name == "halfshell.h" else 400)
     assert max(map(len, lines)) <= 100
 
 
@@ -101,5 +103,5 @@ def test_every_source_names_its_license():
     sources = [p for f in folders for p in (ROOT / f).rglob("*") if p.suffix in kinds]
     assert sources
     for path in sources:
-        if "build" not in path.parts:
+        if not any(part.startswith("build") for part in path.parts):
             assert "SPDX-License-Identifier" in path.read_text()[:200], path

@@ -15,7 +15,7 @@ from halfshell import _include
 
 pytestmark = pytest.mark.slow
 
-HEADERS = ["halfshell.h", "halfshell_capi.h"]
+HEADERS = ["halfshell.h", "halfshell_capi.h", "halfshell_dynamic.h", "halfshell_nodes.h"]
 
 
 def checkout_files():

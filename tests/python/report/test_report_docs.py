@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 from benchmark_modules import bench, only_in_a_checkout  # noqa: F401
 from checkout import BENCHMARKS
-from halfshell import scenes
+from halfshell._report.measure.run import SCENES
 from halfshell._report.page.rows import ReportRow, read_csv, write_csv
 
 pytestmark = only_in_a_checkout
@@ -28,7 +28,7 @@ def test_the_committed_report_is_whole() -> None:
     with (DOCS / "report" / "report.csv").open(newline="", encoding="utf-8") as stream:
         facts, rows = read_csv(stream)
     assert facts["cpu"] and facts["date"]
-    assert {row.scene for row in rows} <= set(scenes.names())
+    assert {row.scene for row in rows} <= set(SCENES)
     assert not any(row.wrong for row in rows if row.method in ("exact", "verlet"))
     html = (DOCS / "report" / "report.html").read_text(encoding="utf-8")
     assert len(html.encode()) < 2_000_000

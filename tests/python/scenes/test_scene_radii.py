@@ -61,9 +61,12 @@ def test_fields_have_the_promised_types(name):
     assert sizes[0] <= 300 < sizes[1] <= 10_000 < sizes[2] <= 1_000_000
 
 
-def test_the_two_kinds_are_apart():
+def test_the_kinds_are_apart():
     assert len(NAMES) >= 6 and not set(NAMES) & set(scenes.names())
-    assert all(scenes.load(name, "small").radii is None for name in scenes.names())
+    assert all(not scenes.load(name, "small").reach for name in scenes.names())
+    of_supports = scenes.names(supports=True)
+    assert of_supports and not set(of_supports) & {*NAMES, *scenes.names()}
+    assert scenes.names(radii=True, supports=True) == (*NAMES, *of_supports)
 
 
 def test_rounded_sums_are_wrong_on_half_of_the_pairs():

@@ -60,7 +60,7 @@ def test_the_bits_are_those_that_are_written_down(name, size):
 
 
 def test_every_scene_is_written_down():
-    assert tuple(KEPT) == NAMES + scenes.names(radii=True)
+    assert tuple(KEPT) == NAMES + scenes.names(radii=True, supports=True, updates=True)
 
 
 def test_the_page_has_the_table_of_the_docstrings():

@@ -107,6 +107,58 @@ def fields(value, names):
     return [getattr(value, name) for name in names.split()]
 
 
+def node_lists(first=0):
+    """Two lists with ghosts, of which the first node is that one."""
+    parts = np.array_split(np.arange(first, N), 2)
+    return [
+        hs.NodeList(name, POINTS[part], 0.4 + 0.3 * RADII[part], n_ghost=ghosts)
+        for name, part, ghosts in zip("ab", parts, (0, 7), strict=True)
+    ]
+
+
+LISTS, FEWER = node_lists(), node_lists(5)
+WITH_ALL = {"overlap": True, "intersection": True}
+
+
+def links(connectivity):
+    """All arrays of it."""
+    names = ["offsets", "indices"]
+    if connectivity._links.overlap is not None:
+        names += ["overlap_offsets", "overlap_indices"]
+        names += ["intersection_offsets", "intersection_indices"]
+    columns = fields(connectivity.pairs, "i_node i_list j_node j_list")
+    return fields(connectivity, " ".join(names)) + columns
+
+
+def connected(change=None, **options):
+    """A connectivity after a change: where this fails, nothing may have changed."""
+    c = hs.Connectivity(LISTS, **options)
+    before = links(c)
+    if change is not None:
+        try:
+            change(c)
+        except MemoryError:
+            for one, other in zip(before, links(c), strict=True):
+                assert np.array_equal(one, other)
+            raise
+    return links(c)
+
+
+def culled():
+    return [np.arange(one.n_nodes) % 5 != 1 for one in LISTS]
+
+
+def turned():
+    """New numbers in another order, ghosts last."""
+    found = []
+    for one, mask in zip(LISTS, culled(), strict=True):
+        numbers = np.cumsum(mask) - 1
+        m = one.n_nodes - one.n_ghost
+        numbers[:m] = mask[:m].sum() - 1 - numbers[:m]
+        found.append(numbers)
+    return found
+
+
 BAD = POINTS.copy()
 BAD[3, 1] = np.nan
 FLAT_BOX = np.ones((3, 3))
@@ -182,6 +234,19 @@ CALLS = {
     "cells.cell_of": lambda: SPARSE.cell_of(FAR[:9]),
     "VerletList": verlet,
     "VerletList, threads": lambda: verlet(threads=2),
+    "Connectivity": lambda: connected(),
+    "Connectivity, all": lambda: connected(**WITH_ALL),
+    "Connectivity, threads": lambda: connected(**WITH_ALL, threads=2),
+    "Connectivity, box": lambda: connected(box=BOX, ghosts=True),
+    "Connectivity, Z curve": lambda: connected(order="morton", exclude=[(0, 0, 1, 0)]),
+    "rebuild": lambda: connected(lambda c: c.rebuild(FEWER), **WITH_ALL),
+    "patch": lambda: connected(lambda c: c.patch(culled())),
+    "patch, all": lambda: connected(lambda c: c.patch(c.used()), **WITH_ALL),
+    "patch, turned": lambda: connected(lambda c: c.patch(culled(), turned()), ghosts=True),
+    "remove": lambda: connected(lambda c: c.remove(np.arange(len(c.pairs)) % 3 == 0), **WITH_ALL),
+    "remove, function": lambda: connected(lambda c: c.remove(lambda i, a, j, b: i == 3)),
+    "between_planes": lambda: LISTS[0].between_planes(
+        ([0.0] * 3, [1.0, 0.0, 0.0]), ([5.0, 0.0, 0.0], [1.0, 0.0, 0.0])),
     "Box": lambda: fields(hs.Box(BOX), "perpendicular_heights volume vectors"),
     "Box, angles": lambda: hs.Box.from_lengths_angles((3, 4, 5), (80, 90, 100)).vectors,
     "Box.wrap": lambda: hs.Box(BOX).wrap(POINTS),
@@ -206,9 +271,12 @@ CALLS = {
 
 
 # With these, CPython or NumPy crash or say that arguments are wrong, where CPython has no memory:
-# NumPy's errstate and np.unique. Our own functions are refused memory
-# all the same.
-NOT_NUMPY = {"rdf", "verify"}
+# NumPy's errstate, np.unique, and arrays that are indexed by arrays. Our own functions are refused
+# memory all the same.
+NOT_NUMPY = {
+    "rdf", "verify", "Connectivity, Z curve", "patch", "patch, all", "remove", "remove, function",
+    "between_planes",
+}  # fmt: skip
 
 
 def plain(value):

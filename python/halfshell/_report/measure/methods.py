@@ -39,7 +39,8 @@ def options_of(method: str, scene: Any) -> dict[str, Any]:
             points = points.astype(np.float32)
         if not np.isfinite(points).all():
             raise ValueError("coordinates beyond the range of float32")
-    return {
+    reach: dict[str, Any] = scene.reach
+    return reach | {
         "points": points,
         "cutoff": scene.cutoff,
         "box": scene.box,

@@ -29,9 +29,13 @@ from halfshell._report.physics.forces import (
 from halfshell._report.truth.accuracy import Sample, pair_errors, quantity_errors, sample_of
 from halfshell._report.truth.answer import Answer
 from halfshell._report.truth.pairs import Truth, true_pairs
+from halfshell._report.truth.reach import reach_of
 from halfshell._terminal import printable
 
-__all__ = ["PEERS", "Plan", "Progress", "plan_of", "run"]
+__all__ = ["PEERS", "SCENES", "Plan", "Progress", "plan_of", "run"]
+
+#: Scenes by name, those with a radius or a support for each point after those with one cutoff.
+SCENES = (*catalogue.names(), *catalogue.names(radii=True, supports=True))
 
 #: Other libraries by name.
 PEERS = tuple(LIBRARIES)
@@ -86,7 +90,7 @@ def plan_of(
     if size not in catalogue.SIZES:
         raise ValueError(f"size must be one of {', '.join(catalogue.SIZES)}, got {size!r}")
     return Plan(
-        _named("scene", scenes, catalogue.names()),
+        _named("scene", scenes, SCENES),
         _named("method", chosen, methods.METHODS),
         _named("peer", peers, PEERS),
         size,
@@ -132,12 +136,14 @@ class _Stage:
         self.plan = plan
         self.effort = effort
         self.scene: Any = catalogue.load(name, plan.size)
-        self.rows_of_box = _rows_of(self.scene)
+        self.reach = reach_of(self.scene)
+        self.cutoff = self.scene.cutoff if self.reach is None else self.reach.largest
+        self.rows_of_box = _rows_of(self.scene, self.cutoff)
         repeating = self.scene.periodic if self.scene.box is not None else ()
         box = "open" if not any(repeating) else "periodic" if all(repeating) else "partly periodic"
         self.blank = ReportRow(
             self.scene.name, self.scene.title, self.scene.n_points, self.scene.ndim,
-            self.scene.cutoff, box, "", "",
+            self.cutoff, box, "", "",
         )  # fmt: skip
         self._forces: dict[bool, Forces] = {}
         self._no_forces: str | None = None
@@ -147,15 +153,19 @@ class _Stage:
         periodic = self.scene.periodic if self.scene.box is not None else None
         try:
             self.truth: Truth = true_pairs(
-                self.scene.points, self.scene.cutoff, self.scene.box, periodic
+                self.scene.points, self.scene.cutoff, self.scene.box, periodic, self.reach
             )
         except (ValueError, MemoryError) as error:
             yield replace(self.blank, status="no truth", note=str(error))
             return
         self.sample: Sample = sample_of(self.truth)
         motion = self.scene.motion
-        self.sigma = sigma_of(self.scene.cutoff, motion.sigma if motion is not None else None)
-        self._no_forces = why_no_forces(self.truth, self.sigma, self.effort.most_pairs)
+        self.sigma = sigma_of(self.cutoff, motion.sigma if motion is not None else None)
+        self._no_forces = (
+            why_no_forces(self.truth, self.sigma, self.effort.most_pairs)
+            if self.reach is None
+            else "no one length to scale them by"
+        )
         yield from self._ours()
         for other in others:
             yield self._peer(other)
@@ -196,7 +206,8 @@ class _Stage:
         library = other.library
         reply = other.ask({
             "points": np.asarray(self.scene.points, dtype=np.float64),
-            "cutoff": self.scene.cutoff,
+            "cutoff": self.cutoff,
+            "reach": self.scene.reach,
             "rows": self.rows_of_box,
             "periodic": tuple(self.scene.periodic) if self.scene.box is not None else (),
             "patience": self.effort.peers,
@@ -212,7 +223,7 @@ class _Stage:
             **reply["answer"], inclusive=library.inclusive, full=library.full,
             own_images_twice=library.own_images_twice,
         )  # fmt: skip
-        note = _remark(library, answer, reply["folded"])
+        note = _remark(library, answer, reply["folded"], self.scene)
         return _timed(self._judged(replace(row, note=note), answer), reply["timings"])
 
     def _judged(self, row: ReportRow, answer: Answer) -> ReportRow:
@@ -244,7 +255,7 @@ class _Plain:
         self.points, self.rows, self.periodic = scene.points, rows, scene.periodic
 
 
-def _rows_of(scene: Any) -> Any:
+def _rows_of(scene: Any, cutoff: float) -> Any:
     """The box as rows; for other libraries, rows of open axes that are zero reach round it all."""
     if scene.box is None:
         return None
@@ -255,14 +266,19 @@ def _rows_of(scene: Any) -> Any:
         present = rows[rows.any(axis=1)]
         across = np.linalg.qr(np.concatenate([present, np.eye(len(rows))]).T)[0].T[len(present) :]
         across = across[np.argsort(np.abs(across).argmax(axis=1), kind="stable")]
-        extents = np.ptp(scene.points @ across.T, axis=0) + 3.0 * scene.cutoff
+        extents = np.ptp(scene.points @ across.T, axis=0) + 3.0 * cutoff
         rows[lacking] = np.abs(extents[:, None]) * across * np.sign(across.sum(axis=1))[:, None]
     return rows
 
 
-def _remark(library: Library, answer: Answer, folded: bool) -> str:
+def _remark(library: Library, answer: Answer, folded: bool, scene: Any) -> str:
     """Say what a reader should know about a comparison."""
     told = [library.remark] if library.remark else []
+    for given, remark in (
+        (scene.radii, library.remark_on_radii), (scene.supports, library.remark_on_supports)
+    ):  # fmt: skip
+        if given is not None and remark:
+            told.append(remark)
     if folded:
         told.append("points were folded into the box in float64 beforehand, as it wants")
     if answer.D is None:

@@ -78,7 +78,8 @@ def _handle(library: Any, request: dict[str, Any]) -> dict[str, Any]:
     """Carry out one request: the answer, and how long it takes."""
     from halfshell._peers import Question, wrapped
 
-    asked = Question(*(request[name] for name in ("points", "cutoff", "rows", "periodic")))
+    asked = Question(request["points"], request["cutoff"], request["rows"], request["periodic"])
+    asked = replace(asked, **request.get("reach", {}))
     reason = library.refuses(asked)
     if reason is not None:
         return {"status": "not offered", "note": reason}

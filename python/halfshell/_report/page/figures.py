@@ -34,6 +34,7 @@ LOOKS: dict[str, tuple[str, str]] = {
     "freud": ("P", "0.35"),
     "pymatgen": ("X", "0.35"),
     "ase": ("D", "0.35"),
+    "NumPy": ("d", "0.35"),
     "float32": ("s", "#cc79a7"),
     "single": ("s", "#e69f00"),
     "double": ("s", "#56b4e9"),

@@ -15,6 +15,7 @@ from halfshell._report.page import figures
 from halfshell._report.page.rows import ReportRow
 from halfshell._report.page.table import SUMMARY, method_label, summary_cells
 from halfshell._report.page.words import duration, findings, in_short, number, scene_words
+from halfshell.scenes import names
 
 __all__ = ["page"]
 
@@ -36,7 +37,10 @@ _HOW = (
     "explicit images, SciPy's k-d tree with a proven margin, and integer arithmetic inside the "
     "margin, for the numbers that the floats are. A method is judged by its own rule for a pair "
     "at exactly the cutoff (≤ or &lt;), and by what it tells: where it gives no shifts, by i "
-    "and j. What it does not offer is not held against it. Times are of one call for i and j on "
+    "and j. What it does not offer is not held against it. Balls are pairs where the distance is "
+    "at most the real sum of two radii; precision 'double' and other libraries compare with the "
+    "rounded one. Where points have supports, a pair is judged by the length of H D, which they "
+    "compute in float64. Times are of one call for i and j on "
     "one thread, other libraries each in a process of their own. Distances are compared with the "
     "true ones rounded once, in units in the last place (ulp). Energy and forces are "
     "Lennard-Jones sums over the list with sigma = cutoff / 2.5 unless the scene has its own, "
@@ -100,7 +104,10 @@ def _scene(rows: Sequence[ReportRow]) -> list[str]:
     size = f"{first.points:,} points in {first.dimensions}-D, {first.box}"
     pairs = next((row.pairs_true for row in rows if row.pairs_true is not None), None)
     ties = next((row.ties for row in rows if row.ties is not None), 0)
-    told = f"{size}; {pairs:,} pairs, {ties:,} at exactly the cutoff" if pairs is not None else size
+    at = "touching exactly" if first.scene in names(radii=True) else (
+        "exactly on a surface" if first.scene in names(supports=True) else "at exactly the cutoff"
+    )
+    told = f"{size}; {pairs:,} pairs, {ties:,} {at}" if pairs is not None else size
     parts = [
         f'<h3 id="{escape(first.scene)}">{escape(first.scene)}: {escape(first.title)}</h3>',
         f'<p class="facts">{escape(told)}</p>',

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Objects", "as_integers", "common_unit", "nearest_float", "nearest_root"]
+__all__ = ["Objects", "as_integers", "common_unit", "nearest_float", "nearest_root", "signs"]
 
 Objects = NDArray[np.object_]  # of Python integers
 
@@ -86,3 +86,14 @@ def nearest_root(square: int, unit: int) -> float:
     scaled = square << 2 * extra
     root = math.isqrt(scaled)
     return nearest_float(2 * root + (root * root != scaled), unit - extra - 1)
+
+
+def signs(values: Objects) -> NDArray[np.int64]:
+    """Return -1, 0 or 1 for each.
+
+    Examples
+    --------
+    >>> signs(np.array([10**40, 0, -3], dtype=object)).tolist()
+    [1, 0, -1]
+    """
+    return (values > 0).astype(np.int64) - (values < 0).astype(np.int64)

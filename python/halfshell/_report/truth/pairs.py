@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._report.truth.integers import Objects
+from halfshell._report.truth.integers import Objects, signs
+from halfshell._report.truth.reach import Reach
 from halfshell._report.truth.replicas import (
     Copies,
     Scene,
@@ -82,17 +83,25 @@ class Truth:
         return self.pairs if inclusive else self.pairs.take(~self.tie)
 
 
-def true_pairs(points: Any, cutoff: float, box: Any = None, periodic: Any = None) -> Truth:
+def true_pairs(
+    points: Any,
+    cutoff: float | None,
+    box: Any = None,
+    periodic: Any = None,
+    reach: Reach | None = None,
+) -> Truth:
     """Find every pair within the cutoff, decided by the numbers as given.
 
     Parameters
     ----------
     points : array_like of float32 or float64, shape (n, d)
-    cutoff : float
-        Not negative; same unit.
+    cutoff : float or None
+        Not negative; same unit. Not looked at where there is a reach.
     box : array_like, shape (d,) or (d, d), optional
     periodic : sequence of bool, shape (d,), optional
         Default: all axes with a box.
+    reach : Balls or Ellipsoids, optional
+        Of each pair, in place of the cutoff.
 
     Returns
     -------
@@ -112,19 +121,25 @@ def true_pairs(points: Any, cutoff: float, box: Any = None, periodic: Any = None
     >>> truth.tie.tolist(), len(truth.by_rule(inclusive=False))
     ([True], 0)
     """
-    scene = scene_of(points, cutoff, box, periodic)
+    largest = reach.largest if reach is not None else 0.0 if cutoff is None else cutoff
+    scene = scene_of(points, largest, box, periodic, None if reach is None else reach.lengths)
     space = fold(scene)
     copies = copies_near(space)
     margin = space.margin(copies.reach)
+    scale = space.cutoff / largest if largest > 0.0 else 1.0  # a power of two
     found = [Pairs(*(np.empty(0, np.int64),) * 2, np.empty((0, scene.points.shape[1]), np.int32))]
     ties = [np.empty(0, dtype=bool)]
     n_open = 0
-    for i, copy in _candidates(space, copies, margin):
+    if reach is None:
+        candidates = _candidates(space, copies, margin)
+    else:
+        candidates = _of_parts(space, copies, margin, scale, reach)
+    for i, copy in candidates:
         for start in range(0, len(i), _CHUNK):
             part = slice(start, start + _CHUNK)
-            sure, unsure = _settled(space, copies, i[part], copy[part], margin)
+            sure, unsure = _settled(space, copies, i[part], copy[part], margin, scale, reach)
             sure, unsure = (_in_given_shifts(scene, space, some) for some in (sure, unsure))
-            excess = _excess(scene, unsure)
+            excess = _excess(scene, unsure, reach)
             within = excess <= 0
             found += [_half(sure), _half(unsure.take(within))]
             ties += [np.zeros(len(sure), dtype=bool), excess[within] == 0]
@@ -152,8 +167,50 @@ def _candidates(space: Space, copies: Copies, margin: float) -> Iterator[tuple[I
         yield table["i"].astype(np.int64), table["j"].astype(np.int64) + n
 
 
+def _of_parts(
+    space: Space, copies: Copies, margin: float, scale: float, reach: Reach
+) -> Iterator[tuple[Ints, Ints]]:
+    """As `_candidates`, where pairs have a reach each: of two parts at a time."""
+    from scipy.spatial import cKDTree
+
+    n = len(space.near)
+    part_of_copy: dict[int, Any] = {}
+
+    def tree_of_copies(part: Ints) -> tuple[Any, Ints]:
+        if id(part) not in part_of_copy:
+            chosen = np.flatnonzero(np.isin(copies.point, part))
+            part_of_copy[id(part)] = (
+                part, chosen, cKDTree(copies.place[chosen], balanced_tree=False)
+            )  # fmt: skip
+        _, chosen, tree = part_of_copy[id(part)]
+        return tree, chosen
+
+    for one, other, largest in reach.searches():
+        radius = (largest * scale + margin) * (1.0 + 1e-9)
+        home = cKDTree(space.near[one], balanced_tree=False)
+        if one is other:
+            pairs = home.query_pairs(radius, output_type="ndarray")
+            yield one[pairs[:, 0]], one[pairs[:, 1]]
+        else:
+            second = cKDTree(space.near[other], balanced_tree=False)
+            table = home.sparse_distance_matrix(second, radius, output_type="ndarray")
+            yield one[table["i"]], other[table["j"]]
+        for asking, among in ((one, other),) if one is other else ((one, other), (other, one)):
+            around, chosen = tree_of_copies(among)
+            if len(chosen):
+                tree = home if asking is one else second
+                table = tree.sparse_distance_matrix(around, radius, output_type="ndarray")
+                yield asking[table["i"]], chosen[table["j"]] + n
+
+
 def _settled(
-    space: Space, copies: Copies, i: Ints, copy: Ints, margin: float
+    space: Space,
+    copies: Copies,
+    i: Ints,
+    copy: Ints,
+    margin: float,
+    scale: float,
+    reach: Reach | None,
 ) -> tuple[Pairs, Pairs]:
     """Split candidates into sure pairs and open cases, with shifts over the short basis."""
     n, k = len(space.near), len(space.basis)
@@ -163,13 +220,16 @@ def _settled(
     else:
         place, j, shift = space.near[copy], copy, np.zeros((len(copy), k), dtype=np.int64)
     difference = place - space.near[i]
-    length = np.sqrt(np.einsum("ij,ij->i", difference, difference))
     shift = shift + space.turns[i] - space.turns[j]
     candidates = Pairs(i, j, shift)
     # What was moved inwards is further apart than it seems: never surely a pair.
     moved = space.far[i] | space.far[j]
-    sure = (length < space.cutoff - margin) & ~moved
-    return candidates.take(sure), candidates.take(~sure & ~(length > space.cutoff + margin))
+    if reach is not None:
+        sure, beyond = reach.settle(i, j, difference, moved, margin, scale)
+    else:
+        length = np.sqrt(np.einsum("ij,ij->i", difference, difference))
+        sure, beyond = (length < space.cutoff - margin) & ~moved, length > space.cutoff + margin
+    return candidates.take(sure), candidates.take(~sure & ~beyond)
 
 
 def _in_given_shifts(scene: Scene, space: Space, pairs: Pairs) -> Pairs:
@@ -196,14 +256,17 @@ def exact_vectors(scene: Scene, pairs: Pairs) -> Objects:
     return vectors
 
 
-def _excess(scene: Scene, pairs: Pairs) -> NDArray[np.int64]:
-    """Return the sign of ``|D| - cutoff``: -1, 0 or 1, exactly."""
-    signs = [np.empty(0, dtype=np.int64)]
+def _excess(scene: Scene, pairs: Pairs, reach: Reach | None) -> NDArray[np.int64]:
+    """Return the sign of ``|D|`` less the cutoff, or the reach of the pair: -1, 0 or 1, exactly."""
+    found = [np.empty(0, dtype=np.int64)]
     for start in range(0, len(pairs), _EXACT_CHUNK):
-        vectors = exact_vectors(scene, pairs.take(slice(start, start + _EXACT_CHUNK)))
-        above = (vectors * vectors).sum(axis=1) - scene.cutoff**2
-        signs.append((above > 0).astype(np.int64) - (above < 0).astype(np.int64))
-    return np.concatenate(signs)
+        some = pairs.take(slice(start, start + _EXACT_CHUNK))
+        vectors = exact_vectors(scene, some)
+        if reach is None:
+            found.append(signs((vectors * vectors).sum(axis=1) - scene.cutoff**2))
+        else:
+            found.append(reach.excess(some.i, some.j, vectors, scene.unit))
+    return np.concatenate(found)
 
 
 def _half(pairs: Pairs) -> Pairs:

@@ -59,8 +59,13 @@ class Scene:
     unit: int
 
 
-def scene_of(points: Any, cutoff: float, box: Any, periodic: Any) -> Scene:
-    """Read a scene: `points` (n, d), `box` None, (d,) or (d, d), `periodic` None or flags."""
+def scene_of(
+    points: Any, cutoff: float, box: Any, periodic: Any, lengths: Floats | None = None
+) -> Scene:
+    """Read a scene: `points` (n, d), `box` None, (d,) or (d, d), `periodic` None or flags.
+
+    lengths: further numbers that are whole in the unit of the scene.
+    """
     given = np.asarray(points, dtype=np.float64)  # float32 fits
     ndim = given.shape[1]
     axes: list[int] = []
@@ -71,7 +76,8 @@ def scene_of(points: Any, cutoff: float, box: Any, periodic: Any) -> Scene:
         flags = np.broadcast_to(True if periodic is None else np.asarray(periodic, bool), ndim)
         axes = np.flatnonzero(flags).tolist()
         vectors = table[axes]
-    unit = common_unit(given, vectors, np.array([cutoff]))
+    more = np.empty(0) if lengths is None else lengths
+    unit = common_unit(given, vectors, np.array([cutoff]), more)
     return Scene(
         as_integers(given, unit), given, int(as_integers([cutoff], unit)[0]),
         as_integers(vectors, unit).tolist(), axes, unit,

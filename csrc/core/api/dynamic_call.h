@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* dynamic_call.h: what each public function of a hs_dynamic does first and last. */
+#ifndef HS_DYNAMIC_CALL_H
+#define HS_DYNAMIC_CALL_H
+
+#include "../base/fpenv.h"
+#include "../base/outcome.h"
+#include "../dynamic/dynamic.h"
+
+typedef struct hs_dynamic_call {
+    hs_fpenv env;
+    bool     writes;
+} hs_dynamic_call;
+
+/* Waits until the list may be used, and sets the rounding mode. */
+HS_ALWAYS_INLINE hs_dynamic_call
+hs_dynamic_enter(const hs_dynamic *list, bool writes)
+{
+    hs_dynamic_call call = {.writes = writes};
+    hs_dynamic     *self = (hs_dynamic *)list; /* its gate changes, the list does not */
+    if (!list->is_held) {
+        if (writes) {
+            hs_gate_write(&self->gate);
+        } else {
+            hs_gate_read(&self->gate);
+        }
+        call.env = hs_fpenv_enter();
+    }
+    return call;
+}
+
+HS_ALWAYS_INLINE void
+hs_dynamic_leave(const hs_dynamic *list, hs_dynamic_call call)
+{
+    hs_dynamic *self = (hs_dynamic *)list;
+    if (!list->is_held) {
+        hs_fpenv_leave(call.env);
+        if (call.writes) {
+            hs_gate_write_end(&self->gate);
+        } else {
+            hs_gate_read_end(&self->gate);
+        }
+    }
+}
+
+/* Where a failure goes. */
+HS_ALWAYS_INLINE hs_failure *
+hs_failure_or(hs_failure *failure, hs_failure *ignored)
+{
+    failure = failure != NULL ? failure : ignored;
+    *failure = HS_NO_FAILURE;
+    return failure;
+}
+
+/* The caller's numbers, each read once. */
+HS_ALWAYS_INLINE void
+hs_read_position(const hs_dynamic *list, const double *position, double *own)
+{
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        own[k] = ((const volatile double *)position)[k];
+    }
+}
+
+#endif

@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* ball_scan.h: one cell of a ball: whether it is in reach, which image of it is meant, and its
+ * entries. For ball_walk.c, which knows the dimension where that is 2 or 3. */
+#ifndef HS_BALL_SCAN_H
+#define HS_BALL_SCAN_H
+
+#include "ball.h"
+
+#include <float.h>
+
+/* What is known of one index along one axis. */
+typedef struct part {
+    double   gap;    /* square of the distance to it; infinity: out of reach */
+    uint64_t number; /* dense: what it adds to the number of a cell; sparse: to its hash */
+    int64_t  index;  /* within the period */
+    int64_t  image;
+} part;
+
+typedef struct ball_walk {
+    hs_ball             *ball;
+    const hs_ball_visit *visit;
+    double               limit;   /* cells with larger gaps are beyond the radius */
+    bool                 is_near; /* no distances: each entry once */
+    bool                 meets_images;
+    hs_ball_image        turned; /* the last image but home, if there is one */
+    bool                 has_turned;
+} ball_walk;
+
+HS_ALWAYS_INLINE part
+part_of(const ball_walk *walk, int k, int64_t u)
+{
+    const hs_dynamic *list = walk->ball->list;
+    const hs_axis    *axis = &list->axes.axis[k];
+    part              p = {.image = hs_axis_image(axis, u)};
+    p.index = u - p.image * axis->n;
+    if (list->lattice.aligned && walk->limit < DBL_MAX) {
+        p.gap = hs_axis_gap(axis, walk->ball->centre.t[k], u, walk->ball->span[k].centre);
+    }
+    if (!list->cells.dense) {
+        p.number = hs_cell_part(k, p.index);
+    } else { /* the span of the ball has been cut to the table's */
+        p.number = (uint64_t)((p.index - list->cells.lowest[k]) * list->cells.stride[k]);
+    }
+    return p;
+}
+
+HS_ALWAYS_INLINE bool
+tell(const ball_walk *walk, const hs_ball_image *image, uint32_t place)
+{
+    const hs_dynamic    *list = walk->ball->list;
+    const hs_entry_tail *tail = hs_entry_tail_at(&list->entries, place);
+    const double        *given = hs_entry_given(&list->entries, place);
+    int64_t              shift[HS_MAX_DIM];
+    if (walk->visit->with_shift) {
+        hs_ball_shift(walk->ball, image, place, shift);
+    }
+    return walk->visit->fn((hs_key){tail->id, tail->tag}, isnan(given[0]) ? NULL : given,
+                           walk->visit->with_shift ? shift : NULL, walk->visit->user) != 0;
+}
+
+/* One entry in one image; whether to stop. Loops over axes are of the do-while form here, as there
+ * is always one: compilers that do not know ndim then need no test before the first. */
+HS_ALWAYS_INLINE bool
+scan_entry(const ball_walk *walk, const hs_ball_image *image, uint32_t place, const int ndim)
+{
+    const hs_ball *ball = walk->ball;
+    const double  *x = hs_entry_at(&ball->list->entries, place);
+    double         square = 0.0;
+    int            k = 0;
+    do {
+        const double difference = x[k] - image->centre[k];
+        square += difference * difference;
+    } while (++k < ndim);
+    if (square > image->out) {
+        return false;
+    }
+    if (place == ball->skip && hs_ball_skips(ball, image)) {
+        return false;
+    }
+    if (!(square < image->in) && !hs_ball_settle(ball, image, place)) {
+        return false;
+    }
+    return walk->visit->fn == NULL || tell(walk, image, place);
+}
+
+/* Entries of one cell in one image; whether to stop. */
+HS_ALWAYS_INLINE bool
+scan_cell(const ball_walk *walk, const hs_ball_image *image, hs_cell cell, const int ndim)
+{
+    for (uint32_t place = cell.start; place < cell.start + cell.count; place++) {
+        if (walk->is_near ? tell(walk, image, place) : scan_entry(walk, image, place, ndim)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The image of these parts. */
+static inline const hs_ball_image *
+image_of(ball_walk *walk, const int64_t *along)
+{
+    const hs_dynamic *list = walk->ball->list;
+    int64_t           image[HS_MAX_DIM];
+    bool              same = walk->has_turned;
+    for (int k = 0; k < list->lattice.ndim; k++) {
+        const int r = list->axes.axis[k].row;
+        if (r >= 0) {
+            image[r] = along[k];
+            same = same && walk->turned.image[r] == along[k];
+        }
+    }
+    if (!same) {
+        hs_ball_turn(walk->ball, image, &walk->turned);
+        walk->has_turned = true;
+    }
+    return &walk->turned;
+}
+
+/* A cell that is in reach, if there is one; whether to stop. number: the sum of its parts. */
+HS_ALWAYS_INLINE bool
+scan_number(ball_walk *walk, uint64_t number, const int64_t *index, const int64_t *along,
+            const int ndim)
+{
+    const hs_dynamic    *list = walk->ball->list;
+    const hs_ball_image *image = &walk->ball->home;
+    if (!list->cells.dense) {
+        number = hs_cell_table_probe(&list->cells, index, hs_cell_mark(number));
+        if (number == HS_NO_CELL) {
+            return false;
+        }
+    }
+    const hs_cell cell = list->cells.cell[number];
+    if (HS_UNLIKELY(list->counters != NULL)) {
+        list->counters->cells++;
+        list->counters->lookups += !list->cells.dense;
+        list->counters->candidates += walk->is_near ? 0 : cell.count;
+    }
+    if (cell.count == 0) {
+        return false;
+    }
+    if (walk->meets_images && !walk->is_near) {
+        uint64_t turns = 0;
+        int      k = 0;
+        do
+            turns |= (uint64_t)along[k];
+        while (++k < ndim);
+        image = turns != 0 ? image_of(walk, along) : image;
+    }
+    return scan_cell(walk, image, cell, ndim);
+}
+
+#endif

@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * halfshell_nodes.h: nodes of several lists, as of the materials of a simulation: which of them are
+ * neighbours, list by list, and each pair of them once. The words and rules of halfshell.h hold;
+ * docs/systems/spheral.md explains the rest.
+ *
+ * A node is known by its list and its number there. Nodes of all lists are points of one search:
+ * those of list 0, of list 1, and so on. The last nodes of a list may be ghosts, copies of nodes
+ * that are elsewhere: pairs of two ghosts are of no interest to most.
+ */
+#ifndef HALFSHELL_NODES_H
+#define HALFSHELL_NODES_H
+
+#include "halfshell.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct hs_node_lists {
+    int32_t        n_lists;
+    const int64_t *n_nodes;     /* n_lists; their sum is the number of points */
+    const int64_t *n_ghosts;    /* n_lists: how many of them; NULL: none */
+    const int32_t *number;      /* n: the points come in another order, point p is node number[p]
+                                 * of all; NULL: in that order */
+    bool           ghost_rows;  /* ghosts have rows, too */
+    bool           ghost_pairs; /* and pairs with each other */
+    bool           rows_only;   /* no pairs at all */
+} hs_node_lists;
+
+/* Pairs that the caller has, each once, borrowed: ascending by (i, j, S), with i < j, or i == j and
+ * the first nonzero component of S positive. */
+typedef struct hs_half_list {
+    int64_t        n;
+    const int32_t *i, *j; /* numbers of points */
+    const int32_t *shift; /* n * ndim; NULL: none */
+    int            ndim;
+} hs_half_list;
+
+/* Rows that the caller has, one for each of n points, borrowed: that of point i begins at
+ * indices[offsets[i]] and ends before indices[offsets[i + 1]], ascending, without i itself. */
+typedef struct hs_index_rows {
+    int64_t        n;
+    const int64_t *offsets; /* n + 1, from 0 to n_indices */
+    int64_t        n_indices;
+    const int32_t *indices;
+} hs_index_rows;
+
+/* Rows of nodes that the caller has, laid out as those of hs_connectivity_rows; borrowed. */
+typedef struct hs_list_rows {
+    int64_t        n;       /* rows */
+    int32_t        n_lists; /* entries of each */
+    const int64_t *offsets; /* n * n_lists + 1, from 0 to n_indices */
+    int64_t        n_indices;
+    const int32_t *indices;
+    const int32_t *shift; /* n_indices * ndim; NULL: none */
+    int            ndim;
+} hs_list_rows;
+
+/* Pairs of nodes that the caller has, as those of hs_connectivity_pairs and hs_connectivity_lists;
+ * borrowed. */
+typedef struct hs_node_pairs {
+    int64_t        n;
+    const int32_t *i_node, *i_list, *j_node, *j_list;
+    const int32_t *shift; /* n * ndim; NULL: none */
+    int            ndim;
+} hs_node_pairs;
+
+/* What becomes of the nodes of lists of which some go; borrowed. */
+typedef struct hs_node_change {
+    int32_t        n_lists;
+    const int64_t *n_nodes; /* n_lists; as yet */
+    const int32_t *target;  /* of each node, list after list: its new number there; -1: it goes */
+    const int32_t *place;   /* of each node: its place among those that stay, which entries of rows
+                             * are to ascend by; NULL: they keep their order */
+} hs_node_change;
+
+/* Which nodes are neighbours: opaque, owned by the caller. */
+typedef struct hs_connectivity hs_connectivity;
+
+/*
+ * Find all pairs of hs_pairs_find as neighbours in lists of nodes, to be freed with
+ * hs_connectivity_free. options: sorted, want, index_bytes and out are ignored; numbers are int32,
+ * and shifts are there where the box is periodic. Or make rows and pairs of a half list of theirs.
+ */
+hs_status hs_connectivity_build(const hs_among *among, const hs_node_lists *lists,
+                                const hs_options *options, hs_connectivity **connectivity,
+                                hs_failure *failure);
+hs_status hs_connectivity_link(const hs_half_list *pairs, const hs_node_lists *lists,
+                               const hs_options *options, hs_connectivity **connectivity,
+                               hs_failure *failure);
+
+/*
+ * Rows: those of the nodes of list 0, of list 1, ...; without ghost_rows, of internal nodes alone.
+ * Each has an entry for each list: entry l of row r, of which hs_pairs_offsets tells where it
+ * begins as number r * n_lists + l, has in HS_WANT_J the neighbours that are of list l, in the
+ * order of the points, of one neighbour ascending by S (HS_WANT_SHIFT).
+ *
+ * Pairs: HS_WANT_I and HS_WANT_J are node numbers, HS_WANT_SHIFT is S; those of
+ * hs_connectivity_lists, of which list each of the two is. Ascending in the order of the points;
+ * the lower one comes first, but an internal node before a ghost, unless `number` is given.
+ *
+ * All borrow from the object and can be read by hs_pairs_array, hs_pairs_take and so on; not freed.
+ */
+hs_pairs *hs_connectivity_rows(hs_connectivity *connectivity);
+hs_pairs *hs_connectivity_pairs(hs_connectivity *connectivity);
+hs_pairs *hs_connectivity_lists(hs_connectivity *connectivity);
+
+void hs_connectivity_free(hs_connectivity *connectivity);
+
+/* The pairs of hs_connectivity_build, from its rows, of all nodes and without `number`: for callers
+ * who wanted rows_only at first. The object has no rows. */
+hs_status hs_connectivity_pair(const hs_list_rows *rows, const hs_node_lists *lists,
+                               const hs_options *options, hs_connectivity **connectivity,
+                               hs_failure *failure);
+
+/*
+ * What is left of rows and pairs when nodes go, without a search: the same as of a new connectivity
+ * of the nodes that stay. Row k is made of row source[k], each at most once; source: NULL for all
+ * rows, n of them. Pairs keep their order, and with it the place of each pair that stays; keep, one
+ * for each pair, says which others go as well, or is NULL; change: NULL where no node goes. Of the
+ * options, those of resources count. Results are freed as those of hs_connectivity_overlap and
+ * hs_connectivity_build; the latter has pairs alone.
+ */
+hs_status hs_rows_keep(const hs_list_rows *rows, const hs_node_change *change,
+                       const int64_t *source, int64_t n, const hs_options *options,
+                       hs_pairs **result, hs_failure *failure);
+hs_status hs_node_pairs_keep(const hs_node_pairs *pairs, const hs_node_change *change,
+                             const bool *keep, const hs_options *options, hs_connectivity **result,
+                             hs_failure *failure);
+
+/*
+ * Rows without the entries of others, which have as many rows and lists. ascend: both ascend, and
+ * entries that are not in `rows` are ignored; else there must be none, and what there is must have
+ * the same order. To be freed with hs_pairs_free.
+ */
+hs_status hs_rows_without(const hs_list_rows *rows, const hs_list_rows *without, bool ascend,
+                          const hs_options *options, hs_pairs **result, hs_failure *failure);
+
+/*
+ * Rows, as those of hs_connectivity_rows but of all nodes, of points that are in each other's rows
+ * or have a common number in them; to be freed with hs_pairs_free. With rows of what each point's
+ * own support reaches (HS_RULE_GATHER): of points whose supports have a common point. points: of
+ * all nodes, in the order of `gather`. They make it quick, and change nothing else.
+ */
+hs_status hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
+                                  const hs_node_lists *lists, const hs_options *options,
+                                  hs_pairs **rows, hs_failure *failure);
+
+/*
+ * For each pair of hs_connectivity_pairs, of a half list without shifts: the points that are
+ * neighbours of both ends and whose foot on the line through these lies on the closed segment
+ * between them, in exact arithmetic; all common neighbours where the ends coincide; and the ends.
+ * Entry l of pair p, as of a row, has in HS_WANT_J those of list l, the ends last. To be freed with
+ * hs_pairs_free. points: of all nodes, in the order of the half list.
+ */
+hs_status hs_connectivity_intersect(const hs_points *points, const hs_half_list *pairs,
+                                    const hs_node_lists *lists, const hs_options *options,
+                                    hs_pairs **result, hs_failure *failure);
+
+/* Whether the foot of each point on the line through p and q lies on the closed segment between
+ * them, in exact arithmetic; always where p and q coincide. between: one for each point. */
+hs_status hs_feet_between(const hs_points *points, const double *p, const double *q, bool *between,
+                          hs_failure *failure);
+
+/*
+ * The place of each point on the Z curve through the box from low to high, ndim numbers each: 63 /
+ * ndim bits for each coordinate, those of the first axis lowest. HS_ERR_BOX_FINITE where
+ * low <= high does not hold for an axis (failure->column), HS_ERR_FAR for a point outside
+ * (failure->row).
+ */
+hs_status hs_morton_keys(const hs_points *points, const double *low, const double *high,
+                         uint64_t *keys, hs_failure *failure);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,399 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Points that come, go and move one at a time, each under a key."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell import _core
+from halfshell._convert import dynamic
+from halfshell._convert.arrays import in_order
+from halfshell._convert.lengths import as_positive
+from halfshell._convert.options import as_flag
+from halfshell._convert.scene import as_own_box
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from halfshell._convert.types import ArrayLike, BoxLike, Number, PeriodicLike, PointsLike
+
+    Key = int | tuple[int, int]
+    _Given = tuple[int, float, Any, int, int, float, bool, bool]
+
+_PICKLE_VERSION = 1
+_BLOCK = 1024  # keys that an iterator takes at a time
+
+
+class DynamicCellList:
+    """Points that are inserted, moved and removed one at a time, with exact queries.
+
+    Each point has a key. The time of insert, move and remove depends neither on the number of
+    points nor on how crowded a cell is; a query looks at the cells that its ball meets.
+
+    Parameters
+    ----------
+    dim : int
+        Number of dimensions, 1 to 8.
+    cell_size : float
+        Least width of the cells, in the unit of the positions; about the radius of the queries.
+    box, periodic : optional
+        As in `pairs`. Positions may lie anywhere; each image of a point counts for itself.
+    storage : {"hash", "dense", "all-pairs"}, default "hash"
+        "hash": memory follows the occupied cells. "dense": every cell between the outermost ones
+        has its place, up to 1 GB of cells; the fastest. "all-pairs": no cells, for a few dozen
+        points; keys need no position, and `near` gives all of them.
+    max_radius : float, optional
+        Largest radius of a query. Default: `cell_size`.
+    inclusive : bool, default True
+        Whether a point at exactly the radius is within. Hard disks that touch do not overlap:
+        False.
+    tagged : bool, default False
+        Keys are tuples (tag, integer), as for owned sites and their ghosts, in place of integers.
+        Integers fit int64, tags int32.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError
+        For arguments of the wrong kind; lengths that are not positive, not finite or beyond
+        2**-300 to 2**300; a `max_radius` that spans more than 2**20 images of the box; a box as in
+        `pairs`.
+
+    See Also
+    --------
+    CellList : for points that do not change.
+    VerletList : for points that all move in each step.
+
+    Notes
+    -----
+    Whether a point is within a ball is decided for the real numbers that the positions and the
+    radius are, as everywhere in this package.
+
+    Several threads may use one list: queries at the same time, changes one after the other. Each
+    row of `within_many` is answered for the list as it is then. A list that changes while it is
+    iterated over raises RuntimeError.
+
+    The order of results is not specified, but the same after the same history.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> disks = hs.DynamicCellList(2, 1.0, box=[8.0, 8.0], inclusive=False)
+    >>> disks.insert(0, [1.0, 1.0])
+    >>> disks.insert(1, [7.5, 1.0])
+    >>> disks.any_within([8.1, 1.0], 1.0, skip=1)  # 0.9 from the image of 0 at x = 9
+    True
+    >>> disks.any_within([8.0, 1.0], 1.0, skip=1)  # they touch
+    False
+    >>> disks.move(1, [8.0, 1.0])
+    >>> disks.position(1).tolist(), len(disks), 2 in disks
+    ([8.0, 1.0], 2, False)
+    """
+
+    __slots__ = ("__weakref__", "_cells", "_given")
+
+    def __init__(
+        self,
+        dim: int,
+        cell_size: Number,
+        *,
+        box: BoxLike | None = None,
+        periodic: PeriodicLike | None = None,
+        storage: Literal["hash", "dense", "all-pairs"] = "hash",
+        max_radius: Number | None = None,
+        inclusive: bool = True,
+        tagged: bool = False,
+    ) -> None:
+        ndim, kind = dynamic.as_dim(dim), dynamic.as_storage(storage)
+        vectors, bits = as_own_box(box, periodic, ndim)
+        radius = 0.0 if max_radius is None else as_positive(max_radius, "max_radius")
+        self._given: _Given = (
+            ndim, as_positive(cell_size, "cell_size"), vectors, bits, kind,
+            radius, as_flag(inclusive, "inclusive"), as_flag(tagged, "tagged"),
+        )  # fmt: skip
+        self._cells = _core.dynamic_new(*self._given, dynamic.as_position)
+
+    @property
+    def dim(self) -> int:
+        """Number of dimensions."""
+        return int(self._given[0])
+
+    @property
+    def cell_size(self) -> tuple[float, ...]:
+        """Width of the cells along each axis, across their faces; infinity where one holds all."""
+        return tuple(self._cells.look()["cell_size"])
+
+    @property
+    def max_radius(self) -> float:
+        """Largest radius of a query."""
+        return float(self._cells.look()["max_radius"])
+
+    @property
+    def storage(self) -> str:
+        """How cells are stored: "hash", "dense" or "all-pairs"."""
+        return dynamic.STORAGES[self._given[4]]
+
+    @property
+    def inclusive(self) -> bool:
+        """Whether a point at exactly the radius is within."""
+        return bool(self._given[6])
+
+    @property
+    def tagged(self) -> bool:
+        """Whether keys are tuples (tag, integer)."""
+        return bool(self._given[7])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that the list holds."""
+        return int(self._cells.look()["bytes"])
+
+    def insert(self, key: Key, position: ArrayLike | None) -> None:
+        """Add a point, or move the one that has this key.
+
+        Parameters
+        ----------
+        key : int or tuple of int
+            An integer, or with `tagged` a tuple (tag, integer).
+        position : array_like of float, shape (dim,)
+            Anywhere. None, with storage "all-pairs" only: the key has no position.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError, MemoryError
+            For a key of the wrong kind or size; a position of the wrong length, not finite, 2**51
+            boxes away or, with "dense", beyond 1 GB of cells. The list is as it was.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> points = hs.DynamicCellList(2, 2.0)
+        >>> points.insert(7, (-41.5, 18.5))
+        >>> points.cell(7)
+        (-21, 9)
+        """
+        self._cells.insert(key, position)
+
+    def move(self, key: Key, position: ArrayLike | None) -> None:
+        """Move a point; KeyError if there is none of this key. Otherwise as `insert`."""
+        self._cells.move(key, position)
+
+    def remove(self, key: Key) -> bool:
+        """Remove a point. Returns whether there was one; TypeError for a key of the wrong kind."""
+        return self._cells.remove(key)
+
+    def position(self, key: Key) -> npt.NDArray[np.float64]:
+        """The position of a point, shape (dim,), as it was given.
+
+        KeyError if there is no such key, ValueError if it has no position.
+        """
+        return self._cells.position(key)
+
+    def cell(self, key: Key) -> tuple[int, ...]:
+        """Indices of the cell that a point is in, one for each axis.
+
+        Along open axes floor(x / cell_size), but for rounding; along periodic ones from 0, at half
+        a box below the origin. Errors as for `position`.
+        """
+        return self._cells.cell(key)
+
+    def near(self, position: ArrayLike, radius: Number) -> npt.NDArray[np.int64]:
+        """Keys of all points in the cells that a ball meets: a superset of those within.
+
+        Parameters
+        ----------
+        position : array_like of float, shape (dim,)
+            Centre of the ball, anywhere.
+        radius : float
+            From 0 to `max_radius`.
+
+        Returns
+        -------
+        ndarray of int64, shape (m,), or (m, 2) with `tagged`
+            Each key once, however many images are near. No distance is computed.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError
+            For a position as in `insert`, and a radius beyond `max_radius`.
+        """
+        return self._cells.near(position, radius)
+
+    def within(self, position: ArrayLike, radius: Number, *, shifts: bool = False) -> Any:
+        """Keys of the points within a ball, decided exactly.
+
+        Parameters
+        ----------
+        position, radius
+            As in `near`.
+        shifts : bool, default False
+            Whether to return S as well.
+
+        Returns
+        -------
+        keys : ndarray of int64, shape (m,), or (m, 2) with `tagged`
+            A key once for each image of its point within the ball. The cells nearest to the centre
+            come first.
+        S : ndarray of int32, shape (m, dim)
+            Only with `shifts`: the point is within at position(key) + S @ box.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError
+            As `near`; ValueError if a key has no position; OverflowError if S does not fit int32.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> points = hs.DynamicCellList(1, 1.0, box=[3.0], max_radius=2.0)
+        >>> points.insert(5, [0.5])
+        >>> keys, S = points.within([2.0], 1.5, shifts=True)
+        >>> keys.tolist(), sorted(S[:, 0].tolist())
+        ([5, 5], [0, 1])
+        """
+        return self._cells.within(position, radius, as_flag(shifts, "shifts"))
+
+    def any_within(self, position: ArrayLike, radius: Number, skip: Key | None = None) -> bool:
+        """Whether there is a point within a ball, decided exactly. Stops at the first one.
+
+        Parameters
+        ----------
+        position, radius
+            As in `near`.
+        skip : key, optional
+            A point whose image S = 0 does not count; its other images do. For a trial move: give
+            the new position next to the old one, not wrapped into the box by itself.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError, KeyError
+            As `within`; KeyError if the key to skip is not there.
+        """
+        return self._cells.any_within(position, radius, skip)
+
+    def insert_many(self, keys: ArrayLike, positions: PointsLike) -> None:
+        """Insert many points, all or none.
+
+        Parameters
+        ----------
+        keys : array_like of int, shape (n,), or (n, 2) with `tagged`
+            Each once.
+        positions : array_like of float, shape (n, dim)
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError, MemoryError
+            As `insert`; ValueError names a key that comes twice. The list is as it was.
+        """
+        ids, tags = dynamic.as_keys(keys, self.tagged)
+        self._cells.insert_many(ids, tags, dynamic.as_positions(positions, self.dim, len(ids)))
+
+    def move_many(self, keys: ArrayLike, positions: PointsLike) -> None:
+        """Move many points, all or none. As `insert_many`, but KeyError for one that is absent."""
+        ids, tags = dynamic.as_keys(keys, self.tagged)
+        self._cells.move_many(ids, tags, dynamic.as_positions(positions, self.dim, len(ids)))
+
+    def remove_many(self, keys: ArrayLike) -> npt.NDArray[np.bool_]:
+        """Remove many points. Returns which of them were there; ValueError if a key comes twice."""
+        return self._cells.remove_many(*dynamic.as_keys(keys, self.tagged))
+
+    def within_many(self, positions: PointsLike, radius: Number, *, shifts: bool = False) -> Any:
+        """The points within each of many balls: `within` for each row.
+
+        Parameters
+        ----------
+        positions : array_like of float, shape (q, dim)
+        radius : float
+            From 0 to `max_radius`, for all.
+        shifts : bool, default False
+            Whether to return S as well.
+
+        Returns
+        -------
+        offsets : ndarray of int64, shape (q + 1,)
+            Row q is from offsets[q] to offsets[q + 1].
+        keys : ndarray of int64, shape (m,), or (m, 2) with `tagged`
+        S : ndarray of int32, shape (m, dim)
+            Only with `shifts`.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError, MemoryError
+            As `within`.
+        """
+        centres = in_order(dynamic.as_positions(positions, self.dim), np.float64)
+        offsets, found = self._cells.within_many(centres, radius, as_flag(shifts, "shifts"))
+        return (offsets, *found) if shifts else (offsets, found)
+
+    def clear(self) -> None:
+        """Remove all points, and give their memory back."""
+        self._cells.clear()
+
+    def shrink_to_fit(self) -> None:
+        """Give back memory that the points do not need; MemoryError if it lacks some meanwhile."""
+        self._cells.shrink_to_fit()
+
+    def copy(self) -> DynamicCellList:
+        """Another list with the same points."""
+        made = object.__new__(type(self))
+        made._given = self._given
+        made._cells = self._cells.copy()
+        return made
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: Any) -> DynamicCellList:
+        return self.copy()
+
+    def __contains__(self, key: Key) -> bool:
+        return self._cells.has(key)
+
+    def __len__(self) -> int:
+        return len(self._cells)
+
+    def __iter__(self) -> Iterator[Any]:
+        """The keys, in no order; RuntimeError if the list changes meanwhile."""
+        return self._walk(self._cells.changes())
+
+    def _walk(self, changes: int) -> Iterator[Any]:
+        cursor, keys = 0, list[Any]()
+        while True:
+            if self._cells.changes() != changes:
+                raise RuntimeError("DynamicCellList changed during iteration")
+            if not keys:
+                cursor, block = self._cells.keys(cursor, _BLOCK)
+                keys = block.tolist()[::-1]
+                if not keys:
+                    return
+            key = keys.pop()
+            yield tuple(key) if self.tagged else key
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        cells = self._cells.copy()  # other threads may change the list meanwhile
+        keys = cells.keys(0, max(len(cells), 1))[1]
+        return _unpickled, (_PICKLE_VERSION, self._given, keys, cells.positions(keys))
+
+    def __repr__(self) -> str:
+        dim, _, _, bits = self._given[:4]
+        axes = ", ".join(str(k) for k in range(dim) if bits >> k & 1)
+        space = f"periodic along {axes}" if axes else "open space"
+        return (
+            f"DynamicCellList({dim}, {self._given[1]!r}, storage={self.storage!r}): "
+            f"{len(self)} points, {space}"
+        )
+
+
+def _unpickled(version: int, given: _Given, keys: Any, positions: Any) -> DynamicCellList:
+    """A list from its pickle."""
+    if version != _PICKLE_VERSION:
+        raise ValueError(f"this DynamicCellList was pickled by another version ({version!r})")
+    made = object.__new__(DynamicCellList)
+    made._given = given
+    made._cells = _core.dynamic_new(*given, dynamic.as_position)
+    placed = ~np.isnan(positions[:, 0])
+    made.insert_many(keys[placed], positions[placed])
+    for key in keys[~placed].tolist():
+        made.insert(tuple(key) if made.tagged else key, None)
+    return made

@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`PairTable`: every pair of nodes of a connectivity, once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from halfshell._convert.arrays import as_array, as_real_array
+from halfshell._convert.options import as_whole
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from halfshell._convert.types import FloatArray
+    from halfshell._objects.nodes import Nodes
+
+    Ints = npt.NDArray[np.int32]
+
+
+class Pair(NamedTuple):
+    """Two nodes, each by its number in its list and by its list."""
+
+    i_node: int
+    i_list: int
+    j_node: int
+    j_list: int
+
+
+class Columns(NamedTuple):
+    """Both nodes of all pairs, and S where there is a box that repeats."""
+
+    i_node: Ints
+    i_list: Ints
+    j_node: Ints
+    j_list: Ints
+    shifts: Ints | None
+
+
+class PairTable:
+    """Every pair of nodes that are neighbours, each once.
+
+    Made by `Connectivity`, of which it is the attribute ``pairs``; it does not change but for
+    `coupling`, and the other arrays are read-only.
+
+    Attributes
+    ----------
+    i_node, i_list, j_node, j_list : ndarray of int32, shape (m,)
+        The numbers of both nodes in their lists, and of their lists.
+    shifts : ndarray of int32, shape (m, d)
+        S of each pair, in a box that repeats: D = x_j - x_i + S @ box.
+    coupling : ndarray of float64, shape (m,)
+        A number for each pair, 1 at first. It takes no memory, and cannot be written to, until
+        it is assigned to: ``pairs.coupling = 1.0``.
+
+    Raises
+    ------
+    AttributeError
+        If there are no shifts.
+
+    See Also
+    --------
+    PairField : numbers of your own for each pair.
+
+    Notes
+    -----
+    The lower (list, node) comes first, but an internal node comes before a ghost. Pairs ascend by
+    the lower and the higher of the two. With ``order="morton"`` both go by the order of the nodes
+    on the Z curve.
+
+    The arrays are made when one of them is first looked at, out of the rows.
+
+    ``pairs[k]`` is pair k as a tuple (i_node, i_list, j_node, j_list), and ``len(pairs)`` the
+    number of pairs.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0]),
+    ...                      hs.NodeList("b", [[2.5]], [1.0])])
+    >>> c.pairs
+    PairTable(2 pairs)
+    >>> c.pairs[1]
+    Pair(i_node=1, i_list=0, j_node=0, j_list=1)
+    >>> c.pairs.index((0, 1, 1, 0))
+    1
+    """
+
+    __slots__ = (
+        "__weakref__",
+        "_columns",
+        "_coupling",
+        "_keys",
+        "_make",
+        "_nodes",
+        "_outdated",
+    )  # fmt: skip
+
+    def __init__(self, nodes: Nodes, made: Columns | Callable[[], Columns]) -> None:
+        self._nodes = nodes
+        self._make: Callable[[], Columns] | None = made if callable(made) else None
+        self._columns: Columns | None = None if callable(made) else made
+        self._coupling: FloatArray | None = None
+        self._keys: npt.NDArray[np.int64] | None = None
+        self._outdated: str | None = None  # by what
+
+    def _all(self) -> Columns:
+        """The columns, which are made when they are first looked at."""
+        make = self._make  # before the columns are looked at, which come before it goes
+        columns = self._columns
+        if columns is None:
+            assert make is not None
+            self._columns = columns = make()
+            self._make = None
+        return columns
+
+    @property
+    def _are_made(self) -> bool:
+        return self._columns is not None
+
+    @property
+    def i_node(self) -> Ints:
+        return self._all().i_node
+
+    @property
+    def i_list(self) -> Ints:
+        return self._all().i_list
+
+    @property
+    def j_node(self) -> Ints:
+        return self._all().j_node
+
+    @property
+    def j_list(self) -> Ints:
+        return self._all().j_list
+
+    @property
+    def _shifts(self) -> Ints | None:
+        return self._all().shifts
+
+    def __len__(self) -> int:
+        return len(self.i_node)
+
+    def __repr__(self) -> str:
+        return f"PairTable({len(self)} pair{'s' * (len(self) != 1)})"
+
+    def __getitem__(self, k: int) -> Pair:
+        k = self._number(k)
+        return Pair(
+            int(self.i_node[k]), int(self.i_list[k]), int(self.j_node[k]), int(self.j_list[k])
+        )
+
+    def __iter__(self) -> Iterator[Pair]:
+        return (self[k] for k in range(len(self)))
+
+    @property
+    def shifts(self) -> Ints:
+        if self._shifts is None:
+            raise AttributeError("these pairs have no shifts: there is no box that repeats")
+        return self._shifts
+
+    @property
+    def coupling(self) -> FloatArray:
+        if self._coupling is None:
+            ones: FloatArray = np.broadcast_to(np.ones(()), (len(self),))
+            return ones
+        return self._coupling
+
+    @coupling.setter
+    def coupling(self, values: npt.ArrayLike) -> None:
+        array = as_real_array(values, "coupling", "be a number")
+        if array.shape not in ((), (len(self),)):
+            raise ValueError(
+                f"coupling must be a number or have shape ({len(self)},), got {array.shape}"
+            )
+        self._coupling = np.array(np.broadcast_to(array, (len(self),)), np.float64)
+
+    def view(self) -> npt.NDArray[Any]:
+        """All pairs as one structured array.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            A new one, with the fields i_node, i_list, j_node, j_list of int32 and coupling of
+            float64.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])])
+        >>> c.pairs.view()["j_node"].tolist()
+        [1]
+        """
+        names = ("i_node", "i_list", "j_node", "j_list")
+        table = np.empty(len(self), [*((name, np.int32) for name in names), ("coupling", float)])
+        for name in (*names, "coupling"):
+            table[name] = getattr(self, name)
+        return table
+
+    def index(self, pair: npt.ArrayLike, shift: npt.ArrayLike | None = None) -> Any:
+        """Where a pair is in the table, in whatever order its nodes are given.
+
+        Parameters
+        ----------
+        pair : array_like of int, shape (4,) or (k, 4)
+            (i_node, i_list, j_node, j_list), or several such rows.
+        shift : array_like of int, shape (d,), optional
+            S of a single pair that the table has in several images.
+
+        Returns
+        -------
+        int, or ndarray of int64, shape (k,)
+
+        Raises
+        ------
+        KeyError
+            If a pair is not in the table.
+        TypeError, ValueError
+            If these are no pairs, a pair is there in several images and `shift` does not say
+            which, or `shift` is given where no box repeats.
+
+        Notes
+        -----
+        The first call makes an index of 8 bytes a pair; after that a pair takes a binary search.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0], [2.0]], [0.5] * 3)])
+        >>> c.pairs.index((2, 0, 1, 0))
+        1
+        >>> c.pairs.index([(1, 0, 0, 0), (1, 0, 2, 0)]).tolist()
+        [0, 1]
+        """
+        rows = as_pair_rows(pair, "pair", single=True)
+        ranks = self._nodes.ranks_of(rows)
+        if ranks is None:
+            raise KeyError(f"there is no such node: {pair!r}")
+        wanted = self._nodes.keys_of(*ranks)
+        keys = self._lookup()
+        first = np.searchsorted(keys, wanted)
+        end = np.searchsorted(keys, wanted, side="right")
+        if (first == end).any():
+            missing = tuple(rows[np.flatnonzero(first == end)[0]].tolist())
+            raise KeyError(f"{missing} is no pair")
+        if shift is not None:
+            return self._index_of_image(int(first[0]), int(end[0]), ranks, shift)
+        if (end - first > 1).any():
+            missing = tuple(rows[np.flatnonzero(end - first > 1)[0]].tolist())
+            raise ValueError(f"{missing} is a pair in several images: say which by shift")
+        return int(first[0]) if np.ndim(pair) == 1 else first.astype(np.int64)
+
+    def _index_of_image(
+        self, first: int, end: int, ranks: tuple[npt.NDArray[Any], npt.NDArray[Any]], shift: Any
+    ) -> int:
+        given = as_array(shift, "shift")
+        if self._shifts is None:
+            raise ValueError("shift is for boxes that repeat: these pairs have none")
+        shifts = self.shifts
+        if given.dtype.kind not in "iu" or given.shape != shifts.shape[1:] or len(ranks[0]) != 1:
+            raise ValueError(
+                f"shift must be {shifts.shape[1]} whole numbers, and pair a single one"
+            )
+        first_rank, second_rank = (int(rank[0]) for rank in ranks)
+        for k in range(first, end):
+            own = self._nodes.ranks_of(np.array([self[k]]))
+            turned = own is not None and int(own[0][0]) != first_rank
+            either = first_rank == second_rank
+            row = shifts[k].astype(np.int64)
+            if (turned or either) and (row == -given).all():
+                return k
+            if not turned and (row == given).all():
+                return k
+        raise KeyError(f"there is no pair of these nodes with the shift {given.tolist()}")
+
+    def _lookup(self) -> npt.NDArray[np.int64]:
+        if self._keys is None:
+            first, second = self._nodes.ranks_of_columns(self)
+            self._keys = self._nodes.keys_of(first, second)
+        return self._keys
+
+    def _number(self, k: Any) -> int:
+        number = as_whole(k, "the number of a pair")
+        if not -len(self) <= number < len(self):
+            raise IndexError(f"there are {len(self)} pairs, got {number}")
+        return number % len(self)
+
+
+def as_pair_rows(values: Any, name: str, single: bool = False) -> npt.NDArray[np.int64]:
+    """Rows (i_node, i_list, j_node, j_list); single: one such row is as good."""
+    array = as_array(values, name)
+    if array.size == 0 and not single:
+        return np.empty((0, 4), np.int64)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"{name} must hold whole numbers, got dtype {array.dtype}")
+    if array.ndim not in ((1, 2) if single else (2,)) or array.shape[-1] != 4:
+        shapes = "(4,) or (k, 4)" if single else "(k, 4)"
+        raise ValueError(
+            f"{name} must have shape {shapes}: i_node, i_list, j_node, j_list; got {array.shape}"
+        )
+    if array.dtype == np.uint64:  # those that int64 does not have are no numbers of nodes or lists
+        array = np.minimum(array, np.uint64(2**63 - 1))
+    return np.atleast_2d(array).astype(np.int64)

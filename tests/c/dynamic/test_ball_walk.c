@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_ball_walk.c: a list does only what its scene needs, as its counters show; ties are decided
+ * beyond float64. */
+#include "../support/dynamic_brute.h"
+
+#include <math.h>
+
+void test_ball_walk(void);
+
+static hs_dynamic *
+filled(hs_storage storage, const hs_box *box, int ndim)
+{
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = NULL;
+    harness_random     random = {11};
+    options.ndim = ndim;
+    options.box = box;
+    options.storage = storage;
+    CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+    for (int64_t id = 0; id < 500; id++) {
+        double x[3];
+        for (int k = 0; k < 3; k++)
+            x[k] = 10.0 * random_unit(&random);
+        CHECK(hs_dynamic_insert(list, (hs_key){id, 0}, x, NULL) == HS_OK);
+    }
+    return list;
+}
+
+static void
+what_a_scene_does_not_need_is_left_out(void)
+{
+    const hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{10, 0}, {0, 10}}};
+    const double        centre[3] = {5.25, 5.25, 5.25};
+    hs_dynamic_counters counters;
+    bool                any;
+    for (int storage = 0; storage < 3; storage++) {
+        hs_dynamic *open = filled((hs_storage)storage, NULL, 2);
+        hs_dynamic *periodic = filled((hs_storage)storage, &box, 2);
+        hs_dynamic_count(open, &counters);
+        for (int64_t id = 0; id < 500; id += 9)
+            CHECK(hs_dynamic_move(open, (hs_key){id, 0}, centre, NULL) == HS_OK);
+        CHECK(hs_dynamic_any_within(open, centre, 0.0, NULL, &any, NULL) == HS_OK && any);
+        CHECK(counters.wraps == 0);
+        CHECK((counters.lookups > 0) == (storage == HS_STORE_HASH));
+        CHECK(counters.cells == 1);
+        hs_dynamic_count(open, NULL);
+        hs_dynamic_count(periodic, &counters);
+        CHECK(hs_dynamic_any_within(periodic, centre, 0.0, NULL, &any, NULL) == HS_OK);
+        CHECK(counters.wraps == 1);
+        hs_dynamic_free(open);
+        hs_dynamic_free(periodic);
+    }
+}
+
+/* A ball of radius 1 in cells of width 1: the nine cells that it meets, without corners that it
+ * does not reach, and all three cells an axis only where it reaches them. */
+static void
+cells_out_of_reach_are_dropped(void)
+{
+    const double        corner[2] = {5.01, 5.01}, middle[2] = {5.5, 5.5};
+    hs_dynamic         *list = filled(HS_STORE_DENSE, NULL, 2);
+    hs_dynamic_counters counters;
+    brute_found         found = {.n = 0};
+    hs_dynamic_count(list, &counters);
+    CHECK(hs_dynamic_within(list, middle, 1.0, false, take_found, &found, NULL) == HS_OK);
+    CHECK(counters.cells == 9);
+    hs_dynamic_count(list, &counters);
+    CHECK(hs_dynamic_within(list, corner, 1.0, false, take_found, &found, NULL) == HS_OK);
+    CHECK(counters.cells == 8); /* not the one at (6, 6), 0.99 * sqrt(2) away */
+    hs_dynamic_count(list, &counters);
+    CHECK(hs_dynamic_within(list, middle, 0.4, false, take_found, &found, NULL) == HS_OK);
+    CHECK(counters.cells == 1);
+    hs_dynamic_free(list);
+}
+
+/* Points at the radius but for less than float64 resolves, and exactly at it. */
+static void
+ties_are_decided_exactly(void)
+{
+    for (int inclusive = 0; inclusive <= 1; inclusive++) {
+        hs_dynamic_options  options = hs_dynamic_options_default();
+        hs_dynamic_counters counters;
+        hs_dynamic         *list;
+        bool                any;
+        options.ndim = 2;
+        options.inclusive = inclusive == 1;
+        options.max_radius = 5.0;
+        CHECK(hs_dynamic_new(&options, &list, NULL) == HS_OK);
+        hs_dynamic_count(list, &counters);
+        const double tie[2] = {3.0, 4.0}, origin[2] = {0.0, 0.0}, above[2] = {5.0, 0x1p-60};
+        CHECK(hs_dynamic_insert(list, (hs_key){0, 0}, tie, NULL) == HS_OK);
+        CHECK(hs_dynamic_any_within(list, origin, 5.0, NULL, &any, NULL) == HS_OK);
+        CHECK(any == (inclusive == 1) && counters.exact == 1);
+        CHECK(hs_dynamic_move(list, (hs_key){0, 0}, above, NULL) == HS_OK);
+        CHECK(hs_dynamic_any_within(list, origin, 5.0, NULL, &any, NULL) == HS_OK);
+        CHECK(!any && counters.exact == 2);
+        hs_dynamic_free(list);
+    }
+}
+
+/* Held, a list gives the same answers. */
+static void
+held_lists_answer_the_same(void)
+{
+    const hs_box box = {
+        .ndim = 3, .periodic = {true, true, true}, .rows = {{10, 0, 0}, {3, 9, 0}, {-2, 1, 8}}};
+    hs_dynamic    *list = filled(HS_STORE_HASH, &box, 3);
+    harness_random random = {13};
+    bool           plain[100], held[100];
+    for (int h = 0; h < 2; h++) {
+        random.state = 13;
+        if (h == 1)
+            hs_dynamic_hold(list);
+        for (int trial = 0; trial < 100; trial++) {
+            double x[3];
+            for (int k = 0; k < 3; k++)
+                x[k] = 10.0 * random_unit(&random);
+            CHECK(hs_dynamic_any_within(list, x, 0.7, NULL, h == 1 ? &held[trial] : &plain[trial],
+                                        NULL) == HS_OK);
+        }
+        if (h == 1)
+            hs_dynamic_release(list);
+    }
+    CHECK(memcmp(plain, held, sizeof plain) == 0);
+    hs_dynamic_free(list);
+}
+
+static int
+stop_at(hs_key key, const double *position, const int64_t *shift, void *user)
+{
+    (void)key, (void)position, (void)shift;
+    return --*(int *)user == 0;
+}
+
+/* A visitor ends any way through the cells, near or within, with images or without. */
+static void
+visitors_may_stop(void)
+{
+    const hs_box box = {.ndim = 3, .periodic = {true, true, true}};
+    for (int kind = 0; kind < 6; kind++) {
+        hs_box small = box;
+        for (int l = 0; l < 3; l++)
+            small.rows[l][l] = 10.0;
+        hs_dynamic  *list = filled((hs_storage)(kind % 3), kind >= 3 ? &small : NULL, 3);
+        const double corner[3] = {0.1, 0.1, 0.1};
+        for (int after = 1; after <= 3; after++) {
+            int near = after, within = after;
+            CHECK(hs_dynamic_near(list, corner, 1.0, stop_at, &near, NULL) == HS_OK && near <= 0);
+            CHECK(hs_dynamic_insert(list, (hs_key){after, 1}, corner, NULL) == HS_OK);
+            CHECK(hs_dynamic_insert(list, (hs_key){after, 2}, corner, NULL) == HS_OK);
+            CHECK(hs_dynamic_within(list, corner, 0.5, true, stop_at, &within, NULL) == HS_OK);
+            CHECK(within == 0);
+        }
+        hs_dynamic_free(list);
+    }
+}
+
+/* A near query compares no distances. */
+static void
+near_counts_cells_and_no_candidates(void)
+{
+    const double        middle[3] = {5.5, 5.5, 5.5};
+    hs_dynamic_counters counters;
+    for (int storage = 0; storage < 2; storage++) {
+        hs_dynamic *list = filled((hs_storage)storage, NULL, 2);
+        brute_found found = {.n = 0};
+        hs_dynamic_count(list, &counters);
+        CHECK(hs_dynamic_near(list, middle, 1.0, take_found, &found, NULL) == HS_OK);
+        CHECK(counters.cells == 9 && counters.candidates == 0 && counters.exact == 0);
+        CHECK(found.n > 9);
+        hs_dynamic_free(list);
+    }
+}
+
+void
+test_ball_walk(void)
+{
+    RUN(what_a_scene_does_not_need_is_left_out);
+    RUN(cells_out_of_reach_are_dropped);
+    RUN(ties_are_decided_exactly);
+    RUN(held_lists_answer_the_same);
+    RUN(visitors_may_stop);
+    RUN(near_counts_cells_and_no_candidates);
+}

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_cell_axes.c: the cells of a ball hold every coordinate within it, and gaps are no larger than
+ * distances, at any width, radius and distance from the origin. */
+#include "../../../csrc/core/base/fpenv.h"
+#include "../../../csrc/core/dynamic/cell_axes.h"
+#include "../support/harness.h"
+
+void test_cell_axes(void);
+
+static hs_axes
+axes_of(double length, double cell_size, double radius)
+{
+    hs_box     box = {.ndim = 1, .periodic = {length > 0.0}, .rows = {{length}}};
+    hs_lattice lattice;
+    hs_axes    axes;
+    hs_lattice_init(length > 0.0 ? &box : NULL, 1, hs_scale_of(0), &lattice);
+    hs_axes_init(&axes, &lattice, cell_size, false, radius);
+    return axes;
+}
+
+/* A number of ordinary size, often with few digits. */
+static double
+some_number(harness_random *random)
+{
+    const double x = ldexp(random_unit(random) - 0.5, (int)(random_bits(random) % 40) - 10);
+    return random_bits(random) % 2 == 0 ? x : rint(x * 8.0) / 8.0;
+}
+
+static void
+open_balls_hold_what_is_within(void)
+{
+    harness_random random = {7};
+    for (int trial = 0; trial < TRIALS(200000); trial++) {
+        const double   width = fabs(some_number(&random)) + 0x1p-20;
+        const int      times = (int)(random_bits(&random) % 5);
+        const double   radius = trial % 2 == 0 ? width * times : width * 5.0 * random_unit(&random);
+        const hs_axes  axes = axes_of(0.0, width, radius);
+        const hs_axis *axis = &axes.axis[0];
+        const double   t = some_number(&random);
+        hs_span_of_cells span;
+        hs_axis_span(axis, t, hs_axis_cell(axis, t), radius, 0.0, &span);
+        for (int side = -1; side <= 1; side += 2) {
+            double y = t + side * radius;
+            while (fabs(y - t) > radius) /* not beyond, for the numbers as rounded */
+                y = nextafter(y, t);
+            const int64_t cell = hs_axis_cell(axis, y);
+            CHECK(cell >= span.first && cell <= span.last);
+            CHECK(sqrt(hs_axis_gap(axis, t, cell, span.centre)) <= fabs(y - t) * (1.0 + 0x1p-50));
+        }
+        CHECK(span.first <= span.centre && span.centre <= span.last);
+    }
+}
+
+/* Every image of a point within the radius has its u in the span, and the gap of u is no more. */
+static void
+periodic_balls_hold_what_is_within(void)
+{
+    harness_random random = {8};
+    for (int trial = 0; trial < TRIALS(100000); trial++) {
+        const double     length = 0.5 + 8.0 * random_unit(&random);
+        const double     width = length / (0.5 + 9.0 * random_unit(&random));
+        const double     radius = 3.0 * length * random_unit(&random);
+        const hs_axes    axes = axes_of(length, width, radius);
+        const hs_axis   *axis = &axes.axis[0];
+        const double     t = (random_unit(&random) - 0.5) * length;
+        const double     x = (random_unit(&random) - 0.5) * length;
+        hs_span_of_cells span;
+        hs_axis_span(axis, t, hs_axis_cell(axis, t), radius, 0.0, &span);
+        CHECK(axis->width >= width * (1.0 - 0x1p-50) || axis->n == 1);
+        for (int image = -5; image <= 5; image++) {
+            const double  y = x + image * length;
+            const int64_t u = hs_axis_cell(axis, x) + image * axis->n;
+            CHECK(hs_axis_image(axis, u) == image);
+            if (fabs(y - t) <= radius * (1.0 - 0x1p-40)) {
+                CHECK(u >= span.first && u <= span.last);
+                CHECK(image >= span.least && image <= span.most);
+                CHECK(hs_axis_gap(axis, t, u, span.centre) <= (y - t) * (y - t) + 0x1p-40);
+            }
+        }
+    }
+}
+
+static void
+far_cells_are_one(void)
+{
+    const hs_axes axes = axes_of(0.0, 1.0, 1.0);
+    CHECK(hs_axis_cell(&axes.axis[0], 1e300) == (int64_t)HS_FARTHEST_CELL);
+    CHECK(hs_axis_cell(&axes.axis[0], -1e300) == -(int64_t)HS_FARTHEST_CELL);
+    CHECK(hs_axis_cell(&axes.axis[0], -0.5) == -1 && hs_axis_cell(&axes.axis[0], -1.0) == -1);
+    CHECK(hs_axis_image(&axes.axis[0], -7) == 0);
+}
+
+void
+test_cell_axes(void)
+{
+    const hs_fpenv env = hs_fpenv_enter();
+    RUN(open_balls_hold_what_is_within);
+    RUN(periodic_balls_hold_what_is_within);
+    RUN(far_cells_are_one);
+    hs_fpenv_leave(env);
+}

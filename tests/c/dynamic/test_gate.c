@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_gate.c: a writer is alone, readers are not, and no thread waits for ever, in a child neither. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L
+#endif
+#include "../../../csrc/core/base/os_thread.h"
+#include "../../../csrc/core/dynamic/gate.h"
+#include "../../../csrc/core/memory/account.h"
+#include "../support/harness.h"
+
+#if !defined(_WIN32)
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
+
+void test_gate(void);
+
+enum { ROUNDS = 20000 };
+
+typedef struct shared {
+    hs_gate gate;
+    int64_t one, other; /* equal, but while a writer is inside */
+    bool    differed;
+} shared;
+
+static hs_thread_result HS_THREAD_CALL
+read_and_write(void *context)
+{
+    shared *of = context;
+    for (int round = 0; round < ROUNDS; round++) {
+        if (round % 4 == 0) {
+            hs_gate_write(&of->gate);
+            of->one++;
+            of->other++;
+            hs_gate_write_end(&of->gate);
+        } else {
+            hs_gate_read(&of->gate);
+            const bool same = of->one == of->other;
+            hs_gate_read_end(&of->gate);
+            if (!same) {
+                hs_gate_write(&of->gate);
+                of->differed = true;
+                hs_gate_write_end(&of->gate);
+            }
+        }
+    }
+    return (hs_thread_result)0;
+}
+
+static void
+writers_are_alone(void)
+{
+    enum { THREADS = 4 };
+    shared    of = {.differed = false};
+    hs_thread threads[THREADS];
+    CHECK(hs_gate_init(&of.gate));
+    for (int t = 0; t < THREADS; t++)
+        CHECK(hs_thread_start(&threads[t], read_and_write, &of));
+    for (int t = 0; t < THREADS; t++)
+        hs_thread_join(threads[t]);
+    CHECK(of.one == THREADS * ROUNDS / 4 && of.one == of.other && !of.differed);
+    CHECK(of.gate.state == 0 && of.gate.waiting == 0);
+    hs_gate_destroy(&of.gate);
+}
+
+static void
+readers_are_many(void)
+{
+    hs_gate gate;
+    CHECK(hs_gate_init(&gate));
+    hs_gate_read(&gate);
+    hs_gate_read(&gate);
+    CHECK(gate.state == 2);
+    hs_gate_read_end(&gate);
+    hs_gate_read_end(&gate);
+    hs_gate_write(&gate);
+    CHECK(gate.state == -1);
+    hs_gate_write_end(&gate);
+    hs_gate_destroy(&gate);
+    hs_test_fail_allocation(1);
+    CHECK(!hs_gate_init(&gate));
+}
+
+/* A thread of the parent that was inside does not exist in a child. */
+static void
+children_do_not_wait_for_the_parent(void)
+{
+#if !defined(_WIN32) && !defined(HS_COVERAGE) && !defined(__SANITIZE_THREAD__)
+    hs_gate gate;
+    int     status = 1;
+    CHECK(hs_gate_init(&gate));
+    hs_gate_read(&gate);
+    const pid_t child = fork();
+    if (child == 0) {
+        hs_gate_write(&gate);
+        hs_gate_write_end(&gate);
+        _exit(gate.state == 0 ? 0 : 2);
+    }
+    CHECK(waitpid(child, &status, 0) == child && status == 0);
+    hs_gate_read_end(&gate);
+    hs_gate_destroy(&gate);
+#endif
+}
+
+/* As if the process had been forked off while a reader was inside. */
+static void
+readers_of_another_process_are_forgotten(void)
+{
+    hs_gate gate;
+    CHECK(hs_gate_init(&gate));
+    hs_gate_read(&gate);
+    gate.process++;
+    hs_gate_write(&gate);
+    CHECK(gate.state == -1);
+    hs_gate_write_end(&gate);
+    CHECK(gate.state == 0 && gate.waiting == 0);
+    hs_gate_destroy(&gate);
+}
+
+void
+test_gate(void)
+{
+    RUN(writers_are_alone);
+    RUN(readers_are_many);
+    RUN(children_do_not_wait_for_the_parent);
+    RUN(readers_of_another_process_are_forgotten);
+}

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`algorithm=`: the pairs are the same for all, and the one asked for runs."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from oracles import as_rows, check, lattice, random_box
+from reach_scenes import RULES, SYMMETRIC
+
+ALGORITHMS = ("auto", "all-pairs", "grid", "hash", "hierarchy")
+FORCED = ALGORITHMS[1:]
+
+
+def rows(points, cutoff, algorithm, **how):
+    return as_rows(*hs.pairs(points, cutoff, quantities="ijS", algorithm=algorithm, **how))
+
+
+def scenes():
+    """Scenes that every algorithm answers alike, by name: points, cutoff, keywords."""
+    rng = np.random.default_rng(20)
+    cube = rng.uniform(0.0, 6.0, (400, 3))
+    clumps = (rng.uniform(-1e9, 1e9, (8, 1, 3)) + rng.uniform(0.0, 3.0, (8, 40, 3))).reshape(-1, 3)
+    crystal, box = lattice("fcc", (4, 4, 4))
+    yield "open", cube, 1.0, {}
+    yield "periodic", cube, 1.0, {"box": [6.0] * 3}
+    yield "images", cube[:40], 7.5, {"box": [6.0, 5.0, 9.0]}
+    yield "slab", cube, 1.1, {"box": [6.0, 5.0, 3.0], "periodic": [True, True, False]}
+    for kind in ("triclinic", "sheared", "left-handed"):
+        yield kind, cube, 1.0, {"box": random_box(rng, kind, length=6.0)}
+    yield "outside the box", cube * 50.0 - 100.0, 1.0, {"box": [6.0] * 3}
+    for ndim, size, cutoff in ((1, 300.0, 1.5), (2, 18.0, 1.0), (5, 2.5, 1.0), (8, 2.0, 1.2)):
+        yield f"{ndim}-D", rng.uniform(0.0, size, (300, ndim)), cutoff, {}
+        yield f"{ndim}-D periodic", rng.uniform(0.0, size, (100, ndim)), cutoff, {
+            "box": [size] * ndim
+        }
+    yield "crystal", crystal, 1.0, {"box": box}
+    yield "strict", crystal, 1.0, {"box": box, "inclusive": False}
+    yield "empty", np.zeros((0, 3)), 1.0, {}
+    yield "empty in a box", np.zeros((0, 3)), 1.0, {"box": [2.0, 3.0, 4.0]}
+    yield "one point", np.zeros((1, 3)), 1.0, {}
+    yield "one point and its images", np.zeros((1, 3)), 2.5, {"box": [1.0] * 3}
+    yield "two points", np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 1.0, {}
+    yield "coincident", np.ones((30, 3)), 1.0, {}
+    yield "cutoff 0", np.repeat(cube[:50], 2, axis=0), 0.0, {}
+    yield "cutoff 0 in a box", np.repeat(cube[:50], 2, axis=0), 0.0, {"box": [6.0] * 3}
+    yield "huge coordinates", cube * 2.0**900, 2.0**900, {}
+    yield "tiny coordinates", cube * 2.0**-1000, 2.0**-1000, {}
+    yield "every scale", cube * 10.0 ** rng.uniform(-300, 300, (400, 1)), 1.0, {}
+    yield "far clumps", clumps, 1.0, {}
+    yield "float32", cube.astype(np.float32), 1.0, {"box": [6.0] * 3}
+    yield "a line in 3-D", np.outer(np.arange(500.0), [1.0, 1.0, 0.0]), 3.0, {}
+
+
+SCENES = {name: scene for name, *scene in scenes()}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_algorithm_finds_the_same_pairs(name):
+    points, cutoff, how = SCENES[name]
+    expected = rows(points, cutoff, "auto", **how)
+    for algorithm in FORCED:
+        found = rows(points, cutoff, algorithm, **how)
+        assert np.array_equal(found, expected), algorithm
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_algorithm_that_was_asked_for_runs(name):
+    points, cutoff, how = SCENES[name]
+    n_pairs = hs.count_pairs(points, cutoff, **how)
+    for algorithm in FORCED:
+        plan = hs.explain(points, cutoff, algorithm=algorithm, measure=True, **how)
+        assert plan.algorithm == algorithm and algorithm in str(plan)
+        assert plan.measured["pairs"] == n_pairs
+        if algorithm == "all-pairs":
+            assert plan.shape == (1,) * plan.ndim and plan.n_cells == 1
+        elif algorithm == "hash":
+            assert plan.n_cells <= max(plan.n, 1)
+        elif algorithm == "grid":
+            assert plan.n_cells == np.prod(plan.shape) <= 2 * plan.n + 64
+    assert hs.explain(points, cutoff, **how).algorithm in FORCED[:3]
+
+
+@pytest.mark.parametrize("algorithm", FORCED)
+def test_a_small_scene_is_right_by_rational_arithmetic(algorithm):
+    rng = np.random.default_rng(4)
+    for kind, cutoff in itertools.product((None, "orthorhombic", "triclinic"), (0.3, 1.7)):
+        box = None if kind is None else random_box(rng, kind)
+        check(rng.uniform(-1.0, 2.0, (25, 3)), cutoff, box, algorithm=algorithm)
+
+
+def test_counters_tell_the_algorithms_apart():
+    points = np.random.default_rng(1).uniform(0.0, 20.0, (5000, 3))
+
+    def measured(algorithm):
+        return hs.explain(points, 1.0, algorithm=algorithm, measure=True).measured
+
+    assert measured("all-pairs")["candidates"] > 0.99 * (5000 * 4999 // 2)
+    assert measured("grid")["candidates"] < 5000 * 500
+    assert measured("hash")["candidates"] < 5000 * 500
+    assert measured("grid")["bytes"]["cells"] != measured("hash")["bytes"]["cells"]
+    # One level is searched as without levels.
+    assert measured("hierarchy") == measured("auto")
+
+
+def test_the_order_does_not_depend_on_kernel_or_threads():
+    points = np.random.default_rng(2).uniform(0.0, 60.0, (30_000, 3))
+    for algorithm in ("grid", "hash", "hierarchy"):
+        first = hs.pairs(points, 2.0, algorithm=algorithm, threads=1)
+        for kernel, threads in itertools.product(hs.kernels(), (1, 3)):
+            again = hs.pairs(points, 2.0, algorithm=algorithm, kernel=kernel, threads=threads)
+            assert all(np.array_equal(a, b) for a, b in zip(first, again))
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_every_function_takes_it(algorithm):
+    rng = np.random.default_rng(3)
+    points, queries = rng.uniform(0.0, 5.0, (200, 3)), rng.uniform(0.0, 5.0, (50, 3))
+    box = [5.0] * 3
+    plain, how = {"box": box}, {"box": box, "algorithm": algorithm}
+    assert hs.count_pairs(points, 1.0, **how) == hs.count_pairs(points, 1.0, **plain)
+    several = hs.count_pairs(points, [0.5, 1.0], **how)
+    assert several.tolist() == hs.count_pairs(points, [0.5, 1.0], **plain).tolist()
+    edges = [0.0, 0.5, 1.0]
+    assert np.array_equal(
+        hs.pair_histogram(points, edges, **how), hs.pair_histogram(points, edges, **plain)
+    )
+    assert np.array_equal(
+        hs.coordination(points, 1.0, **how), hs.coordination(points, 1.0, **plain)
+    )
+    for asking in (None, queries):
+        one = hs.neighbors(points, 1.0, queries=asking, quantities="jdDS", **how)
+        two = hs.neighbors(points, 1.0, queries=asking, quantities="jdDS", **plain)
+        assert np.array_equal(one.offsets, two.offsets)
+        assert np.array_equal(one.indices, two.indices)
+        assert np.array_equal(one.distances, two.distances)
+        assert np.array_equal(one.shifts, two.shifts)
+    one = hs.pairs_between(queries, points, 1.0, quantities="ijdS", **how)
+    two = hs.pairs_between(queries, points, 1.0, quantities="ijdS", **plain)
+    assert all(np.array_equal(a, b) for a, b in zip(one, two))
+    assert hs.count_pairs(points, 1.0, queries=queries, **how) == len(one[0])
+    i, j = hs.pairs(points, 1.0, **how)
+    blocks = list(hs.iter_pairs(points, 1.0, max_pairs=100, **how))
+    assert np.array_equal(np.concatenate([block[0] for block in blocks]), i)
+    assert np.array_equal(np.concatenate([block[1] for block in blocks]), j)
+    seen = []
+    hs.for_each_pair(points, 1.0, lambda i, j, *_: seen.append((i, j)), **how)
+    assert seen == list(zip(i.tolist(), j.tolist()))
+
+
+@pytest.mark.parametrize("rule", SYMMETRIC)
+@pytest.mark.parametrize("box", [None, [9.0, 8.0, 10.0]], ids=["open", "periodic"])
+def test_radii_are_compared_alike_by_every_algorithm(rule, box):
+    rng = np.random.default_rng(7)
+    points = rng.uniform(0.0, 9.0, (300, 3))
+    points[200:] = np.round(points[200:])
+    for radii in (
+        np.full(300, 0.5),
+        10.0 ** rng.uniform(-4.0, 0.3, 300),
+        rng.choice([0.0, 0.25, 0.5, 1.0], 300),
+        np.concatenate([[5.0], np.full(299, 0.01)]),
+        np.zeros(300),
+    ):
+        how = {"radii": radii, "rule": rule, "box": box}
+        expected = rows(points, None, "auto", **how)
+        for algorithm in FORCED:
+            assert np.array_equal(rows(points, None, algorithm, **how), expected), algorithm
+            bound = rows(points, 0.6, algorithm, **how)
+            assert np.array_equal(bound, rows(points, 0.6, "auto", **how))
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_rows_by_radii_are_alike(rule):
+    rng = np.random.default_rng(8)
+    points, queries = rng.uniform(0.0, 6.0, (150, 3)), rng.uniform(0.0, 6.0, (60, 3))
+    points[:20] = queries[:20]
+    radii, asking = 10.0 ** rng.uniform(-3, 0.2, 150), 10.0 ** rng.uniform(-3, 0.2, 60)
+    marks = {"radii": radii, "query_radii": asking, "queries": queries}
+    if rule in ("gather", "scatter"):
+        del marks["radii" if rule == "gather" else "query_radii"]
+    for how in ({"radii": radii}, marks):
+        tables = [
+            hs.neighbors(points, None, rule=rule, box=[6.0] * 3, algorithm=algorithm,
+                         quantities="jdS", **how)
+            for algorithm in ALGORITHMS
+        ]  # fmt: skip
+        counts = [
+            hs.coordination(points, None, rule=rule, box=[6.0] * 3, algorithm=algorithm, **how)
+            for algorithm in ALGORITHMS
+        ]
+        for table, count in zip(tables, counts):
+            assert np.array_equal(table.offsets, tables[0].offsets)
+            assert np.array_equal(table.indices, tables[0].indices)
+            assert np.array_equal(table.distances, tables[0].distances)
+            assert np.array_equal(table.shifts, tables[0].shifts)
+            assert np.array_equal(count, table.counts)
+
+
+@pytest.mark.parametrize("n_types", [1, 3, 8, 12])
+def test_types_are_compared_alike_by_every_algorithm(n_types):
+    rng = np.random.default_rng(n_types)
+    points = rng.uniform(0.0, 8.0, (300, 3))
+    types = rng.integers(0, n_types, 300)
+    table = rng.uniform(0.0, 1.5, (n_types, n_types))
+    table = np.maximum(table, table.T)
+    table[0, 0] = 0.0
+    expected = rows(points, table, "auto", types=types, box=[8.0] * 3)
+    for algorithm in FORCED:
+        found = rows(points, table, algorithm, types=types, box=[8.0] * 3)
+        assert np.array_equal(found, expected), algorithm
+    none = {(0, 0): 0.5} if n_types > 1 else {(0, 1): 0.5}
+    expected = rows(points, none, "auto", types=types)
+    for algorithm in FORCED:
+        assert np.array_equal(rows(points, none, algorithm, types=types), expected)
+
+
+def test_radii_are_explained():
+    rng = np.random.default_rng(9)
+    points, radii = rng.uniform(0.0, 20.0, (3000, 3)), 10.0 ** rng.uniform(-3, 0, 3000)
+    plan = hs.explain(points, None, radii=radii)  # few are near any other
+    assert plan.algorithm == "grid" and "one search" in plan.reason
+    radii[0] = 30.0  # which one search would look for around all of them
+    for algorithm in ALGORITHMS:
+        plan = hs.explain(points, None, radii=radii, algorithm=algorithm)
+        assert plan.algorithm == ("hierarchy" if algorithm == "auto" else algorithm)
+        assert ("octaves" in plan.reason) == (algorithm in ("auto", "hierarchy"))
+        assert ("one search" in plan.reason) == (algorithm not in ("auto", "hierarchy"))
+
+
+@pytest.mark.parametrize(("rule", "searches"), [("sum", 10), ("max", 7), ("min", 7)])
+def test_octaves_are_counted_from_the_largest_radius(rule, searches):
+    points = np.random.default_rng(0).random((600, 3)) * 30.0
+    four = np.array([5.0, 2.5, 2.4, 1.2, 0.6])[np.arange(600) % 5]  # 2.5 is with 5
+    plan = hs.explain(points, None, radii=four, rule=rule, algorithm="hierarchy")
+    assert plan.reason.startswith("4 octaves of radii up to 5,")
+    assert plan.reason.endswith(f"in {searches} searches")
+    none = hs.explain(points, None, radii=np.zeros(600), algorithm="hierarchy")
+    assert none.reason.startswith("1 octave of radii up to 0,")
+    four[:9] = 0.0
+    plan = hs.explain(points, None, radii=four, algorithm="hierarchy")
+    assert plan.reason.startswith("5 octaves of radii up to 5,")
+
+
+def test_one_cutoff_is_one_level():
+    plan = hs.explain(np.random.default_rng(1).random((2000, 3)), 0.1, algorithm="hierarchy")
+    assert plan.algorithm == "hierarchy" and "one level" in plan.reason
+
+
+def test_clusters_that_are_far_apart_are_explained():
+    rng = np.random.default_rng(5)
+    for n_clusters, each in ((10, 100), (100, 1000)):
+        centres = 1e9 * np.arange(n_clusters)[:, None, None]
+        points = (centres + rng.uniform(0.0, 5.0, (n_clusters, each, 3))).reshape(-1, 3)
+        plan = hs.explain(points, 1.0)
+        found = hs.count_pairs(points, 1.0)
+        assert plan.algorithm == "hash"
+        assert n_clusters <= plan.n_cells <= len(points)
+        assert 0.7 * found < plan.expected_pairs < 1.4 * found
+        assert f"{plan.n_cells} that hold points" in str(plan)
+
+
+def test_a_grid_of_far_points_takes_no_more_memory():
+    points = np.random.default_rng(6).random((1000, 3)) * 1e12
+    plan = hs.explain(points, 1.0, algorithm="grid", measure=True)
+    assert plan.n_cells <= 2 * 1000 + 64 and min(plan.cell_sizes) > 1e10
+    assert plan.measured["bytes_peak"] < 1_000_000
+
+
+@pytest.mark.parametrize("algorithm", ["", "Grid", "sparse", "cells", "auto\0"])
+def test_unknown_names_are_refused_with_those_that_there_are(algorithm):
+    points = np.zeros((2, 3))
+    must = r"algorithm must be 'auto', 'all-pairs', 'grid', 'hash' or 'hierarchy', got "
+    for call in (
+        lambda: hs.pairs(points, 1.0, algorithm=algorithm),
+        lambda: hs.neighbors(points, 1.0, algorithm=algorithm),
+        lambda: hs.count_pairs(points, [1.0, 2.0], algorithm=algorithm),
+        lambda: hs.explain(points, 1.0, algorithm=algorithm),
+        lambda: hs.pair_histogram(points, [0.0, 1.0], algorithm=algorithm),
+        lambda: hs.pairs(points, None, radii=[1.0, 1.0], algorithm=algorithm),
+    ):
+        with pytest.raises(ValueError, match=must):
+            call()
+
+
+@pytest.mark.parametrize("algorithm", [None, 3, b"grid", ["grid"], np.array(["grid"])])
+def test_what_is_no_name_is_refused(algorithm):
+    with pytest.raises(TypeError, match="algorithm must be 'auto'"):
+        hs.pairs(np.zeros((2, 3)), 1.0, algorithm=algorithm)

@@ -1,0 +1,438 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pairs by supports against a brute force in rational arithmetic, which meets every image of every
+two points: rules, boxes, dimensions, needles, sizes, ties."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+RULES = ("max", "min", "gather", "scatter")
+
+
+def whole(*tables):
+    """Tables of floats, each a list of rows, as whole numbers of a unit; and the unit's inverse."""
+    exact = [[[Fraction(x) for x in row] for row in table] for table in tables]
+    unit = math.lcm(1, *(x.denominator for table in exact for row in table for x in row))
+    return [[[int(x * unit) for x in row] for row in table] for table in exact], unit
+
+
+def norm2(matrix, vector):
+    d = len(vector)
+    return sum(sum(matrix[k * d + m] * vector[m] for m in range(d)) ** 2 for k in range(d))
+
+
+def most_images(H, extent, box, periodic):
+    """More periods than any pair is apart along each axis, for points in the box."""
+    longest = extent / np.linalg.eigvalsh(H)[:, 0].min() * 1.001
+    heights = 1.0 / np.linalg.norm(np.linalg.inv(box), axis=0)
+    return [int(longest / h) + 2 if p else 0 for h, p in zip(heights, periodic)]
+
+
+def brute(
+    x, H, extent, rule, box=None, periodic=None, inclusive=True, q=None, Hq=None, cutoff=None
+):
+    """All (i, j, S): of one set each pair once, or rows of it for rules with a direction."""
+    d = x.shape[1]
+    directed = q is not None or rule in ("gather", "scatter")
+    asking, of_asking = (x, H) if q is None else (q, Hq)
+    edges = np.zeros((d, d)) if box is None else np.asarray(box, np.float64)
+    (X, Q, rows), unit = whole(
+        *(np.asarray(table, np.float64).tolist() for table in (x, asking, edges))
+    )
+    (T, A), of_entries = whole(
+        *([] if h is None else h.reshape(len(h), d * d).tolist() for h in (H, of_asking))
+    )
+    limit = (Fraction(extent) * unit * of_entries) ** 2
+    ball = None if cutoff is None else (Fraction(cutoff) * unit) ** 2
+    every = [h for h in (H, of_asking) if h is not None]
+    shifts = [(0,) * d]
+    if box is not None:
+        wide = most_images(np.concatenate(every), extent, np.asarray(box, float), periodic)
+        shifts = list(itertools.product(*(range(-m, m + 1) for m in wide)))
+
+    def below(square, most):
+        return square <= most if inclusive else square < most
+
+    found = []
+    for i, p in enumerate(Q):
+        for j, r in enumerate(X):
+            if not directed and j < i:
+                continue
+            for S in shifts:
+                if q is None and i == j:
+                    first = next((s for s in S if s), 0)
+                    if first == 0 or (not directed and first < 0):
+                        continue
+                D = [r[k] - p[k] + sum(s * row[k] for s, row in zip(S, rows)) for k in range(d)]
+                if ball is not None and not below(sum(a * a for a in D), ball):
+                    continue
+                judged = []
+                if rule != "scatter":
+                    judged.append(below(norm2(A[i], D), limit))
+                if rule != "gather":
+                    judged.append(below(norm2(T[j], D), limit))
+                if all(judged) if rule == "min" else any(judged):
+                    found.append((i, j, *S))
+    return sorted(found)
+
+
+def rotations(rng, n, d):
+    return np.linalg.qr(rng.standard_normal((n, d, d)))[0]
+
+
+def tensors(rng, n, d, h, aspect, rotated=True):
+    """Supports whose longest axis is about h, and the shortest one about h / aspect."""
+    values = np.exp(rng.uniform(0.0, math.log(aspect), (n, d))) / h
+    values[:, 0] = 1.0 / h
+    values[:, -1] = aspect / h if d > 1 else 1.0 / h
+    if not rotated:
+        return np.stack([np.diag(v) for v in values]) if n else np.empty((0, d, d))
+    Q = rotations(rng, n, d)
+    H = np.einsum("nab,nb,ncb->nac", Q, values, Q)
+    return (H + H.transpose(0, 2, 1)) / 2.0
+
+
+def rows_of(result):
+    i, j, S = result
+    return sorted(zip(i.tolist(), j.tolist(), *S.T.tolist()))
+
+
+def found(x, rule, *, kernel=None, threads=None, **how):
+    if rule in ("gather", "scatter") and "queries" not in how:
+        table = hs.neighbors(x, how.pop("cutoff", None), rule=rule, quantities="jS", kernel=kernel,
+                             threads=threads, **how)  # fmt: skip
+        return rows_of(table.to_pairs(quantities="ijS"))
+    cutoff = how.pop("cutoff", None)
+    if "queries" in how:
+        return rows_of(hs.pairs_between(how.pop("queries"), x, cutoff, rule=rule, quantities="ijS",
+                                        kernel=kernel, threads=threads, **how))  # fmt: skip
+    return rows_of(
+        hs.pairs(x, cutoff, rule=rule, quantities="ijS", kernel=kernel, threads=threads, **how)
+    )
+
+
+BOXES = {
+    "open": (lambda d: None, lambda d: None),
+    "periodic": (lambda d: np.eye(d), lambda d: [True] * d),
+    "mixed": (lambda d: np.eye(d) * 1.25, lambda d: [k % 2 == 0 for k in range(d)]),
+    "triclinic": (
+        lambda d: np.eye(d) + 0.375 * np.tril(np.ones((d, d)), -1),
+        lambda d: [True] * d,
+    ),
+    "images": (lambda d: np.diag([0.5, 1.5, 2.0][:d]), lambda d: [True] + [False] * (d - 1)),
+}
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("kind", BOXES)
+def test_the_brute_force_agrees(kind, rule, d):
+    rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
+    for trial in range(4):
+        n = 14 if d < 3 else 10
+        box, periodic = BOXES[kind][0](d), BOXES[kind][1](d)
+        x = rng.random((n, d)).astype(np.float32 if trial % 2 else np.float64)
+        H = tensors(rng, n, d, 0.3 + 0.2 * (d == 3), (1.0, 3.0, 20.0, 1e3)[trial])
+        how = {} if box is None else {"box": box, "periodic": periodic}
+        expected = brute(x, H, 1.0, rule, box, periodic)
+        assert found(x, rule, supports=H, extent=1.0, **how) == expected
+        if rule in ("max", "min"):
+            table = hs.neighbors(x, None, supports=H, extent=1.0, rule=rule, quantities="jS", **how)
+            both = [(j, i, *(-s for s in S)) for i, j, *S in expected]
+            assert rows_of(table.to_pairs(quantities="ijS")) == sorted(expected + both)
+            count = hs.count_pairs(x, None, supports=H, extent=1.0, rule=rule, **how)
+            assert count == len(expected)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("rule", RULES)
+def test_two_sets_agree(rule, d):
+    rng = np.random.default_rng([d, RULES.index(rule)])
+    x, q = rng.random((12, d)), rng.random((9, d)).astype(np.float32)
+    H, Hq = tensors(rng, 12, d, 0.5, 10.0), tensors(rng, 9, d, 0.3, 4.0)
+    own = None if rule == "gather" else H
+    asking = None if rule == "scatter" else Hq
+    for box, periodic in ((None, None), (np.eye(d), [True] * d)):
+        how = {} if box is None else {"box": box}
+        expected = brute(x, own, 2.0, rule, box, periodic, q=q, Hq=asking)
+        given = {"supports": own, "query_supports": asking, "extent": 2.0, **how}
+        assert found(x, rule, queries=q, **given) == expected
+        counts = hs.coordination(x, None, queries=q, rule=rule, **given)
+        assert counts.tolist() == [sum(row[0] == i for row in expected) for i in range(len(q))]
+        assert hs.count_pairs(x, None, queries=q, rule=rule, **given) == len(expected)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_rotated_needles_a_million_times_as_long_as_wide(d):
+    rng = np.random.default_rng(d)
+    n = 24
+    H = tensors(rng, n, d, 1.0, 1e6)
+    x = rng.random((n, d))
+    for k in range(0, n, 2):  # along the needle of the point before, a little to the side
+        axis = np.linalg.eigh(H[k])[1][:, 0]
+        side = rng.standard_normal(d) * 1e-6 * rng.random()
+        x[k + 1] = x[k] + 0.999 * rng.random() * axis + side
+    expected = brute(x, H, 1.0, "max")
+    assert len(expected) > 5
+    for kernel in hs.kernels():
+        assert found(x, "max", supports=H, extent=1.0, kernel=kernel) == expected
+    for rule in RULES:
+        assert found(x, rule, supports=H, extent=1.0) == brute(x, H, 1.0, rule)
+    assert hs.verify(x, None, *hs.pairs(x, None, supports=H, extent=1.0), supports=H, extent=1.0)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_sizes_that_differ_a_million_times(rule):
+    rng = np.random.default_rng(7)
+    n = 40
+    x = rng.random((n, 3))
+    x[20:] = x[:20] + 1e-6 * rng.standard_normal((20, 3))
+    H = tensors(rng, n, 3, 1.0, 5.0) * np.where(np.arange(n) % 5 == 0, 2.0, 1e6)[:, None, None]
+    assert found(x, rule, supports=H, extent=2.0) == brute(x, H, 2.0, rule)
+
+
+def tie_scene():
+    """Pairs at which |H D| is exactly the extent, 5, and beside it by one unit of a coordinate."""
+    H = np.array([[3.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.25]])
+    H = np.stack([H, np.array([[2.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 1.0]])])
+    x, T = [], []
+    for k, (h, D) in enumerate([(0, (1.0, 2.0, 0.0)), (0, (0.0, 0.0, 20.0)), (1, (3.0, -1.0, 0.0)),
+                                (1, (1.0, 1.0, 0.0)), (0, (1.0, 0.0, 16.0))]):  # fmt: skip
+        for beside in (-1, 0, 1):
+            q = np.array(D)
+            axis = int(np.argmax(np.abs(q)))
+            if beside:
+                q[axis] = np.nextafter(q[axis], beside * np.sign(q[axis]) * np.inf)
+            origin = np.array([64.0 * (3 * k + beside + 1), 0.0, 0.0])
+            x += [origin * 0.0, q]
+            T += [H[h], 1e6 * np.eye(3)]
+            yield np.array(x[-2:]), np.array(T[-2:]), beside
+
+
+def test_ties_are_decided_exactly():
+    kept = 0
+    for x, H, beside in tie_scene():
+        for inclusive in (True, False):
+            expected = brute(x, H, 5.0, "max", inclusive=inclusive)
+            for kernel in hs.kernels():
+                got = found(x, "max", supports=H, extent=5.0, inclusive=inclusive, kernel=kernel)
+                assert got == expected
+            if beside:
+                assert len(expected) == (beside < 0)
+            kept += len(expected)
+    assert kept > 8
+
+
+@pytest.mark.parametrize("inclusive", [True, False])
+def test_lattices_of_ties(inclusive):
+    """Every neighbour along an axis is on the surface: powers of two, and thirds, which are not."""
+    g = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    for unit, factor in ((1.0, 0.5), (0.25, 2.0), (1.0 / 3.0, 3.0), (0.1, 10.0)):
+        x = g * unit
+        H = np.tile(factor * np.diag([2.0, 1.0, 0.5]) / 2.0, (len(x), 1, 1))
+        args = {"supports": H, "extent": 0.5, "inclusive": inclusive}
+        got = hs.pairs(x, None, quantities="ijS", **args)
+        assert hs.verify(x, None, *got, **args)
+        few = slice(0, 30)
+        part = {**args, "supports": H[few]}
+        expected = brute(x[few], H[few], 0.5, "max", inclusive=inclusive)
+        assert found(x[few], "max", **part) == expected
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("inclusive", [True, False])
+def test_round_supports_are_radii(rule, d, inclusive):
+    """Radii whose inverses are exact: H = I / r, extent 1."""
+    rng = np.random.default_rng([d, inclusive])
+    n = 300
+    x = np.round(rng.random((n, d)) * 64) / 64
+    radii = 2.0 ** rng.integers(-5, -1, n)
+    H = np.eye(d) / radii[:, None, None]
+    for box in (None, [1.0] * d):
+        same = {"box": box, "inclusive": inclusive, "rule": rule}
+        by_radii = hs.neighbors(x, None, radii=radii, quantities="jS", **same)
+        by_supports = hs.neighbors(x, None, supports=H, extent=1.0, quantities="jS", **same)
+        assert np.array_equal(by_radii.offsets, by_supports.offsets)
+        assert np.array_equal(by_radii.indices, by_supports.indices)
+        assert np.array_equal(by_radii.shifts, by_supports.shifts)
+
+
+@pytest.mark.parametrize("rule", ["max", "min"])
+def test_every_function_gives_the_same_pairs(rule):
+    rng = np.random.default_rng(3)
+    x = rng.random((500, 3))
+    args = {"supports": tensors(rng, 500, 3, 0.2, 4.0), "extent": 1.0, "rule": rule, "box": 1.0}
+    reference = hs.pairs(x, None, quantities="ijSdD", sort=True, **args)
+    i, j, S, d, D = reference
+    assert np.allclose(np.linalg.norm(D, axis=1), d)
+    unsorted = hs.pairs(x, None, quantities="ijSdD", **args)
+    for kernel, threads in itertools.product(hs.kernels(), (1, 2, 3)):
+        again = hs.pairs(x, None, quantities="ijSdD", kernel=kernel, threads=threads, **args)
+        assert all(np.array_equal(a, b) for a, b in zip(again, unsorted))
+    blocks = list(hs.iter_pairs(x, None, quantities="ijSdD", max_pairs=1000, **args))
+    assert all(np.array_equal(np.concatenate(a), b) for a, b in zip(zip(*blocks), unsorted))
+    seen = []
+    hs.for_each_pair(x, None, lambda i, j, S, D, d2: seen.append((i, j, *S)), **args)
+    assert sorted(seen) == rows_of((i, j, S))
+    assert hs.count_pairs(x, None, **args) == len(i)
+    degree = np.bincount(i, minlength=500) + np.bincount(j, minlength=500)
+    assert np.array_equal(hs.coordination(x, None, **args), degree)
+    assert hs.verify(x, None, i, j, S, **args)
+    assert hs.verify(x, None, hs.neighbors(x, None, quantities="jS", **args), **args)
+
+
+@pytest.mark.parametrize("inclusive", [True, False])
+def test_a_cutoff_is_a_further_limit(inclusive):
+    rng = np.random.default_rng(11)
+    x = np.round(rng.random((14, 2)) * 16) / 16
+    H = tensors(rng, 14, 2, 0.6, 3.0)
+    for cutoff in (0.0, 0.125, 0.3125, 0.5, 5.0):
+        for box in (None, np.eye(2)):
+            how = {} if box is None else {"box": box}
+            expected = brute(x, H, 1.0, "max", box, [True] * 2, inclusive, cutoff=cutoff)
+            args = {"supports": H, "extent": 1.0, "inclusive": inclusive, **how}
+            assert found(x, "max", cutoff=cutoff, **args) == expected
+            i, j, S = hs.pairs(x, cutoff, quantities="ijS", **args)
+            assert hs.verify(x, cutoff, i, j, S, **args)
+
+
+@pytest.mark.parametrize("inclusive", [True, False])
+def test_an_extent_of_zero_holds_coincident_points(inclusive):
+    x = np.array([[0.0, 0.0], [0.0, 0.0], [1e-300, 0.0], [1.0, 1.0], [1.0, 1.0]])
+    H = np.tile(np.diag([1.0, 2.0]), (5, 1, 1))
+    expected = [(0, 1, 0, 0), (3, 4, 0, 0)] if inclusive else []
+    assert found(x, "max", supports=H, extent=0.0, inclusive=inclusive) == expected
+
+
+@pytest.mark.parametrize("exponent", [-940, -400, -60, 60, 400, 900])
+@pytest.mark.parametrize("aspect", [1.5, 1e7])
+def test_any_unit_of_length(exponent, aspect):
+    rng = np.random.default_rng(5)
+    x = rng.random((16, 2))
+    H = tensors(rng, 16, 2, 0.5, aspect)
+    x[8:] = x[:8] + np.linalg.solve(H[:8], rng.standard_normal((8, 2, 1)) * 0.6)[..., 0]
+    expected = brute(x, H, 1.0, "max")
+    assert expected
+    scaled = np.ldexp(x, exponent)
+    inverse = np.ldexp(H, -exponent)
+    assert np.array_equal(np.ldexp(scaled, -exponent), x)
+    assert np.array_equal(np.ldexp(inverse, exponent), H)
+    assert found(scaled, "max", supports=inverse, extent=1.0) == expected
+    box = np.ldexp(np.eye(2) * 64.0, exponent)
+    assert found(scaled, "max", supports=inverse, extent=1.0, box=box) == expected
+
+
+@pytest.mark.parametrize("extent_exponent", [-1000, 0, 1000])
+def test_any_unit_of_the_extent(extent_exponent):
+    rng = np.random.default_rng(6)
+    x = rng.random((16, 3))
+    H = tensors(rng, 16, 3, 0.5, 8.0)
+    extent = math.ldexp(1.0, extent_exponent)
+    assert found(x, "max", supports=np.ldexp(H, extent_exponent), extent=extent) == brute(
+        x, H, 1.0, "max"
+    )
+
+
+def test_entries_of_extreme_sizes_in_one_support():
+    """The product of entries leaves float64's range, and so does the determinant."""
+    x = np.array([[0.0, 0.0], [1e150, 0.0], [0.0, 1e-150], [1.1e150, 0.0], [1e150, 1e-150]])
+    H = np.tile(np.diag([1e-150, 1e150]), (5, 1, 1))
+    assert found(x, "max", supports=H, extent=1.0) == brute(x, H, 1.0, "max")
+    assert found(x, "min", supports=H, extent=1.0) == brute(x, H, 1.0, "min")
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_other_precisions_are_those_of_any_kernel(precision):
+    rng = np.random.default_rng(8)
+    x = rng.random((400, 3))
+    args = {"supports": tensors(rng, 400, 3, 0.3, 6.0), "extent": 1.0, "box": 1.0}
+    exact = set(found(x, "max", **args))
+    answers = [found(x, "max", precision=precision, kernel=k, **args) for k in hs.kernels()]
+    assert all(a == answers[0] for a in answers)
+    assert len(exact ^ set(answers[0])) <= 2
+
+
+def test_points_far_apart_and_outside_the_box():
+    rng = np.random.default_rng(9)
+    x = rng.random((20, 3))
+    H = tensors(rng, 20, 3, 0.4, 5.0)
+    inside = found(x, "max", supports=H, extent=1.0, box=1.0)
+    turns = rng.integers(-1000, 1000, (20, 3)).astype(float)
+    moved = np.round(x * 1024) / 1024
+    inside = found(moved, "max", supports=H, extent=1.0, box=1.0)
+    outside = found(moved + turns, "max", supports=H, extent=1.0, box=1.0)
+    assert [row[:2] for row in inside] == [row[:2] for row in outside]
+    apart = moved + 1e9 * (np.arange(20) >= 10)[:, None]
+    assert found(apart, "max", supports=H, extent=1.0) == brute(apart, H, 1.0, "max")
+
+
+SKEWED = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.25, -0.375, 1.25]])
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("kind", ["open", "box", "slab", "skewed", "short"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_needles_along_the_axes(d, kind, rule):
+    """Cells and images go by the width of needles along each axis of the grid."""
+    rng = np.random.default_rng([d, RULES.index(rule), len(kind)])
+    n = 18
+    box = {
+        "open": None, "box": np.eye(d), "slab": np.eye(d), "skewed": SKEWED[:d, :d],
+        "short": np.diag([1.0, 0.5, 0.75][:d]),
+    }[kind]  # fmt: skip
+    periodic = [kind != "slab" or k == 0 for k in range(d)]
+    how = {} if box is None else {"box": box, "periodic": periodic}
+    n_pairs = 0
+    for axis in range(d):
+        values = np.full((n, d), 8.0) + rng.random((n, d))
+        values[:, axis] = 1.2 + 0.2 * rng.random(n)
+        H = np.stack([np.diag(v) for v in values])
+        H[:, 0, 1] = H[:, 1, 0] = 0.05 * rng.random(n)  # not quite along it
+        x = rng.random((n, d)) * (1.25 if box is None else 1.0)
+        expected = brute(x, H, 1.0, rule, box, periodic)
+        assert found(x, rule, supports=H, extent=1.0, **how) == expected
+        n_pairs += len(expected)
+    assert n_pairs > 0
+
+
+def test_a_needle_at_its_very_ends():
+    """Points on the surface of needles along each axis, across faces of the box: ties."""
+    for axis in range(3):
+        values = np.full(3, 64.0)
+        values[axis] = 2.0
+        x = [[0.5, 0.5, 0.5]]
+        for k in range(3):
+            for side in (-1.0, 1.0):
+                x.append([(0.5 + side / values[k] * (m == k)) % 1.0 for m in range(3)])
+        x = np.array(x)
+        H = np.tile(np.diag(values), (len(x), 1, 1))
+        counts = []
+        for inclusive in (True, False):
+            expected = brute(x, H, 1.0, "max", np.eye(3), [True] * 3, inclusive)
+            args = {"supports": H, "extent": 1.0, "box": 1.0, "inclusive": inclusive}
+            assert found(x, "max", **args) == expected
+            counts.append(len(expected))
+        assert counts[0] >= counts[1] + 6
+
+
+def test_many_needles_in_many_cells():
+    rng = np.random.default_rng(21)
+    n = 1000
+    x = rng.random((n, 3))
+    for axis in range(3):
+        values = np.full((n, 3), 40.0)
+        values[:, axis] = 4.0
+        H = np.stack([np.diag(v) for v in values])
+        turned = rotations(rng, 1, 3)[0]
+        for matrices in (H, turned @ H @ turned.T):
+            matrices = (matrices + matrices.transpose(0, 2, 1)) / 2.0
+            for box in (1.0, SKEWED, None):
+                args = {"supports": matrices, "extent": 1.0, "box": box}
+                result = hs.pairs(x, None, quantities="ijS", **args)
+                assert hs.verify(x, None, *result, **args)

@@ -1,0 +1,343 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Patch, remove, exclude and rebuild: each equals a build from nothing."""
+
+import numpy as np
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+import halfshell as hs
+from node_oracle import check, random_lists
+
+PARTS = ("offsets", "indices", "overlap_offsets", "overlap_indices", "intersection_offsets",
+         "intersection_indices")  # fmt: skip
+COLUMNS = ("i_node", "i_list", "j_node", "j_list")
+
+
+def assert_equal(c, other):
+    for name in PARTS:
+        try:
+            want = getattr(other, name)
+        except ValueError:
+            continue
+        assert np.array_equal(getattr(c, name), want), name
+    for name in COLUMNS:
+        assert np.array_equal(getattr(c.pairs, name), getattr(other.pairs, name)), name
+    assert c.n_nodes == other.n_nodes
+    assert c.n_ghosts == other.n_ghosts
+    for k in range(len(c.names)):
+        assert np.array_equal(c.traversal(k), other.traversal(k))
+    ours, theirs = c.global_neighbors(), other.global_neighbors()
+    for one, want in zip(ours, theirs, strict=True):
+        assert np.array_equal(one, want)
+    c.validate()
+
+
+def random_options(rng):
+    names = ("ghosts", "overlap", "intersection")
+    options = {name: bool(rng.integers(2)) for name in names}
+    return options | ({"order": "morton"} if rng.integers(3) == 0 else {})
+
+
+def with_ids(lists, rng):
+    """The same lists with ids of their own: a patch keeps those that nodes have."""
+    n = sum(one.n_nodes for one in lists)
+    ids = np.split(rng.permutation(n), np.cumsum([one.n_nodes for one in lists])[:-1])
+    return [
+        hs.NodeList(one.name, one.positions, one.H, one.n_ghost, own)
+        for one, own in zip(lists, ids, strict=False)
+    ]  # fmt: skip
+
+
+def culled(lists, keep, old2new):
+    """The lists as they are once nodes have gone."""
+    out = []
+    for one, mask, new in zip(lists, keep, old2new, strict=True):
+        order = np.empty(mask.sum(), int)
+        order[new[mask]] = np.flatnonzero(mask)
+        ghosts = int(mask[one.n_internal :].sum())
+        out.append(
+            hs.NodeList(one.name, one.positions[order], one.H[order], ghosts, one.ids[order])
+        )
+    return out
+
+
+def random_culling(lists, rng, shuffled):
+    keep, old2new = [], []
+    for one in lists:
+        mask = rng.random(one.n_nodes) < rng.choice([0.3, 0.8, 1.0])
+        new = np.full(one.n_nodes, -1)
+        for part in (slice(0, one.n_internal), slice(one.n_internal, None)):
+            kept = np.flatnonzero(mask[part]) + (part.start or 0)
+            start = 0 if part.start == 0 else mask[: one.n_internal].sum()
+            numbers = np.arange(start, start + len(kept))
+            new[kept] = rng.permutation(numbers) if shuffled else numbers
+        keep.append(mask)
+        old2new.append(new)
+    return keep, old2new
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_patch_equals_a_build_of_what_is_left(seed):
+    rng = np.random.default_rng([seed, 1])
+    lists = random_lists(rng, rng.integers(0, 20, rng.integers(1, 4)), 2, lattice=seed % 3 == 0)
+    lists = with_ids(lists, rng)
+    options = random_options(rng)
+    c = hs.Connectivity(lists, **options)
+    coupling = {}
+    if seed % 2:
+        c.pairs.coupling = rng.random(len(c.pairs))
+        ids = [one.ids for one in lists]
+        coupling = {
+            frozenset((ids[a][i], ids[b][j])): value
+            for (i, a, j, b), value in zip(c.pairs, c.pairs.coupling, strict=True)
+        }
+    for _ in range(2):
+        keep, old2new = random_culling(lists, rng, shuffled=seed % 4 < 2)
+        lists = culled(lists, keep, old2new)
+        c.patch(keep, None if seed % 4 >= 2 else old2new)
+        assert_equal(c, hs.Connectivity(lists, **options))
+        ids = [one.ids for one in lists]
+        for (i, a, j, b), value in zip(c.pairs, c.pairs.coupling, strict=True):
+            assert value == coupling.get(frozenset((ids[a][i], ids[b][j])), 1.0)
+
+
+def test_a_patch_by_used_drops_ghosts_that_no_node_sees():
+    rng = np.random.default_rng(4)
+    lists = with_ids(random_lists(rng, (40, 30), 2, size=9.0), rng)
+    c = hs.Connectivity(lists)
+    keep = c.used()
+    assert sum(int((~mask).sum()) for mask in keep) > 0
+    pairs = c.pairs.view()
+    c.patch(keep)
+    assert len(c.pairs) == len(pairs)
+    assert_equal(c, hs.Connectivity(culled(lists, keep, [np.cumsum(m) - 1 for m in keep])))
+
+
+def test_a_patch_in_a_box_keeps_shifts():
+    rng = np.random.default_rng(6)
+    lists = with_ids(random_lists(rng, (14, 9), 2, size=5.0, h=(0.1, 0.7)), rng)
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        c = hs.Connectivity(lists, box=[2.0, 3.0], ghosts=bool(seed % 2))
+        keep, old2new = random_culling(lists, rng, shuffled=True)
+        c.patch(keep, old2new)
+        other = hs.Connectivity(
+            culled(lists, keep, old2new), box=[2.0, 3.0], ghosts=bool(seed % 2)
+        )
+        assert_equal(c, other)
+        assert (c.shifts == other.shifts).all()
+        assert (c.pairs.shifts == other.pairs.shifts).all()
+
+
+@pytest.mark.parametrize("ghosts", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_mask_takes_single_images(seed, ghosts):
+    """In a box, where two nodes are a pair in several images: rows lose these as well."""
+    rng = np.random.default_rng([seed, 9])
+    lists = random_lists(rng, (12, 0, 9), 2, size=5.0, h=(0.1, 0.8))
+    c = hs.Connectivity(lists, box=[[1.6, 0.0], [0.3, 1.8]], ghosts=ghosts)
+    rows = _rows_with_shifts(c)
+    mask = rng.random(len(c.pairs)) < 0.4
+    c.pairs.coupling = np.arange(len(mask))
+    table = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
+    several = np.unique(table[:, :4], axis=0, return_counts=True)[1]
+    assert (several > 1).any()
+    for i, a, j, b, *s in table[mask].tolist():
+        rows.discard((a, i, b, j, *s))
+        rows.discard((b, j, a, i, *(-k for k in s)))
+    c.remove(mask)
+    assert _rows_with_shifts(c) == rows
+    left = np.column_stack([*(getattr(c.pairs, name) for name in COLUMNS), c.pairs.shifts])
+    assert (left == table[~mask]).all()
+    assert c.pairs.coupling.tolist() == np.flatnonzero(~mask).tolist()
+    c.validate()
+
+
+def _rows_with_shifts(c):
+    """(list, node, list and node of a neighbour, S) of all entries."""
+    found = set()
+    for a, start in enumerate(c.row_start[:-1]):
+        for row in range(start, c.row_start[a + 1]):
+            for b in range(len(c.names)):
+                at = row * len(c.names) + b
+                for e in range(c.offsets[at], c.offsets[at + 1]):
+                    found.add((a, int(row - start), b, int(c.indices[e]), *c.shifts[e].tolist()))
+    assert len(found) == len(c.indices)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_remove_equals_exclude(seed):
+    rng = np.random.default_rng([seed, 2])
+    lists = random_lists(rng, rng.integers(1, 16, 3), 2)
+    options = random_options(rng)
+
+    def gone(i_node, i_list, j_node, j_list):
+        """Symmetric, and of pairs that merely overlap as well."""
+        return (i_node * 7 + j_node * 7 + i_list + j_list) % 5 == seed % 5
+
+    c = hs.Connectivity(lists, **options)
+    c.pairs.coupling = np.arange(len(c.pairs))
+    stays = ~gone(*(getattr(c.pairs, name) for name in COLUMNS))
+    c.remove(gone)
+    assert_equal(c, hs.Connectivity(lists, exclude=gone, **options))
+    assert c.pairs.coupling.tolist() == np.flatnonzero(stays).tolist()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pairs_that_are_excluded_by_number_count_nowhere(seed):
+    rng = np.random.default_rng([seed, 3])
+    lists = random_lists(rng, (9, 0, 7), 2, lattice=True)
+    n = 16
+    gone = {tuple(sorted(rng.choice(n, 2, replace=False).tolist())) for _ in range(20)}
+    label = [(i, 0) for i in range(9)] + [(i, 2) for i in range(7)]
+    rows = [(*label[b], *label[a]) if (a + b) % 2 else (*label[a], *label[b]) for a, b in gone]
+    c = hs.Connectivity(lists, overlap=True, intersection=True, exclude=rows)
+    check(c, lists, gone=gone)
+    masked = hs.Connectivity(lists, ghosts=True)
+    mask = np.zeros(len(masked.pairs), bool)
+    for row in rows:
+        try:
+            mask[masked.pairs.index(row)] = True
+        except KeyError:
+            continue
+    masked.remove(mask)
+    check(masked, lists, ghosts=True, gone=gone)
+
+
+def test_removing_twice_does_not_bring_back_what_was_removed():
+    """Nodes 0 and 1 overlap through node 2 as well, whatever else is removed later."""
+    lists = [hs.NodeList("a", [[0.0], [1.0], [0.5], [9.0], [9.5]], [0.5] * 5)]
+    c = hs.Connectivity(lists, overlap=True)
+    c.remove(lambda i, a, j, b: (i == 0) & (j == 1))
+    assert c.overlap(0, 0)[0].tolist() == [2]
+    c.remove(lambda i, a, j, b: (i == 3) & (j == 4))
+    assert c.overlap(0, 0)[0].tolist() == [2]
+    c.patch([[True, True, True, False, True]])
+    assert c.overlap(0, 0)[0].tolist() == [2]
+    assert c.overlap(0, 1)[0].tolist() == [2]
+
+
+def test_every_access_to_an_old_field_is_stale():
+    lists = [hs.NodeList("a", [[0.0], [1.0], [2.0]], [0.5] * 3)]
+    accesses = (
+        lambda f: f[0], lambda f: f[(0, 0, 1, 0)], lambda f: f.values, lambda f: f.pairs,
+        lambda f: len(f), lambda f: list(f), lambda f: f.zero(), lambda f: f.copy(),
+        lambda f: f.__setitem__(0, 1.0), lambda f: f[:], lambda f: f[-1],
+    )  # fmt: skip
+    changes = (
+        lambda c: c.rebuild(lists), lambda c: c.patch([[True] * 3]),
+        lambda c: c.remove(np.zeros(2, bool)),
+    )  # fmt: skip
+    for change in changes:
+        c = hs.Connectivity(lists)
+        old = c.pairs
+        field = hs.PairField(old, n_elements=1)
+        wide = hs.PairField(old, np.float32, 3)
+        assert wide.values.shape == (2, 3)
+        change(c)
+        for access in accesses:
+            for one in (field, wide):
+                with pytest.raises(hs.StaleError, match="PairField"):
+                    access(one)
+        with pytest.raises(hs.StaleError):
+            hs.PairField(old)
+        assert "no more" in repr(field)
+        hs.PairField(c.pairs)[0] = 2.0
+        change(c)
+        with pytest.raises(hs.StaleError):
+            _ = field[0]
+
+
+def test_a_rebuild_takes_other_nodes_and_keeps_what_is_excluded():
+    lists = [hs.NodeList("a", [[0.0], [1.0]], [1.0] * 2), hs.NodeList("b", [], [])]
+    c = hs.Connectivity(lists, exclude=[(0, 0, 1, 0)])
+    assert len(c.pairs) == 0
+    more = [hs.NodeList("a", [[0.0], [1.0], [2.0]], [1.0] * 3), hs.NodeList("b", [[0.5]], [0.1])]
+    c.rebuild(more)
+    check(c, more, gone=[(0, 1)])
+
+
+def test_memory_of_results_is_used_again():
+    rng = np.random.default_rng(0)
+    lists = [hs.NodeList("a", rng.random((30000, 3)), np.full(30000, 0.03))]
+    c = hs.Connectivity(lists)
+    for _ in range(4):
+        c.rebuild(lists)
+    held = hs.cache_info().held
+    for _ in range(3):
+        c.rebuild(lists)
+        assert abs(hs.cache_info().held - held) <= 0.2 * held + 2**20
+
+
+class Machine(RuleBasedStateMachine):
+    """Any sequence of changes leaves what a build from nothing gives, and no field alive."""
+
+    @initialize(seed=st.integers(0, 2**32 - 1))
+    def begin(self, seed):
+        self.rng = np.random.default_rng(seed)
+        self.options = random_options(self.rng)
+        self.cut = []
+        self.lists = self._lists()
+        self.c = hs.Connectivity(self.lists, **self.options)
+        self.fields = []
+
+    def _lists(self):
+        lists = random_lists(self.rng, self.rng.integers(0, 9, 2), 2, lattice=True, size=3.0)
+        return with_ids(lists, self.rng)
+
+    def _changed(self):
+        for field in self.fields:
+            with pytest.raises(hs.StaleError):
+                _ = field[0]
+
+    @rule()
+    def field(self):
+        field = hs.PairField(self.c.pairs)
+        field.values[:] = np.arange(len(field))
+        for k in range(min(len(field), 3)):
+            i, a, j, b = self.c.pairs[k]
+            assert field[j, b, i, a] == k
+        self.fields.append(field)
+
+    @rule()
+    def rebuild(self):
+        self.lists, self.cut = self._lists(), []
+        self.c.rebuild(self.lists)
+        self._changed()
+
+    @rule(shuffled=st.booleans())
+    def patch(self, shuffled):
+        keep, old2new = random_culling(self.lists, self.rng, shuffled)
+        self.lists = culled(self.lists, keep, old2new)
+        self.c.patch(keep, old2new)
+        self._changed()
+
+    @rule(key=st.integers(0, 6))
+    def remove(self, key):
+        ids = [one.ids for one in self.lists]
+        self.cut.append(key)
+        self.c.remove(self._predicate([key], ids))
+        self._changed()
+
+    @staticmethod
+    def _predicate(cut, ids):
+        every = np.concatenate(ids)
+        first = np.concatenate(([0], np.cumsum([len(one) for one in ids])))
+
+        def gone(i_node, i_list, j_node, j_list):
+            total = every[first[i_list] + i_node] + every[first[j_list] + j_node]
+            return np.isin(total % 7, cut)
+
+        return gone
+
+    @invariant()
+    def equals_a_build(self):
+        exclude = self._predicate(self.cut, [one.ids for one in self.lists])
+        assert_equal(self.c, hs.Connectivity(self.lists, exclude=exclude, **self.options))
+
+
+TestMachine = Machine.TestCase
+TestMachine.settings = settings(max_examples=40, stateful_step_count=8, deadline=None)

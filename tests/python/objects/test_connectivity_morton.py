@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The order of the Z curve: the same pairs of ids for any storage and any split into ghosts."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell import _core
+
+
+def key_of(x, low, high):
+    """Bits in turns, from fractions of the box, by whole numbers."""
+    d = len(x)
+    bits = 63 // d
+    key = 0
+    for k in range(d):
+        width = high[k] - low[k]
+        part = (x[k] - low[k]) / width if width > 0 else 0.0
+        slot = min(int(Fraction(float(part)) * 2**bits), 2**bits - 1)
+        for b in range(bits):
+            key |= (slot >> b & 1) << (b * d + k)
+    return key
+
+
+@pytest.mark.parametrize("d", range(1, 9))
+def test_keys(d):
+    rng = np.random.default_rng(d)
+    x = np.concatenate((rng.random((60, d)), rng.integers(0, 2, (20, d)))) * 3.0 - 1.0
+    low, high = x.min(axis=0), x.max(axis=0)
+    keys = _core.morton_keys(x, low, high)
+    assert keys.tolist() == [key_of(one, low, high) for one in x]
+    assert keys.max() < 2**63
+    assert keys[np.flatnonzero((x == high).all(axis=1))].tolist() == [
+        2 ** (63 // d * d) - 1
+    ] * int((x == high).all(axis=1).sum())
+
+
+def test_a_grid_has_as_many_keys_as_nodes():
+    """Of 512 nodes of such a grid, Spheral's keys tell 148 apart."""
+    grid = np.stack(np.meshgrid(*[np.arange(8.0)] * 3), -1).reshape(-1, 3)
+    assert len(np.unique(_core.morton_keys(grid, np.zeros(3), np.full(3, 7.0)))) == 512
+    half = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [1.0, 1.0]])
+    assert len(np.unique(_core.morton_keys(half, np.zeros(2), np.ones(2)))) == 4
+
+
+def test_boxes_without_width_and_near_the_largest_number():
+    x = np.array([[1.0, 0.0], [1.0, 2.0]])
+    assert _core.morton_keys(x, np.array([1.0, 0.0]), np.array([1.0, 2.0]))[0] == 0
+    big = np.array([[-1.7e308], [0.0], [1.7e308]])
+    keys = _core.morton_keys(big, big[0], big[2])
+    assert keys[0] == 0
+    assert keys[0] < keys[1] < keys[2]
+    assert keys[2] == 2**63 - 1
+
+
+def scene(rng, n, d, tied):
+    x = rng.integers(0, 4, (n, d)) * 1.0 if tied else rng.random((n, d)) * 4
+    return x, rng.uniform(0.2, 0.6, n), rng.integers(0, 2, n), rng.permutation(n * 3)[:n]
+
+
+def lists_of(x, h, which, ids, ghost):
+    """Two lists, with the ghosts of each at its end."""
+    lists = []
+    for k in range(2):
+        own = np.flatnonzero(which == k)
+        own = np.concatenate((own[~ghost[own]], own[ghost[own]]))
+        lists.append(hs.NodeList(f"{k}", x[own], h[own], int(ghost[own].sum()), ids[own]))
+    return lists
+
+
+def id_pairs(c, lists):
+    ids = [one.ids for one in lists]
+    return [(int(ids[a][i]), int(ids[b][j])) for i, a, j, b in c.pairs]
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("tied", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_storage_and_division_do_not_change_the_sequence(d, tied, seed):
+    rng = np.random.default_rng([seed, d])
+    x, h, which, ids = scene(rng, 60, d, tied)
+    none = np.zeros(60, bool)
+    lists = lists_of(x, h, which, ids, none)
+    serial = hs.Connectivity(lists, order="morton", morton_box=[[-1.0] * d, [5.0] * d])
+    want = id_pairs(serial, lists)
+    walk = [
+        [int(lists[k].ids[i]) for i in serial.traversal(k)] for k in range(2)
+    ]  # fmt: skip
+    assert {frozenset(p) for p in want} == {
+        frozenset(p) for p in id_pairs(hs.Connectivity(lists), lists)
+    }
+    for _ in range(3):
+        order = rng.permutation(60)
+        ghost = rng.random(60) < 0.4
+        parts = lists_of(x[order], h[order], which[order], ids[order], ghost)
+        options = {"order": "morton", "morton_box": [[-1.0] * d, [5.0] * d]}
+        c = hs.Connectivity(parts, ghosts=True, **options)
+        c.validate()
+        assert id_pairs(c, parts) == want
+        owned = hs.Connectivity(parts, **options)
+        is_ghost = dict(zip(ids[order].tolist(), ghost, strict=True))
+        assert id_pairs(owned, parts) == [
+            (a, b) for a, b in want if not (is_ghost[a] and is_ghost[b])
+        ]
+        assert [[int(parts[k].ids[i]) for i in c.traversal(k)] for k in range(2)] == walk
+        for k in range(2):
+            for i in range(parts[k].n_nodes):
+                at = int(np.flatnonzero(lists[k].ids == parts[k].ids[i])[0])
+                for m in range(2):
+                    row = parts[m].ids[c.neighbors(k, i)[m]]
+                    assert (row == lists[m].ids[serial.neighbors(k, at)[m]]).all()
+
+
+def test_a_part_of_a_divided_scene_has_the_pairs_of_the_whole_in_their_order():
+    rng = np.random.default_rng(8)
+    x, h, which, ids = scene(rng, 150, 2, False)
+    options = {"order": "morton", "morton_box": [[0.0, 0.0], [4.0, 4.0]]}
+    lists = lists_of(x, h, which, ids, np.zeros(150, bool))
+    whole = id_pairs(hs.Connectivity(lists, **options), lists)
+    is_left = x[:, 0] < 2.0
+    for own in (is_left, ~is_left):
+        seen = own | (np.abs(x[:, 0] - 2.0) < 1.3)  # beyond the largest support
+        parts = lists_of(x[seen], h[seen], which[seen], ids[seen], ~own[seen])
+        mine = set(ids[own].tolist())
+        want = [(a, b) for a, b in whole if a in mine or b in mine]
+        assert id_pairs(hs.Connectivity(parts, **options), parts) == want
+
+
+def test_overlap_and_intersection_do_not_depend_on_the_order():
+    rng = np.random.default_rng(9)
+    x, h, which, ids = scene(rng, 50, 2, True)
+    lists = lists_of(x, h, which, ids, rng.random(50) < 0.3)
+    options = {"overlap": True, "intersection": True}
+    plain = hs.Connectivity(lists, **options)
+    curved = hs.Connectivity(lists, order="morton", **options)
+    for k in range(2):
+        for i in range(lists[k].n_nodes):
+            for one, other in zip(plain.overlap(k, i), curved.overlap(k, i), strict=True):
+                assert one.tolist() == sorted(other.tolist())
+    assert len(plain.pairs) == len(curved.pairs)
+    for p, pair in enumerate(curved.pairs):
+        other = plain.intersection(pair)
+        for m, row in enumerate(curved.intersection(p)):
+            assert sorted(row.tolist()) == sorted(other[m].tolist())
+            ends = [node for node, which_list in (pair[:2], pair[2:]) if which_list == m]
+            assert row[len(row) - len(ends) :].tolist() == ends
+
+
+def test_nodes_outside_the_box_are_refused():
+    lists = [hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])]
+    for box in ([[0.0], [0.9]], [[0.1], [2.0]]):
+        with pytest.raises(ValueError, match="morton_box must hold all nodes"):
+            hs.Connectivity(lists, order="morton", morton_box=box)
+    c = hs.Connectivity(lists, order="morton", morton_box=[[0.0], [2.0]])
+    with pytest.raises(ValueError, match="morton_box"):
+        c.rebuild([hs.NodeList("a", [[0.0], [3.0]], [1.0, 1.0])])
+    assert len(c.pairs) == 1
+    assert hs.PairField(c.pairs).values.tolist() == [0.0]

@@ -1,0 +1,350 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`VerletList.changes`: what two searches differ by, whatever points, box and list do between."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell._objects import pair_changes
+from oracles import BOX_KINDS, random_box, same_arrays
+
+
+def rows(i, j, S):
+    return {(int(a), int(b), *map(int, s)) for a, b, s in zip(i, j, S)}
+
+
+def upright(i, j, S):
+    """The one of a pair of a point with its own image that a search finds."""
+    first = next((x for x in S if x), 0)
+    return (i, j, *(-x for x in S)) if i == j and first < 0 else (i, j, *S)
+
+
+def expected(cutoff, before, turns_before, now, turns, options=None):
+    """Formed and broken pairs by (i, j, S), S as of their step; turns: boxes a point was moved by.
+
+    Points less their turns do not jump, and two searches of these differ by what has changed.
+    """
+
+    def found(scene, moved):
+        points, box = scene
+        i, j, S = hs.pairs(points, cutoff, box=box, quantities="ijS", **(options or {}))
+        return {
+            upright(a, b, tuple(s + moved[b] - moved[a])): upright(a, b, tuple(s))
+            for a, b, s in zip(i.tolist(), j.tolist(), S.astype(np.int64))
+        }
+
+    old, new = found(before, turns_before), found(now, turns)
+    formed = {new[key] for key in new.keys() - old.keys()}
+    broken = {old[key] for key in old.keys() - new.keys()}
+    return formed, broken, len(new.keys() & old.keys())
+
+
+def check(changes, wanted):
+    """Each exactly once, in ascending order; returns how many there are of each."""
+    for side, want in zip(changes, wanted):
+        listed = list(zip(side[0].tolist(), side[1].tolist(), map(tuple, side[2].tolist())))
+        assert listed == sorted(listed)
+        assert rows(*side) == want and len(listed) == len(want)
+    return np.array([len(side[0]) for side in changes])
+
+
+@pytest.mark.parametrize("skin", [0.0, 0.1, "auto"])
+@pytest.mark.parametrize("index_dtype", [np.int64, np.int32])
+@pytest.mark.parametrize("ndim", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", [None, "slab", *BOX_KINDS])
+def test_random_walks_with_jumps(rng, kind, ndim, index_dtype, skin):
+    box = None if kind is None else random_box(rng, "triclinic" if kind == "slab" else kind, ndim)
+    periodic = None if kind != "slab" else [axis != ndim - 1 for axis in range(ndim)]
+    pair_list = hs.VerletList(0.35, skin, box=box, periodic=periodic, track_changes=True)
+    options = {} if box is None else {"periodic": periodic}
+    points = rng.random((40, ndim))
+    before = (points[:0], box), np.zeros((0, ndim), int)
+    seen, rebuilt = np.zeros(2, int), set()
+    turns = np.zeros((40, ndim), int)
+    for _ in range(8):
+        given = points if box is None else points + turns @ box
+        rebuilt.add(pair_list.update(given))
+        changes = pair_list.changes(quantities="ijS", index_dtype=index_dtype)
+        assert changes.formed[0].dtype == changes.broken[1].dtype == index_dtype
+        *wanted, _ = expected(0.35, *before, (given, box), turns, options)
+        seen += check(changes, wanted)
+        before = (given, box), turns
+        points = points + rng.normal(0.0, 0.01, points.shape)
+        if box is not None:
+            jumps = rng.integers(-3, 4, turns.shape) * (rng.random((40, 1)) < 0.3)
+            turns = turns + jumps * (True if periodic is None else periodic)
+    assert seen.min() > 5 and True in rebuilt
+    assert skin != 0.1 or rebuilt == {True, False}
+
+
+@pytest.mark.parametrize("kind", BOX_KINDS)
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+def test_images_count_one_by_one(rng, kind, ndim):
+    """A cutoff beyond the box: pairs of a point with itself, and several of the same two."""
+    box = random_box(rng, kind, ndim, length=0.5)
+    pair_list = hs.VerletList(1.1, 0.1, track_changes=True)
+    fractions = rng.random((5, ndim))
+    turns = np.zeros(fractions.shape, int)
+    before = (np.zeros((0, ndim)), box), turns[:0]
+    went = np.zeros(2, int)
+    for step in range(8):
+        vectors = box * (1.0 + 0.05 * math.sin(step))
+        points = (fractions + turns) @ vectors
+        pair_list.update(points, vectors)
+        *wanted, _ = expected(1.1, *before, (points, vectors), turns)
+        went += check(pair_list.changes(quantities="ijS"), wanted)
+        before = (points, vectors), turns
+        fractions = fractions + rng.normal(0.0, 0.02, fractions.shape)
+        turns = turns + rng.integers(-2, 3, turns.shape)
+    assert went.min() > 3
+
+
+@pytest.mark.parametrize("stray", [False, True])
+def test_drift_of_all_points_breaks_nothing(rng, stray):
+    """By half a box and more in a step, which no rule for single points could tell. The drift is
+    that of the first point, unless that has another one."""
+    box = random_box(rng, "triclinic")
+    points = rng.random((60, 3)) @ box
+    pair_list = hs.VerletList(0.4, 0.2, box=box, track_changes=True)
+    for step in range(6):
+        drifted = points + 0.5 * step * box[0] + 0.77 * step * box[2]
+        if stray:
+            drifted[0] = rng.random(3) @ box
+        pair_list.update(hs.Box(box).wrap(drifted)[0] if step % 2 else drifted)
+        formed, broken = pair_list.changes(quantities="ijd")
+        if step:
+            near = np.r_[formed[2][formed[0] >= stray], broken[2][broken[0] >= stray]]
+            assert len(pair_list.pairs(quantities="i")) > 200  # but for rounding of the drift
+            assert np.all(abs(near - 0.4) < 1e-13)
+
+
+def test_a_sheared_box_that_is_flipped_back(rng):
+    fractions = rng.random((80, 3))
+    pair_list = hs.VerletList(0.45, 0.1, track_changes=True)
+    before = None
+    for step, tilt in enumerate((0.40, 0.45, 0.50, -0.45, -0.40)):
+        box = np.array([[1.0, 0.0, 0.0], [tilt, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        laboratory = np.array([[1.0, 0.0, 0.0], [0.40 + 0.05 * step, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        points = fractions @ laboratory
+        pair_list.update(hs.Box(box).wrap(points)[0], box)
+        changes = pair_list.changes(quantities="ijS")
+        if before is not None:
+            wanted = expected(0.45, *before, (points, laboratory), np.zeros((80, 3), int))
+            assert [len(side[0]) for side in changes] == [len(side) for side in wanted[:2]]
+            assert wanted[2] > 100
+        before = (points, laboratory), np.zeros((80, 3), int)
+
+
+@pytest.mark.parametrize("turned", [[[0, 1], [1, 0]], [[-1, 0], [0, 1]], [[1, 1], [0, -1]]])
+def test_another_basis_breaks_nothing(rng, turned):
+    """Pairs of a point with its own image, too, of which the search finds another one then."""
+    box = np.array([[0.6, 0.1], [0.05, 0.5]])
+    points = rng.random((6, 2))
+    pair_list = hs.VerletList(0.9, 0.1, track_changes=True)
+    pair_list.update(points, box)
+    assert len(pair_list.changes().formed[0]) > 40
+    pair_list.update(points, np.array(turned) @ box)
+    assert [len(side) for side in pair_list.changes(quantities="i")] == [0, 0]
+
+
+def test_a_box_that_becomes_another_one(rng):
+    """Twice as long is no other basis: images then go by their numbers."""
+    points = rng.random((10, 1)) * 1e-3
+    pair_list = hs.VerletList(1.5, 0.1, track_changes=True)
+    before = None
+    for box in ([[1.0]], [[2.0]], [[1e-3]], [[2.0]]):
+        pair_list.update(points, box)
+        i, j, S = hs.pairs(points, 1.5, box=box, quantities="ijS")
+        if before is not None:
+            formed, broken = pair_list.changes(quantities="ijS")
+            assert rows(*formed) <= rows(i, j, S) and rows(*broken) <= rows(*before)
+            kept = rows(i, j, S) - rows(*formed)
+            assert len(kept) == len(before[0]) - len(broken[0]) >= 45
+        before = i, j, S
+
+
+def test_quantities_are_those_of_their_step(rng):
+    box = random_box(rng, "triclinic")
+    points = rng.random((60, 3))
+    pair_list = hs.VerletList(0.4, 0.1, box=box, track_changes=True)
+    scenes = []
+    for step in range(4):
+        scenes.append(points % 1.0)
+        pair_list.update(scenes[-1])
+        if step in (1, 3):  # not known from the step before; then other letters; then the same
+            for letters in ("PdDS", "Sid", "PdDS", "PdDS"):
+                formed, broken = pair_list.changes(quantities=letters)
+                for side, scene in ((formed, scenes[-1]), (broken, scenes[-2])):
+                    every = hs.pairs(scene, 0.4, box=box, quantities=letters, sort=True)
+                    at = dict(zip(every[letters.index("d")].tolist(), itertools.count()))
+                    chosen = [at[d] for d in side[letters.index("d")].tolist()]
+                    assert chosen == sorted(chosen)
+                    assert same_arrays(side, tuple(column[chosen] for column in every))
+        points = points + rng.normal(0.0, 0.03, points.shape)
+    assert isinstance(pair_list.changes(quantities="d").formed, np.ndarray)
+
+
+def test_first_step_and_steps_without_points():
+    pair_list = hs.VerletList(1.0, 0.1, track_changes=True)
+    pair_list.update([])
+    assert [side[1].shape for side in pair_list.changes(quantities="iD")] == [(0, 3), (0, 3)]
+    pair_list.update([[0.0] * 3, [0.5] * 3])
+    formed, broken = pair_list.changes(quantities="ijD")
+    assert formed[2].tolist() == [[0.5, 0.5, 0.5]] and broken[2].shape == (0, 3)
+    pair_list.update([[0.0] * 3, [0.55] * 3])
+    assert [len(side) for side in pair_list.changes(quantities="D")] == [0, 0]
+    pair_list.update([])
+    assert [len(side) for side in pair_list.changes(quantities="P")] == [0, 1]
+    pair_list.update([])
+    assert [len(side) for side in pair_list.changes(quantities="P")] == [0, 0]
+
+
+def test_another_number_of_points(rng):
+    """Pairs of those that are in both steps go on, those of the others do not."""
+    points = rng.random((50, 2))
+    pair_list = hs.VerletList(0.2, 0.1, box=[1.0, 1.0], track_changes=True)
+    before = (points[:0], [1.0, 1.0]), np.zeros((0, 2), int)
+    for n in (30, 50, 10, 0, 20, 1):
+        turns = rng.integers(-2, 3, (n, 2))
+        given = points[:n] + turns
+        pair_list.update(given)
+        *wanted, _ = expected(0.2, *before, (given, [1.0, 1.0]), turns)
+        check(pair_list.changes(quantities="ijS"), wanted)
+        before = (given, [1.0, 1.0]), turns
+
+
+def test_another_number_of_dimensions_breaks_all(rng):
+    pair_list = hs.VerletList(0.5, track_changes=True)
+    flat, solid = rng.random((20, 2)), rng.random((20, 3))
+    pair_list.update(flat)
+    pair_list.update(solid)
+    formed, broken = pair_list.changes(quantities="ijd")
+    assert same_arrays(formed, hs.pairs(solid, 0.5, quantities="ijd", sort=True))
+    assert same_arrays(broken, hs.pairs(flat, 0.5, quantities="ijd", sort=True))
+
+
+def test_axes_that_repeat_in_one_step_only(rng):
+    points = rng.random((40, 2))
+    pair_list = hs.VerletList(0.3, 0.1, box=[1.0, 1.0], track_changes=True)
+    pair_list.update(points, periodic=[True, False])
+    pair_list.update(points + [3.0, 0.0], periodic=True)
+    formed, broken = pair_list.changes(quantities="ijS")
+    assert len(broken[0]) == 0 and len(formed[0]) > 5 and np.all(formed[2][:, 1] != 0)
+    pair_list.update(points, periodic=[False, True])
+    formed, broken = pair_list.changes(quantities="ijS")
+    assert len(formed[0]) == 0 and len(broken[0]) > 5 and np.all(broken[2][:, 0] != 0)
+    open_list = hs.VerletList(0.3, 0.1, track_changes=True)
+    open_list.update(points)
+    open_list.update(points, [1.0, 1.0])
+    assert np.all(open_list.changes(quantities="S").formed.any(axis=1))
+
+
+@pytest.mark.parametrize("limit", [0, 2**62])
+def test_pairs_with_too_many_images_for_one_number(rng, monkeypatch, limit):
+    monkeypatch.setattr(pair_changes, "MOST_KEYS", limit)
+    box = random_box(rng, "triclinic")
+    pair_list = hs.VerletList(0.4, 0.1, box=box, track_changes=True)
+    points = rng.random((40, 3))
+    before = (points, box), np.zeros((40, 3), int)
+    pair_list.update(points)
+    points, turns = points + rng.normal(0.0, 0.05, points.shape), rng.integers(-4, 5, (40, 3))
+    pair_list.update(points + turns @ box)
+    *wanted, kept = expected(0.4, *before, (points + turns @ box, box), turns)
+    assert check(pair_list.changes(quantities="ijS"), wanted).min() > 5 and kept > 20
+
+
+@pytest.mark.parametrize("scale", [1e-290, 1.0, 1e290])
+def test_any_unit_of_length_and_boxes_of_any_shape(rng, scale):
+    box = np.array([[1.0, 0.2, 0.0], [0.0, 1e-7, 0.0], [3e6, 0.0, 1e7]]) * scale
+    points = rng.random((30, 3)) @ box
+    pair_list = hs.VerletList(2e-7 * scale, 1e-8 * scale, box=box, track_changes=True)
+    pair_list.update(points)
+    assert len(pair_list.changes().formed[0]) >= 30
+    pair_list.update(points + rng.integers(-2, 3, (30, 3)) @ box)
+    kept = len(pair_list.pairs(quantities="i")) - len(pair_list.changes(quantities="i").formed)
+    assert kept >= 30  # the others moved by roundings of the longest vector
+
+
+def test_points_beyond_the_range_of_float64_in_boxes():
+    """Where a place in the box overflows, S alone tells images apart."""
+    pair_list = hs.VerletList(1.0, 0.1, box=[[1.0, 1e300], [0.0, 0.0]], periodic=[True, False],
+                              track_changes=True)  # fmt: skip
+    for x in (0.0, 0.5):
+        pair_list.update([[x, 1e305], [x, 1e305]])
+    assert [len(side) for side in pair_list.changes(quantities="i")] == [0, 0]
+
+
+def test_threads_and_kernels_agree(rng):
+    points = rng.random((20_000, 3)) * 20.0
+    lists = [
+        hs.VerletList(1.0, 0.2, box=[20.0] * 3, kernel=kernel, threads=threads, track_changes=True)
+        for kernel in hs.kernels()
+        for threads in (1, 3)
+    ]
+    for _ in range(3):
+        found = []
+        for pair_list in lists:
+            pair_list.update(points)
+            found.append(pair_list.changes(quantities="ijdDS"))
+        for other in found[1:]:
+            assert same_arrays(found[0].formed, other.formed)
+            assert same_arrays(found[0].broken, other.broken)
+        points = (points + rng.normal(0.0, 0.02, points.shape)) % 20.0
+    assert len(found[0].formed[0]) > 1000 and lists[0].n_builds < 3
+
+
+def test_sums_of_changes_are_the_pairs(rng):
+    """What a count of contacts and their lifetimes is made of."""
+    box = random_box(rng, "orthorhombic", 2)
+    points = rng.random((60, 2))
+    pair_list = hs.VerletList(0.2, 0.05, box=box, inclusive=False, track_changes=True)
+    present = set()
+    for _ in range(20):
+        pair_list.update(hs.Box(box).wrap(points)[0])
+        formed, broken = (set(zip(*map(np.ndarray.tolist, side))) for side in pair_list.changes())
+        assert not formed & present and broken <= present
+        present = (present - broken) | formed
+        points = points + rng.normal(0.0, 0.01, points.shape)
+    assert present == set(zip(*map(np.ndarray.tolist, pair_list.pairs())))
+
+
+def test_a_refused_step_changes_nothing(rng):
+    points = rng.random((30, 2))
+    pair_list = hs.VerletList(0.3, 0.1, track_changes=True)
+    pair_list.update(points)
+    pair_list.update(points * 0.9)
+    as_it_was = pair_list.changes(quantities="ijd")
+    with pytest.raises(ValueError, match="must be finite"):
+        pair_list.update(points * np.nan)
+    again = pair_list.changes(quantities="ijd")
+    assert same_arrays(as_it_was.formed, again.formed)
+    assert same_arrays(as_it_was.broken, again.broken)
+    points[:] = 0.0  # they were copied
+    assert same_arrays(pair_list.changes(quantities="ijd").formed, as_it_was.formed)
+
+
+def test_refusals(rng):
+    with pytest.raises(RuntimeError, match="track_changes=True"):
+        hs.VerletList(1.0).changes()
+    with pytest.raises((TypeError, ValueError), match="track_changes"):
+        hs.VerletList(1.0, track_changes="yes")
+    pair_list = hs.VerletList(1.0, track_changes=True)
+    with pytest.raises(RuntimeError, match="call update first"):
+        pair_list.changes()
+    pair_list.update(rng.random((4, 3)))
+    for wrong in ("ii", "x", "", 3, "ijSS"):
+        like_pairs = pytest.raises((TypeError, ValueError))
+        with like_pairs as caught:
+            pair_list.changes(quantities=wrong)
+        with pytest.raises(caught.type) as of_pairs:
+            pair_list.pairs(quantities=wrong)
+        assert str(of_pairs.value) == str(caught.value)
+    with pytest.raises((TypeError, ValueError), match="index_dtype"):
+        pair_list.changes(index_dtype=np.int16)
+    far = hs.VerletList(0.5, 0.1, box=[1.0, 1.0], track_changes=True)
+    far.update([[0.25, 0.5], [0.5 + 2.0**33, 0.5]])
+    with pytest.raises(OverflowError, match="too many box vectors away"):
+        far.changes()
