@@ -104,7 +104,7 @@ hs_pages_grow(size_t bytes, void **mapping, size_t *length)
     const size_t wanted = HS_PAGES_STEP + round_up(bytes);
     hs_pages_advise(*mapping, (char *)*mapping + *length, false); /* mremap takes one part only */
     char *moved = mremap(*mapping, *length, wanted, 0);
-    if (moved == MAP_FAILED) {
+    if (moved == MAP_FAILED && HS_MAPPINGS_MOVE) {
         void  *target;
         size_t target_length;
         if (map_aligned(bytes, MAP_NORESERVE, &target, &target_length) != NULL) {
