@@ -33,8 +33,8 @@ void *hs_pages_reserve(size_t bytes, void **mapping, size_t *length);
  * need not comply. */
 void hs_pages_advise(void *from, void *to, bool huge);
 
-/* Whether a mapping can move to where there is more room. ThreadSanitizer does not see mremap: where
- * a mapping moved away, it would take another thread's next one for a race with what lay there. */
+/* Whether a mapping can move to where there is more room. ThreadSanitizer does not see mremap:
+ * where one moved away, it would take another thread's next one for a race with what lay there. */
 #if !defined(__linux__) || HS_WATCHED_MALLOC || defined(__SANITIZE_THREAD__)
 #define HS_MAPPINGS_MOVE 0
 #elif defined(__has_feature)
