@@ -285,7 +285,7 @@ typedef struct hs_among {
     const hs_cells  *cells;   /* in place of points and box, which are NULL then; or NULL */
     const hs_reach  *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
                                * hs_pairs_count, hs_neighbors_*, hs_stream_open, hs_pairs_visit,
-                               * hs_plan_make */
+                               * hs_clusters_find, hs_plan_make */
 } hs_among;
 
 /* A finished search: opaque, owned by the caller. */
@@ -453,6 +453,25 @@ typedef struct hs_visit {
  */
 hs_status hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
                          int64_t *n_visited, hs_failure *failure);
+
+/*
+ * Which points hang together over pairs of hs_pairs_find, none of which is stored: the connected
+ * components of the graph, or with `core` the clusters of DBSCAN.
+ *
+ * core       NULL, or n: not 0 for points that clusters are made of; the others belong to the first
+ *            cluster that has a core point within their cutoff, or to none
+ * labels     n: cluster of each point, from 0, in the order of their lowest core points; -1: none.
+ *            They depend on nothing but the pairs; unspecified on failure
+ * winding    NULL, or n, of which the first n_clusters are filled: bit l is set if, along pairs of
+ *            core points, the cluster meets images of itself that lie apart along box vector l
+ *
+ * No queries. options->want, ->sorted, ->index_bytes and ->out are ignored; with points that are
+ * not core, pairs are looked for a second time, which the counters leave out. Takes 4 bytes a
+ * point beyond the search, with windings in a periodic box 5 + 4 * ndim.
+ */
+hs_status hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t *core,
+                           int64_t *labels, uint8_t *winding, int64_t *n_clusters,
+                           hs_failure *failure);
 
 /*
  * Points that are sorted into cells once and searched many times. Immutable: any number of calls

@@ -171,6 +171,9 @@ typedef struct hs_capi {
     void (*dynamic_release)(hs_dynamic *list);
     hs_dynamic_state (*dynamic_look)(const hs_dynamic *list);
     void (*dynamic_count)(hs_dynamic *list, hs_dynamic_counters *counters);
+    hs_status (*clusters_find)(const hs_among *among, const hs_options *options,
+                               const uint8_t *core, int64_t *labels, uint8_t *winding,
+                               int64_t *n_clusters, hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

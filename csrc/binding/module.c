@@ -20,6 +20,7 @@ static PyMethodDef methods[] = {
      "See halfshell.count_pairs: of two sets."},
     {"neighbors", FASTCALL(hs_py_neighbors), METH_FASTCALL, "See halfshell.neighbors."},
     {"coordination", FASTCALL(hs_py_coordination), METH_FASTCALL, "See halfshell.coordination."},
+    {"clusters", FASTCALL(hs_py_clusters), METH_FASTCALL, "See halfshell.clusters."},
     {"cells_build", FASTCALL(hs_py_cells_build), METH_FASTCALL, "See halfshell.CellList."},
     {"cells_layout", hs_py_cells_layout, METH_O, "The layout of cells."},
     {"cells_find", FASTCALL(hs_py_cells_find), METH_FASTCALL, "See CellList.cell_of."},

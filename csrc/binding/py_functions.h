@@ -32,6 +32,10 @@ hs_py_search hs_py_neighbors;
 /* The arguments of py_call.h, queries or None. */
 hs_py_search hs_py_coordination;
 
+/* py_clusters.c. The arguments of py_call.h, an array of bool or None, winding -> (how many,
+ * labels, bits of winding or None). */
+hs_py_search hs_py_clusters;
+
 /* py_cells.c. The arguments of py_call.h, the least width of cells or 0 -> cells, which stand for
  * points and box afterwards. */
 hs_py_search hs_py_cells_build;

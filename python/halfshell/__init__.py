@@ -14,6 +14,7 @@ from halfshell._objects.box import Box
 
 if TYPE_CHECKING:
     from halfshell._check.verify import Verdict, verify
+    from halfshell._functions.clusters import clusters
     from halfshell._functions.explain import Explanation, explain
     from halfshell._functions.histogram import pair_histogram
     from halfshell._functions.nearest import nearest
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._include import get_include
     from halfshell._objects.cell_list import CellList
+    from halfshell._objects.clusters import Clusters
     from halfshell._objects.connectivity import Connectivity
     from halfshell._objects.dynamic_cell_list import DynamicCellList
     from halfshell._objects.graph import Graph
@@ -40,6 +42,7 @@ __all__ = [
     "CacheInfo",
     "CapacityError",
     "CellList",
+    "Clusters",
     "Connectivity",
     "DynamicCellList",
     "Explanation",
@@ -55,6 +58,7 @@ __all__ = [
     "VerletList",
     "cache_info",
     "clear_cache",
+    "clusters",
     "coordination",
     "count_pairs",
     "explain",
@@ -76,6 +80,7 @@ __all__ = [
 #: Where names are that are imported when they are first used, for a quick start.
 _LATER = {
     "CellList": "_objects.cell_list",
+    "Clusters": "_objects.clusters",
     "Connectivity": "_objects.connectivity",
     "DynamicCellList": "_objects.dynamic_cell_list",
     "Explanation": "_functions.explain",
@@ -88,6 +93,7 @@ _LATER = {
     "RadialDistribution": "_functions.rdf",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
+    "clusters": "_functions.clusters",
     "coordination": "_functions.neighbors",
     "explain": "_functions.explain",
     "for_each_pair": "_functions.stream",

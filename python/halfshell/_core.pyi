@@ -51,6 +51,11 @@ def for_each_pair(
     *arguments: *tuple[*_Search, Callable[..., object] | int, int, bool, _Reach, str]
 ) -> int: ...
 
+# core points or None, winding -> number of clusters, labels, bits of winding or None
+def clusters(
+    *arguments: *tuple[*_Search, npt.NDArray[np.bool_] | None, bool, _Reach, str]
+) -> tuple[int, npt.NDArray[np.int64], npt.NDArray[np.uint8] | None]: ...
+
 # edges, last_inclusive, queries, n_types; types and weights of the points, then of the queries
 def histogram(
     *arguments: *tuple[

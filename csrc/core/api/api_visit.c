@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_visit.c: pairs handed to a function as they are found, stored nowhere. */
+#include "visit_columns.h"
+
 #include "by_reach.h"
 
 #include "../base/outcome.h"
@@ -68,6 +70,8 @@ visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
 /* What the threads share. */
 typedef struct visiting {
     const hs_visit *visit;
+    unsigned        want; /* columns, with indices of so many bytes */
+    int             index_bytes;
     hs_search      *search;
     int64_t        *n_visited; /* by those that have ended */
 } visiting;
@@ -78,7 +82,8 @@ open_visitor(void *job, void *place)
     const visiting *shared = job;
     visitor        *doing = place;
     doing->visit = shared->visit;
-    hs_output_init(NULL, shared->search->scene.ndim, WANTED, sizeof(int64_t), &doing->part);
+    hs_output_init(NULL, shared->search->scene.ndim, shared->want, shared->index_bytes,
+                   &doing->part);
     return hs_recorder_init(&shared->search->call->account, &doing->part, HS_MOST_HITS,
                             &doing->recorder);
 }
@@ -110,7 +115,7 @@ visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
     }
     hs_status status = hs_crew_open(&crew);
     if (status == HS_OK) {
-        const hs_visitors all = {.use = HS_BLOCK_LISTS_PLACES,
+        const hs_visitors all = {.use = hs_record_use(shared->want),
                                  .visit = visit_hits,
                                  .contexts = crew.workers,
                                  .context_size = crew.worker_size};
@@ -122,10 +127,27 @@ visit_pairs(void *context, hs_search *search, int64_t *n_pairs, hs_failure *fail
 }
 
 hs_status
+hs_visit_columns(const hs_among *among, const hs_options *options, const hs_visit *visit,
+                 int64_t *n_visited, hs_failure *failure)
+{
+    visiting   shared = {.visit = visit,
+                         .want = options->want,
+                         .index_bytes = options->index_bytes,
+                         .n_visited = n_visited};
+    hs_options of_visit = *options;
+    hs_request request = hs_request_among(among, HS_HALF_LIST, &of_visit);
+    of_visit.sorted = false;
+    of_visit.out = NULL;
+    request.sets.keeps_none = true;
+    *n_visited = 0;
+    const hs_status status = hs_by_reach_use(&request, visit_pairs, &shared, failure);
+    return status == HS_ENOUGH ? HS_OK : status;
+}
+
+hs_status
 hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
                int64_t *n_visited, hs_failure *failure)
 {
-    visiting shared = {.visit = visit, .n_visited = n_visited};
     if (n_visited != NULL) {
         *n_visited = 0;
     }
@@ -134,12 +156,7 @@ hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit 
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_options of_visit = *options;
-    hs_request request = hs_request_among(among, HS_HALF_LIST, &of_visit);
     of_visit.want = WANTED;
-    of_visit.sorted = false;
     of_visit.index_bytes = 8;
-    of_visit.out = NULL;
-    request.sets.keeps_none = true;
-    const hs_status status = hs_by_reach_use(&request, visit_pairs, &shared, failure);
-    return status == HS_ENOUGH ? HS_OK : status;
+    return hs_visit_columns(among, &of_visit, visit, n_visited, failure);
 }

@@ -317,12 +317,16 @@ what_is_searched_cannot_contradict_itself(void)
         CHECK(hs_nearest_find(among, 1, options, &pairs, NULL) == HS_ERR_ARGUMENT);
         CHECK(hs_stream_open(among, options, 1, &stream, NULL) == HS_ERR_ARGUMENT);
         CHECK(hs_pairs_visit(among, options, &s.visit, &n, NULL) == HS_ERR_ARGUMENT);
+        CHECK(hs_clusters_find(among, options, NULL, &n, NULL, &n, NULL) == HS_ERR_ARGUMENT);
         CHECK(hs_plan_make(among, options, &plan, NULL) == HS_ERR_ARGUMENT);
     }
     const hs_among *queried = QUERIED(&s.points, &s.points, &s.box);
     CHECK(hs_pairs_find(queried, options, &pairs, NULL) == HS_ERR_ARGUMENT && pairs == NULL);
     CHECK(hs_stream_open(queried, options, 1, &stream, NULL) == HS_ERR_ARGUMENT);
     CHECK(hs_pairs_visit(queried, options, &s.visit, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_clusters_find(queried, options, NULL, &n, NULL, &n, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_clusters_find(AMONG(&s.points, NULL), options, NULL, NULL, NULL, &n, NULL) ==
+          HS_ERR_ARGUMENT);
     CHECK(hs_plan_make(queried, options, &plan, NULL) == HS_ERR_ARGUMENT);
     call_free_objects(&s.c);
 }

@@ -104,6 +104,25 @@ call_free_objects(call *c)
     c->list = NULL;
 }
 
+/* Every third point is none that clusters are made of. */
+static inline hs_status
+call_clusters(call *c, hs_failure *failure)
+{
+    const hs_among among = call_among(c, NULL);
+    int64_t        labels[CALL_ROOM], n = -7;
+    uint8_t        core[CALL_ROOM], winding[CALL_ROOM];
+    for (int p = 0; p < CALL_ROOM; p++) {
+        core[p] = p % 3 != 0;
+    }
+    const hs_status status =
+        hs_clusters_find(&among, c->options, core, labels, winding, RESULT(n), failure);
+    CHECK(status == HS_OK ? n >= 0 : n == -7);
+    if (status == HS_OK) {
+        c->answer = call_hash(call_hash(2, labels, (size_t)c->n_points * 8), winding, (size_t)n);
+    }
+    return status;
+}
+
 #define OF_VERLET \
     (OF_SCENE | USES_OPTIONS | USES_CUTOFF | NEEDS_FINITE | USES_KERNEL | USES_RESULT | USES_LIST)
 
@@ -122,6 +141,8 @@ static const call_kind call_kinds[] = {
      OF_SCENE | (OF_SEARCH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES | USES_MAX_PAIRS},
     {"stream_next", call_stream_next, USES_STREAM | USES_RESULT},
     {"pairs_visit", call_visit, OF_SCENE | OF_SEARCH | USES_VISIT},
+    {"clusters_find", call_clusters, OF_SCENE | OF_SEARCH},
+    {"clusters_find in cells", call_clusters, USES_CELLS | OF_SEARCH},
     {"cells_build", call_cells_build, OF_SCENE | OF_SEARCH | USES_INDEX_BYTES},
     {"pairs_find in cells", call_find, USES_CELLS | OF_SEARCH | OF_ARRAYS},
     {"pairs_count in cells", call_count, USES_CELLS | USES_QUERIES | OF_SEARCH},

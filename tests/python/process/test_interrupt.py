@@ -17,6 +17,8 @@ SEARCHES = {
     "count": "hs.count_pairs(points, 0.5)",
     "count of coincident points": "hs.count_pairs(points * 0, 0.0)",
     "count of many cutoffs": "hs.count_pairs(points, np.linspace(0.4, 0.5, 50))",
+    "clusters": "hs.clusters(points, 0.3)",
+    "clusters of core points": "hs.clusters(points, 0.3, min_points=10**6)",
     "pairs of balls": "hs.pairs(points, None, radii=sizes, sort=True, memory_limit=1e13)",
     "count of balls": "hs.count_pairs(points, None, radii=4 * sizes)",
     "rows of balls": "hs.neighbors(points, None, radii=sizes, rule='max', memory_limit=1e13)",

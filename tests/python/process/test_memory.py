@@ -34,6 +34,8 @@ CALLS = {
     "refused blocks": "fails(lambda: hs.iter_pairs(broken, 0.3, box=box))",
     "visits": "hs.for_each_pair(points, 0.2, lambda *pair: None, box=box)",
     "failing visits": "fails(lambda: hs.for_each_pair(points, 0.3, lambda: None, box=box))",
+    "clusters": "hs.clusters(points, 0.2, box=box, min_points=2, winding=True)",
+    "failing clusters": "fails(lambda: hs.clusters(points, 0.2, box=box, memory_limit=9))",
     "box": "hs.Box.from_matrix(box).wrap(points)",
     "verify": "hs.verify(points, 0.1, *hs.pairs(points, 0.1))",
     "explain": "str(hs.explain(points, 0.3, box=box))",

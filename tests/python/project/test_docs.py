@@ -46,8 +46,8 @@ def test_public_functions_have_examples(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs", "nearest",
-        "neighbors", "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
+        "clusters", "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs",
+        "nearest", "neighbors", "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
     ],
 )
 def test_every_argument_is_documented(name):
@@ -194,6 +194,15 @@ def test_example_of_histograms_runs():
     exec(compile(ast.parse(code), "histograms.md", "exec"), names)
     assert names["counts"].sum() == names["within"][-1] == names["result"].counts.sum()
     assert names["near"].sum() == names["within"][1] and names["far"].shape == (2, 2, 50)
+
+
+def test_example_of_clusters_runs():
+    text = (ROOT / "docs/clusters.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    exec(compile(ast.parse(code), "clusters.md", "exec"), names)
+    assert names["found"].sizes.sum() == 5000 and names["spans"].winding.any()
+    assert names["noise"].any() and names["core"].any()
 
 
 def test_examples_of_nearest_run():

@@ -215,6 +215,8 @@ CALLS = {
     "iter_pairs, progress": lambda: len(list(hs.iter_pairs(
         POINTS, 1.5, max_pairs=5, progress=lambda done: None))),
     "for_each_pair": lambda: visited(**PERIODIC),
+    "clusters": lambda: tuple(hs.clusters(POINTS, 0.8, winding=True, **PERIODIC)),
+    "clusters, core": lambda: tuple(hs.clusters(POINTS, 1.0, min_points=3)),
     "CellList": lambda: hs.CellList(POINTS, 1.5, **PERIODIC).pairs(sort=True),
     "CellList, layout": lambda: fields(
         hs.CellList(POINTS, 1.5), "shape cell_sizes cell_start order cell_ids cutoff"),
