@@ -3,11 +3,11 @@
 
     python benchmarks/clusters.py [--points N ...] [--neighbours K] [--min-points M] [--rounds R]
 
-Points at random in a cube. Connected components: our clusters, and SciPy's `connected_components`
-of our table of neighbours and of cKDTree's pairs; DBSCAN: ours and scikit-learn's, if that is
-installed. Each call is made in a process of its own, in turns, and must give the same labels; the least
-wall-clock time of all rounds counts. Memory is what the process grew by at most, with the labels.
-One thread.
+Points at random in a cube. Connected components: our clusters, and SciPy's
+`connected_components` of our table of neighbours and of cKDTree's pairs; DBSCAN: ours and
+scikit-learn's, if that is installed. Each call is made in a process of its own, in turns, and
+must give the same labels; the least wall-clock time of all rounds counts. Memory is what the
+process grew by at most, with the labels. One thread.
 """
 
 from __future__ import annotations
