@@ -112,6 +112,7 @@ find_clusters(const hs_among *among, const hs_options *options, const uint8_t *c
         hs_options of_search = *options;
         of_search.memory_limit -= (double)account.held;
         status = gather(among, &of_search, &doing, winding, n_clusters, failure);
+        failure->limit_bytes += status == HS_ERR_MEMORY ? (double)account.held : 0.0;
     } else {
         failure->limit_bytes = account.limit;
     }
