@@ -210,8 +210,8 @@ look_up_given(hs_trace *trace)
     return trace->n;
 }
 
-/* Shifts over B, the metric's where it measures between X. Where the block has none, the arrays are
- * zeroed once and left alone. */
+/* Shifts over B, the metric's where it measures between X. Where the block has none, they are zeroed
+ * once and left alone; nobody asks how many times the metric shifts then. */
 static void
 look_up_images(hs_trace *trace)
 {
@@ -224,7 +224,6 @@ look_up_images(hs_trace *trace)
         const int32_t *from = trace->of.image + r;
         if (zero) {
             memset(trace->image[r], 0, HS_BATCH * sizeof(int64_t));
-            memset(trace->times[r], 0, HS_BATCH * sizeof(double));
         }
         for (int32_t e = 0; e < trace->n && !zero; e++) {
             const int32_t image = from[(int64_t)trace->place[e] * trace->of.width];

@@ -22,7 +22,7 @@ typedef struct hs_trace {
     int64_t         *image[HS_MAX_DIM];             /* shift over B, of X */
     int64_t *given[HS_MAX_DIM]; /* S over the periodic box vectors as given; when needs_given */
     int32_t *shift[HS_MAX_DIM]; /* S as int32, when is_narrow */
-    bool     has_zeros;         /* image and times hold nothing but zeros */
+    bool     has_zeros;         /* image holds nothing but zeros */
     bool     is_shifted;        /* some entry of times is not zero */
     bool     is_wide;           /* some entry is too large for the batch kernels */
 } hs_trace;

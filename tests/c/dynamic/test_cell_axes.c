@@ -80,6 +80,21 @@ periodic_balls_hold_what_is_within(void)
     }
 }
 
+/* What is well inside an image meets that image and no other. */
+static void
+balls_meet_no_more_images_than_they_must(void)
+{
+    const hs_axes axes = axes_of(4.0, 0.5, 9.0);
+    for (int image = -3; image <= 3; image++) {
+        for (int further = 0; further <= 2; further++) {
+            hs_span_of_cells span;
+            hs_axis_images(&axes.axis[0], 4.0 * image - 1.9, 4.0 * (image + further) + 1.9, 0.01,
+                           &span);
+            CHECK(span.least == image && span.most == image + further);
+        }
+    }
+}
+
 static void
 far_cells_are_one(void)
 {
@@ -96,6 +111,7 @@ test_cell_axes(void)
     const hs_fpenv env = hs_fpenv_enter();
     RUN(open_balls_hold_what_is_within);
     RUN(periodic_balls_hold_what_is_within);
+    RUN(balls_meet_no_more_images_than_they_must);
     RUN(far_cells_are_one);
     hs_fpenv_leave(env);
 }

@@ -152,9 +152,57 @@ small_scenes_are_known_exactly(void)
     search_unit_close(&unit);
 }
 
+/* Each point of a crystal has as many neighbours as any other: a sample of them is sure. */
+static void
+samples_of_a_crystal_are_sure(void)
+{
+    static search_unit unit;
+    enum { SIDE = 44, N = SIDE * SIDE, AROUND = 441 };
+    hs_failure   failure = HS_NO_FAILURE;
+    const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{SIDE, 0.0}, {0.0, SIDE}}};
+    search_unit_points(21, N, 2, 1.0, &unit);
+    for (int p = 0; p < N; p++) {
+        unit.x[2 * p] = p % SIDE;
+        unit.x[2 * p + 1] = p / SIDE;
+    }
+    search_unit_open(&box, 12.0, true, HS_WANT_DISTANCE, &unit);
+    hs_account  *account = &unit.call.account;
+    const double needed = (double)N * AROUND * sizeof(double);
+    account->limit = (double)account->held + 1.001 * needed;
+    CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_OK);
+    account->limit -= 0.002 * needed;
+    CHECK(hs_estimate_by_sample(&unit.search, &failure) == HS_ERR_MEMORY);
+    CHECK(failure.expected_pairs == (double)N * AROUND);
+    search_unit_close(&unit);
+}
+
+/* Many images of each point: the box tells how many there must be, wherever along it they are. */
+static void
+many_images_are_known_by_the_box(void)
+{
+    static search_unit unit;
+    enum { N = 400 };
+    for (int open = 0; open < 2; open++) {
+        const hs_box box = {
+            .ndim = 2, .periodic = {true, open == 0}, .rows = {{1.0, 0.0}, {0.0, 1.0}}};
+        hs_failure failure = HS_NO_FAILURE;
+        search_unit_points(22, N, 2, 1.0, &unit);
+        search_unit_open(&box, 100.0, false, HS_WANT_DISTANCE, &unit);
+        const double half = 0.5 * N * N; /* points, and those about each within a unit of area */
+        const double pairs = half * (open == 0 ? 3.14159265358979 * 99.0 * 99.0 : 2.0 * 98.9);
+        unit.call.account.limit = (double)unit.call.account.held + 0.95 * pairs * sizeof(double);
+        CHECK(hs_estimate_by_density(&unit.search, &failure) == HS_ERR_MEMORY);
+        unit.call.account.limit += 0.1 * pairs * sizeof(double);
+        CHECK(hs_estimate_by_density(&unit.search, &failure) == HS_OK);
+        search_unit_close(&unit);
+    }
+}
+
 void
 test_estimate(void)
 {
+    RUN(samples_of_a_crystal_are_sure);
+    RUN(many_images_are_known_by_the_box);
     RUN(small_scenes_are_known_exactly);
     RUN(expectations_are_near_the_truth);
     RUN(samples_end_early_in_a_crowd);
