@@ -210,8 +210,8 @@ look_up_given(hs_trace *trace)
     return trace->n;
 }
 
-/* Shifts over B, the metric's where it measures between X. Where the block has none, they are zeroed
- * once and left alone; nobody asks how many times the metric shifts then. */
+/* Shifts over B, the metric's where it measures between X. Where the block has none, they are
+ * zeroed once and left alone; nobody asks how many times the metric shifts then. */
 static void
 look_up_images(hs_trace *trace)
 {

@@ -16,6 +16,7 @@ FOLDERS = {
     "arguments": "what goes in, and what is refused",
     "laws": "scenes on which the answer is known, or must not change",
     "process": "memory, threads, signals, the environment",
+    "compat": "stand-ins for other libraries",
     "scenes": "the scenes and structures of the package",
     "binding": "the boundary to C",
     "report": "`halfshell report`",

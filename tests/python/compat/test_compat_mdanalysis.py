@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`halfshell.compat.mdanalysis` gives what MDAnalysis gives, but for its rounding."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell import scenes
+
+distances = pytest.importorskip("MDAnalysis.lib.distances", reason="MDAnalysis is not installed")
+from halfshell.compat import mdanalysis as ours  # noqa: E402
+
+BOXES = {
+    "open": None,
+    "zeros": np.zeros(6, np.float32),
+    "ortho": np.array([10, 12, 9, 90, 90, 90], np.float32),
+    "triclinic": np.array([10, 12, 11, 80, 75, 100], np.float32),
+}
+
+
+def assert_same(found, wanted, cutoffs):
+    """Pairs and distances, but for pairs so near to a cutoff that rounding decides."""
+    near = [
+        {tuple(map(int, pair)): d for pair, d in zip(*result, strict=True)}
+        for result in (found, wanted)
+    ]
+    assert all(len(table) == len(result[0]) for table, result in zip(near, (found, wanted)))
+    for pair in near[0].keys() ^ near[1].keys():
+        d = near[0].get(pair, near[1].get(pair))
+        assert min(abs(d - cutoff) for cutoff in cutoffs) < 1e-5
+    for pair in near[0].keys() & near[1].keys():
+        assert near[0][pair] == pytest.approx(near[1][pair], abs=2e-5)
+    assert found[0].dtype == np.intp and found[1].dtype == np.float64
+    assert found[0].shape == (len(found[1]), 2)
+
+
+def scatter(rng, n, dtype=np.float32):
+    return rng.uniform(-8.0, 20.0, (n, 3)).astype(dtype)
+
+
+@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("method", [None, "bruteforce", "nsgrid", "pkdtree"])
+def test_pairs_of_one_set(name, method, rng):
+    box = BOXES[name]
+    theirs = None if name == "zeros" else box
+    for n, largest, least in [(300, 2.5, None), (300, 3.0, 1.5), (12, 4.0, None), (1, 2.0, None)]:
+        points = scatter(rng, n)
+        found = ours.self_capped_distance(points, largest, least, box, method)
+        wanted = distances.self_capped_distance(points, largest, least, theirs, "bruteforce")
+        assert_same(found, wanted, [largest, least or largest])
+        assert (found[0][:, 0] < found[0][:, 1]).all()
+        alone = ours.self_capped_distance(points, largest, least, box, return_distances=False)
+        assert np.array_equal(alone, found[0])
+
+
+@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_pairs_of_two_sets(name, dtype, rng):
+    box = BOXES[name]
+    theirs = None if name == "zeros" else box
+    for q, n, largest, least in [(40, 200, 3.0, None), (40, 200, 3.0, 2.0), (1, 5, 4.0, None)]:
+        queries, points = scatter(rng, q, dtype), scatter(rng, n, dtype)
+        found = ours.capped_distance(queries, points, largest, least, box)
+        wanted = distances.capped_distance(queries, points, largest, least, theirs, "bruteforce")
+        assert_same(found, wanted, [largest, least or largest])
+    one = ours.capped_distance(points[0], points, 4.0, box=box)
+    assert_same(one, distances.capped_distance(points[0], points, 4.0, box=theirs), [4.0])
+
+
+@pytest.mark.parametrize("name", ["ortho", "triclinic"])
+def test_cutoffs_beyond_half_the_box_give_the_nearest_image_alone(name, rng):
+    points = scatter(rng, 30)
+    box = BOXES[name]
+    for cutoff in (5.0, 6.5, 12.0):
+        found = ours.self_capped_distance(points, cutoff, box=box)
+        wanted = distances.self_capped_distance(points, cutoff, box=box, method="bruteforce")
+        assert_same(found, wanted, [cutoff])
+        found = ours.capped_distance(points[:9], points, cutoff, box=box)
+        wanted = distances.capped_distance(points[:9], points, cutoff, box=box, method="bruteforce")
+        assert_same(found, wanted, [cutoff])
+
+
+def test_nothing_to_find():
+    none = np.empty((0, 3), np.float32)
+    for cutoff in (1.0, -1.0):
+        for found in (
+            ours.self_capped_distance(none, cutoff),
+            ours.capped_distance(none, none, cutoff),
+        ):
+            assert found[0].shape == (0, 2) and found[1].shape == (0,)
+    two = np.zeros((2, 3), np.float32)
+    assert len(ours.self_capped_distance(two, -1.0)[0]) == 0
+    assert len(ours.self_capped_distance(two, 0.0)[0]) == 1
+
+
+def test_pairs_at_the_cutoff_are_those_of_the_real_numbers():
+    """The difference of these float32 is more than the cutoff, and rounds to it in float32."""
+    x = np.array([[-(2.0**-30), 0.0, 0.0], [1.0, 0.0, 0.0]], np.float32)
+    assert Fraction(float(x[1, 0])) - Fraction(float(x[0, 0])) > 1
+    assert np.float32(x[1, 0] - x[0, 0]) == 1
+    assert len(ours.self_capped_distance(x, 1.0)[0]) == 0
+    assert len(ours.self_capped_distance(x * np.float32(-1.0), 1.0)[0]) == 0
+    assert len(ours.self_capped_distance(np.abs(x), 1.0)[0]) == 1
+
+
+def test_scenes_of_the_package():
+    """The open ones in three dimensions, as far as float32 holds them."""
+    tried = 0
+    for name in scenes.names():
+        scene = scenes.load(name, "small")
+        with np.errstate(over="ignore", under="ignore"):
+            points = scene.points.astype(np.float32)
+        if points.shape[1] == 3 and scene.box is None and np.isfinite(points).all():
+            found = ours.self_capped_distance(points, scene.cutoff)
+            i, j, d = hs.pairs(points, scene.cutoff, quantities="ijd")
+            assert np.array_equal(found[0], np.column_stack([i, j]))
+            assert np.array_equal(found[1], d)
+            tried += 1
+    assert tried >= 3
+
+
+def test_what_the_original_refuses():
+    points = np.zeros((3, 3), np.float32)
+    for module in (ours, distances):
+        with pytest.raises(ValueError, match="alpha, beta, gamma"):
+            module.self_capped_distance(points, 1.0, box=[1.0, 1.0, 1.0])
+        with pytest.raises(KeyError, match="nonsense"):
+            module.self_capped_distance(points, 1.0, method="nonsense")
+        with pytest.raises(ValueError, match="shape"):
+            module.self_capped_distance(np.zeros((3, 2), np.float32), 1.0)
+        with pytest.raises(TypeError):
+            module.capped_distance("points", points, 1.0)
