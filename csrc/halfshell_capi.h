@@ -171,6 +171,8 @@ typedef struct hs_capi {
     void (*dynamic_release)(hs_dynamic *list);
     hs_dynamic_state (*dynamic_look)(const hs_dynamic *list);
     void (*dynamic_count)(hs_dynamic *list, hs_dynamic_counters *counters);
+    hs_status (*measure)(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
+                         const hs_options *options, hs_pairs **result, hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -91,6 +91,7 @@ static const hs_capi table = {
     .dynamic_release = hs_dynamic_release,
     .dynamic_look = hs_dynamic_look,
     .dynamic_count = hs_dynamic_count,
+    .measure = hs_measure,
 };
 
 int
