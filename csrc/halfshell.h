@@ -376,6 +376,29 @@ hs_status hs_pairs_histogram(const hs_among *among, const hs_options *options,
 hs_status hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options,
                           hs_pairs **rows, hs_failure *failure);
 
+/* Pairs that the caller has, borrowed, in any order: fixed edges, lists of other programs. */
+typedef struct hs_pair_numbers {
+    int64_t        n;
+    const int64_t *i, *j; /* n numbers of points; they may be equal */
+    const int64_t *shift; /* n * ndim, below 2^62, 0 along axes that do not repeat: S of each; NULL:
+                             that of the nearest image of j to i, and of several that are equally
+                             near the lexicographically least S */
+} hs_pair_numbers;
+
+/*
+ * Measure pairs: the vector D = points[j] - points[i] + S * box, its length and S, in their order.
+ * Which image is the nearest is decided for the real numbers that the inputs are; d and D are
+ * those of hs_pairs_find. box: NULL for open space.
+ *
+ * Of options->want only distance, vector and shift count; of the others kernel, threads, limits,
+ * poll and counters. Memory as for hs_pairs_find. failure.row is a pair: HS_ERR_ARGUMENT for a
+ * number or a shift that cannot be; HS_ERR_SHIFT_RANGE where points are more than 2^51 periods
+ * away, or S does not fit int32; HS_ERR_FAR for a vector that float64 does not hold;
+ * HS_ERR_BOX_SKEWED for a box, or for a pair with too many images that are about as near.
+ */
+hs_status hs_measure(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
+                     const hs_options *options, hs_pairs **result, hs_failure *failure);
+
 /* Rows of a result of hs_neighbors_find or hs_cells_candidates, and where each
  * begins: rows + 1 numbers, the last one the length of all; borrowed. 0 and NULL when taken, or of
  * another search. */

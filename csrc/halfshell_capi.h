@@ -174,6 +174,8 @@ typedef struct hs_capi {
     hs_status (*clusters_find)(const hs_among *among, const hs_options *options,
                                const uint8_t *core, int64_t *labels, uint8_t *winding,
                                int64_t *n_clusters, hs_failure *failure);
+    hs_status (*measure)(const hs_points *points, const hs_box *box, const hs_pair_numbers *pairs,
+                         const hs_options *options, hs_pairs **result, hs_failure *failure);
 } hs_capi;
 
 /* The table, or NULL with an ImportError (also that of halfshell itself) when halfshell is not

@@ -92,6 +92,7 @@ static const hs_capi table = {
     .dynamic_look = hs_dynamic_look,
     .dynamic_count = hs_dynamic_count,
     .clusters_find = hs_clusters_find,
+    .measure = hs_measure,
 };
 
 int

@@ -29,6 +29,7 @@ static PyMethodDef methods[] = {
     {"batch_pairs", FASTCALL(hs_py_batch_pairs), METH_FASTCALL, "pairs of many systems."},
     {"batch_count", FASTCALL(hs_py_batch_count), METH_FASTCALL, "count_pairs of many systems."},
     {"nearest", FASTCALL(hs_py_nearest), METH_FASTCALL, "See halfshell.nearest."},
+    {"measure", FASTCALL(hs_py_measure), METH_FASTCALL, "See halfshell.measure."},
     {"connect", FASTCALL(hs_py_connect), METH_FASTCALL, "See halfshell.Connectivity."},
     {"connect_search", FASTCALL(hs_py_connect_search), METH_FASTCALL,
      "See halfshell.Connectivity."},

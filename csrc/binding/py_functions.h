@@ -96,6 +96,10 @@ hs_py_search hs_py_morton_keys;
  * index_bytes; queries or None, k -> arrays of k entries a query, one query after another. */
 hs_py_search hs_py_nearest;
 
+/* py_measure.c. Those of py_call.h (cutoff: ignored), then quantities of d D S, i and j (int64), S
+ * (int64) or None -> arrays of the pairs. */
+hs_py_search hs_py_measure;
+
 /* py_explain.c. The arguments of py_call.h, then quantities, sort, index_bytes, measure. */
 hs_py_search hs_py_explain;
 

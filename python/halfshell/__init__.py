@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from halfshell._functions.clusters import clusters
     from halfshell._functions.explain import Explanation, explain
     from halfshell._functions.histogram import pair_histogram
+    from halfshell._functions.measure import measure
     from halfshell._functions.nearest import nearest
     from halfshell._functions.neighbors import coordination, neighbors
     from halfshell._functions.rdf import RadialDistribution, rdf
@@ -66,6 +67,7 @@ __all__ = [
     "get_include",
     "iter_pairs",
     "kernels",
+    "measure",
     "nearest",
     "neighbors",
     "pair_histogram",
@@ -99,6 +101,7 @@ _LATER = {
     "for_each_pair": "_functions.stream",
     "get_include": "_include",
     "iter_pairs": "_functions.stream",
+    "measure": "_functions.measure",
     "nearest": "_functions.nearest",
     "neighbors": "_functions.neighbors",
     "pair_histogram": "_functions.histogram",

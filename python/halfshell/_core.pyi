@@ -130,6 +130,13 @@ def cells_candidates(
     *arguments: *tuple[*_Search, _Queries]
 ) -> tuple[npt.NDArray[np.int64], ...]: ...
 # quantities, index_bytes, queries, k; the cutoff is the largest distance
+
+# quantities, i, j, S
+def measure(
+    *arguments: *tuple[
+        *_Search, str, npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64] | None
+    ]
+) -> _Arrays: ...
 def nearest(*arguments: *tuple[*_Search, str, int, _Queries, int]) -> _Arrays: ...
 def verlet_new() -> Any: ...  # a capsule, which comes before the arguments of a search
 

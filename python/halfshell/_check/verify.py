@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_array
 from halfshell._convert.given import Given
+from halfshell._convert.listed import as_listed
 from halfshell._convert.options import as_flag
 from halfshell._convert.rules import DIRECTED
 from halfshell._convert.search import as_rest, as_search_of_each, refuse_indefinite
@@ -230,35 +230,10 @@ def _columns(table: NeighborTable) -> tuple[Any, Any, Any]:
 
 def _rows(i: Any, j: Any, S: Any, points: PointArray, queries: PointArray | None) -> IntArray:
     """The list as rows (i, j) or (i, j, *S), checked."""
-    ndim = points.shape[1]
-    numbered = {"i": "points" if queries is None else "queries", "j": "points"}
-    columns = []
-    for name, values in (("i", i), ("j", j)):
-        n = len(points if numbered[name] == "points" or queries is None else queries)
-        column = as_array(values, name)
-        if column.size and column.dtype.kind not in "iu":
-            raise TypeError(f"{name} must hold integers, got dtype {column.dtype}")
-        if column.ndim != 1:
-            raise ValueError(f"{name} must have shape (m,), got {column.shape}")
-        if column.size and n == 0:
-            raise ValueError(f"{name} must be empty: there are no {numbered[name]}")
-        if column.size and (int(column.min()) < 0 or int(column.max()) >= n):
-            raise ValueError(f"{name} must be numbers of {numbered[name]}, from 0 to {n - 1}")
-        columns.append(column.astype(np.int64))
-    if columns[0].shape != columns[1].shape:
-        raise ValueError(
-            f"i and j must have the same length, got {len(columns[0])} and {len(columns[1])}"
-        )
-    if S is None:
-        return np.column_stack(columns)
-    shifts = as_array(S, "S")
-    if shifts.shape != (len(columns[0]), ndim):
-        raise ValueError(f"S must have shape ({len(columns[0])}, {ndim}), got {shifts.shape}")
-    if shifts.size and (shifts.dtype.kind not in "iuf" or (shifts != np.rint(shifts)).any()):
-        raise TypeError("S must hold whole numbers")
-    if shifts.size and not (np.abs(shifts.astype(np.float64)) < 2.0**62).all():
-        raise OverflowError("S must hold whole numbers below 2**62")
-    return np.column_stack([*columns, shifts.astype(np.int64)])
+    n_queries = None if queries is None else len(queries)
+    first, second, shifts = as_listed(i, j, S, points.shape[1], len(points), n_queries)
+    parts = (first, second) if shifts is None else (first, second, shifts)
+    return np.column_stack(parts)
 
 
 def _reversed(rows: IntArray) -> IntArray:

@@ -28,6 +28,9 @@ SEARCHES = {
     )""",
     "pairs by type": "hs.pairs(points, np.eye(9) * 0.3, types=kinds, memory_limit=1e13)",
     "histogram": "hs.pair_histogram(points, np.linspace(0.0, 0.5, 100))",
+    "measure": """i = np.arange(10**6) % 500
+    while True:
+        hs.measure(points, i, i + 1, box=[[0.3, 0.1, 0], [0, 0.3, 0], [0, 0, 0.3]])""",
     "nearest": "hs.nearest(points, 100, memory_limit=1e13)",
     "nearest, all equally far": """hs.nearest(
         np.concatenate([points > 0.5] * 5), 1_000_000, queries=points[:9] * 0 + 0.5

@@ -219,7 +219,7 @@ def test_example_of_clusters_runs():
 
 def test_examples_of_nearest_run():
     text = (ROOT / "docs/nearest.md").read_text()
-    searches, masks, cells = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    searches, masks, cells, given = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     names = {}
     exec(compile(ast.parse(searches), "nearest.md", "exec"), names)
     assert names["j"].shape == (1, 4) and names["S"].shape == (1, 4, 3)
@@ -229,6 +229,8 @@ def test_examples_of_nearest_run():
     assert not hs.verify(points, 0.03, i, j, queries=points, box=1.0).spurious.size
     exec(compile(ast.parse(cells), "nearest.md", "exec"), names)
     assert names["j"].shape == (10, 3) and (np.diff(names["d"]) >= 0.0).all()
+    exec(compile(ast.parse(given), "nearest.md", "exec"), names)
+    assert names["d"].shape == (1000,) and names["S"].any()
 
 
 def test_example_of_dynamic_lists_runs():

@@ -208,6 +208,7 @@ CALLS = {
     "histogram, weights": lambda: hs.pair_histogram(
         POINTS, EDGES, weights=WEIGHTS, queries=OTHER, query_weights=WEIGHTS[:12]),
     "rdf": lambda: fields(hs.rdf(POINTS, 1.5, 10, **PERIODIC), "r g counts edges"),
+    "measure": lambda: hs.measure(POINTS, [0, 1], [2, 3], **PERIODIC),
     "nearest": lambda: hs.nearest(POINTS, 4, **PERIODIC),
     "nearest, queries": lambda: hs.nearest(
         POINTS, 50, queries=OTHER, quantities="jdDS", max_distance=2.0),

@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`measure`: given pairs against rational arithmetic, and against `pairs`, to the last bit."""
+
+import itertools
+import math
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.rational_images import Images, between, dot, exact
+
+import halfshell as hs
+
+
+def vector_of(points, i, j, S, box, periodic):
+    """D of a pair, exactly."""
+    images = Images(points.shape[1], box, periodic)
+    apart = between(exact(points[i]), exact(points[j]))
+    for axis, row in zip(images.axes, images.rows, strict=True):
+        apart = [x + int(S[axis]) * y for x, y in zip(apart, row, strict=True)]
+    return apart
+
+
+def along(images, vector):
+    """The part of a vector in the space of the box vectors: the rest is that of every image."""
+    part = [Fraction(0)] * len(vector)
+    for row, square in zip(images._apart, images._squares, strict=True):
+        times = dot(vector, row) / square
+        part = [x + times * y for x, y in zip(part, row, strict=True)]
+    return part
+
+
+def ulps(value, true):
+    """|value - true| in units in the last place of a number of this size."""
+    size = max(abs(true), Fraction(5e-324))
+    return abs(Fraction(float(value)) - true) / Fraction(math.ulp(float(size)))
+
+
+def check(points, i, j, box=None, periodic=None, **options):
+    """Each pair is that of the nearest image with the least S, and measured to an ulp."""
+    points = np.asarray(points)
+    d, D, S = hs.measure(points, i, j, box=box, periodic=periodic, **options)
+    assert d.dtype == D.dtype == np.float64 and S.dtype == np.int32
+    assert d.shape == (len(i),) and D.shape == S.shape == (len(i), points.shape[1])
+    images = Images(points.shape[1], box, periodic)
+    for e, (a, b) in enumerate(zip(i, j, strict=True)):
+        true = vector_of(points, a, b, S[e], box, periodic)
+        square = dot(true, true)
+        apart = along(images, between(exact(points[a]), exact(points[b])))
+        least = dot(along(images, true), along(images, true))
+        found = sorted((length, T) for T, _, length in images.within(apart, least))
+        assert found[0] == (least, tuple(S[e].tolist())), (a, b, S[e], found[:3])
+        length = Fraction(math.isqrt(square.numerator * square.denominator << 400)) / (
+            square.denominator << 200
+        )
+        assert ulps(d[e], length) <= 1
+        unit = Fraction(math.ulp(float(max(length, Fraction(5e-324)))))
+        for k, component in enumerate(true):
+            assert abs(Fraction(float(D[e, k])) - component) <= unit
+    again = hs.measure(points, i, j, S, box=box, periodic=periodic, **options)
+    for one, other in zip((d, D, S), again, strict=True):
+        np.testing.assert_array_equal(one, other)
+    return d, D, S
+
+
+def some_pairs(rng, n, m):
+    return rng.integers(0, n, m), rng.integers(0, n, m)
+
+
+@pytest.mark.parametrize("dim", range(1, 9))
+@pytest.mark.parametrize("kind", ["open", "upright", "mixed", "skewed", "slanted"])
+def test_nearest_images_are_those_of_rational_arithmetic(dim, kind):
+    rng = np.random.default_rng(dim)
+    points = rng.uniform(-3.0, 4.0, (12, dim))
+    box = np.diag(rng.uniform(0.5, 2.0, dim))
+    periodic = None
+    if kind == "open":
+        box = None
+    elif kind == "mixed":
+        periodic = rng.integers(0, 2, dim).astype(bool)
+    elif kind == "skewed":
+        for row in range(1, dim):
+            box[row] += rng.integers(-3, 4) * box[row - 1] * 1.01
+    elif kind == "slanted":
+        box = box + rng.uniform(-0.3, 0.3, (dim, dim))
+        periodic = np.arange(dim) != dim // 2
+    i, j = some_pairs(rng, 12, 40 if dim < 5 else 6)
+    check(points, i, j, box, periodic)
+
+
+BCC = np.array([[-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]])
+FCC = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        np.eye(3), BCC, FCC, FCC + [[0, 0, 0], [3, 3, 0], [5, 0, 5]], np.diag([1.0, -2.0, 0.5]),
+        [[1.0, 0.0, 0.0], [4.0, 1.0, 0.0], [7.0, -3.0, 1.0]],
+        [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+    ],
+)  # fmt: skip
+def test_ties_go_to_the_least_shift(box):
+    grid = np.array(list(itertools.product([0.0, 0.25, 0.5, 1.0], repeat=3)))
+    points = np.concatenate([grid, grid @ np.asarray(box) + [3.0, 0.0, 1.0]])
+    j = np.arange(len(points))
+    check(points, np.zeros_like(j), j, box)
+    _, _, S = check(points[:2] * 0.0, [0, 1, 0], [0, 0, 1], box)
+    assert not S.any()
+
+
+@pytest.mark.parametrize("dim", [4, 8])
+def test_many_images_are_equally_near(dim):
+    half = np.full((2, dim), 0.5)
+    half[0] = 0.0
+    _, _, S = hs.measure(half, [0, 1], [1, 0], box=np.eye(dim))
+    assert S.tolist() == [[-1] * dim, [0] * dim]
+    rows = np.eye(dim)  # D_n: even sums, whose deep holes have 2**dim / 2 or 2 dim of them
+    rows[:-1] -= np.eye(dim)[1:]
+    rows[-1, -2:] = 1.0
+    points = np.zeros((3, dim))
+    points[1], points[2, 0] = 0.5, 1.0
+    check(points, [0, 0, 1], [1, 2, 2], rows)
+
+
+def test_a_last_bit_decides():
+    below, above = np.nextafter(0.5, 0.0), np.nextafter(0.5, 1.0)
+    points = np.array([[0.0], [below], [0.5], [above], [1e9 + 0.5]])
+    _, _, S = check(points, [0] * 5, range(5), [1.0])
+    assert S[:, 0].tolist() == [0, 0, -1, -1, -1_000_000_001]
+    points = np.array([[0.0, 0.0], [0.5, below], [0.5, above], [0.5, 0.5]])
+    check(points, [0] * 4, range(4), [[1.0, 0.0], [0.5, 1.0]])
+
+
+def test_far_points_and_huge_coordinates():
+    rng = np.random.default_rng(4)
+    points = rng.uniform(0.0, 1.0, (10, 3)) + rng.integers(-(2**30), 2**30, (10, 3))
+    i, j = some_pairs(rng, 10, 30)
+    check(points, i, j, np.eye(3))
+    check(points, i, j, np.eye(3) + 0.1)
+    slab = rng.uniform(0.0, 1.0, (10, 3))
+    slab[::2, 2] = 1e300
+    hexagonal = [[1.0, 0.0, 0.0], [0.5, 0.75, 0.0], [0.0, 0.0, 0.0]]
+    check(slab, i, j, hexagonal, [True, True, False])
+    check(slab, i, j, [1.0, 1.0, 0.0], [True, True, False])
+    wires = np.array([[1e300, 0.0], [0.0, 1e-300], [3e300, 1e-299], [-1e300, -7e-300]])
+    check(wires, [0, 0, 1, 3], [1, 2, 2, 0], [1.5e300, 3e-300])
+    for exponent in (-1070, -500, 500, 1020):
+        scaled = np.ldexp(np.round(slab[1::2] * 8), exponent)
+        check(scaled, [0, 1, 2, 3], [1, 2, 0, 4], np.ldexp(np.eye(3) * 3.0, exponent))
+        check(scaled, [0, 1, 2, 3], [1, 2, 0, 4], np.ldexp(BCC * 3.0, exponent))
+
+
+@pytest.mark.parametrize("kind", ["open", "upright", "mixed", "skewed"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("kernel", hs.kernels())
+def test_pairs_that_are_found_have_the_same_bits(kind, dtype, kernel):
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-2.0, 5.0, (400, 3)).astype(dtype)
+    box = np.diag([2.0, 3.1, 2.7]) + (np.tri(3, k=-1) * 1.3 if kind == "skewed" else 0.0)
+    options = {} if kind == "open" else {"box": box, "periodic": [True, kind != "mixed", True]}
+    i, j, d, D, S = hs.pairs(points, 1.9, quantities="ijdDS", **options)
+    assert len(i) > 1000
+    found = hs.measure(points, i, j, S, kernel=kernel, **options)
+    for one, other in zip(found, (d, D, S), strict=True):
+        assert one.tobytes() == other.tobytes()
+    turned = hs.measure(points, j, i, -S, kernel=kernel, quantities="SDd", **options)
+    for one, other in zip(turned, (-S, -D + 0.0, d), strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+def test_long_and_thin_boxes():
+    rng = np.random.default_rng(3)
+    for box in ([[300.0, 1.0], [0.5, 1.0]], [[0.5, 1.0], [3e4, 1.0]], [[1.0, 1.0], [1e-4, -3e-4]]):
+        i, j = some_pairs(rng, 10, 20)
+        check(rng.uniform(-1.0, 1.0, (10, 2)) @ np.array(box), i, j, box)
+
+
+def test_points_may_be_wrapped_or_not():
+    rng = np.random.default_rng(1)
+    points = np.round(rng.uniform(0, 1, (300, 3)) * 1024) / 1024
+    moved = points + rng.integers(-4, 5, points.shape)
+    i, j = some_pairs(rng, 300, 5000)
+    d, D, S = hs.measure(points, i, j, box=[1.0] * 3)
+    at_ties = (np.abs(D) == 0.5).any(axis=1)
+    e, E, T = hs.measure(moved, i, j, box=[1.0] * 3)
+    np.testing.assert_array_equal(d, e)
+    np.testing.assert_array_equal(D[~at_ties], E[~at_ties])
+    np.testing.assert_array_equal(moved[j] - moved[i] + T, E)
+    np.testing.assert_array_equal(points[j] - points[i] + S, D)
+
+
+def test_threads_do_not_matter():
+    rng = np.random.default_rng(2)
+    points = rng.uniform(0, 1, (30000, 3))
+    i, j = some_pairs(rng, 30000, 300_000)
+    box = np.eye(3) + [[0, 0, 0], [0.4, 0, 0], [0.2, 0.3, 0]]
+    one, two = (hs.measure(points, i, j, box=box, threads=n) for n in (1, 2))
+    for a, b in zip(one, two, strict=True):
+        assert a.tobytes() == b.tobytes()
+
+
+def test_quantities_come_in_the_order_of_their_letters():
+    points = [[0.0, 0.0], [3.0, 4.0]]
+    d, D, S = hs.measure(points, [0], [1])
+    assert d.tolist() == [5.0] and D.tolist() == [[3.0, 4.0]] and S.tolist() == [[0, 0]]
+    for n in (1, 2, 3):
+        for letters in itertools.permutations("dDS", n):
+            arrays = hs.measure(points, [0], [1], quantities="".join(letters))
+            for letter, array in zip(letters, (arrays,) if n == 1 else arrays, strict=True):
+                np.testing.assert_array_equal(array, {"d": d, "D": D, "S": S}[letter])
+
+
+def test_nothing_to_measure():
+    for points in ([], np.empty((0, 3)), np.zeros((4, 3))):
+        d, D, S = hs.measure(points, [], [], box=[1.0, 1.0, 1.0])
+        assert d.shape == (0,) and D.shape == S.shape == (0, 3)
+        assert (d.dtype, D.dtype, S.dtype) == (np.float64, np.float64, np.int32)
+    assert hs.measure(np.empty((0, 2)), [], [], np.empty((0, 2)), quantities="D").shape == (0, 2)
+    d, D, S = hs.measure([[7.5, 1e300]], [0, 0], [0, 0], [[0, 0], [2, 0]], box=[1.5, 2.0])
+    assert d.tolist() == [0.0, 3.0] and D.tolist() == [[0.0, 0.0], [3.0, 0.0]]
+
+
+POINTS, BOX = np.zeros((3, 2)), [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "message"),
+    [
+        (([0.5], [1]), {}, TypeError, "i must hold integers"),
+        (([True], [1]), {}, TypeError, "i must hold integers"),
+        (([0], ["a"]), {}, TypeError, "j must"),
+        (([[0]], [1]), {}, ValueError, "i must have shape (m,), got (1, 1)"),
+        (([0], [3]), {}, ValueError, "j must be numbers of points, from 0 to 2"),
+        (([-1], [0]), {}, ValueError, "i must be numbers of points, from 0 to 2"),
+        (([0, 1], [0]), {}, ValueError, "i and j must have the same length, got 2 and 1"),
+        (([0], [1], [[0]]), {}, ValueError, "S must have shape (1, 2), got (1, 1)"),
+        (([0], [1], [[0.5, 0]]), {}, TypeError, "S must hold whole numbers"),
+        (([0], [1], [[2.0**62, 0]]), {}, OverflowError, "below 2**62"),
+        (([0], [1], [[1, 0]]), {}, ValueError, "pair 0: "),
+        (([0], [1], [[0, 1]]), {"box": BOX, "periodic": [1, 0]}, ValueError, "pair 0: "),
+        (([0], [1], [[2**40, 0]]), {"box": BOX}, OverflowError, "pair 0: "),
+        (([0], [1]), {"quantities": "ij"}, ValueError, "letters d D S"),
+        (([0], [1]), {"quantities": "dd"}, ValueError, "each at most once"),
+        (([0], [1]), {"quantities": ""}, ValueError, "letters d D S"),
+        (([0], [1]), {"quantities": 3}, TypeError, "quantities must be a string"),
+        (([0], [1]), {"periodic": True}, ValueError, "periodic needs a box"),
+        (([0], [1]), {"box": [[1.0, 2.0], [2.0, 4.0]]}, ValueError, "dependent"),
+        (([0], [1]), {"memory_limit": 8}, MemoryError, "8 bytes are allowed"),
+        (([0], [1]), {"threads": 0}, ValueError, "threads"),
+        (([0], [1]), {"kernel": "none"}, ValueError, "kernel"),
+    ],
+)
+def test_what_is_wrong_is_said(arguments, options, error, message):
+    with pytest.raises(error, match=re.escape(message)):
+        hs.measure(POINTS, *arguments, **options)
+
+
+def test_what_no_float_holds_is_refused():
+    far = [[0.0, 0.0], [1e300, 0.0], [-1.7e308, 0.0], [1.7e308, 0.0]]
+    with pytest.raises(OverflowError, match=re.escape("pair 1: a point lies too many box")):
+        hs.measure(far, [0, 0], [0, 1], box=BOX)
+    with pytest.raises(OverflowError, match="pair 1: the vector is too long"):
+        hs.measure(far, [0, 2], [1, 3], quantities="d")
+    with pytest.raises(OverflowError, match=re.escape("pair 0: a point lies too many box")):
+        hs.measure([[0.0, 0.0], [1e12, 0.0]], [0], [1], box=BOX)
+    assert hs.measure([[0.0, 0.0], [1e12, 0.0]], [0], [1], box=BOX, quantities="d")[0] == 0.0
+    with pytest.raises(ValueError, match="finite"):
+        hs.measure([[0.0, np.nan]], [], [])
+
+
+def test_boxes_that_float64_cannot_tell_are_refused():
+    thin = np.array([[1.0, 1.0], [1e-200, -1e-200 * 3]])
+    with pytest.raises(ValueError, match="box"):
+        hs.measure(POINTS, [0], [1], box=thin)
+    assert hs.measure(POINTS, [0], [1], [[0, 0]], box=thin, quantities="d").tolist() == [0.0]
+
+
+def test_points_may_bring_their_box():
+    class Atoms:
+        positions = np.array([[0.1, 0.0, 0.0], [0.9, 0.0, 0.0]])
+        cell = np.eye(3)
+        pbc = (True, False, False)
+
+    assert hs.measure(Atoms(), [0], [1], quantities="S").tolist() == [[-1, 0, 0]]
+    with pytest.raises(ValueError, match="box comes from"):
+        hs.measure(Atoms(), [0], [1], box=np.eye(3))
