@@ -16,6 +16,7 @@ FOLDERS = {
     "arguments": "what goes in, and what is refused",
     "laws": "scenes on which the answer is known, or must not change",
     "process": "memory, threads, signals, the environment",
+    "frameworks": "tensors of PyTorch and JAX",
     "scenes": "the scenes and structures of the package",
     "binding": "the boundary to C",
     "report": "`halfshell report`",
