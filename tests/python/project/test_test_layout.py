@@ -17,6 +17,7 @@ FOLDERS = {
     "laws": "scenes on which the answer is known, or must not change",
     "process": "memory, threads, signals, the environment",
     "compat": "stand-ins for other libraries",
+    "frameworks": "tensors of PyTorch and JAX",
     "scenes": "the scenes and structures of the package",
     "binding": "the boundary to C",
     "report": "`halfshell report`",

@@ -1,0 +1,386 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Neighbour lists of PyTorch tensors on the CPU: exact, with derivatives, and under torch.compile.
+
+The search is an operator that PyTorch knows and that has no derivative: which pairs there are does
+not change under an infinitesimal step. Vectors and distances are computed from its pairs by
+PyTorch, so that derivatives of any order come from there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from halfshell._extras import needs
+from halfshell._functions.directed import check_rows, entries_between, entries_of
+from halfshell._objects.box import Box
+
+try:
+    import torch
+except ModuleNotFoundError as error:
+    if error.name != "torch":
+        raise
+    raise ImportError(f"{needs('halfshell.torch', 'torch')} (the extra halfshell[torch])") from None
+
+__all__ = ["neighbor_list", "radius", "radius_graph"]
+
+Tensor = Any  # torch.Tensor, also for type checkers where torch is not installed
+
+
+def neighbor_list(
+    positions: Tensor,
+    cutoff: float,
+    *,
+    box: Any = None,
+    periodic: Any = None,
+    quantities: str = "ij",
+    half: bool = False,
+    inclusive: bool = True,
+    batch: Tensor | None = None,
+) -> Tensor | tuple[Tensor, ...]:
+    """Find all neighbours of each point.
+
+    Parameters
+    ----------
+    positions : Tensor of float32 or float64, shape (n, d)
+        Coordinates on the CPU, any length unit, 1 <= d <= 8. They are searched as they are,
+        without a copy where they are contiguous.
+    cutoff : float
+        Largest distance of a pair, in the unit of `positions`; finite, not negative.
+    box : float, array_like or Tensor, shape (d,), (d, d) or (s, d, d), or Box, optional
+        As in `halfshell.pairs`. d and D can be differentiated by a tensor.
+    periodic : bool or sequence of bool, shape (d,), optional
+        Which box vectors repeat. Default: all with a box, none without.
+    quantities : str, default "ij"
+        Any of the letters ``i j d D S P``: indices, distance, vector, shift, both indices.
+    half : bool, default False
+        Each pair once, as `halfshell.pairs` has it; otherwise (i, j, S) and (j, i, -S).
+    inclusive : bool, default True
+        Whether a pair at exactly `cutoff` counts.
+    batch : Tensor of int, shape (n,), optional
+        The system of each point, ascending; points pair within their system only, and `box` may
+        have one matrix a system, (s, d, d).
+
+    Returns
+    -------
+    Tensor or tuple of Tensor
+        One for each letter, in that order, ascending by (i, j, S); a bare tensor for one letter. i
+        and j int64 (m,), P int64 (m, 2), S int32 (m, d); d (m,) and D (m, d) of the type of
+        `positions`, with ``D = positions[j] - positions[i] + S @ box``. Sums are made in float64.
+        The decision is exact for the coordinates given; d is rounded after it and may differ from
+        `cutoff` by rounding. The gradient of d is 0 where d is 0.
+
+    Raises
+    ------
+    TypeError
+        If `positions` is no tensor, not on the CPU, not dense or of another type.
+    ValueError, OverflowError, MemoryError
+        As `halfshell.pairs`.
+    NotImplementedError
+        Under ``torch.vmap``, as systems differ in their number of pairs: use `batch`. From PyTorch
+        2.5 on; older ones raise an error of their own.
+
+    Examples
+    --------
+    >>> import torch
+    >>> from halfshell.torch import neighbor_list
+    >>> x = torch.tensor([[0.0], [1.0], [3.0]], dtype=torch.float64, requires_grad=True)
+    >>> i, j, d = neighbor_list(x, 1.5, box=[4.0], quantities="ijd")
+    >>> i.tolist(), j.tolist()
+    ([0, 0, 1, 2], [1, 2, 0, 0])
+    >>> d.pow(2).sum().backward()
+    >>> x.grad.flatten().tolist()
+    [0.0, 4.0, -4.0]
+    """
+    _check_points(positions, "positions")
+    _check_letters(quantities)
+    box = _as_box(box)
+    flags = None if periodic is None else np.atleast_1d(np.asarray(periodic))
+    if flags is not None and (flags.dtype != bool or flags.ndim != 1):
+        raise TypeError(f"periodic must be a bool or one for each axis, got {periodic!r}")
+    if flags is not None and len(flags) == 1:
+        flags = flags.repeat(positions.shape[1])
+    if batch is not None:
+        _check_batch(batch, "batch")
+    i, j, S = _neighbor_list(
+        positions.detach(), float(cutoff), None if box is None else box.detach(),
+        None if flags is None else flags.tolist(), batch, half, inclusive,
+    )  # fmt: skip
+    found = {"i": i, "j": j, "S": S}
+    if "d" in quantities or "D" in quantities:
+        D = _vectors(positions, i, j, S, box, batch)
+        found["D"] = D.to(positions.dtype)
+        if "d" in quantities:
+            found["d"] = _lengths(D).to(positions.dtype)
+    if "P" in quantities:
+        found["P"] = torch.stack((i, j), 1)
+    result = tuple(found[letter] for letter in quantities)
+    return result if len(result) > 1 else result[0]
+
+
+def radius_graph(
+    x: Tensor,
+    r: float,
+    batch: Tensor | None = None,
+    loop: bool = False,
+    max_num_neighbors: int | None = None,
+    flow: str = "source_to_target",
+) -> Tensor:
+    """Connect all points that are less than `r` apart, as PyTorch Geometric's function does.
+
+    That one keeps 32 neighbours of a point unless it is told another number, and leaves out others
+    without a word; which ones depends on the order of the points. Here all of them are kept.
+
+    Parameters
+    ----------
+    x : Tensor of float32 or float64, shape (n, d) or (n,)
+        Coordinates on the CPU.
+    r : float
+        A distance, in the unit of `x`; edges are shorter than this.
+    batch : Tensor of int, shape (n,), optional
+        The graph of each point, ascending; points of different graphs are not connected.
+    loop : bool, default False
+        Whether each point has an edge to itself.
+    max_num_neighbors : int, optional
+        The most edges that a point may have, loops not counted. If one has more, that is an error:
+        none is left out. Default: any number.
+    flow : {"source_to_target", "target_to_source"}, default "source_to_target"
+        Which row of the result holds the points whose neighbours the other row holds: the second
+        one, or the first.
+
+    Returns
+    -------
+    Tensor of int64, shape (2, m)
+        ``edge_index``, ascending by the point and then by its neighbour.
+
+    Raises
+    ------
+    CapacityError
+        If a point has more than `max_num_neighbors`; it carries ``needed``.
+    TypeError, ValueError, OverflowError, MemoryError
+        As `neighbor_list`.
+
+    Examples
+    --------
+    >>> import torch
+    >>> from halfshell.torch import radius_graph
+    >>> radius_graph(torch.tensor([0.0, 1.0, 3.0]), 2.5).tolist()
+    [[1, 0, 2, 1], [0, 1, 1, 2]]
+    """
+    if flow not in ("source_to_target", "target_to_source"):
+        raise ValueError(f"flow must be 'source_to_target' or 'target_to_source', got {flow!r}")
+    x = _as_columns(x, "x")
+    if batch is not None:
+        _check_batch(batch, "batch")
+    edges = _radius_graph(x.detach(), float(r), batch, loop, _as_most(max_num_neighbors))
+    return edges.flip(0) if flow == "source_to_target" else edges
+
+
+def radius(
+    x: Tensor,
+    y: Tensor,
+    r: float,
+    batch_x: Tensor | None = None,
+    batch_y: Tensor | None = None,
+    max_num_neighbors: int | None = None,
+) -> Tensor:
+    """Find all points of `x` that are less than `r` from each of `y`, as PyTorch Geometric's does.
+
+    Parameters
+    ----------
+    x, y : Tensor of float32 or float64, shape (n, d) and (q, d), or (n,) and (q,)
+        Coordinates on the CPU.
+    r : float
+        A distance, in the unit of `x`.
+    batch_x, batch_y : Tensor of int, shape (n,) and (q,), optional
+        The system of each point, ascending. A set without one is all of system 0.
+    max_num_neighbors : int, optional
+        The most points that one of `y` may find, as in `radius_graph`. Default: any number.
+
+    Returns
+    -------
+    Tensor of int64, shape (2, m)
+        Rows of `y` and, below them, of `x`; ascending by both.
+
+    Raises
+    ------
+    CapacityError, TypeError, ValueError, OverflowError, MemoryError
+        As `radius_graph`.
+
+    Examples
+    --------
+    >>> import torch
+    >>> from halfshell.torch import radius
+    >>> radius(torch.tensor([0.0, 1.0, 3.0]), torch.tensor([0.5, 9.0]), 1.0).tolist()
+    [[0, 0], [0, 1]]
+    """
+    x, y = _as_columns(x, "x"), _as_columns(y, "y")
+    for name, batch in (("batch_x", batch_x), ("batch_y", batch_y)):
+        if batch is not None:
+            _check_batch(batch, name)
+    most = _as_most(max_num_neighbors)
+    found: Tensor = _radius(x.detach(), y.detach(), float(r), batch_x, batch_y, most)
+    return found
+
+
+def _check_tensor(value: Any, name: str) -> None:
+    if not isinstance(value, torch.Tensor):
+        raise TypeError(f"{name} must be a torch.Tensor, got {type(value).__name__}")
+    if value.device.type != "cpu":
+        raise TypeError(f"{name} must be on the CPU, but is on {value.device}: give {name}.cpu()")
+    if value.layout != torch.strided:
+        raise TypeError(f"{name} must be dense, got layout {value.layout}")
+
+
+def _check_points(value: Any, name: str) -> None:
+    _check_tensor(value, name)
+    if value.dtype not in (torch.float32, torch.float64):
+        raise TypeError(f"{name} must be of float32 or float64, got {value.dtype}")
+    if value.ndim != 2:
+        raise ValueError(f"{name} must have shape (n, d), got {tuple(value.shape)}")
+
+
+def _check_batch(value: Any, name: str) -> None:
+    _check_tensor(value, name)
+    if value.dtype.is_floating_point or value.dtype.is_complex or value.dtype == torch.bool:
+        raise TypeError(f"{name} must hold integers, got {value.dtype}")
+
+
+def _check_letters(quantities: str) -> None:
+    letters = set(quantities) if isinstance(quantities, str) else set()
+    if not letters or len(letters) < len(quantities) or not letters <= set("ijdDSP"):
+        raise ValueError(
+            f"quantities must be letters of 'ijdDSP', each at most once, got {quantities!r}"
+        )
+
+
+def _as_columns(value: Any, name: str) -> Tensor:
+    if isinstance(value, torch.Tensor) and value.ndim == 1:
+        value = value[:, None]
+    _check_points(value, name)
+    return value
+
+
+def _as_most(value: int | None) -> int | None:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
+        raise ValueError(f"max_num_neighbors must be None or an integer from 0 on, got {value!r}")
+    return value
+
+
+def _as_box(box: Any) -> Tensor | None:
+    if box is None:
+        return None
+    if isinstance(box, torch.Tensor):
+        _check_tensor(box, "box")
+        if box.dtype not in (torch.float32, torch.float64):
+            raise TypeError(f"box must be of float32 or float64, got {box.dtype}")
+        return box
+    return torch.tensor(np.asarray(box.vectors if isinstance(box, Box) else box, np.float64))
+
+
+def _vectors(
+    positions: Tensor, i: Tensor, j: Tensor, S: Tensor, box: Tensor | None, batch: Tensor
+) -> Tensor:
+    D = positions[j].double() - positions[i].double()
+    if box is None:
+        return D
+    box, S = box.double(), S.double()
+    if box.ndim < 2:
+        return D + S * box
+    if box.ndim == 3:  # with a batch, or the search would have refused it
+        return D + (S[:, :, None] * box[batch[i]]).sum(1)
+    return D + (S[:, :, None] * box).sum(1)
+
+
+def _lengths(D: Tensor) -> Tensor:
+    """Lengths that neither overflow nor underflow, with derivatives of 0 where they are 0."""
+    scale = D.detach().abs().amax(-1)
+    zero = scale == 0.0
+    scale = torch.where(zero, 1.0, scale)
+    squares = (D / scale[:, None]).square().sum(-1)
+    return torch.where(zero, 0.0, scale * torch.where(zero, 1.0, squares).sqrt())
+
+
+def _array(tensor: Tensor | None) -> Any:
+    return None if tensor is None else tensor.detach().numpy()
+
+
+def _find_neighbors(
+    positions: Tensor, cutoff: float, box: Tensor, periodic: Any, batch: Tensor, half: bool,
+    inclusive: bool,
+) -> tuple[Tensor, ...]:  # fmt: skip
+    found = entries_of(
+        _array(positions), cutoff, _array(box), periodic, _array(batch), half, inclusive
+    )
+    # Columns of a table are for reading only, and shared by what is made of it.
+    return tuple(torch.from_numpy(x if x.flags.writeable else x.copy()) for x in found)
+
+
+def _find_graph(
+    x: Tensor, r: float, batch: Tensor | None, loop: bool, most: int | None
+) -> Tensor:
+    i, j, _ = entries_of(_array(x), r, None, None, _array(batch), False, False)
+    check_rows(i, most)
+    if loop:
+        own = np.arange(len(x))
+        i, j = np.concatenate((i, own)), np.concatenate((j, own))
+        order = np.lexsort((j, i))
+        i, j = i[order], j[order]
+    return torch.from_numpy(np.stack((i, j)))
+
+
+def _find_between(
+    x: Tensor, y: Tensor, r: float, batch_x: Tensor, batch_y: Tensor, most: int | None
+) -> Tensor:
+    i, j = entries_between(_array(y), _array(x), r, _array(batch_y), _array(batch_x), False)
+    check_rows(i, most)
+    return torch.from_numpy(np.stack((i, j)))
+
+
+def _shape_of_neighbors(positions: Tensor, *_: Any) -> tuple[Tensor, ...]:
+    m = torch.library.get_ctx().new_dynamic_size()
+    index = [positions.new_empty(m, dtype=torch.int64) for _ in range(2)]
+    return *index, positions.new_empty((m, positions.shape[1]), dtype=torch.int32)
+
+
+def _shape_of_edges(x: Tensor, *_: Any) -> Tensor:
+    return x.new_empty((2, torch.library.get_ctx().new_dynamic_size()), dtype=torch.int64)
+
+
+def _refuse_vmap(*_: Any) -> Any:
+    raise NotImplementedError(
+        "systems differ in their number of pairs, so torch.vmap cannot stack them: give all of "
+        "them in one call, with batch="
+    )
+
+
+def _operator(name: str, schema: str, find: Any, shape: Any) -> Any:
+    """Make ``torch.ops.halfshell.<name>``."""
+    op = torch.library.custom_op(f"halfshell::{name}", find, mutates_args=(), schema=schema)
+    op.register_fake(shape)
+    if hasattr(op, "register_vmap"):  # from PyTorch 2.5 on
+        op.register_vmap(_refuse_vmap)
+    return op
+
+
+_neighbor_list = _operator(
+    "neighbor_list",
+    "(Tensor positions, float cutoff, Tensor? box, bool[]? periodic, Tensor? batch, bool half, "
+    "bool inclusive) -> (Tensor, Tensor, Tensor)",
+    _find_neighbors,
+    _shape_of_neighbors,
+)
+_radius_graph = _operator(
+    "radius_graph",
+    "(Tensor x, float r, Tensor? batch, bool loop, int? max_num_neighbors) -> Tensor",
+    _find_graph,
+    _shape_of_edges,
+)
+_radius = _operator(
+    "radius",
+    "(Tensor x, Tensor y, float r, Tensor? batch_x, Tensor? batch_y, int? max_num_neighbors) "
+    "-> Tensor",
+    _find_between,
+    _shape_of_edges,
+)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pages on PyTorch and JAX run, and say in one line what is missing where that is so."""
+
+import ast
+import doctest
+import importlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+from checkout import ROOT
+from frameworks import framework
+
+
+@pytest.mark.parametrize("name", ["torch", "jax"])
+def test_examples_run(name):
+    framework(name)
+    text = (ROOT / f"docs/{name}.md").read_text()
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(compile(ast.parse(code), f"{name}.md", "exec"), names)
+    if name == "torch":
+        assert names["forces"].shape == (500, 3) and names["by_box"].isfinite().all()
+        assert names["edge_index"].shape[1] > 500 and len(names["of_queries"]) > 20
+        assert names["again"] > 0.0
+    else:
+        assert names["gradient"].shape == (500, 3) and names["found"].needed > 100
+        assert names["lists"].i.shape == (5, 2000) and not names["lists"].overflow.any()
+
+
+@pytest.mark.parametrize("name", ["torch", "jax"])
+def test_examples_in_docstrings_run(name):
+    framework(name)
+    module = importlib.import_module(f"halfshell.{name}")
+    result = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.attempted > 5 and result.failed == 0
+
+
+@pytest.mark.parametrize("name", ["torch", "jax"])
+def test_without_the_package_one_line_names_the_extra(name):
+    script = f"import sys; sys.modules[{name!r}] = None\nimport halfshell.{name}"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith(f"ImportError: halfshell.{name} needs {name}: pip install {name}")
+    assert f"halfshell[{name}]" in last
+
+
+@pytest.mark.parametrize("name", ["torch", "jax"])
+def test_it_is_imported_by_name_only(name):
+    script = f"import sys, halfshell; sys.exit({name!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script]).returncode == 0
