@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stand-ins for functions of other libraries, with their names, conventions and errors.
+"""Drop-ins: functions and classes of other libraries, under their names and by their rules.
 
-Each module is imported by its name, `halfshell.compat.ase` for one, and needs the library that it
-stands in for. See ``docs/drop-ins.md``.
+A module for each library, which must be installed. None of them is imported with ``halfshell``:
+write ``from halfshell.compat.ase import neighbor_list``. See ``docs/drop-ins.md``.
 """

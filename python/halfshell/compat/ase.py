@@ -1,87 +1,109 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stand-ins for `ase.neighborlist`: the same calls, answered by `halfshell.neighbors`.
+"""Neighbour lists in place of those of ``ase.neighborlist``.
 
-As in ASE a pair counts below its cutoff, not at it. In ASE rounded distances decide, here the real
-numbers do. Entries are sorted by (i, j, S), where ASE promises i alone.
+All have ASE's arguments, units, dtypes and shapes, and its rule: a pair counts if it is closer
+than the cutoff, or than the sum of the radii of its two atoms (``<``). Here that is decided for the
+real numbers that the floats are, where ASE compares rounded distances with rounded sums; so the
+lists differ where rounding decides ASE's.
+
+The order is ascending (i, j, S), always. ASE promises ascending i alone.
+
+Refused with ValueError, where ASE returns something: coordinates, cells and cutoffs that are not
+finite, negative radii, radii that are not one for each atom, and periodic cell vectors that are
+linearly dependent. `max_nbins` is accepted and has no effect.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
+from numbers import Real
 from typing import Any
 
+import ase.neighborlist as _owner
 import numpy as np
 import numpy.typing as npt
+from ase.cell import Cell
+from ase.data import atomic_numbers
+from ase.neighborlist import first_neighbors, natural_cutoffs
 
-try:
-    import ase.neighborlist as original
-    from ase.data import atomic_numbers
-    from ase.neighborlist import first_neighbors, natural_cutoffs
-except ImportError as error:  # pragma: no cover
-    raise ImportError("halfshell.compat.ase needs ASE: pip install ase") from error
-
-from halfshell._functions.neighbors import neighbors
+import halfshell as hs
 
 __all__ = [
     "NeighborList",
     "NewPrimitiveNeighborList",
     "PrimitiveNeighborList",
+    "build_neighbor_list",
     "first_neighbors",
     "natural_cutoffs",
     "neighbor_list",
     "primitive_neighbor_list",
 ]
 
-_LETTERS = "ijdDS"
-_NAMES = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
+_EMPTY: dict[str, tuple[type, tuple[int, ...]]] = {
+    "i": (int, (0,)),
+    "j": (int, (0,)),
+    "d": (float, (0,)),
+    "D": (float, (0, 3)),
+    "S": (int, (0, 3)),
+}
 
 
-class _Reach:
-    """What a cutoff means: keywords of `neighbors`, and which atoms reach themselves."""
+def neighbor_list(
+    quantities: str,
+    a: Any,
+    cutoff: Any,
+    self_interaction: bool = False,
+    max_nbins: float = 1e6,
+) -> Any:
+    """Find all neighbours of each atom, as ``ase.neighborlist.neighbor_list`` does.
 
-    def __init__(self, cutoff: Any, n: int, numbers: Any) -> None:
-        self.cutoff: Any = cutoff
-        self.options: dict[str, Any] = {}
-        if isinstance(cutoff, Mapping):
-            if numbers is None:
-                raise TypeError("cutoffs of elements need the numbers of the atoms")
-            self._by_number(cutoff, np.asarray(numbers))
-        elif np.ndim(cutoff) == 0:
-            self.itself = np.full(n, float(cutoff) > 0.0)
-        else:
-            radii = np.asarray(cutoff)
-            self.cutoff, self.options = None, {"radii": radii}
-            self.itself = radii > 0.0
+    Parameters
+    ----------
+    quantities : str
+        Letters of what is returned, in their order: i and j, the indices of a pair; d, its
+        distance; D, its vector; S, its shift, with
+        ``D = a.positions[j] - a.positions[i] + S @ a.cell``. A letter may repeat.
+    a : ase.Atoms
+        The atoms, with their cell and periodicity. They may lie outside the cell. Cell vectors that
+        are zero are completed by ``a.get_cell(complete=True)``, as in ASE.
+    cutoff : float, dict or array_like of float, shape (n,)
+        In the unit of the positions: one length for all; one for each pair of elements, by symbol
+        or atomic number, such as ``{("H", "C"): 1.2, (6, 6): 1.85}``, where other pairs do not
+        count and the later of two entries for the same pair holds; or a radius for each atom, whose
+        sums are the cutoffs. A length of zero or less has no neighbours; radii are not negative.
+    self_interaction : bool, default False
+        Whether each atom is its own neighbour, at S = 0 and distance 0, where its cutoff is above
+        zero.
+    max_nbins : float, optional
+        Accepted for ASE's sake, without effect.
 
-    def _by_number(self, cutoff: Mapping[Any, float], numbers: npt.NDArray[Any]) -> None:
-        kinds, types = np.unique(numbers, return_inverse=True)
-        table = np.zeros((len(kinds), len(kinds)))  # no distance is below 0
-        place = {int(number): t for t, number in enumerate(kinds)}
-        for (a, b), length in cutoff.items():
-            p, q = (place.get(atomic_numbers.get(x, x)) for x in (a, b))
-            if p is not None and q is not None:
-                table[p, q] = table[q, p] = length
-        self.cutoff, self.options = table, {"types": types}
-        self.itself = table.diagonal()[types] > 0.0
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        One array for each letter, a bare array for one letter: i, j int64 (m,); d float64 (m,);
+        D float64 (m, 3); S int64 (m, 3). The full list, with (i, j, S) and (j, i, -S), ascending
+        by (i, j, S).
 
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `halfshell.neighbors`; ValueError also for letters that are none of these.
 
-def _with_atoms_themselves(
-    columns: dict[str, npt.NDArray[Any]], itself: npt.NDArray[np.bool_]
-) -> dict[str, npt.NDArray[Any]]:
-    """The entries with (i, i, 0) for these atoms, where (i, j, S) has its place for them."""
-    atoms = np.flatnonzero(itself)
-    i, j, shifts = columns["i"], columns["j"], columns["S"]
-    negative = np.zeros(len(i), np.bool_)  # is the first entry of S that is not 0 negative?
-    for k in range(3):
-        negative = np.where((shifts[:, :k] == 0).all(1) & (shifts[:, k] < 0), True, negative)
-    before = (j < i) | ((j == i) & negative)
-    row = np.searchsorted(i, atoms)
-    place = row + np.bincount(i[before], minlength=len(itself))[atoms]
-    put = {"i": atoms, "j": atoms}
-    return {
-        name: np.insert(column, place, put.get(name, 0), axis=0)
-        for name, column in columns.items()
-    }
+    Examples
+    --------
+    >>> from ase.build import molecule
+    >>> from halfshell.compat.ase import neighbor_list
+    >>> i, j = neighbor_list("ij", molecule("H2O"), 1.2)
+    >>> i.tolist(), j.tolist()
+    ([0, 0, 1, 2], [1, 2, 0, 0])
+    >>> neighbor_list("j", molecule("H2O"), {("H", "H"): 1.6}).tolist()
+    [2, 1]
+    """
+    return primitive_neighbor_list(
+        quantities, a.pbc, a.get_cell(complete=True), a.positions, cutoff,
+        numbers=a.numbers, self_interaction=self_interaction, max_nbins=max_nbins,
+    )  # fmt: skip
 
 
 def primitive_neighbor_list(
@@ -95,179 +117,239 @@ def primitive_neighbor_list(
     use_scaled_positions: bool = False,
     max_nbins: float = 1e6,
 ) -> Any:
-    """All neighbours of each atom, as `ase.neighborlist.primitive_neighbor_list` lists them.
+    """Find all neighbours of each point, as ``ase.neighborlist.primitive_neighbor_list`` does.
 
     Parameters
     ----------
-    quantities : str
-        Some of ``i j d D S``, in any order.
-    pbc : sequence of bool or bool
-    cell : (3, 3) array_like
-        Box vectors in rows.
-    positions : (n, 3) array_like
-    cutoff : float, dict or (n,) array_like
-        One cutoff; one for each two elements, by numbers or symbols; or radii, whose sums count.
-        Pairs of elements that are not in the dict are no neighbours.
-    numbers : (n,) array_like of int, optional
-        Atomic numbers, for a dict.
-    self_interaction : bool, default False
-        Whether an atom within its cutoff of itself is its own neighbour with S = 0.
+    quantities, cutoff, self_interaction, max_nbins
+        As in `neighbor_list`.
+    pbc : bool or sequence of bool, shape (3,)
+        Which cell vectors repeat.
+    cell : array_like of float, shape (3, 3)
+        Cell vectors as rows. Those that do not repeat may be zero.
+    positions : array_like of float, shape (n, 3)
+        Coordinates, in the unit of the cell.
+    numbers : array_like of int, shape (n,), optional
+        Atomic numbers, which a dict of cutoffs needs.
     use_scaled_positions : bool, default False
-        Whether `positions` are multiples of the box vectors.
-    max_nbins : float
-        Not looked at: memory follows the atoms here.
+        Whether `positions` are multiples of the cell vectors. Their product with the cell, rounded
+        to float64 as in ASE, is what is searched.
 
     Returns
     -------
     ndarray or tuple of ndarray
-        i, j int64 (m,); d float64 (m,); D float64 (m, 3); S int64 (m, 3), with
-        ``D = positions[j] - positions[i] + S @ cell``; sorted by (i, j, S).
+        As `neighbor_list`.
 
     Raises
     ------
-    TypeError
-        For a dict without `numbers`.
-    ValueError
-        For any other letter, and for what `halfshell.neighbors` refuses: NaN, a negative cutoff,
-        box vectors that are linearly dependent.
+    TypeError, ValueError, OverflowError, MemoryError
+        As `neighbor_list`; TypeError also for a dict without `numbers`.
 
     Examples
     --------
     >>> import numpy as np
     >>> from halfshell.compat.ase import primitive_neighbor_list
-    >>> i, j, S = primitive_neighbor_list("ijS", True, np.eye(3), [[0.5, 0.5, 0.5]], 1.01)
-    >>> len(i), S[0].tolist()
-    (6, [-1, 0, 0])
+    >>> S = primitive_neighbor_list("S", [True, False, False], np.eye(3), np.zeros((1, 3)), 1.5)
+    >>> S.tolist()
+    [[-1, 0, 0], [1, 0, 0]]
     """
-    if set(quantities) - set(_LETTERS):
-        raise ValueError("Unsupported quantity specified.")
-    points = np.asarray(positions, np.float64).reshape(-1, 3)
-    if use_scaled_positions:
-        points = points @ np.asarray(cell)
-    n = len(points)
-    reach = _Reach(cutoff, n, numbers) if n > 0 else None
-    wanted = set(quantities) | {"j"} | ({"S"} if self_interaction else set())
-    if reach is None:
-        columns: dict[str, npt.NDArray[Any]] = {
-            "i": np.zeros(0, np.int64), "j": np.zeros(0, np.int64), "d": np.zeros(0),
-            "D": np.zeros((0, 3)), "S": np.zeros((0, 3), np.int64),
-        }  # fmt: skip
+    letters = list(quantities)
+    if not _EMPTY.keys() >= set(letters):
+        raise ValueError(f"quantities must be of the letters i j d D S, got {quantities!r}")
+    found: dict[str, npt.NDArray[Any]]
+    if len(positions) == 0:
+        found = {one: np.empty(shape, dtype) for one, (dtype, shape) in _EMPTY.items()}
     else:
-        letters = "".join(letter for letter in "jdDS" if letter in wanted)
-        table = neighbors(
-            points, reach.cutoff, box=cell, periodic=pbc, quantities=letters, inclusive=False,
-            **reach.options,
-        )  # fmt: skip
-        columns = {letter: getattr(table, _NAMES[letter]) for letter in letters}
-        columns["i"] = np.repeat(np.arange(n), np.diff(table.offsets))
-        if self_interaction:
-            columns = _with_atoms_themselves(columns, reach.itself)
-    if "S" in columns:
-        columns["S"] = columns["S"].astype(np.int64)
-    found = tuple(_own(columns[letter]) for letter in quantities)
-    return found[0] if len(found) == 1 else found
+        if use_scaled_positions:
+            positions = np.dot(positions, cell)
+        reach = _reach(cutoff, numbers)
+        wanted = "".join(dict.fromkeys(letters)) or "i"
+        scene = {"box": np.asarray(cell), "periodic": pbc, "inclusive": False}
+        found = (_with_selves if self_interaction else _without_selves)(
+            wanted, positions, *reach, scene
+        )
+    arrays = tuple(found[letter] for letter in letters)
+    return arrays[0] if len(arrays) == 1 else arrays
 
 
-def _own(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Tables may not be written to; what ASE returns may."""
-    return column if column.flags.writeable else column.copy()
+def _reach(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
+    """The cutoff of halfshell, and what each atom brings to it."""
+    if isinstance(cutoff, Mapping):
+        if numbers is None:
+            raise TypeError("numbers must be given where cutoff is a dict")
+        kinds, types = np.unique(np.asarray(numbers), return_inverse=True)
+        places = {kind: place for place, kind in enumerate(kinds.tolist())}
+        table: dict[tuple[int, int], Any] = {}
+        for (one, other), length in cutoff.items():
+            a, b = (places.get(atomic_numbers.get(key, key)) for key in (one, other))
+            if a is not None and b is not None:
+                table[min(a, b), max(a, b)] = _not_negative(length)
+        return table, {"types": types}
+    if np.ndim(cutoff) == 0:
+        return _not_negative(cutoff), {}
+    return None, {"radii": cutoff}
 
 
-def neighbor_list(
-    quantities: str, a: Any, cutoff: Any, self_interaction: bool = False, max_nbins: float = 1e6
-) -> Any:
-    """All neighbours of each atom of `ase.Atoms`: see `primitive_neighbor_list`.
+def _not_negative(length: Any) -> Any:
+    """0 for what is less, within which there are no pairs; all else is for halfshell to judge."""
+    length = length[()] if isinstance(length, np.ndarray) else length
+    return 0.0 if isinstance(length, Real) and float(length) < 0.0 else length
+
+
+def _without_selves(
+    wanted: str, points: Any, cutoff: Any, each: dict[str, Any], scene: dict[str, Any]
+) -> dict[str, npt.NDArray[Any]]:
+    asked = wanted.replace("i", "") or "j"
+    table = hs.neighbors(points, cutoff, quantities=asked, **each, **scene)
+    arrays = _several(table.to_pairs(quantities=wanted))
+    return {one: _own(one, array) for one, array in zip(wanted, arrays)}
+
+
+def _with_selves(
+    wanted: str, points: Any, cutoff: Any, each: dict[str, Any], scene: dict[str, Any]
+) -> dict[str, npt.NDArray[Any]]:
+    """Between two equal sets, where each point finds itself if its reach is above zero."""
+    both = each | {f"query_{name}": values for name, values in each.items()}
+    found = hs.pairs_between(points, points, cutoff, quantities=wanted, **both, **scene)
+    arrays = _several(found)
+    return {one: _own(one, array) for one, array in zip(wanted, arrays)}
+
+
+def _several(arrays: Any) -> tuple[npt.NDArray[Any], ...]:
+    return arrays if isinstance(arrays, tuple) else (arrays,)
+
+
+def _own(letter: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """In ASE's type, and the caller's to write to."""
+    return np.require(array, _EMPTY[letter][0], "W")
+
+
+class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):
+    """In place of ``ase.neighborlist.NewPrimitiveNeighborList``, of which it is a subclass.
+
+    Parameters, attributes and methods are ASE's. With ``bothways=False`` a pair stands once: the
+    one of (i, j, S) and (j, i, -S) whose S has a positive first component that is not zero, or
+    i <= j where S is zero. Neighbours ascend by (j, S), also with ``sorted=False``.
 
     Parameters
     ----------
-    quantities, cutoff, self_interaction, max_nbins
-        As in `primitive_neighbor_list`.
-    a : ase.Atoms
-        Its positions, cell (completed where vectors are zero), pbc and numbers are used.
-
-    Returns
-    -------
-    ndarray or tuple of ndarray
-        As `primitive_neighbor_list`.
-
-    Raises
-    ------
-    ValueError
-        As `primitive_neighbor_list`.
+    cutoffs : array_like of float, shape (n,)
+        A radius for each atom; atoms whose spheres overlap are neighbours.
+    skin : float, default 0.3
+        Added to each radius; the list is used again until an atom has moved farther than this.
+    sorted : bool, default False
+        Without effect, for lists are always sorted.
+    self_interaction : bool, default True
+        Whether an atom is its own neighbour.
+    bothways : bool, default False
+        Whether both atoms of a pair have it.
+    use_scaled_positions : bool, default False
+        Whether positions are multiples of the cell vectors.
 
     Examples
     --------
     >>> from ase.build import bulk
-    >>> from halfshell.compat.ase import neighbor_list
-    >>> i, d = neighbor_list("id", bulk("Cu", "fcc", a=3.6), 2.6)
-    >>> len(i), round(float(d.mean()), 4)
-    (12, 2.5456)
-    """
-    return primitive_neighbor_list(
-        quantities, a.pbc, a.get_cell(complete=True), a.positions, cutoff, a.numbers,
-        self_interaction,
-    )  # fmt: skip
-
-
-class PrimitiveNeighborList(original.NewPrimitiveNeighborList):
-    """`ase.neighborlist.PrimitiveNeighborList`, and the newer one, with lists made here.
-
-    Parameters, attributes and methods are those of ASE: a list is built with cutoff radii that are
-    `skin` larger, and again once an atom has moved by more than `skin` since. Neighbours of each
-    atom come in the order of (j, S).
-
-    Examples
-    --------
-    >>> from ase.build import bulk
-    >>> from halfshell.compat.ase import PrimitiveNeighborList
+    >>> from halfshell.compat.ase import NewPrimitiveNeighborList
     >>> atoms = bulk("Cu", "fcc", a=3.6)
-    >>> found = PrimitiveNeighborList([1.3], skin=0.0, self_interaction=False, bothways=True)
-    >>> found.update(atoms.pbc, atoms.cell, atoms.positions), len(found.get_neighbors(0)[0])
-    (True, 12)
+    >>> nl = NewPrimitiveNeighborList([1.3], skin=0.0, self_interaction=False)
+    >>> nl.update(atoms.pbc, atoms.get_cell(), atoms.positions)
+    True
+    >>> indices, offsets = nl.get_neighbors(0)
+    >>> len(indices)
+    6
     """
 
     def build(self, pbc: Any, cell: Any, positions: Any, numbers: Any = None) -> None:
-        """Build the list for these positions."""
+        """Build the list for these positions, whatever has moved."""
         self.pbc = np.array(pbc, copy=True)
         self.cell = np.array(cell, copy=True)
         self.positions = np.array(positions, copy=True)
-        i, j, shifts = primitive_neighbor_list(
-            "ijS", pbc, cell, positions, self.cutoffs, numbers, self.self_interaction,
-            self.use_scaled_positions,
-        )  # fmt: skip
-        if not self.bothways:  # S points forwards, or atoms of one image ascend
-            first = shifts[np.arange(len(i)), (shifts != 0).argmax(1)]
-            kept = (first > 0) | ((first == 0) & (i <= j))
-            i, j, shifts = i[kept], j[kept], shifts[kept]
-        self.pair_first, self.pair_second, self.offset_vec = i, j, shifts
-        self.first_neigh = first_neighbors(len(self.positions), i)
+        self.pair_first, self.pair_second, self.offset_vec = _half_or_full(self, self.positions)
+        self.first_neigh = _starts(self.pair_first, len(self.positions))
         self.nupdates += 1
 
-    @property
-    def neighbors(self) -> list[npt.NDArray[Any]]:
-        """Of each atom: the other atoms."""
-        return [self.get_neighbors(a)[0] for a in range(len(self.positions))]
 
-    @property
-    def displacements(self) -> list[npt.NDArray[Any]]:
-        """Of each atom: the shifts of the others."""
-        return [self.get_neighbors(a)[1] for a in range(len(self.positions))]
+class PrimitiveNeighborList(_owner.PrimitiveNeighborList):
+    """In place of ``ase.neighborlist.PrimitiveNeighborList``, of which it is a subclass.
+
+    Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair stands once, at
+    the atom where `NewPrimitiveNeighborList` has it; which of the two that is ASE does not say, and
+    its own two classes differ. Neighbours ascend by (j, S), also with ``sorted=False``.
+
+    Parameters
+    ----------
+    cutoffs, skin, sorted, self_interaction, bothways, use_scaled_positions
+        As for `NewPrimitiveNeighborList`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from halfshell.compat.ase import PrimitiveNeighborList
+    >>> nl = PrimitiveNeighborList([0.5, 0.5], skin=0.1, self_interaction=False)
+    >>> nl.update([False, False, False], np.eye(3), np.array([[0, 0, 0], [0, 0, 1.0]]))
+    True
+    >>> nl.get_neighbors(0)[0].tolist(), nl.get_neighbors(1)[0].tolist()
+    ([1], [])
+    """
+
+    def build(self, pbc: Any, cell: Any, coordinates: Any) -> None:
+        """Build the list for these coordinates, whatever has moved."""
+        self.pbc = np.array(pbc, copy=True)
+        self.cell = Cell(cell)
+        self.coordinates = np.array(coordinates, copy=True)
+        i, j, S = _half_or_full(self, self.coordinates)
+        starts = _starts(i, len(self.coordinates)).tolist()
+        rows = [slice(a, b) for a, b in pairwise(starts)]
+        self.neighbors = [j[row] for row in rows]
+        self.displacements = [S[row] for row in rows]
+        self.nupdates += 1
 
 
-NewPrimitiveNeighborList = PrimitiveNeighborList
+def _starts(i: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
+    """As `first_neighbors`, whose time grows with the longest run of atoms without neighbours."""
+    return np.searchsorted(i, np.arange(n + 1))
 
 
-class NeighborList(original.NeighborList):
-    """`ase.neighborlist.NeighborList` with `PrimitiveNeighborList` of this module as default.
+def _half_or_full(nl: Any, positions: Any) -> Any:
+    """Arrays i, j, S of a list with these attributes."""
+    if len(nl.cutoffs) != len(positions):
+        raise ValueError(f"Wrong number of cutoff radii: {len(nl.cutoffs)} != {len(positions)}")
+    i, j, S = primitive_neighbor_list(
+        "ijS", nl.pbc, np.asarray(nl.cell), positions, nl.cutoffs,
+        self_interaction=nl.self_interaction, use_scaled_positions=nl.use_scaled_positions,
+    )  # fmt: skip
+    if nl.bothways:
+        return i, j, S
+    x, y, z = S.T
+    first = np.where(x != 0, x, np.where(y != 0, y, z))
+    kept = (first > 0) | ((first == 0) & (i <= j))
+    return i[kept], j[kept], S[kept]
+
+
+class NeighborList(_owner.NeighborList):
+    """In place of ``ase.neighborlist.NeighborList``, of which it is a subclass.
+
+    Parameters, attributes and methods are ASE's, and so is the skin: until an atom has moved
+    farther than it the list of before is returned, with pairs that may be beyond the cutoff.
+
+    Parameters
+    ----------
+    cutoffs, skin, sorted, self_interaction, bothways
+        As for `NewPrimitiveNeighborList`.
+    primitive : type, default PrimitiveNeighborList
+        The class that does the work. ASE's own classes work too, as they do in ASE.
 
     Examples
     --------
     >>> from ase.build import molecule
-    >>> from halfshell.compat.ase import NeighborList, natural_cutoffs
-    >>> water = molecule("H2O")
-    >>> found = NeighborList(natural_cutoffs(water), self_interaction=False, bothways=True)
-    >>> found.update(water), found.get_neighbors(0)[0].tolist()
-    (True, [1, 2])
+    >>> from halfshell.compat.ase import NeighborList
+    >>> atoms = molecule("CO")
+    >>> nl = NeighborList([0.76, 0.66], self_interaction=False)
+    >>> nl.update(atoms)
+    True
+    >>> indices, offsets = nl.get_neighbors(0)
+    >>> indices.tolist(), offsets.tolist()
+    ([1], [[0, 0, 0]])
     """
 
     def __init__(
@@ -280,3 +362,32 @@ class NeighborList(original.NeighborList):
         primitive: Any = PrimitiveNeighborList,
     ) -> None:
         super().__init__(cutoffs, skin, sorted, self_interaction, bothways, primitive)
+
+
+def build_neighbor_list(atoms: Any, cutoffs: Any = None, **kwargs: Any) -> NeighborList:
+    """Build a `NeighborList` for these atoms, as ``ase.neighborlist.build_neighbor_list`` does.
+
+    Parameters
+    ----------
+    atoms : ase.Atoms
+        The atoms.
+    cutoffs : array_like of float, shape (n,), optional
+        A radius for each atom. Default: `natural_cutoffs`.
+    **kwargs
+        Passed to `NeighborList`.
+
+    Returns
+    -------
+    NeighborList
+        The list, updated for `atoms`.
+
+    Examples
+    --------
+    >>> from ase.build import molecule
+    >>> from halfshell.compat.ase import build_neighbor_list
+    >>> build_neighbor_list(molecule("H2O"), self_interaction=False).get_neighbors(0)[0].tolist()
+    [1, 2]
+    """
+    nl = NeighborList(natural_cutoffs(atoms) if cutoffs is None else cutoffs, **kwargs)
+    nl.update(atoms)
+    return nl

@@ -197,18 +197,6 @@ def test_example_of_histograms_runs():
     assert names["near"].sum() == names["within"][1] and names["far"].shape == (2, 2, 50)
 
 
-def test_examples_of_stand_ins_run(monkeypatch):
-    neighborlist = pytest.importorskip("ase.neighborlist")
-    monkeypatch.setattr(neighborlist, "neighbor_list", neighborlist.neighbor_list)
-    text = (ROOT / "docs/drop-ins.md").read_text()
-    lists, patch = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    names = {}
-    exec(compile(ast.parse(lists), "drop-ins.md", "exec"), names)
-    assert len(names["i"]) == 48 and len(names["indices"]) == 12
-    exec(compile(ast.parse(patch), "drop-ins.md", "exec"), names)
-    assert neighborlist.neighbor_list is names["neighbor_list"]
-
-
 def test_example_of_clusters_runs():
     text = (ROOT / "docs/clusters.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
