@@ -136,6 +136,24 @@ failures_name_system_and_point(void)
     CHECK(failure.row == row && failure.column == 2);
 }
 
+/* Also where each system has one point, which no search would miss. */
+static void
+single_points_are_read(void)
+{
+    enum { SYSTEMS = 5 };
+    double           x[SYSTEMS] = {0.0, 1.0, 2.0, 3.0, 4.0};
+    const int64_t    first[SYSTEMS + 1] = {0, 1, 2, 3, 4, 5};
+    const hs_points  points = {x, SYSTEMS, 1, HS_FLOAT64, 8, 8};
+    const hs_systems systems = {.n = SYSTEMS, .first = first};
+    const hs_options options = hs_options_default();
+    hs_failure       failure;
+    int64_t          counts[SYSTEMS];
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_OK);
+    x[3] = NAN;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_NOT_FINITE);
+    CHECK(failure.row == 3 && failure.system == 3);
+}
+
 static bool
 count_poll(void *context, double fraction)
 {
@@ -465,6 +483,7 @@ test_api_systems(void)
     RUN(progress_goes_on_over_all_systems);
     RUN(cells_of_one_system_are_not_those_of_the_next);
     RUN(the_same_as_single_calls);
+    RUN(single_points_are_read);
     RUN(failures_name_system_and_point);
     RUN(polls_are_counted);
     RUN(a_shortage_is_told_in_pairs_and_bytes);

@@ -215,9 +215,29 @@ what_does_not_settle_is_as_many_rows_away(void)
     }
 }
 
+/* Of parts that are joined in any order, the lowest point that failed. */
+static void
+the_lowest_failure_is_told(void)
+{
+    const int64_t failed[4] = {-1, 0, 3, 5};
+    for (int a = 0; a < 4; a++) {
+        for (int b = 0; b < 4; b++) {
+            hs_folded       joined = hs_folded_none();
+            const hs_folded none = hs_folded_none();
+            hs_folded       parts[2] = {none, none};
+            parts[0].failed = failed[a];
+            parts[1].failed = failed[b];
+            hs_folded_join(&joined, &parts[0]);
+            hs_folded_join(&joined, &parts[1]);
+            CHECK(joined.failed == (a == 0 || b == 0 ? failed[a + b] : failed[a < b ? a : b]));
+        }
+    }
+}
+
 void
 test_wrap(void)
 {
+    RUN(the_lowest_failure_is_told);
     RUN(what_does_not_settle_is_as_many_rows_away);
     RUN(axis_is_exact_up_to_the_limit);
     RUN(axis_is_exact_beyond_the_limit);

@@ -165,6 +165,30 @@ keys_of_equal_marks_are_told_apart(void)
     }
 }
 
+/* The first key that was there before, of any keys; without one there is none. */
+static void
+any_repeated_key_is_found(void)
+{
+    enum { MOST = 600 };
+    static int64_t ids[MOST];
+    static int32_t tags[MOST];
+    harness_random random = {91};
+    for (int trial = 0; trial < TRIALS(400); trial++) {
+        const int n = 2 + (int)(random_bits(&random) % (MOST - 2)), kinds = trial % 3 ? 100000 : 40;
+        int64_t   first = -1;
+        for (int i = 0; i < n; i++) {
+            ids[i] = (int64_t)(random_bits(&random) % (uint64_t)kinds) << (trial % 5 * 8);
+            tags[i] = (int32_t)(random_bits(&random) % 3);
+        }
+        for (int i = 1; i < n && first < 0; i++) {
+            for (int j = 0; j < i && first < 0; j++) {
+                first = ids[i] == ids[j] && tags[i] == tags[j] ? i : -1;
+            }
+        }
+        CHECK(hs_key_map_repeated(ids, tags, n) == first);
+    }
+}
+
 static void
 ascending_keys_are_not_repeated(void)
 {
@@ -185,5 +209,6 @@ test_key_map(void)
     RUN(refused_memory_changes_nothing);
     RUN(repeated_keys_are_named);
     RUN(keys_of_equal_marks_are_told_apart);
+    RUN(any_repeated_key_is_found);
     RUN(ascending_keys_are_not_repeated);
 }
