@@ -212,9 +212,10 @@ find_images(image_list *list, const double *p, const double *q, double magnitude
         }
     }
     const double longest = HS_MAX_DIM * 2.0 * MOST_TIMES * UNIT; /* what is added to y */
-    list->slack =
-        2.0 * HS_MAX_DIM *
-        (box->rounding * (terms + 2.0) + longest + box->row_error + 2.0 * WRAP_ERROR * magnitude);
+    /* INT8_MAX: of a row, as R has it, as many times as an image may have it */
+    list->slack = 2.0 * HS_MAX_DIM *
+                  (box->rounding * (terms + INT8_MAX) + longest + box->row_error +
+                   2.0 * WRAP_ERROR * magnitude);
     list->limit = INFINITY;
     list->n = 0;
     list->steps = 0;
