@@ -381,6 +381,8 @@ WITH_BOX = {
     "pair_histogram": lambda p, box: hs.pair_histogram(p, [0.0, 0.2, 0.5], box=box),
     "rdf": lambda p, box: hs.rdf(p, 0.5, box=box),
     "nearest": lambda p, box: hs.nearest(p, 3, box=box, quantities="jdS"),
+    "measure": lambda p, box: hs.measure(p, [0, 1], [2, 3], box=box, quantities="dDS"),
+    "clusters": lambda p, box: tuple(hs.clusters(p, 0.5, box=box, winding=True)),
     "verify": lambda p, box: hs.verify(p, 0.5, [0], [1], [[0] * p.shape[1]], box=box),
     "explain": lambda p, box: hs.explain(p, 0.5, box=box),
     "CellList": lambda p, box: hs.CellList(p, 0.5, box=box).pairs(quantities="ijd"),
