@@ -6,6 +6,7 @@
 #include "arguments.h"
 #include "dynamic_call.h"
 #include "../dynamic/place_point.h"
+#include "../dynamic/repeated_key.h"
 #include "../dynamic/update.h"
 #include "../scene/points.h"
 
@@ -65,7 +66,7 @@ static hs_status
 check_keys(const hs_dynamic *list, const int64_t *ids, const int32_t *tags, int64_t n,
            bool must_be_there, hs_failure *failure)
 {
-    const int64_t repeated = hs_key_map_repeated(ids, tags, n);
+    const int64_t repeated = hs_repeated_key(ids, tags, n);
     if (repeated != -1) {
         failure->row = repeated >= 0 ? repeated : -1;
         failure->column = repeated >= 0 ? 0 : -1;

@@ -6,17 +6,6 @@
 
 #define LEAST_ROWS 16
 
-/* Bits of a key in which each depends on all of it: the finaliser of SplitMix64 (Steele, Lea and
- * Flood, OOPSLA 2014). */
-HS_ALWAYS_INLINE uint32_t
-mark_of(hs_key key)
-{
-    uint64_t x = (uint64_t)key.id + (uint64_t)(uint32_t)key.tag * UINT64_C(0x9E3779B97F4A7C15);
-    x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
-    x = (x ^ (x >> 27)) * UINT64_C(0x94D049BB133111EB);
-    return (uint32_t)(x >> 32);
-}
-
 HS_ALWAYS_INLINE bool
 holds(const hs_entries *entries, uint32_t place, hs_key key)
 {
@@ -70,7 +59,7 @@ hs_key_map_reserve(hs_key_map *map, int64_t n)
 uint32_t
 hs_key_map_find(const hs_key_map *map, const hs_entries *entries, hs_key key)
 {
-    const uint32_t mark = mark_of(key);
+    const uint32_t mark = hs_key_mark(key);
     if (map->n == 0) {
         return HS_NO_PLACE;
     }
@@ -85,13 +74,13 @@ hs_key_map_find(const hs_key_map *map, const hs_entries *entries, hs_key key)
 void
 hs_key_map_expect(const hs_key_map *map, hs_key key)
 {
-    HS_PREFETCH_WRITE(&map->rows[mark_of(key) & (uint64_t)(map->capacity - 1)]);
+    HS_PREFETCH_WRITE(&map->rows[hs_key_mark(key) & (uint64_t)(map->capacity - 1)]);
 }
 
 void
 hs_key_map_add(hs_key_map *map, hs_key key, uint32_t place)
 {
-    put(map->rows, map->capacity, (hs_key_row){place, mark_of(key)});
+    put(map->rows, map->capacity, (hs_key_row){place, hs_key_mark(key)});
     map->n++;
 }
 
@@ -99,7 +88,7 @@ hs_key_map_add(hs_key_map *map, hs_key key, uint32_t place)
 static int64_t
 row_of(const hs_key_map *map, hs_key key, uint32_t place)
 {
-    int64_t r = mark_of(key) & (uint64_t)(map->capacity - 1);
+    int64_t r = hs_key_mark(key) & (uint64_t)(map->capacity - 1);
     while (map->rows[r].place != place) {
         r = (r + 1) & (map->capacity - 1);
     }
@@ -126,50 +115,4 @@ hs_key_map_remove(hs_key_map *map, hs_key key, uint32_t place)
     }
     map->rows[gap].place = HS_NO_PLACE;
     map->n--;
-}
-
-/* Whether each key is above the one before: then none is repeated, which no table is needed to see.
- */
-static bool
-ascend(const int64_t *ids, const int32_t *tags, int64_t n)
-{
-    bool all = true;
-    for (int64_t i = 1; i < n && all; i++) {
-        all = ids[i] > ids[i - 1] ||
-              (ids[i] == ids[i - 1] && tags != NULL && tags[i] > tags[i - 1]);
-    }
-    return all;
-}
-
-int64_t
-hs_key_map_repeated(const int64_t *ids, const int32_t *tags, int64_t n)
-{
-    int64_t capacity = LEAST_ROWS, repeated = -1;
-    if (ascend(ids, tags, n)) {
-        return -1;
-    }
-    while (n > capacity / 2) {
-        capacity *= 2;
-    }
-    hs_key_row *rows = hs_alloc(NULL, HS_FOR_ORDER, capacity, sizeof *rows);
-    if (rows == NULL) {
-        return -2;
-    }
-    memset(rows, 0xFF, (size_t)capacity * sizeof *rows);
-    for (int64_t i = 0; i < n && repeated < 0; i++) {
-        const hs_key   key = {ids[i], tags != NULL ? tags[i] : 0};
-        const uint32_t mark = mark_of(key);
-        int64_t        r = mark & (uint64_t)(capacity - 1);
-        for (; rows[r].place != HS_NO_PLACE; r = (r + 1) & (capacity - 1)) {
-            const uint32_t other = rows[r].place;
-            if (rows[r].mark == mark && ids[other] == key.id &&
-                (tags == NULL || tags[other] == key.tag)) {
-                repeated = i;
-                break;
-            }
-        }
-        rows[r] = (hs_key_row){(uint32_t)i, mark};
-    }
-    hs_free(NULL, rows);
-    return repeated;
 }

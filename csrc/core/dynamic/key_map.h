@@ -20,6 +20,17 @@ typedef struct hs_key_map {
     int64_t     capacity; /* 0, or a power of two; at most three quarters are in use */
 } hs_key_map;
 
+/* Bits of a key in which each depends on all of it: the finaliser of SplitMix64 (Steele, Lea and
+ * Flood, OOPSLA 2014). */
+HS_ALWAYS_INLINE uint32_t
+hs_key_mark(hs_key key)
+{
+    uint64_t x = (uint64_t)key.id + (uint64_t)(uint32_t)key.tag * UINT64_C(0x9E3779B97F4A7C15);
+    x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    x = (x ^ (x >> 27)) * UINT64_C(0x94D049BB133111EB);
+    return (uint32_t)(x >> 32);
+}
+
 void hs_key_map_free(hs_key_map *map);
 
 /* Room for so many keys in all; false when memory is refused: then nothing has changed. */
@@ -39,8 +50,5 @@ void hs_key_map_moved(hs_key_map *map, hs_key key, uint32_t from, uint32_t to);
 
 /* Removes the key whose entry is at `place`. */
 void hs_key_map_remove(hs_key_map *map, hs_key key, uint32_t place);
-
-/* The first of n keys that came before among them, or -1; -2: out of memory. tags: or NULL. */
-int64_t hs_key_map_repeated(const int64_t *ids, const int32_t *tags, int64_t n);
 
 #endif

@@ -3,8 +3,7 @@
 #include "../../../csrc/core/dynamic/key_map.h"
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
-
-#include <stdlib.h>
+#include "equal_marks.h"
 
 void test_key_map(void);
 
@@ -78,42 +77,6 @@ refused_memory_changes_nothing(void)
 }
 
 static void
-repeated_keys_are_named(void)
-{
-    int64_t ids[NUMBERS];
-    int32_t tags[NUMBERS];
-    for (int n = 0; n < NUMBERS; n++) {
-        ids[n] = key_of(n).id;
-        tags[n] = key_of(n).tag;
-    }
-    CHECK(hs_key_map_repeated(ids, tags, NUMBERS) == -1);
-    CHECK(hs_key_map_repeated(ids, NULL, NUMBERS) == 1);
-    CHECK(hs_key_map_repeated(ids, NULL, 1) == -1 && hs_key_map_repeated(ids, tags, 0) == -1);
-    ids[250] = ids[17];
-    tags[250] = tags[17];
-    CHECK(hs_key_map_repeated(ids, tags, NUMBERS) == 250);
-    hs_test_fail_allocation(1);
-    CHECK(hs_key_map_repeated(ids, tags, NUMBERS) == -2);
-}
-
-/* As key_map.c makes them. */
-static uint32_t
-mark_of(hs_key key)
-{
-    uint64_t x = (uint64_t)key.id + (uint64_t)(uint32_t)key.tag * UINT64_C(0x9E3779B97F4A7C15);
-    x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
-    x = (x ^ (x >> 27)) * UINT64_C(0x94D049BB133111EB);
-    return (uint32_t)(x >> 32);
-}
-
-static int
-compare_marks(const void *one, const void *other)
-{
-    const uint64_t a = *(const uint64_t *)one, b = *(const uint64_t *)other;
-    return (a > b) - (a < b);
-}
-
-static void
 check_apart(hs_key one, hs_key other)
 {
     const int64_t ids[2] = {one.id, other.id};
@@ -131,75 +94,14 @@ check_apart(hs_key one, hs_key other)
     CHECK(hs_key_map_find(&map, &entries, other) == HS_NO_PLACE);
     hs_key_map_add(&map, other, 1);
     CHECK(hs_key_map_find(&map, &entries, one) == 0 && hs_key_map_find(&map, &entries, other) == 1);
-    CHECK(hs_key_map_repeated(ids, tags, 2) == -1);
-    if (one.id != other.id)
-        CHECK(hs_key_map_repeated(ids, NULL, 2) == -1);
     hs_key_map_free(&map);
     hs_entries_free(&entries);
 }
 
-/* Of 2^18 keys some have the same 32 bits of their hash: ids, and tags of one id. Descending, so
- * that it takes a table to see that none is repeated. */
 static void
 keys_of_equal_marks_are_told_apart(void)
 {
-    enum { MANY = 1 << 18 };
-    static uint64_t marks[MANY];
-    for (int tagged = 0; tagged <= 1; tagged++) {
-        int met = 0;
-        for (int64_t x = 0; x < MANY; x++) {
-            const hs_key key = {tagged ? 0 : x, tagged ? (int32_t)x : 0};
-            marks[x] = (uint64_t)mark_of(key) << 32 | (uint64_t)x;
-        }
-        qsort(marks, MANY, sizeof *marks, compare_marks);
-        for (int m = 1; m < MANY; m++) {
-            const int64_t one = (int64_t)(marks[m] & UINT32_MAX);
-            const int64_t other = (int64_t)(marks[m - 1] & UINT32_MAX);
-            if (marks[m] >> 32 == marks[m - 1] >> 32) {
-                check_apart((hs_key){tagged ? 0 : one, tagged ? (int32_t)one : 0},
-                            (hs_key){tagged ? 0 : other, tagged ? (int32_t)other : 0});
-                met++;
-            }
-        }
-        CHECK(met > 0);
-    }
-}
-
-/* The first key that was there before, of any keys; without one there is none. */
-static void
-any_repeated_key_is_found(void)
-{
-    enum { MOST = 600 };
-    static int64_t ids[MOST];
-    static int32_t tags[MOST];
-    harness_random random = {91};
-    for (int trial = 0; trial < TRIALS(400); trial++) {
-        const int n = 2 + (int)(random_bits(&random) % (MOST - 2)), kinds = trial % 3 ? 100000 : 40;
-        int64_t   first = -1;
-        for (int i = 0; i < n; i++) {
-            ids[i] = (int64_t)(random_bits(&random) % (uint64_t)kinds) << (trial % 5 * 8);
-            tags[i] = (int32_t)(random_bits(&random) % 3);
-        }
-        for (int i = 1; i < n && first < 0; i++) {
-            for (int j = 0; j < i && first < 0; j++) {
-                first = ids[i] == ids[j] && tags[i] == tags[j] ? i : -1;
-            }
-        }
-        CHECK(hs_key_map_repeated(ids, tags, n) == first);
-    }
-}
-
-static void
-ascending_keys_are_not_repeated(void)
-{
-    const int64_t ids[5] = {-7, 0, 0, 0, 9};
-    const int32_t tags[5] = {5, -2, 3, 4, 1}, same[5] = {5, -2, 3, 3, 1};
-    CHECK(hs_key_map_repeated(ids, tags, 5) == -1 && hs_key_map_repeated(ids, tags, 0) == -1);
-    CHECK(hs_key_map_repeated(ids, NULL, 5) == 2 && hs_key_map_repeated(ids, same, 5) == 3);
-    hs_test_fail_allocation(1);
-    CHECK(hs_key_map_repeated(ids, tags, 5) == -1); /* without a table */
-    CHECK(hs_key_map_repeated(ids, same, 5) == -2);
-    hs_test_fail_allocation(0);
+    each_pair_of_equal_marks(check_apart);
 }
 
 void
@@ -207,8 +109,5 @@ test_key_map(void)
 {
     RUN(keys_are_found_after_any_history);
     RUN(refused_memory_changes_nothing);
-    RUN(repeated_keys_are_named);
     RUN(keys_of_equal_marks_are_told_apart);
-    RUN(any_repeated_key_is_found);
-    RUN(ascending_keys_are_not_repeated);
 }
