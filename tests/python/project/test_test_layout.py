@@ -28,7 +28,8 @@ FOLDERS = {
 FILES = sorted(PYTHON_TESTS.rglob("*.py"))
 THEMES = [path for path in FILES if path.name.startswith("test_")]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "csrc/README.md"]
-PAGES += [*sorted((ROOT / "docs").rglob("*.md")), *(ROOT / ".ci").iterdir(), TESTS / "c/Makefile"]
+PAGES += [*sorted((ROOT / "docs").rglob("*.md")), TESTS / "c/Makefile"]
+PAGES += [path for path in sorted((ROOT / ".ci").rglob("*")) if path.is_file()]
 
 
 def imported(path):
