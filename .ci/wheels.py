@@ -7,8 +7,8 @@ Usage: python .ci/wheels.py [-o FOLDER] [PYTHON ...]
 From the last commit, the source distribution is built first, and the wheels from nothing else.
 Each wheel is built twice, in different folders, which must give the same bytes; auditwheel says on
 which systems it runs; it must hold what is wanted and be small; and in an environment with NumPy
-alone its self-test must pass. Beside them: a bill of materials (CycloneDX) and SHA256SUMS. PYTHON: the
-interpreters, by default python3.11 to python3.14 and 3.14t from PATH or pyenv.
+alone its self-test must pass. Beside them: a bill of materials (CycloneDX) and SHA256SUMS. PYTHON:
+the interpreters, by default python3.11 to python3.14 and 3.14t from PATH or pyenv.
 """
 
 import argparse
