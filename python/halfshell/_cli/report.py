@@ -29,6 +29,7 @@ QUICK = (
     "slab", "lognormal", "coincident", "subnormal", "plane-2d", "head-on", "stiff-chain",
     "balls-decades", "balls-ties", "balls-rounded", "balls-giant", "needles",
 )  # fmt: skip
+_FULL_SECONDS = 10.0  # of a processor, a scene of full size by all methods of ours
 _DETAILED = 4  # scenes at most whose tables are printed unasked
 
 
@@ -39,7 +40,7 @@ def add_options(command: ArgumentParser) -> None:
         "--size",
         choices=("small", "quick", "full"),
         help="size of the scenes: some hundred, some thousand, about 100,000 points; "
-        "default: full, with --quick: quick",
+        "default: quick",
     )
     command.add_argument("--scenes", type=_names, metavar="A,B", help="which; default: all")
     command.add_argument(
@@ -96,6 +97,8 @@ def run(args: Namespace) -> int:
         raise InputError(f"{folder}: {one_line(error)}") from None
     from halfshell._report.measure.run import run as run_report
 
+    if plan.size == "full":
+        print(_forecast(plan), file=sys.stderr)
     with _progress_bar(args.progress) as progress:
         rows = run_report(plan, progress)
     if args.peers is None:
@@ -132,21 +135,28 @@ def _list() -> int:
 def _plan(args: Namespace) -> Plan:
     from halfshell._report.measure.run import plan_of
 
-    size = args.size or ("quick" if args.quick else "full")
     scenes: Sequence[str] | None = args.scenes
     if scenes is None and args.quick:
         scenes = QUICK
-    peers: Sequence[str] | None = {None: None, ("all",): None, ("none",): ()}.get(
-        args.peers, args.peers
-    )
+    peers: Sequence[str] | str | None = "all" if args.peers is None else args.peers
+    if args.peers in (("all",), ("none",)):
+        peers = args.peers[0]
     for option, names in (("--scenes", args.scenes), ("--methods", args.methods),
                           ("--peers", args.peers)):  # fmt: skip
         if names == ():
             raise InputError(f"{option} names nothing")
     try:
-        return plan_of(scenes, args.methods, peers, size, args.patience)
+        return plan_of(scenes, args.methods, peers, args.size or "quick", args.patience)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
+
+
+def _forecast(plan: Plan) -> str:
+    """How long scenes of full size take, by the time of one on a common machine."""
+    ours = math.ceil(len(plan.scenes) * _FULL_SECONDS / 60.0)
+    others = math.ceil(len(plan.scenes) * len(plan.peers) * plan.effort.give_up / 60.0)
+    text = f"full size: about {ours} min for the truth and the methods of this library"
+    return f"{text}, at most {others} min more for other libraries" if plan.peers else text
 
 
 def _write(folder: Path, rows: Sequence[ReportRow]) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from halfshell._convert.foreign import is_a, kind_of, shown, told
 from halfshell._convert.lengths import as_number
@@ -20,7 +20,7 @@ def report(
     scenes: Sequence[str] | None = None,
     *,
     methods: Sequence[str] | None = None,
-    peers: Sequence[str] | None = (),
+    peers: Sequence[str] | Literal["all", "none"] | None = "none",
     size: str = "quick",
     patience: float | None = None,
 ) -> list[ReportRow]:
@@ -38,11 +38,11 @@ def report(
         Any of "exact", "double" and "single" (the precisions of `pairs`), "float32" (points
         rounded to float32 first), "verlet" and "stale" (on scenes that move: a `VerletList`,
         and lists that are rebuilt by the clock, too late on purpose). Default: all.
-    peers : sequence of str or None, default ()
+    peers : sequence of str, "all" or "none", default "none"
         Other libraries to run beside ours, each in a process of its own: any of "vesin",
         "cKDTree", "neighborlist-rs", "matscipy-neighbours", "matscipy", "MDAnalysis", "freud",
-        "pymatgen", "ase", "NumPy" (all pairs in float64, where points have supports). None: all.
-        One that is not installed gets rows that say so.
+        "pymatgen", "ase", "NumPy" (all pairs in float64, where points have supports). None is
+        "all". One that is not installed gets rows that say so.
     size : {"quick", "full", "small"}, default "quick"
         Size of the scenes, as in `halfshell.scenes.load`, and care in timing.
     patience : float, optional
@@ -89,7 +89,7 @@ def report(
     plan = plan_of(
         _names(scenes, "scenes"),
         _names(methods, "methods"),
-        _names(peers, "peers"),
+        peers if is_a(peers, str) and peers in ("all", "none") else _names(peers, "peers"),
         _as_string(size),
         None if patience is None else as_number(
             patience, "patience", "be a positive number of seconds"

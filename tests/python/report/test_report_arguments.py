@@ -6,6 +6,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
+from halfshell._report.measure import run
 
 
 class Gone:
@@ -64,3 +65,13 @@ def test_an_unknown_kernel_is_refused_before_any_scene(monkeypatch, capsys, tmp_
     assert err.count("\n") == 1
     with pytest.raises(ValueError, match=r"^HALFSHELL_KERNEL=nonsense: is not a kernel"):
         hs.report(["slab"], methods=["exact"], size="small")
+
+
+def test_libraries_are_all_or_none():
+    options = {"scenes": ["near-ties"], "methods": ["exact"], "size": "small"}
+    (alone,) = hs.report(peers="none", **options)
+    assert alone.method == "exact"
+    with pytest.raises(TypeError, match="peers must be a sequence of names, got the string 'ase'"):
+        hs.report(peers="ase", **options)
+    every = hs.report(peers="all", patience=1.0, **options)
+    assert {row.method for row in every} == {"exact", *run.PEERS}

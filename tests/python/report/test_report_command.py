@@ -66,6 +66,26 @@ def test_a_wrong_exact_list_is_an_exit_status(command, monkeypatch):
     assert command("--scenes", "uniform")[0] == 0
 
 
+def test_full_size_is_asked_for_and_says_how_long_it_takes(command, monkeypatch):
+    plans = []
+
+    def note(plan, progress):
+        plans.append(plan)
+        return [row("exact")]
+
+    monkeypatch.setattr(run, "run", note)
+    assert command("--peers", "none")[2] == ""
+    _, _, said = command("--size", "full", "--peers", "vesin,ase", "--patience", "3")
+    assert [plan.size for plan in plans] == ["quick", "full"]
+    scenes = len(SCENES)
+    assert said == (
+        f"full size: about {-(-scenes // 6)} min for the truth and the methods of this "
+        f"library, at most {-(-scenes * 6 // 60)} min more for other libraries\n"
+    )
+    alone = command("--size", "full", "--peers", "none", "--scenes", "uniform")[2]
+    assert alone.endswith("about 1 min for the truth and the methods of this library\n")
+
+
 def test_names_are_listed(command):
     status, out, _ = command("--list")
     assert status == 0

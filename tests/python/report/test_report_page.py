@@ -13,7 +13,7 @@ import halfshell as hs
 from checkout import ROOT
 from halfshell._peers import LIBRARIES
 from halfshell._report.measure.facts import machine_facts
-from halfshell._report.page import figures, html, table, words
+from halfshell._report.page import figures, html, looks, overview, standing, table, words
 from halfshell._report.page.rows import read_csv
 from report_helpers import bare, parse, row
 
@@ -82,11 +82,14 @@ def test_the_page_is_well_formed_and_needs_nothing_else(rows):
     page = html.page(machine_facts(), rows)
     tree = parse(page)
     assert "http" not in re.sub(r"base64,[^\"]*", "", page)
+    names = {element.get("id") for element in tree.iter()}
     for element in tree.iter():
         assert element.tag not in ("script", "link", "iframe", "object")
         for name, value in element.attrib.items():
-            if name in ("src", "href"):
+            if name == "src":
                 assert value.startswith("data:image/svg+xml;base64,")
+            if name == "href":
+                assert value[0] == "#" and value[1:] in names
     images = [element.get("src") for element in tree.iter("img")]
     assert len(images) >= 5
     for image in images:
@@ -104,10 +107,52 @@ def test_what_a_library_says_cannot_break_the_page(rows):
     assert "<script>" not in page
 
 
+def test_methods_are_ranked_by_what_a_reader_cares_about():
+    found = standing.standings([
+        row("exact", seconds=1.0), row("tree", "peer", missed=2, seconds=0.5),
+        bare("slow", "timed out"), bare("slow", "not offered", scene="t"),
+        row("quick", "peer", seconds=3.0), bare("quick", "crashed", scene="t"),
+        row("exact", seconds=1.0, scene="t"), row("tree", "peer", seconds=2.0, scene="t"),
+    ])  # fmt: skip
+    assert [one.method for one in found] == ["exact", "quick", "tree", "slow"]
+    quick, tree, slow = found[1:]
+    assert (quick.right, quick.failed, quick.share, quick.slower) == (1, 1, 0.5, 3.0)
+    assert (tree.right, tree.wrong, tree.missed, tree.slower) == (1, 1, 2, 1.25)
+    assert (slow.late, slow.not_offered, slow.asked, slow.share) == (1, 1, 1, 0.0)
+
+
+def test_the_headline_names_the_best_other_library():
+    ours = [row("exact", seconds=1.0)]
+    assert standing.headline([]) == ""
+    assert standing.headline(ours) == "Precision 'exact' was right on the one scene."
+    one = [*ours, row("tree", "peer", missed=1, seconds=2.0)]
+    assert standing.headline(one).endswith(
+        "tree, the other library, was right on 0 of 1, and took 2 times as long in the median."
+    )
+    two = [*one, row("other", "peer", seconds=5.0)]
+    assert standing.headline(two).endswith(
+        "Of 2 other libraries the best one, other, was right on 1 of 1, and took 5 times as long "
+        "in the median."
+    )
+
+
+def test_labels_of_the_overview_do_not_cover_each_other():
+    Text = pytest.importorskip("matplotlib.text").Text
+    many = [row(name, "halfshell" if name in ("exact", "double", "single", "float32") else "peer",
+                seconds=1.0 + 0.01 * k) for k, name in enumerate(looks.LOOKS)]  # fmt: skip
+    figure = overview.overview_figure(many)
+    assert outside(figure) <= 0.0
+    extents = [Text.get_window_extent(text) for text in figure.axes[0].texts]  # without lines
+    assert len(extents) == len(looks.LOOKS)
+    for k, one in enumerate(extents):
+        assert not any(one.overlaps(other) for other in extents[:k])
+    assert overview.overview_figure([bare("vesin", "crashed")]) is None
+
+
 def test_zero_and_infinity_have_a_place_in_the_figures(rows):
     odd = [row("exact", d_max_ulp=0.0, force_error=0.0),
            row("single", missed=5, d_max_ulp=math.inf, force_error=math.inf)]  # fmt: skip
-    svg = figures.to_svg(figures.scene_figure(odd)).decode()
+    svg = looks.to_svg(figures.scene_figure(odd)).decode()
     assert ">0<" in svg and ">∞<" in svg
     assert figures.scene_figure([bare("vesin", "crashed")]) is None
     assert figures.cost_figure([row("exact")]) is None
@@ -115,12 +160,14 @@ def test_zero_and_infinity_have_a_place_in_the_figures(rows):
 
 
 def test_figures_are_the_same_bytes_each_time(rows):
-    for make in (figures.map_figure, figures.cost_figure, figures.drift_figure):
-        assert figures.to_svg(make(rows)) == figures.to_svg(make(rows))
+    for make in (
+        overview.overview_figure, overview.map_figure, figures.cost_figure, figures.drift_figure
+    ):  # fmt: skip
+        assert looks.to_svg(make(rows)) == looks.to_svg(make(rows))
 
 
 def test_every_method_has_a_mark():
-    assert set(figures.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
+    assert set(looks.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
 
 
 # Geometry ----------------------------------------------------------------------------------
@@ -129,32 +176,35 @@ def test_every_method_has_a_mark():
 def outside(figure):
     """How far what is drawn reaches beyond the picture, in inches."""
     agg = pytest.importorskip("matplotlib.backends.backend_agg")
-    with figures._rules():
+    with looks.rules():
         canvas = agg.FigureCanvasAgg(figure)
         canvas.draw()
         drawn, page = figure.get_tightbbox(canvas.get_renderer()), figure.bbox_inches
     return max(-drawn.x0, -drawn.y0, drawn.x1 - page.x1, drawn.y1 - page.y1)
 
 
-@pytest.mark.parametrize("n", range(1, len(figures.LOOKS) + 1))
-def test_the_key_is_whole_for_any_methods(n):
+@pytest.mark.parametrize("n", range(1, len(looks.LOOKS) + 1))
+def test_every_method_has_its_name_beside_the_diagrams(n):
     ours = {"exact", "double", "single", "float32"}
-    for names in (list(figures.LOOKS)[:n], list(figures.LOOKS)[-n:]):
-        shown = [row(name, "halfshell" if name in ours else "peer") for name in names]
-        figure = figures.key_figure(shown)
+    for names in (list(looks.LOOKS)[:n], list(looks.LOOKS)[-n:]):
+        shown = [
+            row(name, "halfshell" if name in ours else "peer", d_max_ulp=1.0) for name in names
+        ]
+        figure = figures.scene_figure(shown)
         (legend,) = figure.legends
-        assert len(legend.get_texts()) == n
-        extent = legend.get_window_extent()
-        assert extent.x0 >= 0.02 * figure.bbox.width and extent.x1 <= 0.98 * figure.bbox.width
-        assert extent.y0 >= 0.0 and extent.y1 <= figure.bbox.height
-        assert figure.bbox.width == pytest.approx(7.6 * figure.dpi)
+        assert [text.get_text() for text in legend.get_texts()] == [
+            looks.called(name) for name in reversed(looks.LOOKS) if name in names
+        ]
+        assert outside(figure) <= 0.0
+        left = legend.get_window_extent().x0
+        assert all(axes.get_window_extent().x1 < left for axes in figure.axes)
 
 
 @pytest.mark.slow
 def test_no_figure_of_the_committed_report_is_cut():
     with (ROOT / "docs" / "report" / "report.csv").open(newline="", encoding="utf-8") as stream:
         rows = read_csv(stream)[1]
-    made = [figures.key_figure(rows), figures.map_figure(rows), figures.cost_figure(rows),
+    made = [overview.overview_figure(rows), overview.map_figure(rows), figures.cost_figure(rows),
             figures.drift_figure(rows)]  # fmt: skip
     for name in list(dict.fromkeys(one.scene for one in rows))[::8]:
         made.append(figures.scene_figure([one for one in rows if one.scene == name]))

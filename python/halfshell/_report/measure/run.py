@@ -76,15 +76,29 @@ class Plan:
     size: catalogue.Size
     patience: float | None = None  # seconds for a peer on a scene, in place of the usual
 
+    @property
+    def effort(self) -> Effort:
+        """How much care is taken at this size."""
+        usual = _EFFORTS[self.size]
+        if self.patience is None:
+            return usual
+        return replace(usual, give_up=self.patience, budget=math.inf)
+
 
 def plan_of(
     scenes: Sequence[str] | None,
     chosen: Sequence[str] | None,
-    peers: Sequence[str] | None,
+    peers: Sequence[str] | str | None,
     size: str,
     patience: float | None = None,
 ) -> Plan:
-    """Check names; None means all. Raises ValueError with the nearest names."""
+    """Check names; None means all, and so does "all" of libraries; "none" means none.
+
+    Raises ValueError with the nearest names.
+    """
+    libraries = peers
+    if isinstance(peers, str):
+        libraries = {"all": None, "none": ()}[peers]
     if patience is not None and not 0.0 < patience < math.inf:
         raise ValueError(f"patience must be a positive number of seconds, got {patience!r}")
     if size not in catalogue.SIZES:
@@ -92,7 +106,7 @@ def plan_of(
     return Plan(
         _named("scene", scenes, SCENES),
         _named("method", chosen, methods.METHODS),
-        _named("peer", peers, PEERS),
+        _named("peer", libraries, PEERS),
         size,
         patience,
     )
@@ -110,9 +124,7 @@ def _named(kind: str, given: Sequence[str] | None, known: Sequence[str]) -> tupl
 
 def run(plan: Plan, progress: Progress = lambda done, total, text: None) -> list[ReportRow]:
     """Run all of it; return the rows, scene by scene."""
-    effort = _EFFORTS[plan.size]
-    if plan.patience is not None:
-        effort = replace(effort, give_up=plan.patience, budget=math.inf)
+    effort = plan.effort
     rows: list[ReportRow] = []
     with ExitStack() as stack:
         others = [

@@ -11,8 +11,11 @@ from collections.abc import Mapping, Sequence
 from html import escape as _escape
 from typing import Any
 
-from halfshell._report.page import figures
+from halfshell._report.page.figures import cost_figure, drift_figure, scene_figure
+from halfshell._report.page.looks import to_svg
+from halfshell._report.page.overview import map_figure, overview_figure
 from halfshell._report.page.rows import ReportRow
+from halfshell._report.page.standing import headline
 from halfshell._report.page.table import SUMMARY, method_label, summary_cells
 from halfshell._report.page.words import duration, findings, in_short, number, scene_words
 from halfshell.scenes import names
@@ -20,16 +23,22 @@ from halfshell.scenes import names
 __all__ = ["page"]
 
 _STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff; margin: 2rem auto;
-  max-width: 62rem; padding: 0 1rem; }
+:root { color-scheme: light dark; --text: #222; --page: #fff; --quiet: #666; --line: #e4e4e4;
+  --wrong: #a3121f; --link: #0b57a4; }
+@media (prefers-color-scheme: dark) { :root { --text: #ddd; --page: #16181b; --quiet: #a0a0a0;
+  --line: #34373b; --wrong: #ff8a80; --link: #8ab4f8; } }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page);
+  margin: 2rem auto; max-width: 62rem; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-h3 { font-size: 1rem; margin: 1.6rem 0 0.2rem; } p, li { max-width: 48rem; }
+h3 { font-size: 1rem; margin: 1.6rem 0 0.2rem; } p, li, dd { max-width: 48rem; }
+a { color: var(--link); } .lead { font-size: 1.15rem; }
 table { border-collapse: collapse; font-size: 13px; margin: 0.5rem 0; }
-th, td { padding: 0.15rem 0.6rem; text-align: right; border-bottom: 1px solid #e4e4e4; }
+th, td { padding: 0.15rem 0.6rem; text-align: right; border-bottom: 1px solid var(--line); }
 th:first-child, td:first-child, td.text, th.text { text-align: left; }
-tr.wrong td { color: #a3121f; } .facts { color: #666; font-size: 13px; }
-img { max-width: 100%; display: block; } .wide { overflow-x: auto; }
-details { margin: 0.3rem 0; } summary { cursor: pointer; color: #555; font-size: 13px; }
+tr.wrong td { color: var(--wrong); } .facts { color: var(--quiet); font-size: 13px; }
+.wide { overflow-x: auto; } img { display: block; background: #fff; border-radius: 4px; }
+details { margin: 0.3rem 0; } summary { cursor: pointer; color: var(--quiet); font-size: 13px; }
+dt { font-weight: 600; } dd { margin: 0 0 0.4rem 1rem; }
 """
 
 _HOW = (
@@ -48,6 +57,26 @@ _HOW = (
 )
 
 
+#: What words of the page mean.
+_GLOSSARY = {
+    "scene": "Points, a box and a cutoff that are hard in some way, under a name.",
+    "exact, double, single": "Precisions of this library: pairs are decided for the real numbers "
+    "that were given, or by a float64 or float32 comparison.",
+    "float32 input": "Points rounded to float32 beforehand, then decided exactly.",
+    "right": "No pair is missed, none is there that should not be, none comes twice.",
+    "missed, spurious, duplicate": "Pairs that a list lacks, that it should not have, that it has "
+    "more than once.",
+    "timed out, failed, crashed": "No list within the time that was given; an error; a process "
+    "that ended by itself.",
+    "not offered": "What a library does not claim to do, such as skewed boxes.",
+    "tie": "A pair at exactly the cutoff.",
+    "ulp": "A unit in the last place: the distance between neighbouring float64 numbers.",
+    "rule": "Whether a pair at exactly the cutoff counts (≤) or does not (<).",
+    "skin": "By how much farther than the cutoff a list reaches that is kept for several steps.",
+    "energy drift": "How far the total energy has moved at the end of a run, over the kinetic one.",
+}
+
+
 def escape(text: str) -> str:
     """Return text for a page, without the control characters that XML does not allow."""
     return _escape("".join(c if c.isprintable() else " " for c in text))
@@ -62,32 +91,43 @@ def page(facts: Mapping[str, str], rows: Sequence[ReportRow]) -> str:
         "<title>halfshell: error against run time</title>",
         f"<style>{_STYLE}</style></head><body>",
         "<h1>Error against run time</h1>",
-        f'<p class="facts">{escape(_facts(facts))}</p>',
-        "<h2>What was found</h2><ul>",
-        *(f"<li>{escape(text)}</li>" for text in findings(rows)),
-        "</ul><h2>How</h2>",
-        f"<p>{_HOW}</p>",
-        "<h2>All methods</h2>",
-        "<p>Lists that are right, lists that are wrong, scenes without a list; pairs; the largest "
-        "error of a distance; the median of the run time over that of precision 'exact'.</p>",
-        _table(SUMMARY, [(line, line[3] != "0") for line in summary_cells(rows)]),
+        f'<p class="lead">{escape(headline(rows))}</p>',
+        *_picture(overview_figure(rows), "how often each method is right, against its run time"),
         "<h2>Who errs where</h2>",
-        _image(figures.map_figure(rows), "wrong pairs by scene and method"),
+        "<p>The number in a field is the run time, relative to that of precision 'exact'.</p>",
+        *_picture(map_figure(rows), "wrong pairs by scene and method"),
+        "<h2>All methods</h2>",
+        "<p>Scenes by what became of them, pairs over all lists, the largest error of a distance, "
+        "the median of the run time over that of precision 'exact'; most right lists first.</p>",
+        _table(SUMMARY, [(line, False) for line in summary_cells(rows)]),
+        "<details><summary>In words</summary><ul>",
+        *(f"<li>{escape(text)}</li>" for text in findings(rows)),
+        "</ul></details>",
+        f"<details><summary>How this was measured</summary><p>{_HOW}</p></details>",
+        "<details><summary>What the words mean</summary><dl>",
+        *(f"<dt>{escape(word)}</dt><dd>{escape(text)}</dd>" for word, text in _GLOSSARY.items()),
+        "</dl></details>",
+        f'<p class="facts">{escape(_facts(facts))}</p>',
     ]
     for title, figure in (
-        ("What the exact decision costs", figures.cost_figure(rows)),
-        ("Lists that are kept over steps", figures.drift_figure(rows)),
+        ("What the exact decision costs", cost_figure(rows)),
+        ("Lists that are kept over steps", drift_figure(rows)),
     ):
         if figure is not None:
-            parts += [f"<h2>{title}</h2>", _image(figure, title)]
+            parts += [f"<h2>{title}</h2>", *_picture(figure, title)]
+    scenes = dict.fromkeys(row.scene for row in rows)
     parts += [
         "<h2>Scene by scene</h2>",
         "<p>Error upwards, run time to the right; the grey band is error 0.</p>",
-        _image(figures.key_figure(rows), "marks of the methods"),
+        "<p>" + ", ".join(map(_link, scenes)) + "</p>",
     ]
-    for name in dict.fromkeys(row.scene for row in rows):
+    for name in scenes:
         parts += _scene([row for row in rows if row.scene == name])
     return "\n".join([*parts, "</body></html>", ""])
+
+
+def _link(scene: str) -> str:
+    return f'<a href="#{escape(scene)}">{escape(scene)}</a>'
 
 
 def _facts(facts: Mapping[str, str]) -> str:
@@ -112,9 +152,7 @@ def _scene(rows: Sequence[ReportRow]) -> list[str]:
         f'<h3 id="{escape(first.scene)}">{escape(first.scene)}: {escape(first.title)}</h3>',
         f'<p class="facts">{escape(told)}</p>',
     ]
-    figure = figures.scene_figure(rows)
-    if figure is not None:
-        parts.append(_image(figure, f"error against run time on {first.scene}"))
+    parts += _picture(scene_figure(rows), f"error against run time on {first.scene}")
     parts.append(f"<p>{escape(scene_words(rows))}</p>")
     parts += ["<details><summary>figures</summary>", _details(rows), "</details>"]
     return parts
@@ -148,6 +186,10 @@ def _table(heads: Sequence[str], body: Sequence[tuple[Sequence[str], bool]]) -> 
     return "".join([*lines, "</table></div>"])
 
 
-def _image(figure: Any, text: str) -> str:
-    data = base64.b64encode(figures.to_svg(figure)).decode()
-    return f'<img alt="{escape(text)}" src="data:image/svg+xml;base64,{data}"/>'
+def _picture(figure: Any | None, text: str) -> list[str]:
+    """A figure in its own size, which small screens scroll; nothing where there is none."""
+    if figure is None:
+        return []
+    data = base64.b64encode(to_svg(figure)).decode()
+    image = f'<img alt="{escape(text)}" src="data:image/svg+xml;base64,{data}"/>'
+    return [f'<div class="wide">{image}</div>']

@@ -4,47 +4,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from statistics import median
 from typing import Any
 
 from halfshell._report.page.rows import ReportRow
-from halfshell._report.page.words import duration, in_short, methods_of, number
+from halfshell._report.page.standing import standings
+from halfshell._report.page.words import duration, in_short, number
 
 __all__ = ["SUMMARY", "method_label", "scene_table", "summary_cells", "summary_table"]
 
 SUMMARY = (
-    "method", "version", "right", "wrong", "none", "missed", "spurious", "duplicate", "d, ulp",
-    "time / exact",
+    "method", "version", "right", "wrong", "timed out", "failed", "not offered", "missed",
+    "spurious", "duplicate", "d, ulp", "time / exact",
 )  # fmt: skip
+# Narrower heads for 80 columns.
+_NARROW = {"timed out": "late", "not offered": "n/a", "duplicate": "twice", "time / exact": "time"}
 
 
 def summary_cells(rows: Sequence[ReportRow]) -> list[list[str]]:
-    """One line a method over all scenes, under the heads of `SUMMARY`.
+    """One line a method over all scenes, the best first, under the heads of `SUMMARY`.
 
-    Lists that are right, lists that are wrong, scenes without a list; pairs; the largest error
-    of a distance; the median of the time over that of precision "exact".
+    Scenes with a right list, with a wrong one, with none in time, with an error or a crash, and
+    scenes that the method does not offer; wrong pairs; the largest error of a distance; the median
+    of the time over that of precision "exact".
     """
-    exact = {
-        row.scene: row.seconds for row in rows if row.kind == "halfshell" and row.method == "exact"
-    }
     lines = []
-    for method in methods_of(rows, "halfshell", "peer"):
-        mine = [row for row in rows if row.method == method and row.kind != "reuse"]
-        done = [row for row in mine if row.status == "ok"]
-        slower = [
-            row.seconds / base
-            for row in done
-            if row.seconds and (base := exact.get(row.scene)) and method != "exact"
-        ]
-        ulps = [row.d_max_ulp for row in done if row.d_max_ulp is not None]
-        kinds = ("missed", "spurious", "duplicate")
-        counts = [number(sum(getattr(row, kind) or 0 for row in done)) for kind in kinds]
+    for one in standings(rows):
+        pairs = (one.missed, one.spurious, one.duplicate)
         lines.append([
-            method, next((row.version for row in mine if row.version), ""),
-            str(sum(1 for row in done if not row.wrong)),
-            str(sum(1 for row in done if row.wrong)), str(len(mine) - len(done)),
-            *(counts if done else [""] * 3), number(max(ulps)) if ulps else "",
-            number(median(slower)) if slower else "",
+            one.method, one.version,
+            *map(str, (one.right, one.wrong, one.late, one.failed, one.not_offered)),
+            *(map(number, pairs) if one.right + one.wrong else [""] * 3), number(one.ulp),
+            number(one.slower) if one.method != "exact" else "",
         ])  # fmt: skip
     return lines
 
@@ -55,15 +45,16 @@ def summary_table(rows: Sequence[ReportRow]) -> Any:
     from rich.table import Table
 
     table = Table(
-        title="All scenes: lists right, lists wrong, scenes without a list; wrong pairs",
+        title="All scenes: right, wrong, late, failed, not offered (n/a); wrong pairs",
         title_justify="left", box=box.SIMPLE_HEAD, padding=0, pad_edge=False,
     )  # fmt: skip
-    heads = [head.replace("duplicate", "twice").replace(" / exact", "") for head in SUMMARY]
-    for k, head in enumerate(heads):
+    for k, head in enumerate(SUMMARY):
         if k != 1:
-            table.add_column(head, justify="right" if k else "left", no_wrap=True)
+            name = _NARROW.get(head, head)
+            table.add_column(name, justify="right" if k else "left", no_wrap=True)
     for line in summary_cells(rows):
-        table.add_row(line[0], *line[2:], style="bold red" if line[3] != "0" else None)
+        wrong = f"[bold red]{line[3]}[/]" if line[3] != "0" else line[3]
+        table.add_row(line[0], line[2], wrong, *line[4:])
     return table
 
 
