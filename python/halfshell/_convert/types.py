@@ -114,6 +114,7 @@ class PairOptions(ReachOptions, total=False):
     sort: bool
     index_dtype: npt.DTypeLike
     out: Out | None
+    capacity: int | None
     progress: Progress
     batch: npt.ArrayLike | None
 
@@ -126,6 +127,7 @@ class BetweenOptions(ReachOptions, total=False):
     query_supports: ArrayLike | None
     index_dtype: npt.DTypeLike
     out: Out | None
+    capacity: int | None
 
 
 class CountOptions(SearchOptions, total=False):
