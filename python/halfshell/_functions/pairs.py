@@ -10,8 +10,7 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Given
-from halfshell._convert.options import AUTO, as_flag, as_index_bytes
-from halfshell._convert.room import RAISE, as_room
+from halfshell._convert.options import AUTO, RAISE, as_flag, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
-from halfshell._convert.options import AUTO, as_flag, as_index_bytes, most_pairs
-from halfshell._convert.room import as_room
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes, as_room, most_pairs
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
 
