@@ -134,7 +134,8 @@ def pairs(
     box : float, array_like of float, shape (d,) or (d, d), or Box, optional
         The length of all edges, their lengths, or edge vectors as rows, in the unit of `points`;
         finite. None: open space. Rows of axes that are not periodic may be anything finite, such
-        as zero.
+        as zero. A box of freud, with its periodicity, and a frame of mdtraj or MDAnalysis, for its
+        box alone, are taken too.
     periodic : bool or sequence of bool, shape (d,), optional
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
