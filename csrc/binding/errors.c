@@ -184,16 +184,20 @@ raise_kernel(const hs_options *options)
 }
 
 /* halfshell.CapacityError, which carries the number that was needed. */
-static PyObject *
-raise_capacity(const hs_failure *failure)
+void
+hs_raise_capacity(int64_t capacity, int64_t needed)
 {
-    const long long needed = (long long)failure->expected_pairs;
+    static const char *const        of_room = "capacity is %lld, but there are %lld pairs",
+                             *const of_out =
+                                 "out is too small: there are %lld pairs, each array needs room "
+                                 "for all";
+    const long long n = (long long)needed, most = (long long)capacity;
     PyObject       *module = PyImport_ImportModule("halfshell._errors");
     PyObject       *type = module != NULL ? PyObject_GetAttrString(module, "CapacityError") : NULL;
-    PyObject       *message = PyUnicode_FromFormat(
-              "out is too small: there are %lld pairs, each array needs room for all", needed);
+    PyObject       *message = capacity != 0 ? PyUnicode_FromFormat(of_room, most, n)
+                                            : PyUnicode_FromFormat(of_out, n);
     if (type != NULL && message != NULL) {
-        PyObject *error = PyObject_CallFunction(type, "OL", message, needed);
+        PyObject *error = PyObject_CallFunction(type, "OL", message, n);
         if (error != NULL) {
             PyErr_SetObject(type, error);
             Py_DECREF(error);
@@ -202,6 +206,12 @@ raise_capacity(const hs_failure *failure)
     Py_XDECREF(module);
     Py_XDECREF(type);
     Py_XDECREF(message);
+}
+
+static PyObject *
+raise_capacity(const hs_failure *failure)
+{
+    hs_raise_capacity(0, (int64_t)failure->expected_pairs);
     return NULL;
 }
 

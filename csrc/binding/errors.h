@@ -11,6 +11,9 @@
  * HS_ERR_INTERRUPTED expects that poll() has set one. options may be NULL. */
 PyObject *hs_raise(hs_status status, const hs_failure *failure, const hs_options *options);
 
+/* CapacityError, of `out`, or of a capacity where that is not 0. */
+void hs_raise_capacity(int64_t capacity, int64_t needed);
+
 /* Of HS_ERR_MEMORY: whether what was expected is within the limit, and more was taken. */
 bool hs_took_more(const hs_failure *failure);
 

@@ -4,6 +4,7 @@
 
 #include "tuples.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Bytes from which an array keeps the memory that the search wrote it to; smaller ones are copied,
@@ -278,4 +279,71 @@ hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs)
         hs_tuple_put(&result, k, front_of(array, (npy_intp)n_pairs));
     }
     return result;
+}
+
+double
+hs_out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity)
+{
+    double bytes = 0.0;
+    for (const char *letter = letters; *letter != '\0'; letter++) {
+        bytes += (double)form_of(*letter, ndim, index_bytes).bytes;
+    }
+    return bytes * (double)capacity;
+}
+
+PyObject *
+hs_out_new(const char *letters, int ndim, int index_bytes, int64_t capacity)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    PyObject        *result = n > 1 ? PyTuple_New(n) : NULL;
+    for (Py_ssize_t k = 0; k < n && (n == 1 || result != NULL); k++) {
+        const array_form form = form_of(letters[k], ndim, index_bytes);
+        npy_intp         shape[2] = {(npy_intp)capacity, form.width};
+        PyObject        *array = PyArray_SimpleNew(form.width > 0 ? 2 : 1, shape, form.type);
+        if (n == 1) {
+            return array;
+        }
+        hs_tuple_put(&result, k, array);
+    }
+    return result;
+}
+
+/* Writes two numbers in turn over the integers of a type of NumPy, from `first` to the end. */
+static void
+pad_integers(PyArrayObject *array, int64_t first, int64_t even, int64_t odd)
+{
+    const int64_t end = PyArray_SIZE(array);
+    if (PyArray_ITEMSIZE(array) == sizeof(int64_t)) {
+        int64_t *to = PyArray_DATA(array);
+        for (int64_t k = first; k < end; k++) {
+            to[k] = k % 2 == 0 ? even : odd;
+        }
+    } else {
+        int32_t *to = PyArray_DATA(array);
+        for (int64_t k = first; k < end; k++) {
+            to[k] = (int32_t)(k % 2 == 0 ? even : odd);
+        }
+    }
+}
+
+void
+hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j)
+{
+    const Py_ssize_t n = (Py_ssize_t)strlen(letters);
+    for (Py_ssize_t k = 0; k < n; k++) {
+        PyArrayObject *array = (PyArrayObject *)item_of(out, k, n);
+        const int64_t  size = PyArray_SIZE(array), width = size / PyArray_DIM(array, 0);
+        char          *rest = PyArray_BYTES(array) + first * width * PyArray_ITEMSIZE(array);
+        switch (letters[k]) {
+        case 'i': pad_integers(array, first, no_i, no_i); break;
+        case 'j': pad_integers(array, first, no_j, no_j); break;
+        case 'P': pad_integers(array, 2 * first, no_i, no_j); break;
+        case 'd':
+            for (double *to = (double *)rest; to < (double *)PyArray_DATA(array) + size; to++) {
+                *to = (double)INFINITY;
+            }
+            break;
+        default: memset(rest, 0, (size_t)((size - first * width) * PyArray_ITEMSIZE(array))); break;
+        }
+    }
 }

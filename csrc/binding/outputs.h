@@ -22,6 +22,16 @@ bool hs_out_is_apart(PyObject *out, const char *letters, PyObject *input, const 
 /* The filled parts of these arrays, in the same form; a new reference or NULL. */
 PyObject *hs_out_filled(PyObject *out, const char *letters, int64_t n_pairs);
 
+/* Uninitialized arrays for so many pairs, as hs_out_of takes them; a new reference or NULL. */
+PyObject *hs_out_new(const char *letters, int ndim, int index_bytes, int64_t capacity);
+
+/* Bytes of such arrays. */
+double hs_out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity);
+
+/* Writes what is no pair into these arrays from row `first` on: `no_i` and `no_j` as i and j, an
+ * infinite distance, zeros as vector and shift. */
+void hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j);
+
 /* New arrays in the order of the letters: a tuple, or for one letter the array itself. Takes
  * what it can from the pairs; a new reference or NULL. */
 PyObject *hs_arrays_of(hs_pairs *pairs, const char *letters, int ndim, int index_bytes);

@@ -117,7 +117,7 @@ hs_plain_repeats(PyObject *const *arguments, const char *more, PyObject *const *
         (has_box && !is_plain_box(box, ndim))) {
         return false;
     }
-    for (int k = 0; more[k] != '\0' && more[k] != 'h' && more[k] != 'g'; k++) {
+    for (int k = 0; more[k] != '\0' && more[k] != 'h' && more[k] != 'g' && more[k] != 'c'; k++) {
         if (!is_plain(more[k], own[k], ndim)) {
             return false;
         }

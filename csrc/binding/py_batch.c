@@ -193,10 +193,14 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     batch            given;
     PyObject *const *more = arguments + HS_CALL_ARGUMENTS + 4;
     (void)module;
-    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaahg", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaahgc", arguments, n_arguments) ||
         !hs_py_call_is_apart(&call, more[0], "batch") ||
         !hs_py_call_is_apart(&call, more[1], "cutoff") ||
         !hs_py_call_is_apart(&call, more[2], "box") || !take_batch(more, &call, &given)) {
+        return NULL;
+    }
+    if (!hs_py_call_make_room(&call)) {
+        free_batch(&given);
         return NULL;
     }
     hs_py_call_release(&call);

@@ -5,7 +5,6 @@
 #include "available.h"
 #include "convert.h"
 #include "environment.h"
-#include "errors.h"
 #include "foreign.h"
 #include "outputs.h"
 #include "plain.h"
@@ -111,6 +110,13 @@ take_index_bytes(PyObject *object, bool is_plain, hs_options *options)
     return options->index_bytes != -1 || !PyErr_Occurred();
 }
 
+static bool
+take_capacity(PyObject *object, int64_t *capacity)
+{
+    *capacity = PyLong_AsLongLong(object);
+    return *capacity != -1 || !PyErr_Occurred();
+}
+
 /* A number of the function's own, by its letter; true for what is none. */
 static bool
 take_number(char letter, PyObject *object, bool is_plain, hs_py_call *call)
@@ -124,6 +130,7 @@ take_number(char letter, PyObject *object, bool is_plain, hs_py_call *call)
     case 'f': return take_truth(object, &call->flag);
     case 'i': call->integer = PyLong_AsLongLong(object); return !PyErr_Occurred();
     case 'g': return hs_algorithm_of(object, &options->algorithm);
+    case 'c': return object == Py_None || take_capacity(object, &call->capacity);
     case 'x': call->real = PyFloat_AsDouble(object); return !PyErr_Occurred();
     default: return true;
     }
@@ -222,7 +229,7 @@ static int
 count_needed(const char *more, int n_letters)
 {
     int n = n_letters;
-    while (n > 0 && (more[n - 1] == 'h' || more[n - 1] == 'g')) {
+    while (n > 0 && strchr("hgc", more[n - 1]) != NULL) {
         n--;
     }
     return n;
@@ -248,7 +255,8 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
     *options = hs_options_default();
     call->among = (hs_among){.points = NULL};
     call->letters = "ij";
-    call->out = NULL;
+    call->out = call->room = NULL;
+    call->capacity = 0;
     call->thread = NULL;
     if (!take_shared(arguments, call)) {
         return false;
@@ -296,30 +304,4 @@ hs_py_call_acquire(hs_py_call *call)
         PyEval_RestoreThread(call->thread);
         call->thread = NULL;
     }
-}
-
-PyObject *
-hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs)
-{
-    if (status != HS_OK) {
-        return hs_raise(status, &call->failure, &call->options);
-    }
-    PyObject *arrays =
-        call->out != NULL
-            ? hs_out_filled(call->out, call->letters, hs_pairs_length(pairs))
-            : hs_arrays_of(pairs, call->letters, call->points.ndim, call->options.index_bytes);
-    hs_pairs_free(pairs);
-    return arrays;
-}
-
-PyObject *
-hs_py_call_table(hs_py_call *call, hs_status status, hs_pairs *rows)
-{
-    if (status != HS_OK) {
-        return hs_raise(status, &call->failure, &call->options);
-    }
-    PyObject *table =
-        hs_table_of(rows, call->letters, call->points.ndim, call->options.index_bytes);
-    hs_pairs_free(rows);
-    return table;
 }

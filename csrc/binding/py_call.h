@@ -22,9 +22,11 @@ typedef struct hs_py_call {
     hs_reach       reach;
     hs_options     options;
     hs_failure     failure;
-    const char    *letters; /* borrowed: the quantities */
-    PyObject      *out;     /* borrowed: of the caller, or NULL: new arrays */
-    hs_pair_arrays arrays;  /* those of out */
+    const char    *letters;  /* borrowed: the quantities */
+    PyObject      *out;      /* borrowed: of the caller, or NULL: new arrays */
+    hs_pair_arrays arrays;   /* those of out */
+    PyObject      *room;     /* owned: new arrays of a fixed length that `out` is then, or NULL */
+    int64_t        capacity; /* that length, or 0; negative: the number needed is returned too */
     bool           flag;
     int64_t        integer;
     double         real;
@@ -47,7 +49,9 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  *   R  queries                               f, i, x  `flag`, `integer`, `real` of the call
  *   a  anything: left to the function, which runs no Python code for it
  *   h  reach (reach.h), or None: may be left out
- *   g  name of an algorithm: the last one, which may be left out
+ *   g  name of an algorithm, which may be left out
+ *   c  capacity: an int, negative where the number of pairs is returned too, and pairs that do not
+ *      fit are no error; or None. Comes last, and may be left out
  *
  * Returns false with an exception set, or without one where HS_PLAIN is set: see plain.h.
  */
@@ -59,13 +63,18 @@ bool hs_py_call_take(hs_py_call *call, const char *name, const char *more,
  * have been looked at. */
 bool hs_py_call_is_apart(const hs_py_call *call, PyObject *input, const char *name);
 
+/* After that, where there is a capacity: arrays of that length, for hs_py_call_pairs to return. It
+ * must be called then. False with an exception set, and nothing to release. */
+bool hs_py_call_make_room(hs_py_call *call);
+
 /* Release and take the GIL around a call of the core; poll() takes it in between. With few points
  * it stays taken until the first poll: handing it over costs a tenth of a small search. */
 void hs_py_call_release(hs_py_call *call);
 void hs_py_call_acquire(hs_py_call *call);
 
-/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`;
- * NULL with an exception set for a status other than HS_OK. */
+/* What a function returns, the GIL taken: arrays of the pairs, which are freed, or those of `out`,
+ * or with a capacity all of its room, padded; NULL with an exception set for a status other than
+ * HS_OK. */
 PyObject *hs_py_call_pairs(hs_py_call *call, hs_status status, hs_pairs *pairs);
 
 /* The same, as a table of rows. */

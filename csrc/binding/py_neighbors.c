@@ -22,7 +22,8 @@ hs_py_pairs_between(PyObject *module, PyObject *const *arguments, Py_ssize_t n_a
     hs_py_call call;
     hs_pairs  *rows;
     (void)module;
-    if (!hs_py_call_take(&call, "pairs_between", "qsboRhg", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "pairs_between", "qsboRhgc", arguments, n_arguments) ||
+        !hs_py_call_make_room(&call)) {
         return NULL;
     }
     const hs_status status = find_rows(&call, &rows);

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from halfshell._functions.rdf import RadialDistribution, rdf
     from halfshell._functions.report import report
     from halfshell._functions.stream import for_each_pair, iter_pairs
+    from halfshell._functions.trajectory import trajectory_pairs
     from halfshell._include import get_include
     from halfshell._objects.cell_list import CellList
     from halfshell._objects.clusters import Clusters
@@ -76,6 +77,7 @@ __all__ = [
     "rdf",
     "report",
     "set_cache_limit",
+    "trajectory_pairs",
     "verify",
 ]
 
@@ -107,6 +109,7 @@ _LATER = {
     "pair_histogram": "_functions.histogram",
     "rdf": "_functions.rdf",
     "report": "_functions.report",
+    "trajectory_pairs": "_functions.trajectory",
     "verify": "_check.verify",
 }
 

@@ -13,6 +13,10 @@ class CapacityError(ValueError):
         The number of pairs that there are, or for `NeighborTable.to_padded` of entries in the
         longest row.
 
+    See Also
+    --------
+    pairs : has `capacity`, and ``on_overflow="flag"``, with which it is not raised.
+
     Examples
     --------
     >>> import halfshell as hs

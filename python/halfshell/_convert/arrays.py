@@ -83,6 +83,10 @@ def as_array(values: Any, name: str, single: str = "hold real numbers") -> npt.N
     if is_a(values, (list, tuple)):
         refuse_deep_lists(values, name)
         _refuse_masked_items(values, name)
+    elif type(values) not in (float, int, bool, type(None)):
+        from halfshell._convert.tensors import refuse_tensor  # which few calls need
+
+        refuse_tensor(values, name)
     try:
         if not hasattr(values, "__array__") and hasattr(values, "__dlpack__"):
             return np.asarray(np.from_dlpack(values))

@@ -71,7 +71,8 @@ def _scene(
             # Any box will do for the axes that repeat; objects with a box of their own refuse it.
             points, box, bits = as_scene(points, rows, periodic)
             return points, box, bits, _as_boxes(array, points.shape[1])
-        box = array if array.ndim else box
+        if array.ndim and type(box) in (np.ndarray, list, tuple):  # others may say more
+            box = array
     points, box, bits = as_scene(points, box, periodic)
     return points, box, bits, None
 

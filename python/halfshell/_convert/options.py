@@ -16,6 +16,9 @@ AUTO = "auto"
 #: The letters of quantities, in the order in which arrays come.
 LETTERS = "ijdDSP"
 
+# The same of `on_overflow`.
+RAISE = "raise"
+
 # Blocks are counted by int64, and two of them must be.
 _MOST_PAIRS = 2**62
 
@@ -61,6 +64,19 @@ def as_count(value: Any, name: str) -> int:
 def most_pairs(max_pairs: Any) -> int:
     """A number of pairs from 1 on, as the core takes it."""
     return min(as_count(max_pairs, "max_pairs"), _MOST_PAIRS)
+
+
+def as_room(capacity: Any, on_overflow: Any, out: Any) -> int | None:
+    """The length of the arrays, negative where the need is returned; None for as many as needed."""
+    flags = as_choice(on_overflow, "on_overflow", (RAISE, "flag")) == "flag"
+    if capacity is None:
+        if flags:
+            raise ValueError("on_overflow='flag' needs a capacity")
+        return None
+    length = min(as_count(capacity, "capacity"), _MOST_PAIRS)
+    if out is not None:
+        raise ValueError("capacity and out are two ways to say where the result goes: give one")
+    return -length if flags else length
 
 
 def as_list(value: Any, name: str, of_what: str) -> list[Any]:

@@ -36,11 +36,16 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
     return np.empty((0, ndim)) if array.shape == (0,) else array
 
 
-def vectors_of(values: Any, name: str = "box") -> Any:
+def vectors_of(values: Any, name: str = "box", ndim: int | None = None) -> Any:
     """The vectors of a Box, or of another object that has some; else the object itself."""
-    if type(values) in (np.ndarray, list, tuple):
+    if type(values) in (np.ndarray, list, tuple, float, int):
         return values
-    return attribute(values, "vectors", name, values)
+    vectors = attribute(values, "vectors", name, _MISSING)
+    if vectors is not _MISSING:
+        return vectors
+    from halfshell._convert.foreign_box import foreign_vectors  # which few calls need
+
+    return foreign_vectors(values, name, ndim)
 
 
 def as_box(values: Any, ndim: int) -> FloatArray:
@@ -57,7 +62,7 @@ def as_box(values: Any, ndim: int) -> FloatArray:
                 f"in {ndim} dimensions, got {shape}{hint}"
             )
 
-    array = as_real_array(vectors_of(values), "box", "be lengths or vectors", check)
+    array = as_real_array(vectors_of(values, "box", ndim), "box", "be lengths or vectors", check)
     if array.ndim == 2:
         return in_order(array, np.float64)
     if array.ndim == 1:
@@ -87,9 +92,19 @@ def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
     return sum(1 << axis for axis in range(ndim) if array[axis])
 
 
+def periodic_of(box: Any, periodic: Any, ndim: int) -> Any:
+    """What was given, or else what the box says of itself, if it does."""
+    if periodic is not None or type(box) in (np.ndarray, list, tuple, float, int):
+        return periodic
+    from halfshell._convert.foreign_box import foreign_periodic
+
+    return foreign_periodic(box, ndim)
+
+
 def as_own_box(box: Any, periodic: Any, ndim: int) -> OwnBox:
     """Box vectors, or None, and periodic bits, which need a box."""
     if box is not None:
+        periodic = periodic_of(box, periodic, ndim)
         return as_box(box, ndim), as_periodic_bits(periodic, ndim, default=True)
     if as_periodic_bits(periodic, ndim, default=False):
         raise ValueError("periodic needs a box: give box, or leave periodic out")
@@ -118,6 +133,7 @@ def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
         counts[:0] = axes if len(axes) == 1 and 1 <= axes[0] <= MAX_DIM else ()
     ndim = counts[0]
     vectors = None if box is None else as_box(box, ndim)
+    periodic = periodic_of(box, periodic, ndim)
     return ndim, vectors, as_periodic_bits(periodic, ndim, default=box is not None)
 
 

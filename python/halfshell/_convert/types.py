@@ -72,6 +72,26 @@ class _HasVectors(Protocol):
     def vectors(self) -> Any: ...
 
 
+class _HasMatrix(Protocol):
+    """An object like ``freud.box.Box``."""
+
+    def to_matrix(self) -> Any: ...
+
+
+class _HasCells(Protocol):
+    """A frame of mdtraj."""
+
+    @property
+    def unitcell_vectors(self) -> Any: ...
+
+
+class _HasDimensions(Protocol):
+    """A frame of MDAnalysis."""
+
+    @property
+    def triclinic_dimensions(self) -> Any: ...
+
+
 Number = float | np.floating[Any] | np.integer[Any]
 ArrayLike = npt.ArrayLike | _HandsOver
 PointsLike = ArrayLike | _BringsBox
@@ -80,7 +100,7 @@ PairCutoff = (
     Number | Sequence[Sequence[float]] | npt.NDArray[Any]
     | Mapping[tuple[int, int], float] | Mapping[tuple[str, str], float] | None
 )  # fmt: skip
-BoxLike = ArrayLike | _HasVectors
+BoxLike = ArrayLike | _HasVectors | _HasMatrix | _HasCells | _HasDimensions
 PeriodicLike = ArrayLike
 Out = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
 
@@ -114,6 +134,7 @@ class PairOptions(ReachOptions, total=False):
     sort: bool
     index_dtype: npt.DTypeLike
     out: Out | None
+    capacity: int | None
     progress: Progress
     batch: npt.ArrayLike | None
 
@@ -126,6 +147,7 @@ class BetweenOptions(ReachOptions, total=False):
     query_supports: ArrayLike | None
     index_dtype: npt.DTypeLike
     out: Out | None
+    capacity: int | None
 
 
 class CountOptions(SearchOptions, total=False):

@@ -9,7 +9,7 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.given import Given
-from halfshell._convert.options import AUTO, as_index_bytes
+from halfshell._convert.options import AUTO, RAISE, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box
@@ -42,6 +42,7 @@ def pairs_between(
     cutoff: PairCutoff,
     *,
     quantities: Literal["ij"] = "ij",
+    on_overflow: Literal["raise"] = "raise",
     **options: Unpack[BetweenOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
@@ -51,6 +52,7 @@ def pairs_between(
     cutoff: PairCutoff,
     *,
     quantities: Letter,
+    on_overflow: Literal["raise"] = "raise",
     **options: Unpack[BetweenOptions],
 ) -> npt.NDArray[Any]: ...
 @overload
@@ -60,8 +62,19 @@ def pairs_between(
     cutoff: PairCutoff,
     *,
     quantities: str,
+    on_overflow: Literal["raise"] = "raise",
     **options: Unpack[BetweenOptions],
 ) -> Arrays: ...
+@overload
+def pairs_between(
+    queries: PointsLike,
+    points: PointsLike,
+    cutoff: PairCutoff,
+    *,
+    quantities: str = "ij",
+    on_overflow: Literal["flag"],
+    **options: Unpack[BetweenOptions],
+) -> tuple[Any, ...]: ...
 def pairs_between(
     queries: PointsLike,
     points: PointsLike,
@@ -81,12 +94,14 @@ def pairs_between(
     inclusive: bool = True,
     index_dtype: npt.DTypeLike = np.int64,
     out: Out | None = None,
+    capacity: int | None = None,
+    on_overflow: Literal["raise", "flag"] = "raise",
     precision: Precision = "exact",
     algorithm: Algorithm = "auto",
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
-) -> Arrays:
+) -> Arrays | tuple[Any, ...]:
     """Find every pair of a query and a point within a cutoff.
 
     Parameters
@@ -100,8 +115,8 @@ def pairs_between(
         its box; `queries` may be another one with the same box.
     cutoff, box, periodic, inclusive, index_dtype, out, precision, algorithm, kernel
         As in `pairs`.
-    threads, memory_limit
-        As in `pairs`.
+    capacity, on_overflow, threads, memory_limit
+        As in `pairs`; behind the last pair i is the number of queries, j that of points.
     radii, query_radii : array_like of float, shape (n,) and (q,), optional
         A radius for each point and for each query, as in `pairs`. Both, but for rules that go by
         one of them alone.
@@ -161,6 +176,9 @@ def pairs_between(
     """
     if type(box) is Box:
         box = box.vectors
+    room = None
+    if capacity is not None or on_overflow is not RAISE:
+        room = as_room(capacity, on_overflow, out)
     if (
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
@@ -169,6 +187,7 @@ def pairs_between(
         result: Any = _core.plain(
             _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
             memory_limit, None, threads, quantities, True, index_dtype, out, queries,
+            None, AUTO, room,
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
@@ -181,5 +200,6 @@ def pairs_between(
         points, cutoff, box, periodic, rest, given, queries, directed=True
     )
     return _core.pairs_between(
-        *search, quantities, True, as_index_bytes(index_dtype), out, asking, reach, algorithm
-    )
+        *search, quantities, True, as_index_bytes(index_dtype), out, asking, reach, algorithm,
+        room,
+    )  # fmt: skip

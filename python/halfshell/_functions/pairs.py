@@ -10,7 +10,7 @@ import numpy as np
 from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Given
-from halfshell._convert.options import AUTO, as_flag, as_index_bytes
+from halfshell._convert.options import AUTO, RAISE, as_flag, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box
@@ -43,6 +43,7 @@ def pairs(
     cutoff: npt.ArrayLike | PairCutoff,
     *,
     quantities: Literal["ij"] = "ij",
+    on_overflow: Literal["raise"] = "raise",
     **options: Unpack[PairOptions],
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]: ...
 @overload
@@ -51,6 +52,7 @@ def pairs(
     cutoff: npt.ArrayLike | PairCutoff,
     *,
     quantities: Letter,
+    on_overflow: Literal["raise"] = "raise",
     **options: Unpack[PairOptions],
 ) -> npt.NDArray[Any]: ...
 @overload
@@ -59,8 +61,18 @@ def pairs(
     cutoff: npt.ArrayLike | PairCutoff,
     *,
     quantities: str,
+    on_overflow: Literal["raise"] = "raise",
     **options: Unpack[PairOptions],
 ) -> Arrays: ...
+@overload
+def pairs(
+    points: PointsLike,
+    cutoff: npt.ArrayLike | PairCutoff,
+    *,
+    quantities: str = "ij",
+    on_overflow: Literal["flag"],
+    **options: Unpack[PairOptions],
+) -> tuple[Any, ...]: ...
 def pairs(
     points: PointsLike,
     cutoff: npt.ArrayLike | PairCutoff,
@@ -77,6 +89,8 @@ def pairs(
     sort: bool = False,
     index_dtype: npt.DTypeLike = np.int64,
     out: Out | None = None,
+    capacity: int | None = None,
+    on_overflow: Literal["raise", "flag"] = "raise",
     precision: Precision = "exact",
     algorithm: Algorithm = "auto",
     kernel: str | None = None,
@@ -84,7 +98,7 @@ def pairs(
     memory_limit: float | None = None,
     progress: Callable[[float], object] | None = None,
     batch: npt.ArrayLike | None = None,
-) -> Arrays:
+) -> Arrays | tuple[Any, ...]:
     """Find every pair of points within a cutoff, each once.
 
     Parameters
@@ -120,7 +134,8 @@ def pairs(
     box : float, array_like of float, shape (d,) or (d, d), or Box, optional
         The length of all edges, their lengths, or edge vectors as rows, in the unit of `points`;
         finite. None: open space. Rows of axes that are not periodic may be anything finite, such
-        as zero.
+        as zero. A box of freud, with its periodicity, and a frame of mdtraj or MDAnalysis, for its
+        box alone, are taken too.
     periodic : bool or sequence of bool, shape (d,), optional
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
@@ -137,6 +152,14 @@ def pairs(
         Where to write: one array for each letter of `quantities`, of the type and, but for its
         length, the shape of the result, C-contiguous, apart from each other and from all inputs.
         They may be longer than the result; what lies beyond it keeps its values.
+    capacity : int, optional
+        Give all arrays this length, at least 1, whatever the number of pairs m, as compilers of
+        arrays want it. What is behind the m pairs is none: i, j and P are n there, S and D zero,
+        d is infinite.
+    on_overflow : {"raise", "flag"}, default "raise"
+        With a capacity that is too small, raise `CapacityError`; or never, and return m as well,
+        behind the arrays. If m is then above the capacity, the arrays hold no pair at all: a list
+        is never cut.
     precision : {"exact", "double", "single"}, default "exact"
         "exact" decides by the real numbers that the inputs are. The others decide by one rounded
         comparison, as most libraries do, and exist to be compared with: "double" by a fixed
@@ -181,10 +204,11 @@ def pairs(
     -------
     ndarray or tuple of ndarray
         One array per letter of `quantities`, in that order; a bare array for one letter. With
-        `out`, views of its filled parts. With m
-        pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with ``i < j``, or ``i == j`` for a point
-        and its own image; ``d`` float64 (m,); ``D`` float64 (m, d); ``S`` int32 (m, d);
-        ``P`` of `index_dtype` (m, 2). In real arithmetic ``D = points[j] - points[i] + S @ box``.
+        `out`, views of its filled parts; with ``on_overflow="flag"`` a tuple of all of them and
+        the number of pairs. With m pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with
+        ``i < j``, or ``i == j`` for a point and its own image; ``d`` float64 (m,); ``D`` float64
+        (m, d); ``S`` int32 (m, d); ``P`` of `index_dtype` (m, 2). In real arithmetic
+        ``D = points[j] - points[i] + S @ box``.
 
         Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is
         positive. (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within
@@ -216,8 +240,8 @@ def pairs(
         finite, not symmetric or, decided exactly, not positive definite, or reaches further than
         2**1022; if two of `radii`, `types` and `supports` are given together.
     CapacityError
-        If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
-        then.
+        If `capacity` or an array of `out` is too small; it carries ``needed``. What `out` holds is
+        unspecified then.
     OverflowError
         If there are 2**31 points or more, a number is too large for float64, or `quantities` has S
         and a shift does not fit int32; also if a point lies more than 2**51 box vectors away in a
@@ -279,6 +303,13 @@ def pairs(
     >>> i.tolist(), j.tolist()
     ([0], [1])
 
+    Arrays of a fixed length, with what is needed:
+
+    >>> i, j, d, needed = hs.pairs([[0.0], [1.0], [3.0]], 1.5, quantities="ijd", capacity=3,
+    ...                            on_overflow="flag")
+    >>> i.tolist(), j.tolist(), d.tolist(), needed
+    ([0, 3, 3], [1, 3, 3], [1.0, inf, inf], 1)
+
     Two systems in one call, which do not see each other:
 
     >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
@@ -292,6 +323,9 @@ def pairs(
     """
     if type(box) is Box:
         box = box.vectors
+    room = None
+    if capacity is not None or on_overflow is not RAISE:
+        room = as_room(capacity, on_overflow, out)
     if batch is None and (
         radii is None and types is None and rule is None and supports is None and extent is None
         and algorithm is AUTO
@@ -300,7 +334,7 @@ def pairs(
         # arguments need no conversion.
         result: Any = _core.plain(
             _core.pairs, points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit,
-            progress, threads, quantities, sort, index_dtype, out,
+            progress, threads, quantities, sort, index_dtype, out, None, AUTO, room,
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
@@ -314,8 +348,8 @@ def pairs(
         search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
         return _core.pairs(
             *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach,
-            algorithm,
+            algorithm, room,
         )  # fmt: skip
     scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
     wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
-    return _core.batch_pairs(*(*scene, *rest, *wanted, *own, reach, algorithm))
+    return _core.batch_pairs(*(*scene, *rest, *wanted, *own, reach, algorithm, room))

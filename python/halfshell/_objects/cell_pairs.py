@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
-from halfshell._convert.options import AUTO, as_flag, as_index_bytes, most_pairs
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes, as_room, most_pairs
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
 
@@ -30,18 +30,22 @@ class CellPairs(KeptCells):
         sort: bool = False,
         index_dtype: npt.DTypeLike = np.int64,
         out: Out | None = None,
+        capacity: int | None = None,
+        on_overflow: Literal["raise", "flag"] = "raise",
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
         progress: Callable[[float], object] | None = None,
-    ) -> Arrays:
+    ) -> Arrays | tuple[Any, ...]:
         """Find every pair of points within a cutoff, as `halfshell.pairs` does.
 
         Parameters
         ----------
         cutoff : float, optional
             Default: that of the list.
-        quantities, inclusive, sort, index_dtype, out, kernel, memory_limit, progress
+        quantities, inclusive, sort, index_dtype, out, capacity, on_overflow
+            As in `halfshell.pairs`.
+        kernel, memory_limit, progress
             As in `halfshell.pairs`.
         threads : int, optional
             As in `halfshell.pairs`. Default: that of the list.
@@ -61,7 +65,7 @@ class CellPairs(KeptCells):
         options = inclusive, kernel, threads, memory_limit
         return _core.pairs(
             *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
-            as_index_bytes(index_dtype), out, None, AUTO,
+            as_index_bytes(index_dtype), out, None, AUTO, as_room(capacity, on_overflow, out),
         )
 
     def iter_pairs(

@@ -32,7 +32,8 @@ CALLABLES = FUNCTIONS | OF_MODULES | METHODS
 ORDER = """
     user_data queries max_distance radii query_radii rule types query_types supports query_supports
     extent weights query_weights box periodic quantities max_pairs inclusive full sort index_dtype
-    out cell_size precision algorithm kernel threads memory_limit progress batch measure thread_safe
+    out capacity on_overflow cell_size precision algorithm kernel threads memory_limit
+    progress batch measure thread_safe
 """.split()
 
 #: Any is the type of what is passed on or told by its behaviour.

@@ -358,11 +358,12 @@ def calls():
     search = scene | {"inclusive": True, "precision": "exact", "kernel": None, "threads": None}
     search["memory_limit"] = 1e7
     listed = search | {"quantities": "ijS", "sort": True, "index_dtype": np.int64}
+    room = {"capacity": None, "on_overflow": "raise"}
     numbers = [0, 0, 1, 1]
     wrap = lambda box, **how: hs.Box(CUBE).wrap(**how)  # noqa: E731
     return {
-        "pairs": (hs.pairs, listed | {"out": None, "batch": None}),
-        "pairs of a batch": (hs.pairs, listed | {"out": None, "batch": numbers}),
+        "pairs": (hs.pairs, listed | {"out": None, "batch": None} | room),
+        "pairs of a batch": (hs.pairs, listed | {"out": None, "batch": numbers} | room),
         "count_pairs": (hs.count_pairs, search | {"batch": None}),
         "count_pairs of a batch": (hs.count_pairs, search | {"batch": numbers}),
         "explain": (hs.explain, listed | {"measure": False}),

@@ -94,6 +94,14 @@ def capacity_error():
     raise AssertionError("too little room is an error")
 
 
+def no_capacity():
+    try:
+        hs.pairs(POINTS, 1.5, capacity=3)
+    except hs.CapacityError as error:
+        return error.needed
+    raise AssertionError("too little room is an error")
+
+
 def message(function, *arguments, **options):
     """What a refused argument says."""
     try:
@@ -178,6 +186,10 @@ CALLS = {
     "pairs, one": lambda: hs.pairs(POINTS, 1.5, quantities="P", sort=True),
     "pairs into": lambda: into("ijdDS"),
     "capacity": capacity_error,
+    "no capacity": no_capacity,
+    "pairs, capacity": lambda: hs.pairs(
+        POINTS, 1.5, quantities=LETTERS, sort=True, capacity=60 * N, on_overflow="flag"
+    ),
     "pairs, batch": lambda: hs.pairs(POINTS, 1.5, batch=BATCH, sort=True, **PERIODIC),
     "pairs, batch of boxes": lambda: hs.pairs(
         POINTS, np.full(5, 1.5), batch=BATCH, sort=True, box=np.stack([BOX] * 5), periodic=True),
@@ -268,6 +280,7 @@ CALLS = {
     "no threads": lambda: message(hs.pairs, POINTS, 1.5, threads=10**30),
     "no limit": lambda: message(hs.pairs, POINTS, 1.5, memory_limit=POINTS.tolist()),
     "no array to write to": lambda: message(hs.pairs, POINTS, 1.5, out=(LIST[0], LIST[1][:, None])),
+    "no room": lambda: message(hs.pairs, POINTS, 1.5, capacity=0),
     "no edges": lambda: message(hs.pair_histogram, POINTS, -EDGES),
     "no batch": lambda: message(hs.pairs, POINTS, 1.5, batch=BATCH[::-1]),
 }  # fmt: skip

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`trajectory_pairs`: the pairs of one frame after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from typing import Any, Literal, TypedDict, Unpack, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._convert.foreign import kind_of
+from halfshell._convert.frames import as_frame, frames_of, of_frame
+from halfshell._convert.options import as_flag, as_index_bytes, check_letters
+from halfshell._convert.types import Arrays, BoxLike, Letter, Number, PeriodicLike, PointsLike
+from halfshell._functions.pairs import pairs
+from halfshell._objects.verlet_list import VerletList
+
+# Below them a search takes no longer than to look at a list, as docs/verlet.md has measured.
+_FEW_POINTS = 1000
+
+_Frames = Iterable[PointsLike | tuple[PointsLike, BoxLike | None]]
+
+
+class _FrameOptions(TypedDict, total=False):
+    """For overloads: the keywords of `trajectory_pairs`, without `quantities`."""
+
+    skin: Number | Literal["auto"] | None
+    box: BoxLike | None
+    periodic: PeriodicLike | None
+    inclusive: bool
+    sort: bool
+    index_dtype: npt.DTypeLike
+    kernel: str | None
+    threads: int | None
+    memory_limit: float | None
+    progress: Callable[[float], object] | None
+
+
+@overload
+def trajectory_pairs(
+    frames: _Frames,
+    cutoff: Number,
+    *,
+    quantities: Literal["ij"] = "ij",
+    **options: Unpack[_FrameOptions],
+) -> Generator[tuple[npt.NDArray[Any], npt.NDArray[Any]], None, None]: ...
+@overload
+def trajectory_pairs(
+    frames: _Frames, cutoff: Number, *, quantities: Letter, **options: Unpack[_FrameOptions]
+) -> Generator[npt.NDArray[Any], None, None]: ...
+@overload
+def trajectory_pairs(
+    frames: _Frames, cutoff: Number, *, quantities: str, **options: Unpack[_FrameOptions]
+) -> Generator[Arrays, None, None]: ...
+def trajectory_pairs(
+    frames: _Frames,
+    cutoff: Number,
+    *,
+    skin: Number | Literal["auto"] | None = "auto",
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
+    quantities: str = "ij",
+    inclusive: bool = True,
+    sort: bool = False,
+    index_dtype: npt.DTypeLike = np.int64,
+    kernel: str | None = None,
+    threads: int | None = None,
+    memory_limit: float | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Generator[Any, None, None]:
+    """Find the pairs of each frame of a trajectory, one frame after the other; always exact.
+
+    Parameters
+    ----------
+    frames : iterable
+        The frames, each of them points as in `pairs`, or a tuple of two, (points, box), or an
+        object that brings its box: ``ase.Atoms``, a ``Timestep`` of MDAnalysis, an
+        ``mdtraj.Trajectory`` of one frame. An array of shape (f, n, d) has f frames, and so do
+        ``universe.trajectory`` and an ``mdtraj.Trajectory``. A generator is asked for one frame at
+        a time. Frames may differ in their number of points and in their box.
+    cutoff : float
+        Largest distance of a pair, in the unit of the points; finite, not negative.
+    skin : float, "auto" or None, default "auto"
+        As in `VerletList`, which keeps a list from frame to frame; "auto" does so where that is
+        quicker, and arrays of fewer than 1000 points are searched. None: each frame is searched by
+        itself, for frames that have little to do with each other.
+    box, periodic : optional
+        As in `pairs`, for all frames that bring none: a frame (points, None) has this box too.
+        `periodic` holds for the boxes of frames as well, but for objects that have their own.
+    quantities, inclusive, sort, index_dtype, kernel, threads, memory_limit
+        As in `pairs`, for each frame.
+    progress : callable, optional
+        Called once for each frame, as ``progress(fraction)``, before its pairs are handed out: the
+        part of the frames that has been dealt with, up to 1. It needs frames that have a length. An
+        exception ends the iteration.
+
+    Returns
+    -------
+    generator of ndarray or tuple of ndarray
+        For each frame what `pairs` returns for it, new arrays that are the caller's: the same pairs
+        and the same bits of d, D and S. Their order is that of `VerletList`, or with `sort`, or
+        where each frame is searched, that of `pairs`.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError, MemoryError
+        As `VerletList`, for all arguments but the frames, by the call itself. As `pairs`, for a
+        frame, when its pairs are asked for; a note says which frame it is, and the iteration is
+        over. ValueError also if a frame brings its box, and `box` is given.
+
+    See Also
+    --------
+    VerletList : the same with the steps in your hands.
+    pairs : one frame.
+
+    Notes
+    -----
+    Nothing is read ahead, and no frame is kept but the last one: frames of any number take the
+    memory of one. Where a reader hands out the same object in each frame, as MDAnalysis does, that
+    is as good as any.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import halfshell as hs
+    >>> frames = np.array([[[0.0], [1.0], [3.0]], [[0.0], [2.0], [3.0]]])
+    >>> for i, j in hs.trajectory_pairs(frames, 1.5):
+    ...     print(i.tolist(), j.tolist())
+    [0] [1]
+    [1] [2]
+
+    A box for each frame:
+
+    >>> boxes = [[4.0], [5.0]]
+    >>> found = hs.trajectory_pairs(zip(frames, boxes), 1.5, sort=True, quantities="P")
+    >>> [pairs.tolist() for pairs in found]
+    [[[0, 1], [0, 2]], [[1, 2]]]
+    """
+    check_letters(quantities)
+    sort, index_dtype = as_flag(sort, "sort"), np.dtype(f"i{as_index_bytes(index_dtype)}")
+    kept = VerletList(
+        cutoff, 0.0 if skin is None else skin, box=box, periodic=None if box is None else periodic,
+        inclusive=inclusive, kernel=kernel, threads=threads, memory_limit=memory_limit,
+    )  # fmt: skip
+    iterator, n_frames = frames_of(frames)
+    if progress is not None:
+        if not callable(progress):
+            raise TypeError(f"progress must be callable, got {kind_of(progress)}")
+        if n_frames is None:
+            raise TypeError(f"progress needs frames that have a length, got {kind_of(frames)}")
+
+    def search(points: Any, own: Any, repeats: Any) -> Arrays:
+        return pairs(
+            points, kept.cutoff, box=own, periodic=repeats, quantities=quantities,
+            inclusive=inclusive, sort=sort, index_dtype=index_dtype, kernel=kernel,
+            threads=threads, memory_limit=memory_limit,
+        )  # fmt: skip
+
+    def follow(points: Any, own: Any, repeats: Any) -> Arrays:
+        kept._box, kept._periodic = own, repeats  # update() would take None as those before
+        kept.update(points)
+        return kept.pairs(quantities=quantities, sort=sort, index_dtype=index_dtype)
+
+    def choose(points: Any, own: Any, repeats: Any) -> Arrays:
+        is_small = isinstance(points, (np.ndarray, list)) and len(points) < _FEW_POINTS
+        return (search if is_small else follow)(points, own, repeats)
+
+    find = search if skin is None else choose if isinstance(skin, str) else follow
+    return _each(iterator, n_frames, find, box, periodic, progress)
+
+
+def _each(
+    frames: Iterator[Any],
+    n_frames: int | None,
+    find: Callable[[Any, Any, Any], Arrays],
+    box: Any,
+    periodic: Any,
+    progress: Callable[[float], object] | None,
+) -> Generator[Any, None, None]:
+    for number, frame in enumerate(frames):
+        try:
+            found = find(*as_frame(frame, box, periodic))
+        except Exception as error:
+            of_frame(error, number)
+            raise
+        if progress is not None and n_frames:
+            progress(min((number + 1) / n_frames, 1.0))
+        yield found
+        del found  # its memory is for the next frame, if it is nowhere else

@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Trajectories: each frame has the pairs of a search of its own, whatever comes before it."""
+
+from types import SimpleNamespace
+
+import ase
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+LETTERS = "ijdDS"
+SKEWED = np.array([[4.0, 0.0, 0.0], [2.5, 3.0, 0.0], [1.5, 2.0, 3.5]])
+SKINS = ["auto", None, 0.0, 0.4]
+
+
+def walk(n_frames=12, n=80, d=3, step=0.02, seed=0):
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(0.0, step, (n_frames, n, d))
+    steps[0] = rng.uniform(-2.0, 6.0, (n, d))
+    return steps.cumsum(axis=0)
+
+
+def fresh(points, cutoff=1.3, **options):
+    return hs.pairs(points, cutoff, quantities=LETTERS, sort=True, **options)
+
+
+def check(found, expected):
+    found = list(found)
+    assert len(found) == len(expected)
+    for ours, theirs in zip(found, expected):
+        assert len(ours) == len(theirs)
+        for a, b in zip(ours, theirs):
+            assert a.dtype == b.dtype and np.array_equal(a, b)
+
+
+def follow(frames, cutoff=1.3, **options):
+    return hs.trajectory_pairs(frames, cutoff, quantities=LETTERS, sort=True, **options)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+@pytest.mark.parametrize("inclusive", [True, False])
+@pytest.mark.parametrize("box", [None, 4.0, SKEWED], ids=["open", "cube", "skewed"])
+def test_frame_by_frame(skin, inclusive, box):
+    frames = walk()
+    options = {"box": box, "inclusive": inclusive}
+    expected = [fresh(points, **options) for points in frames]
+    assert min(len(one[0]) for one in expected) > 10
+    check(follow(frames, skin=skin, **options), expected)
+    check(follow(list(frames), skin=skin, **options), expected)
+    check(follow(iter(frames), skin=skin, **options), expected)
+    check(follow(frames.astype(np.float32), skin=skin, **options),
+          [fresh(points.astype(np.float32), **options) for points in frames])  # fmt: skip
+
+
+@pytest.mark.parametrize("skin", SKINS)
+@pytest.mark.parametrize("d", [1, 2, 5, 8])
+def test_dimensions_and_mixed_periodicity(skin, d):
+    frames = walk(6, 40, d)
+    options = {"box": np.full(d, 5.0), "periodic": [k % 2 == 0 for k in range(d)]}
+    expected = [fresh(points, 1.0 + 0.3 * d, **options) for points in frames]
+    check(follow(frames, 1.0 + 0.3 * d, skin=skin, **options), expected)
+
+
+@pytest.mark.parametrize("step", [0.005, 3.0])
+def test_many_points(step):
+    """Of so many "auto" keeps a list, or none where the frames have little in common."""
+    frames = walk(8, 3000, step=step) * 2.0
+    expected = [fresh(points, box=2.0 * SKEWED) for points in frames]
+    check(follow(frames, box=2.0 * SKEWED), expected)
+    around = [frames[0], frames[1][:900], frames[2], frames[3][:1], frames[4]]
+    check(follow(around, box=2.0 * SKEWED),
+          [fresh(points, box=2.0 * SKEWED) for points in around])  # fmt: skip
+
+
+def test_without_a_skin_the_order_is_that_of_pairs():
+    frames = walk(5, 300)
+    for letters in ("ij", "P", "dSD"):
+        found = hs.trajectory_pairs(
+            frames, 1.3, skin=None, quantities=letters, box=SKEWED, index_dtype=np.int32
+        )
+        for points, ours in zip(frames, found, strict=True):
+            theirs = hs.pairs(
+                points, 1.3, quantities=letters, box=SKEWED, index_dtype=np.int32
+            )
+            if letters == "P":
+                ours, theirs = (ours,), (theirs,)
+            for a, b in zip(ours, theirs, strict=True):
+                assert a.dtype == b.dtype and np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_frames_of_other_length_box_and_dimension(skin):
+    long, short, flat = walk(2, 90), walk(2, 35, seed=1), walk(2, 60, 2, seed=2)
+    frames = [
+        (long[0], SKEWED), (long[1], 1.01 * SKEWED), (short[0], None), (short[1], 6.0),
+        (np.empty((0, 3)), SKEWED), (short[0][:1], SKEWED), (flat[0], [4.0, 5.0]), (flat[1], None),
+        (long[1], hs.Box(SKEWED)), (long[1] + SKEWED[1], SKEWED), (1e9 * long[1], None),
+    ]  # fmt: skip
+    expected = [fresh(points, box=box) for points, box in frames]
+    check(follow(frames, skin=skin), expected)
+    check(follow((one for one in frames), skin=skin), expected)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_frames_with_and_without_a_box(skin):
+    points = walk(3)
+    frames = [points[0], (points[1], None), points[2].tolist()]
+    check(follow(frames, skin=skin, box=5.0), [fresh(one, box=5.0) for one in points])
+    frames = [points[0], (points[1], SKEWED), points[2]]  # open, in a box, open
+    check(follow(frames, skin=skin), [fresh(points[0]), fresh(points[1], box=SKEWED),
+                                      fresh(points[2])])  # fmt: skip
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_images_of_cutoffs_beyond_the_box(skin):
+    frames = walk(4, 6)
+    expected = [fresh(points, 5.0, box=SKEWED) for points in frames]
+    check(follow(frames, 5.0, skin=skin, box=SKEWED), expected)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_atoms(skin):
+    frames = [
+        ase.Atoms("C80", positions=points, cell=(1.0 + 0.01 * k) * SKEWED, pbc=[True, k > 1, True])
+        for k, points in enumerate(walk(4))
+    ]
+    check(follow(frames, skin=skin), [fresh(atoms) for atoms in frames])
+    with pytest.raises(ValueError, match="box comes from the Atoms object itself"):
+        next(follow(frames, skin=skin, box=3.0))
+
+
+class Timestep:
+    """As MDAnalysis has it: one object for all frames, whose memory is written anew in each."""
+
+    def __init__(self, n):
+        self.positions = np.empty((n, 3), np.float32)
+        self.triclinic_dimensions = None
+
+
+class Reader:
+    """As ``universe.trajectory``."""
+
+    def __init__(self, points, boxes):
+        self.points, self.boxes = points, boxes
+
+    def __len__(self):
+        return len(self.points)
+
+    def __iter__(self):
+        step = Timestep(len(self.points[0]))
+        for points, box in zip(self.points, self.boxes):
+            step.positions[:], step.triclinic_dimensions = points, box
+            yield step
+            step.positions[:] = np.nan
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_readers_that_use_their_memory_again(skin):
+    points = walk(5).astype(np.float32)
+    boxes = [(1.0 + 0.02 * k) * SKEWED.astype(np.float32) for k in range(4)] + [None]
+    expected = [fresh(one, box=box) for one, box in zip(points, boxes)]
+    done = []
+    check(follow(Reader(points, boxes), skin=skin, progress=done.append), expected)
+    assert done == [0.2, 0.4, 0.6, 0.8, 1.0]
+    with pytest.raises(ValueError, match="box is given twice: Timestep bring their own"):
+        next(follow(Reader(points, boxes), skin=skin, box=4.0))
+
+
+def trajectory(points, boxes):
+    """As ``mdtraj.Trajectory``."""
+    return SimpleNamespace(xyz=points, unitcell_vectors=boxes, n_frames=len(points))
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_trajectories_as_wholes_and_frame_by_frame(skin):
+    points = walk(4).astype(np.float32)
+    boxes = np.stack([(1.0 + 0.02 * k) * SKEWED for k in range(4)]).astype(np.float32)
+    expected = [fresh(one, box=box) for one, box in zip(points, boxes)]
+    check(follow(trajectory(points, boxes), skin=skin), expected)
+    single = [trajectory(points[k : k + 1], boxes[k : k + 1]) for k in range(4)]
+    check(follow(single, skin=skin), expected)
+    check(follow(trajectory(points, None), skin=skin), [fresh(one) for one in points])
+    check(follow(trajectory(points, None), skin=skin, box=4.0),
+          [fresh(one, box=4.0) for one in points])  # fmt: skip
+    with pytest.raises(ValueError, match="a SimpleNamespace in frames must be one frame, got 4"):
+        next(follow([trajectory(points, boxes)], skin=skin))
+    with pytest.raises(ValueError, match="box is given twice"):
+        next(follow(trajectory(points, boxes), skin=skin, box=4.0))
+
+
+def test_universe_of_mdanalysis():
+    mda = pytest.importorskip("MDAnalysis")
+    points = walk(6).astype(np.float32)
+    universe = mda.Universe.empty(80, trajectory=True)
+    sizes = [[4.0 + 0.1 * k, 5.0, 6.0, 80.0, 90.0, 70.0] for k in range(6)]
+    universe.load_new(points, dimensions=np.array(sizes, np.float32))
+    expected = []
+    for step in universe.trajectory:
+        box = mda.lib.mdamath.triclinic_vectors(step.dimensions)
+        expected.append(fresh(step.positions.copy(), box=box))
+    assert len(expected) == 6
+    check(follow(universe.trajectory), expected)
+    check(follow(universe.trajectory[1:4]), expected[1:4])
+
+
+def test_nothing_is_read_ahead():
+    read = []
+
+    def frames():
+        for k, points in enumerate(walk(5)):
+            read.append(k)
+            yield points
+
+    found = follow(frames())
+    assert not read
+    next(found)
+    next(found)
+    assert read == [0, 1]
+    found.close()
+    assert list(found) == []
+
+
+def test_arrays_are_of_the_caller():
+    frames = np.repeat(walk(1), 3, axis=0)
+    one, two, three = (hs.trajectory_pairs(frames, 1.3, skin=0.4))
+    for a, b in ((one, two), (two, three)):
+        assert not any(np.shares_memory(x, y) for x in a for y in b)
+        assert all(np.array_equal(x, y) for x, y in zip(a, b))
+
+
+@pytest.mark.parametrize("frames", [[], (), np.empty((0, 5, 3)), iter([])])
+def test_no_frames(frames):
+    assert list(follow(frames)) == []
+
+
+def test_progress():
+    frames = walk(4)
+    for options in ({}, {"skin": None}):
+        done = []
+        for k, _ in enumerate(follow(frames, progress=done.append, **options)):
+            assert len(done) == k + 1  # before the pairs are handed out
+        assert done == [0.25, 0.5, 0.75, 1.0]
+
+    def stop(fraction):
+        raise KeyError("stop")
+
+    found = follow(frames, progress=stop)
+    with pytest.raises(KeyError, match="stop"):
+        next(found)
+    assert list(found) == []
+
+
+@pytest.mark.parametrize("options, kind, message", [
+    ({"cutoff": -1.0}, ValueError, "cutoff"),
+    ({"cutoff": "far"}, TypeError, "cutoff"),
+    ({"cutoff": np.inf}, ValueError, "cutoff"),
+    ({"skin": -1.0}, ValueError, "skin"),
+    ({"skin": "thick"}, ValueError, "skin"),
+    ({"quantities": "x"}, ValueError, "quantities"),
+    ({"quantities": 3}, TypeError, "quantities"),
+    ({"inclusive": "yes"}, TypeError, "inclusive"),
+    ({"sort": 2}, TypeError, "sort"),
+    ({"index_dtype": float}, ValueError, "index_dtype"),
+    ({"kernel": "abacus"}, ValueError, "kernel"),
+    ({"threads": 0}, ValueError, "threads"),
+    ({"memory_limit": -1}, ValueError, "memory_limit"),
+    ({"box": [1.0, np.nan, 1.0]}, ValueError, "box"),
+    ({"progress": 3}, TypeError, "progress must be callable, got int"),
+    ({"frames": iter([]), "progress": print}, TypeError, "progress needs frames that have a len"),
+    ({"frames": 3}, TypeError, "frames must be a sequence or iterator of frames, got int"),
+    ({"frames": "abc"}, TypeError, "frames must be a sequence of frames, got str"),
+    ({"frames": None}, TypeError, "frames must be a sequence"),
+])  # fmt: skip
+def test_bad_arguments_are_refused_by_the_call(options, kind, message):
+    with pytest.raises(kind, match=message):
+        hs.trajectory_pairs(**{"frames": walk(2), "cutoff": 1.0} | options)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+@pytest.mark.parametrize("bad, kind, message", [
+    (np.full((3, 3), np.nan), ValueError, r"points\[0, 0\] = nan"),
+    ("abc", TypeError, "points"),
+    (np.zeros(3), ValueError, "shape"),
+    ((np.zeros((3, 3)), np.zeros((2, 2))), ValueError, "box"),
+    ((np.zeros((3, 3)), np.zeros((3, 3))), ValueError, "box"),
+    (np.zeros((3, 3), complex), TypeError, "points"),
+])  # fmt: skip
+def test_bad_frames_are_named(skin, bad, kind, message):
+    found = follow([*walk(2), bad, *walk(2)], skin=skin)
+    next(found)
+    next(found)
+    with pytest.raises(kind, match=message) as caught:
+        next(found)
+    assert caught.value.__notes__ == ["in frame 2 of trajectory_pairs"]
+    assert list(found) == []
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_periodic_needs_a_box_and_none_of_its_own(skin):
+    with pytest.raises(ValueError, match="periodic needs a box"):
+        next(follow(walk(1), skin=skin, periodic=True))
+    atoms = ase.Atoms("C80", positions=walk(1)[0], cell=SKEWED, pbc=True)
+    with pytest.raises(ValueError, match="periodic comes from the Atoms object"):
+        next(follow([atoms], skin=skin, periodic=True))
+    frames = [(points, SKEWED) for points in walk(3)]
+    periodic = [True, False, True]
+    check(follow(frames, skin=skin, periodic=periodic),
+          [fresh(points, box=box, periodic=periodic) for points, box in frames])  # fmt: skip
+
+
+def test_a_result_that_does_not_fit():
+    with pytest.raises(MemoryError) as caught:
+        next(hs.trajectory_pairs(walk(1, 3000), 5.0, memory_limit=1e5))
+    assert caught.value.__notes__ == ["in frame 0 of trajectory_pairs"]
