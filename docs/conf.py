@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How Sphinx builds the site: `python -m sphinx -W --keep-going docs build/site`."""
+
+import halfshell
+
+project = "halfshell"
+author = "The halfshell developers"
+project_copyright = author
+version = release = halfshell.__version__
+
+extensions = ["sphinx.ext.autodoc", "numpydoc", "myst_nb"]
+source_suffix = {".md": "myst-nb"}
+exclude_patterns = ["_build", "report/*.html"]
+root_doc = "index"
+nitpicky = True
+
+html_theme = "furo"
+html_title = "halfshell"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_extra_path = ["report"]  # report.html and report.csv, beside the pages
+html_show_sphinx = False
+templates_path: list[str] = []
+
+# Pages that begin with a `jupytext` header are notebooks, run at each build. Nothing is kept.
+nb_execution_mode = "force"
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath"]
+myst_links_external_new_tab = False
+
+autodoc_typehints = "none"  # the docstrings say it in words
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
