@@ -61,7 +61,10 @@ def test_scipy():
     assert np.isinf(tree.query(LINE[:1], k=2, distance_upper_bound=1.0)[0][0, 1])
     assert hs.nearest(LINE, 2, queries=LINE[:1], max_distance=1.0, quantities="d")[0, 1] == 1.0
     with pytest.raises(ValueError):
-        names["KDTree"](LINE - 1.0, boxsize=3.0)
+        names["KDTree"](names["points"] + 1.0, boxsize=20.0)
+    points = names["points"][:50]
+    once = names["KDTree"](points, boxsize=20.0).query_pairs(15.0)
+    assert len(once) < hs.count_pairs(points, 15.0, box=names["box"])
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -70,6 +73,18 @@ def test_mdanalysis():
     pairs = set(zip(names["i"].tolist(), names["j"].tolist()))
     assert {tuple(sorted(row)) for row in names["theirs"].tolist()} == pairs
     assert len(names["n_pairs"]) == 3 and names["atoms"][0].min() >= 100
+    from MDAnalysis.analysis.rdf import InterRDF
+    from MDAnalysis.lib.distances import calc_bonds
+
+    group, box, dimensions = names["group"], names["box"], names["u"].dimensions
+    x, i, j = group.positions, np.arange(100), np.arange(100, 200)
+    d = calc_bonds(x[i], x[j], box=dimensions)
+    assert np.allclose(d, hs.measure(x, i, j, box=box, quantities="d"), atol=1e-5)
+    everything = group.universe.atoms.positions
+    group.universe.load_new(everything, dimensions=dimensions)
+    theirs = InterRDF(group, group, nbins=20, range=(0, 5)).run().results.rdf
+    ours = hs.rdf(everything[group.indices], 5.0, 20, box=box).g
+    assert np.allclose(theirs[1:], ours[1:], rtol=1e-6) and theirs[0] > ours[0]
     found, _ = names["self_capped_distance"](LINE.astype(np.float32), 1.0)
     assert len(found) == 3
 
@@ -87,6 +102,9 @@ def test_freud():
     query = freud.locality.AABBQuery(freud.box.Box.cube(10.0), LINE)
     options = {"r_max": 1.0, "exclude_ii": True}
     assert len(query.query(LINE, options).toNeighborList()) == 0
+    sizes = np.bincount(names["cluster"].cluster_idx)
+    ours = hs.clusters(names["points"], 1.2, box=names["length"]).sizes
+    assert (np.diff(sizes) <= 0).all() and np.array_equal(np.sort(ours)[::-1], sizes)
     with pytest.raises(RuntimeError):
         query.query(LINE, {"r_max": 5.5, "exclude_ii": True}).toNeighborList()
     options = {"num_neighbors": 3, "exclude_ii": True}
@@ -105,6 +123,14 @@ def test_vesin_and_matscipy():
     assert np.allclose(again, names["D"])
     assert triples(*names["full"]) == triples(*names["ours"]) == both_ways(*half)
     assert (np.diff(names["full"][0]) >= 0).all()
+    (shifts,) = names["calculator"].compute(
+        points=np.zeros((1, 3)), box=np.eye(3), periodic=True, quantities="S"
+    )
+    ours = hs.pairs(np.zeros((1, 3)), 2.0, box=1.0, quantities="S", inclusive=False)
+    assert {tuple(S) for S in np.concatenate((shifts, -shifts)).tolist()} == {
+        tuple(S) for S in np.concatenate((ours, -ours)).tolist()
+    }
+    assert len(shifts) == len(ours)
     open_space = {"points": LINE, "box": np.zeros((3, 3)), "periodic": False, "quantities": "i"}
     calculator = names["vesin"].NeighborList(cutoff=1.0, full_list=False)
     assert len(calculator.compute(**open_space)[0]) == 0
