@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How Sphinx builds the site: `python -m sphinx -W --keep-going docs build/site`."""
 
+import re
+from pathlib import Path
+
 import halfshell
 
 project = "halfshell"
@@ -37,3 +40,22 @@ autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
+
+
+def leave_out_signature(app, what, name, *_):
+    """Return no signature for classes that users do not call, but get."""
+    results = Path(app.srcdir, "reference", "results.md").read_text(encoding="utf-8")
+    is_result = f"autoclass:: {name.rpartition('.')[2]}\n" in results
+    return ("", None) if what == "class" and is_result else None
+
+
+def link_public_names(_app, _what, _name, _obj, _options, lines):
+    """Make `pairs` in a docstring a link, and leave `points` as it is."""
+    names = "|".join(halfshell.__all__)
+    for k, line in enumerate(lines):
+        lines[k] = re.sub(rf"(?<![`:])`({names})`(?!`)", r":py:obj:`~halfshell.\1`", line)
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", link_public_names)
+    app.connect("autodoc-process-signature", leave_out_signature)

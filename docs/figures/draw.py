@@ -108,7 +108,7 @@ def stages():
 
 def images():
     """A pair across a face, a pair with two images, and what S counts."""
-    fig, ax = plt.subplots(figsize=(7.6, 3.2), layout="constrained")
+    fig, ax = plt.subplots(figsize=(7.6, 1.9), layout="constrained")
     box, points = np.array([[4.0, 0.0], [1.0, 2.2]]), np.array([[1.3, 1.4], [4.0, 1.1]])
     for shift in (-1, 0, 1):
         at = shift * box[0]
@@ -124,7 +124,7 @@ def images():
         ax.text(end[0] - 0.1, 0.62, f"S = ({shift}, 0)", color=RED, ha="right", fontsize=9)
     ax.text(points[0, 0] + 0.05, points[0, 1] + 0.35, "i")
     ax.text(points[1, 0], points[1, 1] + 0.2, "j")
-    ax.set(aspect="equal", ylim=(-0.6, 2.5))
+    ax.set(aspect="equal", ylim=(-0.6, 2.3))
     ax.set_axis_off()
     return fig
 
