@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The drawings of the README and of docs/explanation: `python docs/figures/draw.py` writes them."""
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+import halfshell as hs
+from halfshell.structures import alpha_quartz
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.patches import Circle, Rectangle
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+FOLDER = Path(__file__).parent
+BLUE, ORANGE, RED, GREY, LIGHT = "tab:blue", "tab:orange", "tab:red", "0.45", "#dbe8f4"
+
+
+def quartz():
+    """The bonds of a block of alpha-quartz, and its g(r) by element."""
+    fig = plt.figure(figsize=(9.0, 3.9), layout="constrained")
+    left = fig.add_subplot(1, 2, 1, projection="3d")
+    right = fig.add_subplot(1, 2, 2)
+    points, box, species = alpha_quartz((3, 3, 2))
+    i, _, D, S = hs.pairs(points, 2.0, box=box, quantities="ijDS")
+    bonds = np.stack((points[i], points[i] + D), axis=1)[~S.any(axis=1)]
+    left.add_collection(Line3DCollection(bonds, colors=GREY, linewidths=1.2))
+    for name, size, colour in (("Si", 55, ORANGE), ("O", 28, RED)):
+        left.scatter(*points[species == name].T, s=size, color=colour, depthshade=False)
+    left.set_aspect("equal")
+    left.set_axis_off()
+    left.view_init(12, -82)
+    left.set_box_aspect(None, zoom=1.6)
+
+    points, box, species = alpha_quartz()
+    kinds, types = np.unique(species, return_inverse=True)
+    moved = points + np.random.default_rng(0).normal(0.0, 0.06, points.shape)
+    result = hs.rdf(moved, 6.0, bins=240, types=types, box=box)
+    for a, b in ((0, 1), (0, 0), (1, 1)):
+        right.plot(result.r, result.g[a, b], label=f"{kinds[b]}-{kinds[a]}", linewidth=1.2)
+    right.set(xlabel="r / Å", ylabel="g(r)", xlim=(1.0, 6.0), ylim=(0.0, 16.0))
+    right.spines[["top", "right"]].set_visible(False)
+    right.legend(frameon=False)
+    return fig
+
+
+def grid(ax, columns, rows, shaded=()):
+    for x, y in shaded:
+        ax.add_patch(Rectangle((x, y), 1, 1, color=LIGHT, linewidth=0))
+    ax.hlines(range(rows + 1), 0, columns, color="0.7", linewidth=0.8)
+    ax.vlines(range(columns + 1), 0, rows, color="0.7", linewidth=0.8)
+    ax.set(xlim=(-0.1, columns + 0.1), ylim=(-0.1, rows + 0.1), aspect="equal")
+    ax.set_axis_off()
+
+
+def half_shell():
+    """All neighbouring cells, and the half of them that suffices."""
+    points = np.random.default_rng(5).random((75, 2)) * 5.0
+    fig, axes = plt.subplots(1, 2, figsize=(8.0, 4.3), layout="constrained")
+    full = [(x, y) for x in (1, 2, 3) for y in (1, 2, 3)]
+    half = [(2, 2), (3, 2), (1, 3), (2, 3), (3, 3)]
+    for ax, shaded, title in (
+        (axes[0], full, "all neighbours: each pair is met twice"),
+        (axes[1], half, "half of the shell: each pair is met once"),
+    ):
+        grid(ax, 5, 5, shaded)
+        ax.add_patch(Rectangle((2, 2), 1, 1, fill=False, color=BLUE, linewidth=2))
+        near = np.array([tuple(cell) in shaded for cell in points.astype(int).tolist()])
+        ax.scatter(*points[~near].T, s=10, color="0.75")
+        ax.scatter(*points[near].T, s=14, color=BLUE)
+        ax.set_title(title, fontsize=10)
+    for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
+        axes[1].annotate(
+            "", (2.5 + 0.95 * dx, 2.5 + 0.95 * dy), (2.5, 2.5),
+            arrowprops={"arrowstyle": "->", "color": ORANGE, "linewidth": 1.8},
+        )  # fmt: skip
+    return fig
+
+
+def stages():
+    """Candidates that are gathered, what the filter leaves, and what is decided exactly."""
+    rng = np.random.default_rng(3)
+    group, points = 2.0 + rng.random((4, 2)), rng.random((170, 2)) * 5.0
+    D = points[:, None] - group
+    d = np.sqrt((D * D).sum(axis=2)).min(axis=1)
+    gathered = ((points > 1.0) & (points < 4.0)).all(axis=1)
+    band = 0.06  # a few millionths in truth
+    fig, axes = plt.subplots(1, 3, figsize=(9.6, 3.7), layout="constrained")
+    steps = (
+        ("gather: points of cells in reach", gathered, np.zeros_like(gathered)),
+        ("filter in float32: within, beyond,\nor too close to call", gathered & (d < 1.0 - band),
+         gathered & (abs(d - 1.0) <= band)),
+        ("exact: float64, two float64, integers", gathered & (d <= 1.0), np.zeros_like(gathered)),
+    )  # fmt: skip
+    for ax, (title, kept, unsure) in zip(axes, steps):
+        grid(ax, 5, 5, [(x, y) for x in (1, 2, 3) for y in (1, 2, 3)] if ax is axes[0] else ())
+        for centre in group if ax is not axes[0] else ():
+            ax.add_patch(Circle(centre, 1.0, fill=False, color="0.8", linewidth=0.8))
+        ax.scatter(*points[~kept & ~unsure].T, s=8, color="0.8")
+        ax.scatter(*points[kept].T, s=14, color=BLUE)
+        ax.scatter(*points[unsure].T, s=30, color=ORANGE)
+        ax.scatter(*group.T, s=36, color="black", marker="x")
+        ax.set_title(title, fontsize=10)
+    return fig
+
+
+def images():
+    """A pair across a face, a pair with two images, and what S counts."""
+    fig, ax = plt.subplots(figsize=(7.6, 1.9), layout="constrained")
+    box, points = np.array([[4.0, 0.0], [1.0, 2.2]]), np.array([[1.3, 1.4], [4.0, 1.1]])
+    for shift in (-1, 0, 1):
+        at = shift * box[0]
+        outline = np.array([at, at + box[0], at + box.sum(axis=0), at + box[1], at])
+        own = shift == 0
+        ax.plot(*outline.T, color=BLUE if own else "0.75", linewidth=2.0 if own else 0.8)
+        ax.scatter(*(points + at).T, s=50, color=["black", ORANGE], alpha=1.0 if own else 0.35)
+        name = "the box" if own else "image"
+        ax.text(at[0] + 2.0, -0.35, name, ha="center", fontsize=9)
+    for shift in (0, -1):
+        end = points[1] + shift * box[0]
+        ax.annotate("", end, points[0], arrowprops={"arrowstyle": "->", "color": RED})
+        ax.text(end[0] - 0.1, 0.62, f"S = ({shift}, 0)", color=RED, ha="right", fontsize=9)
+    ax.text(points[0, 0] + 0.05, points[0, 1] + 0.35, "i")
+    ax.text(points[1, 0], points[1, 1] + 0.2, "j")
+    ax.set(aspect="equal", ylim=(-0.6, 2.3))
+    ax.set_axis_off()
+    return fig
+
+
+def levels():
+    """Points of two sizes: one grid for the large, another for the small."""
+    rng = np.random.default_rng(1)
+    small = rng.random((60, 2)) * 6.0
+    large = np.array([[1.6, 3.9], [4.3, 1.7]])
+    fig, axes = plt.subplots(1, 2, figsize=(8.0, 4.3), layout="constrained")
+    for ax, width, title in (
+        (axes[0], 1.5, "large and small ones: wide cells"),
+        (axes[1], 0.4, "small ones with each other: narrow cells"),
+    ):
+        lines = np.arange(0.0, 6.01, width)
+        ax.hlines(lines, 0, 6, color="0.75", linewidth=0.7)
+        ax.vlines(lines, 0, 6, color="0.75", linewidth=0.7)
+        for centre in large if ax is axes[0] else ():
+            ax.add_patch(Circle(centre, 1.3, fill=False, color=ORANGE, linewidth=2))
+        for centre in small:
+            ax.add_patch(Circle(centre, 0.2, fill=False, color=BLUE))
+        ax.set(xlim=(-0.1, 6.1), ylim=(-0.1, 6.1), aspect="equal")
+        ax.set_axis_off()
+        ax.set_title(title, fontsize=10)
+    return fig
+
+
+DRAWINGS = {
+    "quartz": quartz, "half-shell": half_shell, "stages": stages, "images": images,
+    "levels": levels,
+}  # fmt: skip
+
+
+def main(folder=FOLDER):
+    settings = {"svg.hashsalt": "halfshell", "svg.fonttype": "path", "font.size": 10}
+    for name, draw in DRAWINGS.items():
+        with plt.rc_context(settings):
+            fig = draw()
+            fig.savefig(folder / f"{name}.svg", metadata={"Date": None}, facecolor="white")
+            plt.close(fig)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The site is built without a warning, every notebook runs, and it answers what newcomers ask."""
+
+import importlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+import halfshell as hs
+from checkout import ROOT
+from halfshell import scenes, structures
+
+DOCS = ROOT / "docs"
+FOLDERS = ["start", "recipes", "explanation", "reference", "systems"]
+NEEDED = ["sphinx", "numpydoc", "myst_nb", "furo", "ipykernel", "matplotlib", "numba", "ase"]
+NOTEBOOKS = [path for path in sorted(DOCS.rglob("*.md")) if "{code-cell}" in path.read_text()]
+
+#: What newcomers ask -> where the start page sends them.
+QUESTIONS = {
+    "which function": "start/which-function.md",
+    "only these points": "recipes/selected-points.md",
+    "cutoffs by element": "recipes/bonds.md",
+    "MDAnalysis": "start/coming-from.md#mdanalysis",
+    "signs and batches of a graph": "recipes/graph-batches.md",
+    "adding up forces": "recipes/sums-over-pairs.md",
+    "partial g(r)": "recipes/partial-rdf.md",
+    "bonded pairs": "start/which-function.md#pairs-that-are-left-out",
+    "drawing": "recipes/drawing.md",
+    "platforms": "start/platforms.md",
+}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    for name in NEEDED:
+        pytest.importorskip(name, reason=f"{name} is not installed: pip install '.[docs]'")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", str(DOCS), str(folder)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-5000:]
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning(site):
+    for path in DOCS.rglob("*.md"):
+        assert (site / path.relative_to(DOCS).with_suffix(".html")).exists(), path
+
+
+@pytest.mark.slow
+def test_notebooks_have_outputs_and_pictures(site):
+    for path in NOTEBOOKS:
+        page = (site / path.relative_to(DOCS).with_suffix(".html")).read_text()
+        assert "cell_output" in page, path
+        pictures = len(re.findall(r"<img [^>]*_images/", page))
+        assert pictures == path.read_text().count("plt.figure(") + path.read_text().count(
+            "plt.subplots("
+        ), path
+
+
+@pytest.mark.slow
+def test_links_between_built_pages_lead_somewhere(site):
+    for page in site.rglob("*.html"):
+        if page.name == "report.html":
+            continue
+        for target in re.findall(r'<a [^>]*href="([^"#:?]+)(?:#[^"]*)?"', page.read_text()):
+            assert (page.parent / target).exists(), (page, target)
+
+
+def test_there_are_notebooks_and_they_are_kept_without_outputs():
+    assert {path.parent.name for path in NOTEBOOKS} == {"start", "recipes"}
+    assert len(NOTEBOOKS) > 8
+    for path in NOTEBOOKS:
+        assert path.read_text().startswith("---\nfile_format: mystnb\nkernelspec:\n"), path
+
+
+def test_the_start_page_answers_in_one_click():
+    start = (DOCS / "index.md").read_text()
+    for question, target in QUESTIONS.items():
+        assert f"]({target})" in start, question
+        page, _, heading = target.partition("#")
+        text = (DOCS / page).read_text()
+        headings = re.findall(r"^##* (.*)$", text, re.MULTILINE)
+        assert not heading or heading in [h.lower().replace(" ", "-") for h in headings]
+
+
+def test_every_recipe_is_on_the_start_page():
+    start = (DOCS / "index.md").read_text()
+    for path in (DOCS / "recipes").glob("*.md"):
+        assert f"](recipes/{path.name})" in start, path
+
+
+def test_the_reference_has_every_public_name():
+    text = "".join(path.read_text() for path in (DOCS / "reference").glob("*.md"))
+    named = set(re.findall(r"^\.\. auto(?:function|class|data):: (\w+)$", text, re.MULTILINE))
+    assert named >= set(hs.__all__)
+    assert "automodule:: halfshell.structures" in text and structures.__all__
+    assert named >= {name for name in scenes.__all__ if name not in ("SIZES", "Size")}
+
+
+def test_which_function_names_every_search():
+    text = (DOCS / "start/which-function.md").read_text()
+    page = (DOCS / "reference/searches.md").read_text()
+    for name in re.findall(r"autofunction:: (\w+)", page):
+        assert f"(#halfshell.{name})" in text, name
+    exec(re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1), names := {})
+    kept = set(zip(names["i"].tolist(), names["j"].tolist()))
+    every = set(zip(*(a.tolist() for a in hs.pairs(names["points"], 2.0, box=names["box"]))))
+    assert kept == every - set(map(tuple, names["bonded"].tolist()))
+    assert len(kept) < len(every)
+
+
+def test_drawings_are_those_of_the_script(tmp_path):
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    sys.path.insert(0, str(DOCS / "figures"))
+    try:
+        draw = importlib.import_module("draw")
+    finally:
+        sys.path.remove(str(DOCS / "figures"))
+    draw.main(tmp_path)
+    for name in draw.DRAWINGS:
+        assert (tmp_path / f"{name}.svg").stat().st_size > 5000
+        assert (DOCS / "figures" / f"{name}.svg").exists()
