@@ -21,7 +21,6 @@ html_theme = "furo"
 html_title = "halfshell"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
-html_extra_path = ["report"]  # report.html and report.csv, beside the pages
 html_show_sphinx = False
 templates_path: list[str] = []
 
