@@ -29,6 +29,7 @@ form_of(char letter, int ndim, int index_bytes)
     case 'd': return (array_form){HS_WANT_DISTANCE, NPY_DOUBLE, 0, sizeof(double)};
     case 'D': return (array_form){HS_WANT_VECTOR, NPY_DOUBLE, ndim, d * sizeof(double)};
     case 'S': return (array_form){HS_WANT_SHIFT, NPY_INT32, ndim, d * sizeof(int32_t)};
+    case 'k': return (array_form){HS_WANT_SHELL, NPY_INT32, 0, sizeof(int32_t)};
     default: return (array_form){HS_WANT_BOTH, index_type, 2, 2 * index};
     }
 }
@@ -226,6 +227,7 @@ hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair
         case HS_WANT_DISTANCE: arrays->distance = data; break;
         case HS_WANT_VECTOR: arrays->vector = data; break;
         case HS_WANT_SHIFT: arrays->shift = data; break;
+        case HS_WANT_SHELL: arrays->shell = data; break;
         default: arrays->both = data; break;
         }
     }

@@ -16,6 +16,9 @@ AUTO = "auto"
 #: The letters of quantities, in the order in which arrays come.
 LETTERS = "ijdDSP"
 
+#: That of shells, which needs several cutoffs.
+SHELL = "k"
+
 # Blocks are counted by int64, and two of them must be.
 _MOST_PAIRS = 2**62
 

@@ -13,6 +13,7 @@ from halfshell._convert.given import Given
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.shells import as_shells
 from halfshell._objects.box import Box
 
 if TYPE_CHECKING:
@@ -95,10 +96,11 @@ def pairs(
         anywhere, also outside the box. ``[]`` counts as shape (0, 3). An object with
         ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
         periodicity.
-    cutoff : float, array_like of float, shape (t, t), dict or None
+    cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box. With `radii` or `supports` a further limit, or None; with `types` one
-        for each pair of types.
+        for each pair of types. Several, shape (k,), ascending, with the letter ``k``: the pairs
+        are those of the last one.
     radii : array_like of float, shape (n,), optional
         A radius for each point, in the unit of `points`; finite, not negative, at most 2**1022. A
         pair then counts within what `rule` makes of the two radii, and within `cutoff`, if any.
@@ -125,7 +127,9 @@ def pairs(
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
-        both indices. Only these are computed.
+        both indices. Only these are computed. With several cutoffs also ``k``: the innermost one
+        that holds the pair, from 0 on, decided exactly at each; not with `radii`, `types`,
+        `supports`, `batch`, nor a `precision` other than "exact".
     inclusive : bool, default True
         Whether a pair at exactly `cutoff`, or at exactly its reach by radii, types or supports,
         counts.
@@ -184,7 +188,8 @@ def pairs(
         `out`, views of its filled parts. With m
         pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with ``i < j``, or ``i == j`` for a point
         and its own image; ``d`` float64 (m,); ``D`` float64 (m, d); ``S`` int32 (m, d);
-        ``P`` of `index_dtype` (m, 2). In real arithmetic ``D = points[j] - points[i] + S @ box``.
+        ``P`` of `index_dtype` (m, 2); ``k`` int32 (m,). In real arithmetic
+        ``D = points[j] - points[i] + S @ box``.
 
         Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is
         positive. (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within
@@ -206,7 +211,8 @@ def pairs(
         finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
         linearly dependent or so skewed or different in length that float64 does not place points
         along the short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
-        or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
+        or `kernel` is none of those offered; if `quantities` has the letter k without several
+        cutoffs, or these descend or are none; or `memory_limit` is negative; if `periodic` is given
         without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
         not ascending or has a negative number or one that there is no box or cutoff for; if a
         radius is negative, not finite, above 2**1022 or, not being 0, below 2**-1021 with `rule`
@@ -279,6 +285,12 @@ def pairs(
     >>> i.tolist(), j.tolist()
     ([0], [1])
 
+    Two shells around each point, in one search:
+
+    >>> d, k = hs.pairs([[0.0], [1.0], [3.0]], [1.0, 2.5], quantities="dk", sort=True)
+    >>> d.tolist(), k.tolist()
+    ([1.0, 2.0], [0, 1])
+
     Two systems in one call, which do not see each other:
 
     >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
@@ -310,11 +322,12 @@ def pairs(
     )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
+    cutoff, shells = as_shells(cutoff, quantities, precision, given, batch)
     if batch is None:
         search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
         return _core.pairs(
             *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach,
-            algorithm,
+            algorithm, shells,
         )  # fmt: skip
     scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
     wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out

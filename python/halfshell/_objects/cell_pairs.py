@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, most_pairs
+from halfshell._convert.shells import as_shells
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
 
@@ -23,7 +24,7 @@ class CellPairs(KeptCells):
 
     def pairs(
         self,
-        cutoff: Number | None = None,
+        cutoff: Number | Sequence[float] | npt.NDArray[Any] | None = None,
         *,
         quantities: str = "ij",
         inclusive: bool = True,
@@ -39,8 +40,8 @@ class CellPairs(KeptCells):
 
         Parameters
         ----------
-        cutoff : float, optional
-            Default: that of the list.
+        cutoff : float or array_like of float, shape (k,), optional
+            Default: that of the list. Several with the letter ``k``.
         quantities, inclusive, sort, index_dtype, out, kernel, memory_limit, progress
             As in `halfshell.pairs`.
         threads : int, optional
@@ -59,14 +60,15 @@ class CellPairs(KeptCells):
         [[0, 1]]
         """
         options = inclusive, kernel, threads, memory_limit
+        cutoff, shells = as_shells(cutoff, quantities, self._precision)
         return _core.pairs(
             *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
-            as_index_bytes(index_dtype), out, None, AUTO,
+            as_index_bytes(index_dtype), out, None, AUTO, shells,
         )
 
     def iter_pairs(
         self,
-        cutoff: Number | None = None,
+        cutoff: Number | Sequence[float] | npt.NDArray[Any] | None = None,
         *,
         quantities: str = "ij",
         max_pairs: int = 1 << 20,
@@ -81,8 +83,8 @@ class CellPairs(KeptCells):
 
         Parameters
         ----------
-        cutoff : float, optional
-            Default: that of the list.
+        cutoff : float or array_like of float, shape (k,), optional
+            Default: that of the list. Several with the letter ``k``.
         quantities, max_pairs, inclusive, index_dtype, kernel, memory_limit, progress
             As in `halfshell.iter_pairs`.
         threads : int, optional
@@ -102,11 +104,12 @@ class CellPairs(KeptCells):
         2
         """
         most = most_pairs(max_pairs)
+        cutoff, shells = as_shells(cutoff, quantities, self._precision)
         search = self._arguments(
             cutoff, (inclusive, kernel, threads, memory_limit), progress
         )
         index_bytes = as_index_bytes(index_dtype)
-        blocks = _core.iter_pairs(*search, quantities, index_bytes, most, None, AUTO)
+        blocks = _core.iter_pairs(*search, quantities, index_bytes, most, None, AUTO, shells)
         return cast("PairBlocks[Any]", blocks)
 
     def for_each_pair(
