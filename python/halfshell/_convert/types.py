@@ -116,6 +116,7 @@ class PairOptions(ReachOptions, total=False):
     out: Out | None
     progress: Progress
     batch: npt.ArrayLike | None
+    touching: npt.ArrayLike | None
 
 
 class BetweenOptions(ReachOptions, total=False):

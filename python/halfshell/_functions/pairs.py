@@ -85,6 +85,7 @@ def pairs(
     memory_limit: float | None = None,
     progress: Callable[[float], object] | None = None,
     batch: npt.ArrayLike | None = None,
+    touching: npt.ArrayLike | None = None,
 ) -> Arrays:
     """Find every pair of points within a cutoff, each once.
 
@@ -180,6 +181,12 @@ def pairs(
         for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
         systems out. With `radii`, `types` or `supports`, one for each point of all systems,
         `cutoff` is a further limit, of all or one a system, or the table or dict of all.
+    touching : array_like of int, shape (k,), optional
+        Numbers of points, each once: only pairs with one of these, for moves of a few. They are
+        found from these points, whose number the time follows once all points are in cells. With
+        ``sort=False`` they come in the order of `touching`, those of one point by the other one; a
+        pair of two of these points comes with the lower one. Not with `batch`, the letter ``k`` or
+        `precision` "single".
 
     Returns
     -------
@@ -207,20 +214,20 @@ def pairs(
         cannot be converted to an array, flags that are not bools, a `progress` that cannot be
         called.
     ValueError
-        If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
-        finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
-        linearly dependent or so skewed or different in length that float64 does not place points
-        along the short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
-        or `kernel` is none of those offered; if `quantities` has the letter k without several
-        cutoffs, or these descend or are none; or `memory_limit` is negative; if `periodic` is given
-        without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
-        not ascending or has a negative number or one that there is no box or cutoff for; if a
-        radius is negative, not finite, above 2**1022 or, not being 0, below 2**-1021 with `rule`
-        "mean", as its half may be no float64; if `rule` is given without `radii`, or has a
-        direction, as those of `neighbors` may; if a table of cutoffs is not symmetric, a dict is in
-        contradiction or names no element, or a type is none of the table; if a support is not
-        finite, not symmetric or, decided exactly, not positive definite, or reaches further than
-        2**1022; if two of `radii`, `types` and `supports` are given together.
+        If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not finite,
+        an integer is beyond 2**53 and no float64, the periodic box vectors are exactly linearly
+        dependent or so skewed or different in length that float64 does not place points along the
+        short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision` or `kernel`
+        is none of those offered; if `quantities` has the letter k without several cutoffs, or these
+        descend or are none; if `touching` names no point, or one twice; if `memory_limit` is
+        negative; if `periodic` is given without `box`, or `box` or `periodic` beside an object that
+        brings its own; if `batch` is not ascending or has a negative number or one that there is no
+        box or cutoff for; if a radius is negative, not finite, above 2**1022 or, not being 0, below
+        2**-1021 with `rule` "mean", as its half may be no float64; if `rule` is given without
+        `radii`, or has a direction, as those of `neighbors` may; if a table of cutoffs is not
+        symmetric, a dict is in contradiction or names no element, or a type is none of the table;
+        if a support is not finite, not symmetric or, decided exactly, not positive definite, or
+        reaches further than 2**1022; if two of `radii`, `types` and `supports` are given together.
     CapacityError
         If an array of `out` is too small; it carries ``needed``. What `out` holds is unspecified
         then.
@@ -291,6 +298,12 @@ def pairs(
     >>> d.tolist(), k.tolist()
     ([1.0, 2.0], [0, 1])
 
+    Only the pairs of a point that has moved:
+
+    >>> i, j = hs.pairs([[0.0], [1.0], [2.0], [3.0]], 1.0, touching=[2])
+    >>> i.tolist(), j.tolist()
+    ([1, 2], [2, 3])
+
     Two systems in one call, which do not see each other:
 
     >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
@@ -304,7 +317,7 @@ def pairs(
     """
     if type(box) is Box:
         box = box.vectors
-    if batch is None and (
+    if batch is None and touching is None and (
         radii is None and types is None and rule is None and supports is None and extent is None
         and algorithm is AUTO
     ):
@@ -318,17 +331,21 @@ def pairs(
             return cast("Arrays", result)
     check_apart(
         out, points=points, cutoff=cutoff, box=box, batch=batch, radii=radii, types=types,
-        supports=supports,
+        supports=supports, touching=touching,
     )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
     cutoff, shells = as_shells(cutoff, quantities, precision, given, batch)
+    wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
+    if touching is not None and (batch is not None or shells is not None):
+        other = "batch" if batch is not None else "the letter k"
+        raise ValueError(f"touching does not go with {other}")
     if batch is None:
         search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
-        return _core.pairs(
-            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach,
-            algorithm, shells,
-        )  # fmt: skip
+        if touching is None:
+            return _core.pairs(*(*search, *wanted, reach, algorithm, shells))
+        from halfshell._convert.touching import pairs_touching  # here: others do without
+
+        return pairs_touching(search, search[0], touching, wanted, reach, algorithm)
     scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
-    wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
     return _core.batch_pairs(*(*scene, *rest, *wanted, *own, reach, algorithm))

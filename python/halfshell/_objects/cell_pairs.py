@@ -12,6 +12,7 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, most_pairs
+from halfshell._convert.scene import check_apart
 from halfshell._convert.shells import as_shells
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
@@ -35,6 +36,7 @@ class CellPairs(KeptCells):
         threads: int | None = None,
         memory_limit: float | None = None,
         progress: Callable[[float], object] | None = None,
+        touching: npt.ArrayLike | None = None,
     ) -> Arrays:
         """Find every pair of points within a cutoff, as `halfshell.pairs` does.
 
@@ -46,6 +48,8 @@ class CellPairs(KeptCells):
             As in `halfshell.pairs`.
         threads : int, optional
             As in `halfshell.pairs`. Default: that of the list.
+        touching : array_like of int, shape (k,), optional
+            As in `halfshell.pairs`: the time follows their number alone.
 
         Returns
         -------
@@ -61,10 +65,17 @@ class CellPairs(KeptCells):
         """
         options = inclusive, kernel, threads, memory_limit
         cutoff, shells = as_shells(cutoff, quantities, self._precision)
-        return _core.pairs(
-            *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
-            as_index_bytes(index_dtype), out, None, AUTO, shells,
-        )
+        search = self._arguments(cutoff, options, progress)
+        wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
+        if touching is None:
+            return _core.pairs(*(*search, *wanted, None, AUTO, shells))
+        if shells is not None:
+            raise ValueError("touching does not go with the letter k")
+        check_apart(out, touching=touching)
+        from halfshell._convert.touching import pairs_touching  # here: others do without
+
+        points = self._origin.scene()[0]
+        return pairs_touching(search, points, touching, wanted, None, AUTO)
 
     def iter_pairs(
         self,
