@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
+# A mark for each of so many points takes less time than one look-up among numbers that ascend.
+_POINTS_PER_LOOKUP = 32
+
 # How a search for pairs writes them: quantities, sort, index_bytes, out.
 Wanted = tuple[str, bool, int, "Out | None"]
 
@@ -55,7 +58,7 @@ def pairs_touching(
         *search, letters, True, index_bytes, None, points[numbers],
         _among(reach, numbers), algorithm,
     )  # fmt: skip
-    columns = _half_list(dict(zip(letters, rows, strict=True)), numbers, sort)
+    columns = _half_list(dict(zip(letters, rows, strict=True)), numbers, len(points), sort)
     if "P" in quantities:
         columns["P"] = np.stack([columns["i"], columns["j"]], axis=1)
     arrays = tuple(columns[letter] for letter in quantities)
@@ -75,24 +78,21 @@ def _among(reach: Reach | None, numbers: npt.NDArray[np.int64]) -> Reach | None:
 
 
 def _half_list(
-    columns: dict[str, Array], numbers: npt.NDArray[np.int64], sort: bool
+    columns: dict[str, Array], numbers: npt.NDArray[np.int64], n_points: int, sort: bool
 ) -> dict[str, Array]:
     """Rows of these points, ascending by (j, S), as pairs that are there once."""
     row, j = columns["i"], columns["j"]
     i = numbers.astype(row.dtype)[row]
-    ascending = np.sort(numbers)
-    place = np.minimum(np.searchsorted(ascending, j), len(ascending) - 1)
-    is_touched = ascending[place] == j if len(ascending) else np.zeros(len(j), dtype=bool)
-    keep = ~is_touched | (i < j)
+    keep = ~_are_among(j, numbers, n_points) | (i < j)
     # A point meets its images in the order of S: the middle one is itself, at S = 0, and those
     # behind it have a positive first component.
     own = np.flatnonzero(i == j)
     n_own = np.bincount(row[own], minlength=len(numbers))
     rank = np.arange(len(own)) - np.repeat(np.cumsum(n_own) - n_own, n_own)
     keep[own] = rank > np.repeat(n_own // 2, n_own)
-    keep = np.flatnonzero(keep)
-    kept = {letter: array[keep] for letter, array in columns.items() if letter in "dDS"}
-    i, j = i[keep], j[keep]
+    entries = np.flatnonzero(keep)
+    kept = {letter: array[entries] for letter, array in columns.items() if letter in "dDS"}
+    i, j = i[entries], j[entries]
     back = np.flatnonzero(j < i)  # these come from their second point
     i[back], j[back] = j[back], i[back]
     if "D" in kept:
@@ -107,6 +107,17 @@ def _half_list(
         order = np.lexsort((place, j, i))
         kept = {letter: array[order] for letter, array in kept.items()}
     return kept
+
+
+def _are_among(j: Array, numbers: npt.NDArray[np.int64], n_points: int) -> npt.NDArray[np.bool_]:
+    """Whether each of j is one of these numbers."""
+    if len(j) > n_points // _POINTS_PER_LOOKUP:
+        is_touched = np.zeros(n_points, dtype=bool)
+        is_touched[numbers] = True
+        return is_touched[j]
+    ascending = np.append(np.sort(numbers), -1)  # behind the last one
+    found: npt.NDArray[np.bool_] = ascending[np.searchsorted(ascending[:-1], j)] == j
+    return found
 
 
 def _check_opposites(shifts: Array) -> None:

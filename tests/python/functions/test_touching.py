@@ -175,6 +175,12 @@ def test_any_letters_and_arrays_of_the_caller(quantities, index_dtype, rng):
         hs.pairs(points, cutoff, quantities=quantities, out=wrong, **options)
 
 
+def test_few_among_many(rng):
+    points = rng.random((20_000, 3))
+    for numbers in ([7], [11, 3], list(range(0, 20_000, 7))):
+        assert_part(points, 0.03, numbers, box=[1.0] * 3)
+
+
 def test_double_precision_is_that_of_the_plain_list(rng):
     points, cutoff, box, _ = random_scene(rng, 80)
     assert_part(points, cutoff, [4, 9], box=box, precision="double")
