@@ -141,7 +141,8 @@ enum {
     HS_WANT_DISTANCE = 4, /* |D|, float64, within 1 ulp, never on the wrong side of the cutoff */
     HS_WANT_VECTOR = 8,   /* D, float64, each component within 1 ulp of |D| */
     HS_WANT_SHIFT = 16,   /* S, int32 */
-    HS_WANT_BOTH = 32     /* i and j side by side */
+    HS_WANT_BOTH = 32,    /* i and j side by side */
+    HS_WANT_SHELL = 64    /* the innermost of options->shells that holds the pair, int32 */
 };
 
 /* Bytes are accounted by what they are for. */
@@ -153,7 +154,7 @@ typedef enum hs_purpose {
     HS_FOR_CELLS,      /* where each cell starts */
     HS_FOR_STENCIL,    /* neighbouring cell rows */
     HS_FOR_CANDIDATES, /* the gathered neighbourhood of one group */
-    HS_FOR_INDICES,    /* i and j */
+    HS_FOR_INDICES,    /* i and j, and the shell */
     HS_FOR_DISTANCES,  /* d */
     HS_FOR_VECTORS,    /* D */
     HS_FOR_SHIFTS,     /* S */
@@ -192,6 +193,7 @@ typedef struct hs_pair_arrays {
     double  *distance;    /* m */
     double  *vector;      /* m * ndim */
     int32_t *shift;       /* m * ndim */
+    int32_t *shell;       /* m */
 } hs_pair_arrays;
 
 /* Called where the result may be large, seldom more than once in a call: bytes that may still be
@@ -219,12 +221,17 @@ typedef struct hs_options {
     const char           *kernel;  /* borrowed; NULL: the best of this CPU */
     int                   threads; /* at most so many, 0 as 1, where the work is worth them, and
                                   HS_MOST_THREADS; -n: n from HS_POINTS_FOR_THREADS on, else 1 */
-    double       memory_limit;     /* bytes that result and search may take; infinity: no limit */
-    hs_limit_fn  find_limit;       /* NULL, or called for a further limit beyond 64 MB */
-    void        *find_context;
-    hs_poll_fn   poll; /* NULL: never */
-    void        *poll_context;
-    hs_counters *counters; /* borrowed, filled also on failure; NULL: not wanted */
+    double        memory_limit;    /* bytes that result and search may take; infinity: no limit */
+    hs_limit_fn   find_limit;      /* NULL, or called for a further limit beyond 64 MB */
+    void         *find_context;
+    hs_poll_fn    poll; /* NULL: never */
+    void         *poll_context;
+    hs_counters  *counters; /* borrowed, filled also on failure; NULL: not wanted */
+    int64_t       n_shells; /* with HS_WANT_SHELL, less than 2^30; ignored without it: */
+    const double *shells;   /* borrowed: cutoffs that do not descend, the last one being `cutoff`.
+                              Shell k holds the pairs within number k and not within number k - 1,
+                              decided exactly; d is on the right side of both. For HS_EXACT in
+                              hs_pairs_find and hs_stream_open, without a reach */
 } hs_options;
 
 /* Defaults: cutoff 0, inclusive, unsorted, exact, i and j of 8 bytes, no limit, no poll. */

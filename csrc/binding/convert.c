@@ -89,7 +89,7 @@ hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, bool *
 
 /* The bit of a letter of HS_LETTERS is its HS_WANT_ bit. */
 _Static_assert(HS_WANT_I == 1 && HS_WANT_J == 2 && HS_WANT_DISTANCE == 4 && HS_WANT_VECTOR == 8 &&
-                   HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32,
+                   HS_WANT_SHIFT == 16 && HS_WANT_BOTH == 32 && HS_WANT_SHELL == 64,
                "hs_quantities_of counts on this");
 
 /* Names the letters that are known. */

@@ -30,6 +30,7 @@ form_of(char letter, int ndim, int index_bytes)
     case 'd': return (array_form){HS_WANT_DISTANCE, NPY_DOUBLE, 0, sizeof(double)};
     case 'D': return (array_form){HS_WANT_VECTOR, NPY_DOUBLE, ndim, d * sizeof(double)};
     case 'S': return (array_form){HS_WANT_SHIFT, NPY_INT32, ndim, d * sizeof(int32_t)};
+    case 'k': return (array_form){HS_WANT_SHELL, NPY_INT32, 0, sizeof(int32_t)};
     default: return (array_form){HS_WANT_BOTH, index_type, 2, 2 * index};
     }
 }
@@ -227,6 +228,7 @@ hs_out_of(PyObject *out, const char *letters, int ndim, int index_bytes, hs_pair
         case HS_WANT_DISTANCE: arrays->distance = data; break;
         case HS_WANT_VECTOR: arrays->vector = data; break;
         case HS_WANT_SHIFT: arrays->shift = data; break;
+        case HS_WANT_SHELL: arrays->shell = data; break;
         default: arrays->both = data; break;
         }
     }
@@ -327,7 +329,8 @@ pad_integers(PyArrayObject *array, int64_t first, int64_t even, int64_t odd)
 }
 
 void
-hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j)
+hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j,
+           int64_t no_shell)
 {
     const Py_ssize_t n = (Py_ssize_t)strlen(letters);
     for (Py_ssize_t k = 0; k < n; k++) {
@@ -338,6 +341,7 @@ hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int6
         case 'i': pad_integers(array, first, no_i, no_i); break;
         case 'j': pad_integers(array, first, no_j, no_j); break;
         case 'P': pad_integers(array, 2 * first, no_i, no_j); break;
+        case 'k': pad_integers(array, first, no_shell, no_shell); break;
         case 'd':
             for (double *to = (double *)rest; to < (double *)PyArray_DATA(array) + size; to++) {
                 *to = (double)INFINITY;

@@ -29,8 +29,9 @@ PyObject *hs_out_new(const char *letters, int ndim, int index_bytes, int64_t cap
 double hs_out_bytes(const char *letters, int ndim, int index_bytes, int64_t capacity);
 
 /* Writes what is no pair into these arrays from row `first` on: `no_i` and `no_j` as i and j, an
- * infinite distance, zeros as vector and shift. */
-void hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j);
+ * infinite distance, zeros as vector and shift, `no_shell` as shell. */
+void hs_out_pad(PyObject *out, const char *letters, int64_t first, int64_t no_i, int64_t no_j,
+                int64_t no_shell);
 
 /* New arrays in the order of the letters: a tuple, or for one letter the array itself. Takes
  * what it can from the pairs; a new reference or NULL. */

@@ -123,7 +123,8 @@ take_number(char letter, PyObject *object, bool is_plain, hs_py_call *call)
 {
     hs_options *options = &call->options;
     switch (letter) {
-    case 'q': return hs_quantities_of(object, HS_LETTERS, &call->letters, &options->want);
+    case 'q': return hs_quantities_of(object, HS_ALL_LETTERS, &call->letters, &options->want);
+    case 'k': return hs_quantities_of(object, HS_LETTERS, &call->letters, &options->want);
     case 'r': return hs_quantities_of(object, HS_ROW_LETTERS, &call->letters, &options->want);
     case 's': return take_truth(object, &options->sorted);
     case 'b': return take_index_bytes(object, is_plain, options);
@@ -191,6 +192,27 @@ take_reach(PyObject *object, hs_py_call *call)
     return hs_reach_of(object, call->points.n, n_queries, call->points.ndim, &call->reach);
 }
 
+/* The cutoffs of shells, which go with their letter; NULL: one cutoff. */
+static bool
+take_shells(PyObject *object, hs_options *options)
+{
+    const bool is_wanted = options->want & HS_WANT_SHELL;
+    if (object == NULL) {
+        if (is_wanted) {
+            PyErr_SetString(PyExc_ValueError,
+                            "the letter k in quantities goes with several cutoffs, got one");
+        }
+        return !is_wanted;
+    }
+    if (!is_wanted || !hs_is_array(object, NPY_DOUBLE, 1)) {
+        PyErr_SetString(PyExc_TypeError, "several cutoffs must be a float64 array, with letter k");
+        return false;
+    }
+    options->n_shells = PyArray_DIM((PyArrayObject *)object, 0);
+    options->shells = PyArray_DATA((PyArrayObject *)object);
+    return true;
+}
+
 /* What else is a view: queries, reach, and `out`, which comes last and is compared with others. */
 static bool
 take_more_views(PyObject *queries, PyObject *out, PyObject *reach, PyObject *const *arguments,
@@ -229,7 +251,7 @@ static int
 count_needed(const char *more, int n_letters)
 {
     int n = n_letters;
-    while (n > 0 && strchr("hgc", more[n - 1]) != NULL) {
+    while (n > 0 && strchr("hgec", more[n - 1]) != NULL) {
         n--;
     }
     return n;
@@ -244,7 +266,7 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
     const int  n_letters = (int)strlen(more), n_needed = count_needed(more, n_letters);
     const int  n_more = n_given < n_needed ? n_needed : n_given < n_letters ? n_given : n_letters;
     PyObject *const *own = arguments + HS_CALL_ARGUMENTS;
-    PyObject        *queries = NULL, *out = NULL, *reach = NULL;
+    PyObject        *queries = NULL, *out = NULL, *reach = NULL, *shells = NULL;
     hs_options      *options = &call->options;
     unsigned long    repeats;
     if (!hs_expect_arguments(name, n_arguments & ~HS_PLAIN, HS_CALL_ARGUMENTS + n_more) ||
@@ -268,8 +290,9 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
         queries = more[k] == 'R' || (more[k] == 'Q' && own[k] != Py_None) ? own[k] : queries;
         out = more[k] == 'o' && own[k] != Py_None ? own[k] : out;
         reach = more[k] == 'h' && own[k] != Py_None ? own[k] : reach;
+        shells = more[k] == 'e' && own[k] != Py_None ? own[k] : shells;
     }
-    if (!take_scene(arguments[0], arguments[2], repeats, call) ||
+    if (!take_shells(shells, options) || !take_scene(arguments[0], arguments[2], repeats, call) ||
         !take_more_views(queries, out, reach, arguments, call)) {
         return false;
     }

@@ -43,7 +43,8 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  * precision, kernel, memory_limit (None: ask the machine), progress (None: no calls), threads
  * (None: as many as pay). Then what this function takes beyond them, a letter each:
  *
- *   q  quantities: some of HS_LETTERS        s  sort
+ *   q  quantities: some of HS_ALL_LETTERS    s  sort
+ *   k  quantities: some of HS_LETTERS, with e: several cutoffs, or None: may be left out
  *   r  quantities: some of HS_ROW_LETTERS    b  index_bytes
  *   Q  queries, or None                      o  out, or None
  *   R  queries                               f, i, x  `flag`, `integer`, `real` of the call

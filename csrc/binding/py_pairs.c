@@ -11,7 +11,7 @@ hs_py_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments
     hs_py_call call;
     hs_pairs  *pairs = NULL;
     (void)module;
-    if (!hs_py_call_take(&call, "pairs", "qsbohgc", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "pairs", "ksbohgec", arguments, n_arguments) ||
         !hs_py_call_make_room(&call)) {
         return NULL;
     }

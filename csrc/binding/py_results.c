@@ -70,7 +70,8 @@ padded(hs_py_call *call, hs_status status, int64_t n_pairs)
     PyObject     *result = NULL;
     if (fits || (status == HS_ERR_CAPACITY && call->capacity < 0)) {
         const hs_points *asking = call->among.queries != NULL ? &call->queries : &call->points;
-        hs_out_pad(call->room, call->letters, fits ? needed : 0, asking->n, call->points.n);
+        hs_out_pad(call->room, call->letters, fits ? needed : 0, asking->n, call->points.n,
+                   call->options.n_shells);
         Py_INCREF(call->room);
         result = call->room;
         if (call->capacity < 0) {

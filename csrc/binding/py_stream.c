@@ -177,7 +177,7 @@ static bool
 take_arguments(pair_stream *self, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call *call = &self->call;
-    if (!hs_py_call_take(call, "iter_pairs", "qbihg", arguments, n_arguments)) {
+    if (!hs_py_call_take(call, "iter_pairs", "kbihge", arguments, n_arguments)) {
         return false;
     }
     strcpy(self->letters, call->letters); /* six different ones at most */

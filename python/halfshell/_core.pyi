@@ -33,7 +33,9 @@ _Batch = tuple[npt.NDArray[np.int64], _Floats | None, _Floats | None]
 # pairs is returned as well.
 _Room = tuple[int | None, ...]
 
-def pairs(*arguments: *tuple[*_Search, *_Result, _Reach, str, *_Room]) -> _Arrays: ...
+def pairs(
+    *arguments: *tuple[*_Search, *_Result, _Reach, str, _Floats | None, *_Room]
+) -> _Arrays: ...
 def count_pairs(*arguments: *tuple[*_Search, _Reach, str]) -> int: ...
 def pairs_between(
     *arguments: *tuple[*_Search, *_Result, _Queries, _Reach, str, *_Room]
@@ -50,8 +52,8 @@ def neighbors(
     *arguments: *tuple[*_Search, str, int, _Queries, _Reach, str]
 ) -> tuple[npt.NDArray[Any], ...]: ...
 
-# quantities, index_bytes, max_pairs -> a PairBlocks
-def iter_pairs(*arguments: *tuple[*_Search, str, int, int, _Reach, str]) -> Any: ...
+# quantities, index_bytes, max_pairs; last the cutoffs of shells -> a PairBlocks
+def iter_pairs(*arguments: *tuple[*_Search, str, int, int, _Reach, str, _Floats | None]) -> Any: ...
 
 # callback, user_data, thread_safe
 def for_each_pair(

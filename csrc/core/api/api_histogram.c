@@ -5,39 +5,13 @@
 #include "../collect/parallel.h"
 #include "../histogram/tally.h"
 
-#include <math.h>
-
-#define MOST_EDGES (INT64_C(1) << 30) /* slots are int32 */
-
 static hs_status
 check_histogram(const hs_histogram *histogram, hs_failure *failure)
 {
     if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
         return HS_ERR_ARGUMENT;
     }
-    if (histogram->n_edges < 1 || histogram->n_edges >= MOST_EDGES) {
-        return HS_ERR_EDGES;
-    }
-    for (int64_t k = 0; k < histogram->n_edges; k++) {
-        const double edge = histogram->edges[k];
-        if (!isfinite(edge) || edge < 0.0 || (k > 0 && edge < histogram->edges[k - 1])) {
-            failure->row = k;
-            failure->value = edge;
-            return HS_ERR_EDGES;
-        }
-    }
-    return HS_OK;
-}
-
-static double
-smallest_edge(const hs_histogram *histogram)
-{
-    for (int64_t k = 0; k < histogram->n_edges; k++) {
-        if (histogram->edges[k] > 0.0) {
-            return histogram->edges[k];
-        }
-    }
-    return 0.0;
+    return hs_check_lengths(histogram->edges, histogram->n_edges, failure);
 }
 
 /* What the threads share. */
@@ -175,7 +149,7 @@ find_histogram(const hs_among *among, const hs_options *options, const hs_histog
     hs_request       request = hs_request_among(among, HS_HALF_OR_QUERIES, &of_search);
     request.sets.is_plain = true;
     request.sets.keeps_none = true;
-    request.sets.least_cutoff = smallest_edge(histogram);
+    request.sets.least_cutoff = hs_least_length(histogram->edges, histogram->n_edges);
     return hs_request_use(&request, fill_histogram, &filled, failure);
 }
 

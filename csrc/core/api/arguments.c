@@ -126,7 +126,8 @@ has_all(const hs_pair_arrays *out, unsigned want)
            (!(want & HS_WANT_BOTH) || out->both != NULL) &&
            (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
            (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
-           (!(want & HS_WANT_SHIFT) || out->shift != NULL);
+           (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
+           (!(want & HS_WANT_SHELL) || out->shell != NULL);
 }
 
 /* Each array that is wanted is there, if anything is to be written to it. */
@@ -143,16 +144,16 @@ hs_check_resources(const hs_options *options)
     return status_of(options->threads > INT_MIN && options->memory_limit >= 0.0);
 }
 
-hs_status
-hs_check_options(const hs_options *options)
+/* These options, of which `known` are bits that may be wanted. */
+static hs_status
+check_options(const hs_options *options, unsigned known)
 {
     const unsigned        want = options->want;
     const hs_pair_arrays *out = options->out;
     if (hs_check_resources(options) != HS_OK) {
         return HS_ERR_ARGUMENT;
     }
-    return status_of((want & ~HS_WANT_ALL) == 0 &&
-                     (want == 0 || is_index_size(options->index_bytes)) &&
+    return status_of((want & ~known) == 0 && (want == 0 || is_index_size(options->index_bytes)) &&
                      (out == NULL || can_hold(out, want)) && options->cell_size >= 0.0 &&
                      (unsigned)options->algorithm < HS_ALGORITHM_END &&
                      (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
@@ -160,8 +161,54 @@ hs_check_options(const hs_options *options)
 }
 
 hs_status
-hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, hs_failure *failure)
+hs_check_options(const hs_options *options)
+{
+    return check_options(options, HS_WANT_ALL);
+}
+
+hs_status
+hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure)
+{
+    if (n < 1 || n >= HS_MOST_LENGTHS) {
+        return HS_ERR_EDGES;
+    }
+    for (int64_t k = 0; k < n; k++) {
+        if (!isfinite(lengths[k]) || lengths[k] < 0.0 || (k > 0 && lengths[k] < lengths[k - 1])) {
+            failure->row = k;
+            failure->value = lengths[k];
+            return HS_ERR_EDGES;
+        }
+    }
+    return HS_OK;
+}
+
+double
+hs_least_length(const double *lengths, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++) {
+        if (lengths[k] > 0.0) {
+            return lengths[k];
+        }
+    }
+    return 0.0;
+}
+
+/* Shells are those of an exact search, up to its cutoff. */
+static hs_status
+check_shells(const hs_options *options, hs_failure *failure)
+{
+    if (options->shells == NULL || options->precision != HS_EXACT) {
+        return HS_ERR_ARGUMENT;
+    }
+    const hs_status status = hs_check_lengths(options->shells, options->n_shells, failure);
+    return status == HS_OK ? status_of(options->shells[options->n_shells - 1] == options->cutoff)
+                           : status;
+}
+
+/* Points, queries and box. */
+static hs_status
+check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
+           hs_failure *failure)
 {
     hs_status status = hs_check_points(points, failure);
     if (status == HS_OK) {
@@ -172,5 +219,25 @@ hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_b
         failure->in_queries = status != HS_OK;
         status = status == HS_OK ? status_of(queries->ndim == points->ndim) : status;
     }
+    return status;
+}
+
+hs_status
+hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
+                   const hs_options *options, hs_failure *failure)
+{
+    const hs_status status = check_sets(points, queries, box, failure);
     return status == HS_OK ? hs_check_options(options) : status;
+}
+
+hs_status
+hs_check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
+                   hs_failure *failure)
+{
+    hs_status status = check_sets(points, NULL, box, failure);
+    if (status == HS_OK) {
+        status = check_options(options, HS_WANT_ALL | HS_WANT_SHELL);
+    }
+    return status == HS_OK && (options->want & HS_WANT_SHELL) ? check_shells(options, failure)
+                                                              : status;
 }

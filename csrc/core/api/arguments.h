@@ -41,8 +41,21 @@ hs_status hs_check_resources(const hs_options *options);
 
 hs_status hs_check_options(const hs_options *options);
 
+/* Most lengths that distances are sorted by: twice as many are int32. */
+#define HS_MOST_LENGTHS (INT64_C(1) << 30)
+
+/* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
+hs_status hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure);
+
+/* The first of such lengths that is above 0, or 0. */
+double hs_least_length(const double *lengths, int64_t n);
+
 /* Checks all of the above but systems; failure->in_queries tells queries from points. */
 hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
                              const hs_options *options, hs_failure *failure);
+
+/* The same for half lists, which may have shells. */
+hs_status hs_check_half_list(const hs_points *points, const hs_box *box, const hs_options *options,
+                             hs_failure *failure);
 
 #endif

@@ -45,13 +45,19 @@ hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *opt
 hs_status
 hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_failure *failure)
 {
-    const hs_sets *sets = &request->sets;
-    hs_status      sound =
-        hs_check_arguments(sets->points, sets->queries, request->box, request->options, failure);
+    const hs_options *options = request->options;
+    hs_sets           sets = request->sets;
+    hs_status         sound =
+        sets.is_full ? hs_check_arguments(sets.points, sets.queries, request->box, options, failure)
+                             : hs_check_half_list(sets.points, request->box, options, failure);
     if (request->reach != NULL) { /* which this search does not know */
         sound = HS_ERR_ARGUMENT;
     }
-    return sound == HS_OK ? hs_search_open(sets, request->box, call, search, failure) : sound;
+    if (sound == HS_OK && (options->want & HS_WANT_SHELL)) {
+        sets.is_plain = true;
+        sets.least_cutoff = hs_least_length(options->shells, options->n_shells);
+    }
+    return sound == HS_OK ? hs_search_open(&sets, request->box, call, search, failure) : sound;
 }
 
 hs_status

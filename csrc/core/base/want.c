@@ -16,6 +16,7 @@ static const quantity quantities[HS_QUANTITIES] = {
     {HS_FOR_VECTORS, sizeof(double), 0},   /* HS_WANT_VECTOR */
     {HS_FOR_SHIFTS, sizeof(int32_t), 0},   /* HS_WANT_SHIFT */
     {HS_FOR_INDICES, 0, 2},                /* HS_WANT_BOTH */
+    {HS_FOR_INDICES, sizeof(int32_t), 1},  /* HS_WANT_SHELL */
 };
 
 static size_t

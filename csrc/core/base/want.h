@@ -8,10 +8,10 @@
 
 #include "../../halfshell.h"
 
-#define HS_QUANTITIES 6 /* one for each HS_WANT_ bit */
+#define HS_QUANTITIES 7 /* one for each HS_WANT_ bit */
 
-/* Every HS_WANT_ bit. */
-#define HS_WANT_ALL ((1u << HS_QUANTITIES) - 1u)
+/* Every HS_WANT_ bit that needs no other options. */
+#define HS_WANT_ALL (2u * HS_WANT_BOTH - 1u)
 
 /* Bytes of one pair in the column of this HS_WANT_ bit. index_bytes: 4 or 8, of i and j. */
 size_t hs_want_width(unsigned bit, int ndim, int index_bytes);

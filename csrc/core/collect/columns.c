@@ -42,7 +42,8 @@ void
 hs_output_fix(hs_output *output, const hs_pair_arrays *arrays)
 {
     void *const data[HS_QUANTITIES] = {arrays->i,      arrays->j,     arrays->distance,
-                                       arrays->vector, arrays->shift, arrays->both};
+                                       arrays->vector, arrays->shift, arrays->both,
+                                       arrays->shell};
     for (int k = 0; k < HS_QUANTITIES; k++) {
         output->column[k] = (hs_region){.data = data[k]};
     }

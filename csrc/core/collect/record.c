@@ -5,6 +5,7 @@
 
 #include "record_measures.h"
 #include "record_write.h"
+#include "record_shells.h"
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 
@@ -77,13 +78,16 @@ put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits 
 hs_status
 hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    const int32_t   n = hits->end[hits->n - 1];
-    const int32_t  *id = scanner->block.id;
-    hs_hits         by_id = *hits;
-    bool            written;
-    const hs_status status = hs_write_hits(recorder, scanner, first, hits, &written);
-    if (status != HS_OK || written) {
+    const int32_t  n = hits->end[hits->n - 1];
+    const int32_t *id = scanner->block.id;
+    hs_hits        by_id = *hits;
+    bool           written;
+    hs_status      status = hs_write_hits(recorder, scanner, first, hits, &written);
+    if (status != HS_OK) {
         return status;
+    }
+    if (written) {
+        return hs_put_shells(recorder, scanner, first, hits);
     }
     if (scanner->search->is_half || (recorder->columns & INDICES)) {
         for (int32_t h = 0; h < n; h++) {
@@ -92,7 +96,8 @@ hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, cons
         by_id.label = recorder->ids;
         put_indices(recorder, scanner->search, &by_id);
     }
-    return hs_put_measures(recorder, scanner, first, hits);
+    status = hs_put_measures(recorder, scanner, first, hits);
+    return status == HS_OK ? hs_put_shells(recorder, scanner, first, hits) : status;
 }
 
 hs_status

@@ -74,7 +74,7 @@ put_distances(hs_recorder *recorder, const hs_scanner *scanner, int32_t first)
     const hs_options *options = &search->call->options;
     const int32_t     n = scanner->trace.n;
     const hs_scale    unscale = hs_measures_unscale(&search->scene);
-    double           *to = hs_output_next(recorder->output, HS_WANT_DISTANCE);
+    double           *to = hs_recorder_distances(recorder);
     hs_restore_distances(recorder->distance, n, unscale);
     if (options->precision == HS_EXACT && search->limits != NULL &&
         search->limits->supports == NULL) {
@@ -186,7 +186,7 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
 {
     hs_trace        *trace = &scanner->trace;
     const hs_search *search = scanner->search;
-    const bool       measured = recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR);
+    const bool       measured = recorder->columns & HS_MEASURED;
     double           sign[HS_BATCH];
     const hs_status  status = hs_trace_look_up(&scanner->trace, measured, &scanner->failed_point);
     if (status != HS_OK) {
@@ -202,7 +202,7 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
     if (measured) {
         measure(recorder, trace);
     }
-    if (recorder->columns & HS_WANT_DISTANCE) {
+    if (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_SHELL)) {
         put_distances(recorder, scanner, part->first);
     }
     if (recorder->columns & HS_WANT_VECTOR) {

@@ -16,7 +16,7 @@ can_write(const hs_recorder *recorder, const hs_scanner *scanner)
     const int        d = search->scene.ndim;
     return search->call->kernel->write != NULL && search->limits == NULL &&
            (search->is_half || !(recorder->columns & (HS_WANT_I | HS_WANT_J))) && d >= 2 &&
-           d <= HS_WRITE_MOST_DIM && (recorder->columns & (HS_WANT_DISTANCE | HS_WANT_VECTOR)) &&
+           d <= HS_WRITE_MOST_DIM && (recorder->columns & HS_MEASURED) &&
            !(recorder->columns & HS_WANT_BOTH) && scanner->trace.of.is_narrow &&
            !search->scene.extreme && search->scene.metric.floats_usable;
 }
@@ -52,7 +52,7 @@ direct(const hs_recorder *recorder, hs_write *write)
     write->index_bytes = output->index_bytes;
     write->i = hs_output_next(output, HS_WANT_I);
     write->j = hs_output_next(output, HS_WANT_J);
-    write->distance = hs_output_next(output, HS_WANT_DISTANCE);
+    write->distance = hs_recorder_distances(recorder);
     write->vector = hs_output_next(output, HS_WANT_VECTOR);
     write->shift = hs_output_next(output, HS_WANT_SHIFT);
 }

@@ -14,7 +14,20 @@ typedef struct hs_recorder {
     int32_t   *ends[2];            /* i and j for HS_WANT_BOTH */
     double    *distance;           /* of a batch */
     double    *vector[HS_MAX_DIM]; /* of a batch */
+    double    *all_distances;      /* of the hits of one visit, where shells need them alone */
 } hs_recorder;
+
+/* Columns that need the distance. */
+#define HS_MEASURED (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHELL)
+
+/* Where the distances of the next hits are written: the column, or memory of the recorder's own;
+ * NULL where nobody needs them. */
+HS_ALWAYS_INLINE double *
+hs_recorder_distances(const hs_recorder *recorder)
+{
+    double *column = hs_output_next(recorder->output, HS_WANT_DISTANCE);
+    return column != NULL ? column : recorder->all_distances;
+}
 
 /* What a walker's block must list for these columns. */
 hs_block_use hs_record_use(unsigned columns);

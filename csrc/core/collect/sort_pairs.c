@@ -142,14 +142,19 @@ put_indices(void *to, int index_bytes, int64_t stride, const int32_t *from, int6
 static void
 put_measures(const hs_sorting *all, const uint64_t *entries, int64_t n, hs_output *sorted)
 {
-    const int     d = all->found->ndim;
-    const double *distances = hs_output_column(all->found, HS_WANT_DISTANCE);
-    const double *vectors = hs_output_column(all->found, HS_WANT_VECTOR);
-    double       *distance = hs_output_next(sorted, HS_WANT_DISTANCE);
-    double       *vector = hs_output_next(sorted, HS_WANT_VECTOR);
-    int32_t      *shift = hs_output_next(sorted, HS_WANT_SHIFT);
+    const int      d = all->found->ndim;
+    const double  *distances = hs_output_column(all->found, HS_WANT_DISTANCE);
+    const double  *vectors = hs_output_column(all->found, HS_WANT_VECTOR);
+    double        *distance = hs_output_next(sorted, HS_WANT_DISTANCE);
+    double        *vector = hs_output_next(sorted, HS_WANT_VECTOR);
+    int32_t       *shift = hs_output_next(sorted, HS_WANT_SHIFT);
+    int32_t       *shell = hs_output_next(sorted, HS_WANT_SHELL);
+    const int32_t *shells = hs_output_column(all->found, HS_WANT_SHELL);
     for (int64_t e = 0; e < n && distance != NULL; e++) {
         distance[e] = distances[hs_pair_of(all, entries[e])];
+    }
+    for (int64_t e = 0; e < n && shell != NULL; e++) {
+        shell[e] = shells[hs_pair_of(all, entries[e])];
     }
     for (int64_t e = 0; e < n && vector != NULL; e++) {
         const double *from = vectors + hs_pair_of(all, entries[e]) * d;

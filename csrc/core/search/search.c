@@ -51,6 +51,7 @@ hs_search_close(hs_search *search)
 {
     hs_account *account = &search->call->account;
     hs_stencil_free(account, &search->stencil);
+    hs_shells_free(account, &search->shells);
     if (!search->is_borrowed) {
         hs_scene_free(account, &search->scene);
         hs_bins_free(account, &search->bins);

@@ -9,6 +9,7 @@
 #include "../cells/sparse_rows.h"
 #include "../cells/stencil.h"
 #include "../threads/call.h"
+#include "shells.h"
 
 typedef struct hs_search {
     /* Large, and filled before they are read: not cleared at first. */
@@ -28,6 +29,7 @@ typedef struct hs_search {
     hs_sparse  query_sparse;
     bool       is_sparse;
     const struct hs_limits *limits;      /* borrowed; NULL: the cutoff is that of all pairs */
+    hs_shells               shells;      /* as the options have them */
     struct hs_kept_form    *kept_forms;  /* borrowed, form.h; NULL: none are kept */
     int64_t                 first_point; /* number of the first point */
     int64_t n_in_all;       /* asking points, of which these may be a part: for fractions done */

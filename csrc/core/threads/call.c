@@ -175,4 +175,5 @@ hs_call_detach(hs_call *call)
     call->options.counters = NULL;
     call->options.kernel = NULL;
     call->options.out = NULL;
+    call->options.shells = NULL;
 }

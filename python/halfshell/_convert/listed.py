@@ -13,7 +13,7 @@ from halfshell._convert.arrays import as_array
 IntArray = npt.NDArray[np.int64]
 
 
-def _as_numbers(values: Any, name: str, n: int, numbered: str) -> IntArray:
+def as_point_numbers(values: Any, name: str, n: int, numbered: str) -> IntArray:
     """Numbers of n points or queries."""
     column = as_array(values, name)
     if column.size and column.dtype.kind not in "iu":
@@ -35,8 +35,8 @@ def as_listed(
     i numbers the queries, if there are any; all else are points.
     """
     asking, numbered = (n_points, "points") if n_queries is None else (n_queries, "queries")
-    first = _as_numbers(i, "i", asking, numbered)
-    second = _as_numbers(j, "j", n_points, "points")
+    first = as_point_numbers(i, "i", asking, numbered)
+    second = as_point_numbers(j, "j", n_points, "points")
     if first.shape != second.shape:
         raise ValueError(
             f"i and j must have the same length, got {len(first)} and {len(second)}"

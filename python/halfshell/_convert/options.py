@@ -16,6 +16,9 @@ AUTO = "auto"
 #: The letters of quantities, in the order in which arrays come.
 LETTERS = "ijdDSP"
 
+#: That of shells, which needs several cutoffs.
+SHELL = "k"
+
 # The same of `on_overflow`.
 RAISE = "raise"
 

@@ -20,7 +20,7 @@ PointArray = npt.NDArray[np.float32] | FloatArray
 
 # What functions return that take `quantities`, and one of its letters.
 Arrays = npt.NDArray[Any] | tuple[npt.NDArray[Any], ...]
-Letter = Literal["i", "j", "d", "D", "S", "P"]
+Letter = Literal["i", "j", "d", "D", "S", "P", "k"]
 
 Progress = Callable[[float], object] | None
 
@@ -97,7 +97,7 @@ ArrayLike = npt.ArrayLike | _HandsOver
 PointsLike = ArrayLike | _BringsBox
 # A cutoff; one for each pair of types; none but what radii say.
 PairCutoff = (
-    Number | Sequence[Sequence[float]] | npt.NDArray[Any]
+    Number | Sequence[float] | Sequence[Sequence[float]] | npt.NDArray[Any]
     | Mapping[tuple[int, int], float] | Mapping[tuple[str, str], float] | None
 )  # fmt: skip
 BoxLike = ArrayLike | _HasVectors | _HasMatrix | _HasCells | _HasDimensions
@@ -137,6 +137,7 @@ class PairOptions(ReachOptions, total=False):
     capacity: int | None
     progress: Progress
     batch: npt.ArrayLike | None
+    touching: npt.ArrayLike | None
 
 
 class BetweenOptions(ReachOptions, total=False):

@@ -13,6 +13,7 @@ from halfshell._convert.given import Given
 from halfshell._convert.options import AUTO, RAISE, as_flag, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.shells import as_shells
 from halfshell._objects.box import Box
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ def pairs(
     memory_limit: float | None = None,
     progress: Callable[[float], object] | None = None,
     batch: npt.ArrayLike | None = None,
+    touching: npt.ArrayLike | None = None,
 ) -> Arrays | tuple[Any, ...]:
     """Find every pair of points within a cutoff, each once.
 
@@ -109,10 +111,11 @@ def pairs(
         anywhere, also outside the box. ``[]`` counts as shape (0, 3). An object with
         ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
         periodicity.
-    cutoff : float, array_like of float, shape (t, t), dict or None
+    cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box. With `radii` or `supports` a further limit, or None; with `types` one
-        for each pair of types.
+        for each pair of types. Several, shape (k,), ascending, with the letter ``k``: the pairs
+        are those of the last one.
     radii : array_like of float, shape (n,), optional
         A radius for each point, in the unit of `points`; finite, not negative, at most 2**1022. A
         pair then counts within what `rule` makes of the two radii, and within `cutoff`, if any.
@@ -140,7 +143,9 @@ def pairs(
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once: indices, distance, vector, shift,
-        both indices. Only these are computed.
+        both indices. Only these are computed. With several cutoffs also ``k``: the innermost one
+        that holds the pair, from 0 on, decided exactly at each; not with `radii`, `types`,
+        `supports`, `batch`, nor a `precision` other than "exact".
     inclusive : bool, default True
         Whether a pair at exactly `cutoff`, or at exactly its reach by radii, types or supports,
         counts.
@@ -155,7 +160,7 @@ def pairs(
     capacity : int, optional
         Give all arrays this length, at least 1, whatever the number of pairs m, as compilers of
         arrays want it. What is behind the m pairs is none: i, j and P are n there, S and D zero,
-        d is infinite.
+        d is infinite, k is the number of cutoffs.
     on_overflow : {"raise", "flag"}, default "raise"
         With a capacity that is too small, raise `CapacityError`; or never, and return m as well,
         behind the arrays. If m is then above the capacity, the arrays hold no pair at all: a list
@@ -199,6 +204,12 @@ def pairs(
         for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
         systems out. With `radii`, `types` or `supports`, one for each point of all systems,
         `cutoff` is a further limit, of all or one a system, or the table or dict of all.
+    touching : array_like of int, shape (k,), optional
+        Numbers of points, each once: only pairs with one of these, for moves of a few. They are
+        found from these points, whose number the time follows once all points are in cells. With
+        ``sort=False`` they come in the order of `touching`, those of one point by the other one; a
+        pair of two of these points comes with the lower one. Not with `batch`, the letter ``k`` or
+        `precision` "single".
 
     Returns
     -------
@@ -207,8 +218,8 @@ def pairs(
         `out`, views of its filled parts; with ``on_overflow="flag"`` a tuple of all of them and
         the number of pairs. With m pairs: ``i``, ``j`` of `index_dtype`, shape (m,), with
         ``i < j``, or ``i == j`` for a point and its own image; ``d`` float64 (m,); ``D`` float64
-        (m, d); ``S`` int32 (m, d); ``P`` of `index_dtype` (m, 2). In real arithmetic
-        ``D = points[j] - points[i] + S @ box``.
+        (m, d); ``S`` int32 (m, d); ``P`` of `index_dtype` (m, 2); ``k`` int32 (m,). In real
+        arithmetic ``D = points[j] - points[i] + S @ box``.
 
         Each pair occurs once (half list): for ``i == j`` the first nonzero component of S is
         positive. (i, i, S = 0) is no pair; coincident points are pairs at distance 0. d is within
@@ -226,19 +237,20 @@ def pairs(
         cannot be converted to an array, flags that are not bools, a `progress` that cannot be
         called.
     ValueError
-        If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not
-        finite, an integer is beyond 2**53 and no float64, the periodic box vectors are exactly
-        linearly dependent or so skewed or different in length that float64 does not place points
-        along the short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision`
-        or `kernel` is none of those offered, or `memory_limit` is negative; if `periodic` is given
-        without `box`, or `box` or `periodic` beside an object that brings its own; if `batch` is
-        not ascending or has a negative number or one that there is no box or cutoff for; if a
-        radius is negative, not finite, above 2**1022 or, not being 0, below 2**-1021 with `rule`
-        "mean", as its half may be no float64; if `rule` is given without `radii`, or has a
-        direction, as those of `neighbors` may; if a table of cutoffs is not symmetric, a dict is in
-        contradiction or names no element, or a type is none of the table; if a support is not
-        finite, not symmetric or, decided exactly, not positive definite, or reaches further than
-        2**1022; if two of `radii`, `types` and `supports` are given together.
+        If a coordinate or box entry is not finite or is masked, `cutoff` is negative or not finite,
+        an integer is beyond 2**53 and no float64, the periodic box vectors are exactly linearly
+        dependent or so skewed or different in length that float64 does not place points along the
+        short ones, or a shape does not fit; if `quantities`, `index_dtype`, `precision` or `kernel`
+        is none of those offered; if `quantities` has the letter k without several cutoffs, or these
+        descend or are none; if `touching` names no point, or one twice; if `memory_limit` is
+        negative; if `periodic` is given without `box`, or `box` or `periodic` beside an object that
+        brings its own; if `batch` is not ascending or has a negative number or one that there is no
+        box or cutoff for; if a radius is negative, not finite, above 2**1022 or, not being 0, below
+        2**-1021 with `rule` "mean", as its half may be no float64; if `rule` is given without
+        `radii`, or has a direction, as those of `neighbors` may; if a table of cutoffs is not
+        symmetric, a dict is in contradiction or names no element, or a type is none of the table;
+        if a support is not finite, not symmetric or, decided exactly, not positive definite, or
+        reaches further than 2**1022; if two of `radii`, `types` and `supports` are given together.
     CapacityError
         If `capacity` or an array of `out` is too small; it carries ``needed``. What `out` holds is
         unspecified then.
@@ -310,6 +322,18 @@ def pairs(
     >>> i.tolist(), j.tolist(), d.tolist(), needed
     ([0, 3, 3], [1, 3, 3], [1.0, inf, inf], 1)
 
+    Two shells around each point, in one search:
+
+    >>> d, k = hs.pairs([[0.0], [1.0], [3.0]], [1.0, 2.5], quantities="dk", sort=True)
+    >>> d.tolist(), k.tolist()
+    ([1.0, 2.0], [0, 1])
+
+    Only the pairs of a point that has moved:
+
+    >>> i, j = hs.pairs([[0.0], [1.0], [2.0], [3.0]], 1.0, touching=[2])
+    >>> i.tolist(), j.tolist()
+    ([1, 2], [2, 3])
+
     Two systems in one call, which do not see each other:
 
     >>> i, j = hs.pairs([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]], 1.5,
@@ -326,7 +350,7 @@ def pairs(
     room = None
     if capacity is not None or on_overflow is not RAISE:
         room = as_room(capacity, on_overflow, out)
-    if batch is None and (
+    if batch is None and touching is None and (
         radii is None and types is None and rule is None and supports is None and extent is None
         and algorithm is AUTO
     ):
@@ -334,22 +358,27 @@ def pairs(
         # arguments need no conversion.
         result: Any = _core.plain(
             _core.pairs, points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit,
-            progress, threads, quantities, sort, index_dtype, out, None, AUTO, room,
+            progress, threads, quantities, sort, index_dtype, out, None, AUTO, None, room,
         )
         if result is not NotImplemented:
             return cast("Arrays", result)
     check_apart(
         out, points=points, cutoff=cutoff, box=box, batch=batch, radii=radii, types=types,
-        supports=supports,
+        supports=supports, touching=touching,
     )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
+    cutoff, shells = as_shells(cutoff, quantities, precision, given, batch)
+    wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
+    if touching is not None and not (batch is None and shells is None and room is None):
+        other = "batch" if batch is not None else "capacity" if shells is None else "the letter k"
+        raise ValueError(f"touching does not go with {other}")
     if batch is None:
         search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
-        return _core.pairs(
-            *search, quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out, reach,
-            algorithm, room,
-        )  # fmt: skip
+        if touching is None:
+            return _core.pairs(*(*search, *wanted, reach, algorithm, shells, room))
+        from halfshell._convert.touching import pairs_touching  # here: others do without
+
+        return pairs_touching(search, search[0], touching, wanted, reach, algorithm)
     scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
-    wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
     return _core.batch_pairs(*(*scene, *rest, *wanted, *own, reach, algorithm, room))

@@ -13,6 +13,7 @@ from halfshell import _core
 from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
 from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.shells import as_shells
 from halfshell._convert.types import (
     Algorithm,
     ArrayLike,
@@ -144,9 +145,10 @@ def iter_pairs(
     most = most_pairs(max_pairs)
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
+    cutoff, shells = as_shells(cutoff, quantities, precision, given)
     search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
     blocks = _core.iter_pairs(
-        *search, quantities, as_index_bytes(index_dtype), most, reach, algorithm
+        *search, quantities, as_index_bytes(index_dtype), most, reach, algorithm, shells
     )
     return cast("PairBlocks[Any]", blocks)
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -12,6 +12,8 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.callbacks import target_of
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, as_room, most_pairs
+from halfshell._convert.scene import check_apart
+from halfshell._convert.shells import as_shells
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
 
@@ -23,7 +25,7 @@ class CellPairs(KeptCells):
 
     def pairs(
         self,
-        cutoff: Number | None = None,
+        cutoff: Number | Sequence[float] | npt.NDArray[Any] | None = None,
         *,
         quantities: str = "ij",
         inclusive: bool = True,
@@ -36,19 +38,21 @@ class CellPairs(KeptCells):
         threads: int | None = None,
         memory_limit: float | None = None,
         progress: Callable[[float], object] | None = None,
+        touching: npt.ArrayLike | None = None,
     ) -> Arrays | tuple[Any, ...]:
         """Find every pair of points within a cutoff, as `halfshell.pairs` does.
 
         Parameters
         ----------
-        cutoff : float, optional
-            Default: that of the list.
-        quantities, inclusive, sort, index_dtype, out, capacity, on_overflow
-            As in `halfshell.pairs`.
-        kernel, memory_limit, progress
+        cutoff : float or array_like of float, shape (k,), optional
+            Default: that of the list. Several with the letter ``k``.
+        quantities, inclusive, sort, index_dtype, out, capacity, on_overflow, kernel,
+        memory_limit, progress
             As in `halfshell.pairs`.
         threads : int, optional
             As in `halfshell.pairs`. Default: that of the list.
+        touching : array_like of int, shape (k,), optional
+            As in `halfshell.pairs`: the time follows their number alone.
 
         Returns
         -------
@@ -63,14 +67,24 @@ class CellPairs(KeptCells):
         [[0, 1]]
         """
         options = inclusive, kernel, threads, memory_limit
-        return _core.pairs(
-            *self._arguments(cutoff, options, progress), quantities, as_flag(sort, "sort"),
-            as_index_bytes(index_dtype), out, None, AUTO, as_room(capacity, on_overflow, out),
-        )
+        cutoff, shells = as_shells(cutoff, quantities, self._precision)
+        search = self._arguments(cutoff, options, progress)
+        wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
+        room = as_room(capacity, on_overflow, out)
+        if touching is None:
+            return _core.pairs(*(*search, *wanted, None, AUTO, shells, room))
+        if shells is not None or room is not None:
+            other = "the letter k" if shells is not None else "capacity"
+            raise ValueError(f"touching does not go with {other}")
+        check_apart(out, touching=touching)
+        from halfshell._convert.touching import pairs_touching  # here: others do without
+
+        points = self._origin.scene()[0]
+        return pairs_touching(search, points, touching, wanted, None, AUTO)
 
     def iter_pairs(
         self,
-        cutoff: Number | None = None,
+        cutoff: Number | Sequence[float] | npt.NDArray[Any] | None = None,
         *,
         quantities: str = "ij",
         max_pairs: int = 1 << 20,
@@ -85,8 +99,8 @@ class CellPairs(KeptCells):
 
         Parameters
         ----------
-        cutoff : float, optional
-            Default: that of the list.
+        cutoff : float or array_like of float, shape (k,), optional
+            Default: that of the list. Several with the letter ``k``.
         quantities, max_pairs, inclusive, index_dtype, kernel, memory_limit, progress
             As in `halfshell.iter_pairs`.
         threads : int, optional
@@ -106,11 +120,12 @@ class CellPairs(KeptCells):
         2
         """
         most = most_pairs(max_pairs)
+        cutoff, shells = as_shells(cutoff, quantities, self._precision)
         search = self._arguments(
             cutoff, (inclusive, kernel, threads, memory_limit), progress
         )
         index_bytes = as_index_bytes(index_dtype)
-        blocks = _core.iter_pairs(*search, quantities, index_bytes, most, None, AUTO)
+        blocks = _core.iter_pairs(*search, quantities, index_bytes, most, None, AUTO, shells)
         return cast("PairBlocks[Any]", blocks)
 
     def for_each_pair(

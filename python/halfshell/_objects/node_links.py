@@ -145,7 +145,7 @@ def search(
     if cut is None:
         rows, pairs = _core.connect_search(*first, *counts, by)
         return with_parts(nodes, how, rows, pairs, None, gathered, points)
-    found: Any = _core.pairs(*first, "ijS" if bits else "ij", True, 4, None, by, "auto")
+    found: Any = _core.pairs(*first, "ijS" if bits else "ij", True, 4, None, by, "auto", None)
     half = Half(found[0], found[1], found[2] if bits else None)
     return link(nodes, how, half, gathered, points, cut)
 

@@ -230,7 +230,7 @@ class VerletList:
         return _core.pairs(
             points, self._cutoff, vectors, bits, self._inclusive, "exact", self._kernel,
             self._memory_limit, None, self._threads, quantities, sort, index_bytes, out, None,
-            AUTO,
+            AUTO, None,
         )
 
     @overload

@@ -222,3 +222,15 @@ def test_arrays_are_of_the_caller():
     one = hs.pairs(points, 2.0, capacity=500)
     two = hs.pairs(points, 2.0, capacity=500)
     assert not any(np.shares_memory(a, b) for a in one for b in two)
+
+
+def test_what_is_no_pair_is_in_no_shell():
+    points = [[0.0], [1.0], [3.0]]
+    d, k = hs.pairs(points, [1.0, 2.5], quantities="dk", capacity=4, sort=True)
+    assert d.tolist() == [1.0, 2.0, np.inf, np.inf] and k.tolist() == [0, 1, 2, 2]
+    cells = hs.CellList(points, 2.5)
+    again, needed = cells.pairs([1.0, 2.5], quantities="k", capacity=1, on_overflow="flag")
+    assert again.tolist() == [2] and needed == 2
+    for searched in (hs.pairs, lambda points, *rest, **how: cells.pairs(*rest, **how)):
+        with pytest.raises(ValueError, match="touching does not go with capacity"):
+            searched(points, 1.0, touching=[1], capacity=4)

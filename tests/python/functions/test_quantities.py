@@ -12,7 +12,7 @@ from hypothesis import given
 
 import halfshell as hs
 from halfshell._check.reference import exact_square, exact_vector, ulp_error
-from halfshell._convert.options import LETTERS
+from halfshell._convert.options import LETTERS, SHELL
 from halfshell._convert.types import Letter
 from oracles import BOX_KINDS, as_set, lattice, random_scene, rotation, same_arrays
 from scene_strategies import scenes
@@ -39,9 +39,10 @@ def assert_last_place(points, cutoff, box, found, inclusive=True):
 
 def test_the_letters_of_types_messages_and_arrays_are_the_same(scene):
     points, cutoff, box = scene
-    assert "".join(get_args(Letter)) == LETTERS == "".join(DTYPES)
+    assert "".join(get_args(Letter)) == LETTERS + SHELL
+    assert "".join(DTYPES) == LETTERS
     assert len(hs.pairs(points, cutoff, box=box, quantities=LETTERS)) == len(LETTERS)
-    with pytest.raises(ValueError, match=f"some of the letters {' '.join(LETTERS)}, each"):
+    with pytest.raises(ValueError, match=f"some of the letters {' '.join(LETTERS + SHELL)}, each"):
         hs.pairs(points, cutoff, box=box, quantities=f"{LETTERS}x")
 
 

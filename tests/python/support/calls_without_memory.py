@@ -176,6 +176,10 @@ CALLS = {
     "pairs, all quantities": lambda: hs.pairs(
         POINTS, 1.5, quantities=LETTERS, sort=True, **PERIODIC),
     "pairs, large": lambda: hs.pairs(CROWD, 2.0, quantities=LETTERS),
+    "pairs, shells": lambda: hs.pairs(
+        POINTS, [0.5, 1.0, 1.5], quantities=LETTERS + "k", sort=True, **PERIODIC),
+    "pairs, touching": lambda: hs.pairs(
+        POINTS, 1.5, quantities=LETTERS, touching=[3, 0], sort=True, **PERIODIC),
     "pairs, int32, threads": lambda: hs.pairs(
         CROWD, 0.5, index_dtype=np.int32, sort=True, threads=2),
     "pairs, lists": lambda: hs.pairs(POINTS.tolist(), 1, sort=True, box=BOX.tolist(),
