@@ -32,7 +32,7 @@ bool hs_box_of(PyObject *object, unsigned long repeats, int ndim, hs_box *box, b
  * bits. */
 #define HS_LETTERS     "ijdDSPk"
 #define HS_ALL_LETTERS "ijdDSP" /* those that every list of pairs has: k needs several cutoffs */
-#define HS_ROW_LETTERS "jdDS" /* a row says itself what i is */
+#define HS_ROW_LETTERS "jdDS"   /* a row says itself what i is */
 bool hs_quantities_of(PyObject *object, const char *known, const char **letters, unsigned *want);
 
 bool hs_precision_of(PyObject *object, hs_precision *precision);
