@@ -112,7 +112,7 @@ def check_letters(quantities: Any) -> None:
     if not are_letters(quantities):
         raise ValueError(
             f"quantities must be some of the letters {' '.join(LETTERS)}, each at most once, got "
-            f"{quantities!r}"
+            f"{shown(quantities)}"
         )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell._convert.arrays import as_real_array
-from halfshell._convert.foreign import is_a
+from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.lengths import check_ascending, check_lengths
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.options import SHELL
@@ -23,7 +23,7 @@ def as_shells(
     cutoff: Any, quantities: Any, precision: Any, given: Given | None = None, batch: Any = None
 ) -> tuple[Any, FloatArray | None]:
     """The largest cutoff and all of them, if the letter k is wanted; else the cutoff, as it is."""
-    if not isinstance(quantities, str) or SHELL not in quantities:
+    if not is_a(quantities, str) or SHELL not in quantities:
         if given is None or (given.is_nothing and batch is None):
             _refuse_several(cutoff)
         return cutoff, None
@@ -33,9 +33,9 @@ def as_shells(
         )
     if batch is not None:
         raise ValueError("the letter k in quantities does not go with batch")
-    if isinstance(precision, str) and precision != "exact":
+    if is_a(precision, str) and precision != "exact":
         raise ValueError(
-            f"the letter k in quantities goes with precision 'exact', got {precision!r}"
+            f"the letter k in quantities goes with precision 'exact', got {shown(precision)}"
         )
     if cutoff is None or is_a(cutoff, Mapping):
         raise TypeError(
@@ -59,7 +59,7 @@ def _check_shape(shape: tuple[int, ...]) -> None:
 
 def _refuse_several(cutoff: Any) -> None:
     """TypeError for an array of cutoffs, which say nothing without the letter."""
-    if isinstance(cutoff, list | tuple) or (isinstance(cutoff, np.ndarray) and cutoff.ndim == 1):
+    if is_a(cutoff, (list, tuple)) or (is_a(cutoff, np.ndarray) and cutoff.ndim == 1):
         raise TypeError(
             "cutoff must be a number; several go with the letter k in quantities, got "
             f"{type(cutoff).__name__} of {len(cutoff)}"

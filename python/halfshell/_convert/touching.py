@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
+from halfshell._convert.foreign import is_a
 from halfshell._convert.listed import as_point_numbers
 from halfshell._convert.options import check_letters
 from halfshell._errors import CapacityError
@@ -45,7 +46,7 @@ def pairs_touching(
     """Pairs with one of these points; `search` begins with the points, or with cells of them."""
     quantities, sort, index_bytes, out = wanted
     check_letters(quantities)
-    if search[5] == "single":
+    if is_a(search[5], str) and search[5] == "single":
         raise ValueError("touching does not go with precision 'single'")
     numbers = as_touching(touching, len(points))
     if out is not None:  # its types and shapes, before anything is searched for

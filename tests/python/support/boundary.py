@@ -362,7 +362,9 @@ def calls():
     numbers = [0, 0, 1, 1]
     wrap = lambda box, **how: hs.Box(CUBE).wrap(**how)  # noqa: E731
     return {
-        "pairs": (hs.pairs, listed | {"out": None, "batch": None} | room),
+        "pairs": (hs.pairs, listed | {"out": None, "batch": None, "touching": None} | room),
+        "pairs that touch": (hs.pairs, listed | {"out": None, "touching": [0, 2]}),
+        "pairs in shells": (hs.pairs, listed | {"cutoff": [0.5, 1.0], "quantities": "ijk"} | room),
         "pairs of a batch": (hs.pairs, listed | {"out": None, "batch": numbers} | room),
         "count_pairs": (hs.count_pairs, search | {"batch": None}),
         "count_pairs of a batch": (hs.count_pairs, search | {"batch": numbers}),
