@@ -119,3 +119,11 @@ def test_drawings_are_those_of_the_script(tmp_path):
     for name in draw.DRAWINGS:
         assert (tmp_path / f"{name}.svg").stat().st_size > 5000
         assert (DOCS / "figures" / f"{name}.svg").exists()
+
+
+@pytest.mark.parametrize("page", ["index.md", "explanation/how-pairs-are-found.md"])
+def test_examples_of_plain_pages_run(page):
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
+    assert blocks
+    for code in blocks:
+        exec(compile(code, page, "exec"), {})
