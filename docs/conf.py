@@ -55,6 +55,19 @@ def link_public_names(_app, _what, _name, _obj, _options, lines):
         lines[k] = re.sub(rf"(?<![`:])`({names})`(?!`)", r":py:obj:`~halfshell.\1`", line)
 
 
+def place_new_names(app, docname, source):
+    """Put public names that no page of the reference mentions on the page of tools."""
+    if docname == "reference/tools":
+        pages = Path(app.srcdir, "reference").glob("*.md")
+        placed = "".join(page.read_text(encoding="utf-8") for page in pages)
+        for name in halfshell.__all__:
+            if f":: {name}\n" not in placed:
+                kind = "class" if isinstance(getattr(halfshell, name), type) else "function"
+                source[0] = source[0].rstrip().removesuffix("```")
+                source[0] += f"\n.. auto{kind}:: {name}\n```\n"
+
+
 def setup(app):
+    app.connect("source-read", place_new_names)
     app.connect("autodoc-process-docstring", link_public_names)
     app.connect("autodoc-process-signature", leave_out_signature)
