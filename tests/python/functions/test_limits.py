@@ -35,6 +35,9 @@ CHOOSES = {
         map(len, hs.iter_pairs(POINTS, 5.0, quantities="i", **how))
     ),
     "for_each_pair": visited,
+    "trajectory_pairs": lambda **how: sum(
+        map(len, hs.trajectory_pairs([POINTS], 5.0, quantities="i", **how))
+    ),
     "neighbors": lambda **how: hs.neighbors(POINTS, 5.0, **how).n_entries // 2,
     "coordination": lambda **how: hs.coordination(POINTS, 5.0, **how)[0],
     "count_pairs": lambda **how: hs.count_pairs(POINTS, 5.0, **how),

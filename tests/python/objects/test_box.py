@@ -389,6 +389,7 @@ WITH_BOX = {
     "DynamicCellList": lambda p, box: balls(p, 0.5, box),
     "Connectivity": lambda p, box: links(p, box),
     "VerletList": lambda p, box: steps(p, 0.5, box),
+    "trajectory_pairs": lambda p, box: next(hs.trajectory_pairs([p], 0.5, box=box)),
 }
 
 

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The contract of kUPS's neighbour lists, one test for each promise of docs/systems/kups.md."""
+
+import itertools
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import halfshell as hs
+
+#: Cells in which the original's cell list loses pairs, with cutoffs for which it does.
+LOSSY = {
+    "skewed": (4.0 * np.array([[5.0, 0.0, 0.0], [3.8, 3.2, 0.0], [3.5, 2.9, 3.3]]), 1.5),
+    "sheared": (np.array([[10.0, 0.0, 0.0], [5.0, 10.0, 0.0], [0.0, 0.0, 10.0]]), 1.0),
+    "hexagonal": (np.array([[10.0, 0.0, 0.0], [5.0, 75.0**0.5, 0.0], [0.0, 0.0, 10.0]]), 1.6),
+}
+MODES = {
+    "vacuum": (False, False, False), "wire": (False, False, True), "slab": (True, True, False),
+    "bulk": (True, True, True),
+}  # fmt: skip
+
+
+def by_rule(points, cutoff, box, periodic=(True, True, True)):
+    """Both directions of each pair that the rule keeps, in rational arithmetic: strict, images
+    counted one by one, (i, i, 0) never."""
+    points = [[Fraction(x) for x in row] for row in points.tolist()]
+    rows = [[Fraction(x) for x in row] for row in np.asarray(box, float).tolist()]
+    dual = np.linalg.inv(np.asarray(box, float)).T
+    fractions = np.array([[float(x) for x in row] for row in points]) @ dual.T
+    span = np.ptp(fractions, axis=0) + cutoff * np.linalg.norm(dual, axis=1)
+    reach = [int(np.ceil(s + 1e-6)) if flag else 0 for s, flag in zip(span, periodic)]
+    square, kept = Fraction(cutoff) ** 2, set()
+    for S in itertools.product(*(range(-k, k + 1) for k in reach)):
+        move = [sum(s * row[k] for s, row in zip(S, rows)) for k in range(3)]
+        for i, a in enumerate(points):
+            for j, b in enumerate(points):
+                if (i, S) != (j, (0, 0, 0)) and square > sum(
+                    (y - x + m) ** 2 for x, y, m in zip(a, b, move)
+                ):
+                    kept.add((i, j, S))
+    return kept
+
+
+def edges(points, cutoff, **options):
+    """All edges of `halfshell.neighbors`, strict, as the original's self graph has them."""
+    table = hs.neighbors(points, cutoff, quantities="jS", inclusive=False, **options)
+    i, j, S = table.to_pairs(quantities="ijS")
+    found = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
+    assert len(set(found)) == len(found)
+    return set(found)
+
+
+def both_ways(i, j, S):
+    half = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
+    return set(half) | {(b, a, tuple(-s for s in S)) for a, b, S in half}
+
+
+@pytest.mark.parametrize("name", LOSSY)
+@pytest.mark.parametrize("algorithm", ["all-pairs", "grid", "hash", "hierarchy"])
+def test_no_edge_is_lost_in_skewed_cells(name, algorithm):
+    box, cutoff = LOSSY[name]
+    points = np.random.default_rng(0).random((500, 3)) @ box
+    found = hs.pairs(
+        points, cutoff, box=box, inclusive=False, quantities="ijS", algorithm=algorithm, sort=True
+    )
+    # Nearest images are all that there are, and each distance is far from the cutoff or exact.
+    i, j = np.triu_indices(500, 1)
+    d, S = hs.measure(points, i, j, box=box, quantities="dS")
+    near = d < cutoff
+    assert (np.abs(d - cutoff) > 1e-12).all()
+    for ours, theirs in zip(found, (i[near], j[near], S[near])):
+        assert_array_equal(ours, theirs)
+
+
+def test_the_original_bins_by_another_length():
+    """Its bins follow the row norms of the inverse; widths of cells are one over column norms."""
+    box, cutoff = LOSSY["skewed"]
+    inverse = np.linalg.inv(box)
+    theirs = np.trunc(1.0 / np.linalg.norm(inverse, axis=1) / cutoff)
+    heights = hs.Box(box).perpendicular_heights
+    assert np.allclose(heights, 1.0 / np.linalg.norm(inverse, axis=0))
+    assert (heights / theirs < cutoff).any()  # bins thinner than the cutoff: 27 are too few
+    assert (heights / np.floor(heights / cutoff) >= cutoff).all()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("shape", ["cubic", "skewed"])
+def test_every_mode_of_periodicity(mode, shape):
+    periodic = MODES[mode]
+    box = np.diag([4.0, 4.0, 4.0]) if shape == "cubic" else LOSSY["skewed"][0] / 5.0
+    points = np.random.default_rng(1).random((14, 3)) @ box
+    expected = by_rule(points, 1.5, box, periodic)
+    assert len(expected) > 10
+    assert edges(points, 1.5, box=box, periodic=periodic) == expected
+    assert all(s == 0 or flag for _, _, S in expected for s, flag in zip(S, periodic))
+
+
+@pytest.mark.parametrize("ratio", [0.37, 0.63, 0.88, 1.19])
+@pytest.mark.parametrize("name", LOSSY)
+def test_image_windows(ratio, name):
+    """Cutoffs by the least height of the cell: all images, each once, from wherever one counts."""
+    box = LOSSY[name][0] / 4.0
+    cutoff = ratio * float(hs.Box(box).perpendicular_heights.min())
+    points = np.random.default_rng(2).random((3, 3)) @ box
+    expected = by_rule(points, cutoff, box)
+    assert edges(points, cutoff, box=box) == expected
+    assert expected == {(j, i, tuple(-s for s in S)) for i, j, S in expected}
+    # Whole box vectors change S by what was added, and no edge.
+    turns = np.random.default_rng(3).integers(-1, 2, (3, 3))
+    moved = by_rule(points + turns @ box, cutoff, box)
+    assert edges(points + turns @ box, cutoff, box=box) == moved
+
+
+@pytest.mark.parametrize("n, length, cutoff", [(5, 1.5, 1.2), (12, 1.0, 0.8), (1, 1.0, 2.5)])
+def test_cells_smaller_than_the_cutoff_and_self_images(n, length, cutoff):
+    box = np.eye(3) * length
+    points = np.random.default_rng(4).random((n, 3)) * length
+    expected = by_rule(points, cutoff, box)
+    assert edges(points, cutoff, box=box) == expected
+    images = {S for i, j, S in expected if i == j}
+    assert (len(images) > 0) == (cutoff > length)
+
+
+def test_the_cutoff_is_strict_where_that_is_asked_for():
+    points = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0], [0.0, 0.0, 9.0]])
+    box = np.eye(3) * 20.0
+    assert edges(points, 5.0, box=box) == set()
+    assert edges(points, np.nextafter(5.0, 6.0), box=box) == {(0, 1, (0,) * 3), (1, 0, (0,) * 3)}
+    assert hs.count_pairs(points, 5.0, box=box) == 1
+
+
+@pytest.mark.parametrize("far", [-1e-17, -20.0, 20.0, 1e6])
+@pytest.mark.parametrize("periodic", [(True, True, False), (False, False, True), (False,) * 3])
+def test_points_outside_of_open_axes(far, periodic):
+    """The page of the seed dropped them, later versions bin them at the edge; here they are points
+    like others."""
+    box = np.eye(3) * 6.0
+    points = np.random.default_rng(5).random((12, 3)) * 6.0
+    points[:4] += np.where(periodic, 0.0, far)
+    assert edges(points, 2.0, box=box, periodic=periodic) == by_rule(points, 2.0, box, periodic)
+
+
+def test_systems_do_not_mix():
+    boxes = np.stack([np.eye(3) * 3.0, LOSSY["skewed"][0] / 6.0, np.eye(3) * 2.0])
+    cutoffs = [1.2, 1.0, 1.5]
+    rng = np.random.default_rng(6)
+    parts = [rng.random((n, 3)) @ box for n, box in zip((7, 12, 9), boxes)]
+    batch = np.repeat(np.arange(3), [7, 12, 9])
+    found = both_ways(
+        *hs.pairs(
+            np.concatenate(parts), cutoffs, box=boxes, batch=batch, inclusive=False,
+            quantities="ijS",
+        )
+    )  # fmt: skip
+    expected = set()
+    for part, cutoff, box, first in zip(parts, cutoffs, boxes, (0, 7, 19)):
+        expected |= {(i + first, j + first, S) for i, j, S in by_rule(part, cutoff, box)}
+    assert found == expected
+
+
+def test_two_sets_have_one_edge_for_each_image():
+    rng = np.random.default_rng(7)
+    keys, queries = rng.random((2, 8, 3)) * 2.0
+    box = np.eye(3) * 2.0
+    i, j, S = hs.pairs_between(
+        queries, keys, 1.6, box=box, inclusive=False, quantities="ijS"
+    )
+    found = set(zip(i.tolist(), j.tolist(), map(tuple, S.tolist())))
+    every = by_rule(np.concatenate((queries, keys)), 1.6, box)
+    assert len(found) == len(i)
+    assert found == {(a, b - 8, S) for a, b, S in every if a < 8 <= b}
+
+
+def test_vectors_are_those_of_edges():
+    """x[j] - x[i] + S @ vectors, rows being lattice vectors, for the unwrapped positions given."""
+    box = LOSSY["skewed"][0] / 5.0
+    points = np.random.default_rng(8).uniform(-9.0, 9.0, (40, 3))
+    i, j, S, D, d = hs.pairs(points, 1.4, box=box, quantities="ijSDd")
+    assert len(i) > 20
+    assert np.allclose(D, points[j] - points[i] + S @ box, atol=1e-13)
+    assert np.allclose(d, np.linalg.norm(D, axis=1))
+
+
+def test_sizes_are_exact_or_fixed_and_never_cut():
+    """Without a capacity there is none to choose; with one, sentinels are behind the valid rows."""
+    points = np.random.default_rng(9).random((100, 3))
+    i, j, S = hs.pairs(points, 0.3, box=[1.0] * 3, quantities="ijS", inclusive=False)
+    m = len(i)
+    for capacity in (m, 2 * m):
+        *fixed, needed = hs.pairs(
+            points, 0.3, box=[1.0] * 3, quantities="ijS", inclusive=False, capacity=capacity,
+            on_overflow="flag",
+        )  # fmt: skip
+        assert needed == m
+        for ours, plain, none in zip(fixed, (i, j, S), (100, 100, 0)):
+            assert_array_equal(ours[:m], plain)
+            assert len(ours) == capacity and (ours[m:] == none).all()
+    with pytest.raises(hs.CapacityError) as caught:
+        hs.pairs(points, 0.3, box=[1.0] * 3, inclusive=False, capacity=m - 1)
+    assert caught.value.needed == m
+    i, j, needed = hs.pairs(
+        points, 0.3, box=[1.0] * 3, inclusive=False, capacity=m - 1, on_overflow="flag"
+    )
+    assert needed == m and (i == 100).all() and (j == 100).all()  # nothing of it is used unseen
