@@ -66,6 +66,7 @@ class Box:
     """
 
     __slots__ = ("_heights", "_vectors", "_volume")
+    _shown = ("vectors", "volume", "perpendicular_heights")
 
     def __init__(self, vectors: BoxLike) -> None:
         array = as_real_array(vectors_of(vectors), "box")
@@ -284,6 +285,15 @@ class Box:
 
     def __repr__(self) -> str:
         return f"Box({self.vectors.tolist()})"
+
+    def __str__(self) -> str:
+        edges = " x ".join(f"{math.hypot(*row):.6g}" for row in self.vectors.tolist())
+        return f"box with edges {edges}, volume {self.volume:.6g}"
+
+    def _repr_html_(self) -> str:
+        from halfshell import _show
+
+        return _show.html(self)
 
 
 def _cosine(degrees: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any, Self, SupportsIndex, overload
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
 from halfshell._convert.foreign import shown
 from halfshell._objects.exact_order import settle
 from halfshell._objects.origin import Origin
@@ -175,6 +176,9 @@ class TableRows:
             self._is_complete, self._is_in_order, self._origin, self._first_row + first,
             self._entries_between(int(offsets[0]), int(offsets[-1])),
         )
+
+    _shown = ("n_rows", "n_points", "n_entries", "quantities")
+    _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         return (
