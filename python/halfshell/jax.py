@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from halfshell import _show
 from halfshell._extras import needs
 from halfshell._functions.directed import entries_of
 from halfshell._objects.box import Box
@@ -61,6 +62,12 @@ class NeighborList(NamedTuple):
     d: Array
     needed: Array
     overflow: Array
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 def neighbor_list(

@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell import _show
+
 __all__ = ["ALPHA_QUARTZ_CIF", "Structure", "alpha_quartz"]
 
 #: The unit cell (9 points) as a CIF file.
@@ -42,6 +44,12 @@ class Structure(NamedTuple):
     positions: NDArray[np.float64]
     box: NDArray[np.float64]
     species: NDArray[np.str_]
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 def alpha_quartz(repeat: tuple[int, int, int] = (8, 8, 8)) -> Structure:

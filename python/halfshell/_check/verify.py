@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
 from halfshell._convert.given import Given
 from halfshell._convert.listed import as_listed
 from halfshell._convert.options import as_flag
@@ -51,6 +52,10 @@ class Verdict:
     missed: IntArray
     spurious: IntArray
     duplicate: IntArray
+
+    _shown = ("ok", "n_expected", "n_given", "missed", "spurious", "duplicate")
+    __repr__ = _show.line
+    _repr_html_ = _show.html
 
     @property
     def ok(self) -> bool:

@@ -55,6 +55,11 @@ class CacheInfo(NamedTuple):
     held: int
     limit: int
 
+    def _repr_html_(self) -> str:
+        from halfshell import _show
+
+        return _show.html(self)
+
 
 def cache_info() -> CacheInfo:
     """Say how much memory of deleted results and finished calls is kept, and how much may be.

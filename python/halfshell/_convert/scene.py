@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MAX_DIM = 8
 MAX_POINTS = 2**31 - 1
 LENGTHS_AND_ANGLES = (
-    "six numbers may be lengths and angles: use Box.from_lengths_angles((a, b, c), (alpha, ...))"
+    "six numbers may be lengths and angles: use Box.from_dimensions((a, b, c, alpha, ...))"
 )
 _MISSING = object()
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.given import Given
 from halfshell._convert.options import as_flag, as_index_bytes
 from halfshell._convert.search import as_rest, as_search_of_each
@@ -88,6 +88,12 @@ class Explanation:
     threads: int
     leaves_out: tuple[str, ...]
     measured: dict[str, Any] = field(default_factory=dict)
+
+    _shown = (
+        "algorithm", "reason", "n", "ndim", "shape", "expected_pairs", "expected_bytes", "threads"
+    )
+    __repr__ = _show.line
+    _repr_html_ = _show.html
 
     def __str__(self) -> str:
         cells = " x ".join(str(k) for k in self.shape)

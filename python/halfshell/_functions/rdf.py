@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.lengths import as_positive
 from halfshell._convert.marks import Marks, as_marks, binned
 from halfshell._convert.memory import refuse_unavailable
@@ -62,6 +62,9 @@ class RadialDistribution:
     g: npt.NDArray[np.float64]
     counts: npt.NDArray[np.int64]
     edges: npt.NDArray[np.float64]
+
+    __repr__ = _show.line
+    _repr_html_ = _show.html
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw g(r), with types one line for each pair of them.

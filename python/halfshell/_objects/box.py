@@ -34,7 +34,7 @@ class Box:
     vectors : array_like of float, shape (d, d) or (d,), or Box
         Box vectors as rows, or edge lengths along the coordinate axes, in the unit of the points;
         1 <= d <= 8. Six bare numbers are refused, for they may be meant as lengths and angles: use
-        `from_lengths_angles`, or `orthorhombic` for six lengths. Any orientation and handedness;
+        `from_dimensions`, or `orthorhombic` for six lengths. Any orientation and handedness;
         the vectors must be linearly independent, which is decided exactly.
 
     Attributes
@@ -66,6 +66,7 @@ class Box:
     """
 
     __slots__ = ("_heights", "_vectors", "_volume")
+    _shown = ("vectors", "volume", "perpendicular_heights")
 
     def __init__(self, vectors: BoxLike) -> None:
         array = as_real_array(vectors_of(vectors), "box")
@@ -202,6 +203,42 @@ class Box:
             directions = _directions(degrees.tolist())
         return cls(np.array(directions) * edges[:, None])
 
+    @classmethod
+    def from_dimensions(cls, dimensions: ArrayLike) -> Box:
+        """Crystallographic cell of six numbers, as ASE's `cellpar` and MDAnalysis's `dimensions`.
+
+        Parameters
+        ----------
+        dimensions : array_like of float, shape (6,)
+            (a, b, c, alpha, beta, gamma): lengths in the unit of the points, angles in degrees.
+
+        Returns
+        -------
+        Box
+            That of `from_lengths_angles`.
+
+        Raises
+        ------
+        TypeError
+            If the entries are not real numbers, or are long doubles.
+        ValueError
+            If there are not six of them, or as `from_lengths_angles`: MDAnalysis has zeros where
+            there is no box.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> hs.Box.from_dimensions([2.0, 3.0, 4.0, 90.0, 90.0, 90.0])
+        Box([[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]])
+        """
+        array = as_real_array(dimensions, "dimensions")
+        if array.shape != (6,):
+            raise ValueError(
+                "dimensions must be six numbers, a, b, c, alpha, beta and gamma, got shape "
+                f"{array.shape}"
+            )
+        return cls.from_lengths_angles(array[:3], array[3:])
+
     @property
     def vectors(self) -> npt.NDArray[np.float64]:
         """The box vectors as rows, shape (d, d); read-only."""
@@ -284,6 +321,15 @@ class Box:
 
     def __repr__(self) -> str:
         return f"Box({self.vectors.tolist()})"
+
+    def __str__(self) -> str:
+        edges = " x ".join(f"{math.hypot(*row):.6g}" for row in self.vectors.tolist())
+        return f"box with edges {edges}, volume {self.volume:.6g}"
+
+    def _repr_html_(self) -> str:
+        from halfshell import _show
+
+        return _show.html(self)
 
 
 def _cosine(degrees: float) -> float:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.lengths import as_cutoff, as_positive
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike, Precision
@@ -31,6 +31,12 @@ class Candidates(NamedTuple):
     """Where each range begins in `CellList.order`; shape (m,)."""
     stop: npt.NDArray[np.int64]
     """Where it ends, not included; shape (m,)."""
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 class CellList(CellPairs, CellRows, CellCounts):
@@ -144,6 +150,8 @@ class CellList(CellPairs, CellRows, CellCounts):
     def __len__(self) -> int:
         """Number of points."""
         return self._n_points
+
+    _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         cells = len(self.cell_start) - 1

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
+
 __all__ = ["Clusters"]
 
 
@@ -38,3 +40,9 @@ class Clusters(NamedTuple):
     sizes: npt.NDArray[np.int64]
     core: npt.NDArray[np.bool_]
     winding: npt.NDArray[np.bool_] | None
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert import dynamic
 from halfshell._convert.arrays import in_order
 from halfshell._convert.lengths import as_positive
@@ -375,14 +375,13 @@ class DynamicCellList:
         keys = cells.keys(0, max(len(cells), 1))[1]
         return _unpickled, (_PICKLE_VERSION, self._given, keys, cells.positions(keys))
 
+    _repr_html_ = _show.html
+
     def __repr__(self) -> str:
-        dim, _, _, bits = self._given[:4]
+        dim, size, _, bits = self._given[:4]
         axes = ", ".join(str(k) for k in range(dim) if bits >> k & 1)
-        space = f"periodic along {axes}" if axes else "open space"
-        return (
-            f"DynamicCellList({dim}, {self._given[1]!r}, storage={self.storage!r}): "
-            f"{len(self)} points, {space}"
-        )
+        space = f"{len(self)} points, " + (f"periodic along {axes}" if axes else "open space")
+        return f"DynamicCellList({dim}, {size!r}, storage={self.storage!r}): {space}"
 
 
 def _unpickled(version: int, given: _Given, keys: Any, positions: Any) -> DynamicCellList:

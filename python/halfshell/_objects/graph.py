@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
+
 __all__ = ["Graph", "check_complete", "turned"]
 
 
@@ -38,6 +40,12 @@ class Graph(NamedTuple):
     shifts: npt.NDArray[np.int32]
     vectors: npt.NDArray[np.float64]
     distances: npt.NDArray[np.float64] | None
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 def check_complete(quantities: str) -> None:

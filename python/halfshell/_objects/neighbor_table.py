@@ -53,12 +53,12 @@ class NeighborTable(TableRows):
     Notes
     -----
     ``table[i]`` is row i, without a copy: one array, or a tuple of them, one for each letter of
-    `quantities`. ``table[a:b]`` is a table of these rows, numbered from 0: their indices still
-    mean points of the whole, so that it counts as a table of queries. ``len(table)`` is the
-    number of rows, and iteration goes over them.
+    `quantities`. ``table[a:b]``, ``table[[5, 0, 5]]`` and ``table[mask]`` are tables of these rows,
+    numbered from 0: their indices still mean points of the whole, so that they count as tables of
+    queries. ``len(table)`` is the number of rows, and iteration goes over them.
 
     A table with indices and distances also keeps points, queries and box, for `sort`: copies, or,
-    if it is from a `CellList`, what that holds. Rows of a slice keep all of it alive. A pickle has
+    if it is from a `CellList`, what that holds. Tables of some rows keep it all alive. A pickle has
     the points that its rows name and no others, and the shifts of its entries if the box repeats:
     for them the scene is searched once more if the table has no 'S'.
 

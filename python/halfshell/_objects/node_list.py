@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.lengths import as_positive, check_lengths
@@ -117,6 +117,8 @@ class NodeList:
 
     def __len__(self) -> int:
         return self.n_nodes
+
+    _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         ghosts = f" and {self.n_ghost} ghost{'s' * (self.n_ghost != 1)}" if self.n_ghost else ""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.arrays import as_real_array, in_order
 from halfshell._objects.node_links import stored
 from halfshell._objects.node_rows import NodeRows
@@ -26,6 +26,12 @@ class GlobalNeighbors(NamedTuple):
     ids: npt.NDArray[np.int64]
     offsets: npt.NDArray[np.int64]
     neighbors: npt.NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 class NodeSets(NodeRows):

@@ -85,7 +85,11 @@ class Origin:
         return Origin.of_own(self.points, own, self._box, self._periodic, find_shifts)
 
     def of_rows(
-        self, rows: slice, indices: npt.NDArray[Any], entries: Any, lacks_shifts: bool
+        self,
+        rows: slice | npt.NDArray[Any],
+        indices: npt.NDArray[Any],
+        entries: Any,
+        lacks_shifts: bool,
     ) -> Origin:
         """What these rows alone need, with the points that their entries name and no search.
 
@@ -93,7 +97,7 @@ class Origin:
         """
         _, vectors, bits = self.scene()
         points, numbers, queries = self.points, self._numbers, self.queries
-        all_ask = queries is None and rows == slice(0, len(points))
+        all_ask = queries is None and isinstance(rows, slice) and rows == slice(0, len(points))
         if not all_ask:
             queries = self.asking[rows]
             named = np.unique(indices)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
 from halfshell._convert.types import Arrays
 
 __all__ = ["PairChanges", "Step", "compare"]
@@ -43,6 +44,12 @@ class PairChanges(NamedTuple):
 
     formed: Arrays
     broken: Arrays
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 class Step(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.options import as_count
 from halfshell._errors import StaleError
@@ -89,6 +90,8 @@ class PairField:
     def __iter__(self) -> Iterator[Any]:
         self._refuse_stale()
         return iter(self._values)
+
+    _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         state = ", stale: its pairs are no more" if self._pairs._outdated else ""

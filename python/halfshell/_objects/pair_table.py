@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from halfshell import _show
 from halfshell._convert.arrays import as_array, as_real_array
 from halfshell._convert.options import as_whole
 
@@ -37,6 +38,12 @@ class Columns(NamedTuple):
     j_node: Ints
     j_list: Ints
     shifts: Ints | None
+
+    def __repr__(self) -> str:
+        return _show.line(self)
+
+    def _repr_html_(self) -> str:
+        return _show.html(self)
 
 
 class PairTable:
@@ -142,6 +149,8 @@ class PairTable:
 
     def __len__(self) -> int:
         return len(self.i_node)
+
+    _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         return f"PairTable({len(self)} pair{'s' * (len(self) != 1)})"

@@ -11,13 +11,16 @@ from typing import Any, Self, SupportsIndex, overload
 import numpy as np
 import numpy.typing as npt
 
+from halfshell import _show
 from halfshell._convert.foreign import shown
 from halfshell._objects.exact_order import settle
 from halfshell._objects.origin import Origin
-from halfshell._objects.table_forms import order_by_distance
+from halfshell._objects.table_choice import as_rows, entries_of, row_sums
+from halfshell._objects.table_forms import order_by_distance, rows_of
 
 Array = npt.NDArray[Any]
 Row = Array | tuple[Array, ...]
+Chosen = Array | list[int] | list[bool]
 
 _SORTED_AT_A_TIME = 1 << 17  # entries: some milliseconds
 
@@ -37,7 +40,7 @@ class TableRows:
     _is_complete: bool  # no entry was left out
     _is_in_order: bool  # each row ascends by (j, S)
     _origin: Origin | None  # None: exact comparisons are not possible
-    _first_row: int  # number of row 0 among those that asked
+    _first_row: int | Array  # number of row 0 among those that asked, or that of each row
     _entries: slice | Array  # which of all entries of the search, if their shifts are not here
 
     def __init__(
@@ -49,7 +52,7 @@ class TableRows:
         is_complete: bool = True,
         is_in_order: bool = True,
         origin: Origin | None = None,
-        first_row: int = 0,
+        first_row: int | Array = 0,
         entries: slice | Array = slice(None),
     ) -> None:
         self._arrays = arrays
@@ -136,18 +139,18 @@ class TableRows:
         return len(self._arrays[0]) - 1
 
     @overload
-    def __getitem__(self, row: SupportsIndex) -> Row: ...
+    def __getitem__(self, row: slice | Chosen) -> Self: ...  # type: ignore[overload-overlap]
     @overload
-    def __getitem__(self, row: slice) -> Self: ...
-    def __getitem__(self, row: SupportsIndex | slice) -> Row | Self:
+    def __getitem__(self, row: SupportsIndex) -> Row: ...
+    def __getitem__(self, row: SupportsIndex | slice | Chosen) -> Row | Self:
         if isinstance(row, slice):
             return self._rows(row)
         try:
-            i = operator.index(row)
+            i = operator.index(row)  # type: ignore[arg-type]
         except TypeError:
-            raise TypeError(
-                f"a row is chosen by a whole number, rows by a slice, got {type(row).__name__}"
-            ) from None
+            i = None
+        if i is None:
+            return self._chosen(as_rows(row, len(self)))
         n = len(self)
         if not -n <= i < n:
             raise IndexError(f"row {shown(i)} of a table of {n} rows")
@@ -172,9 +175,55 @@ class TableRows:
         parts = tuple(column[offsets[0] : offsets[-1]] for column in self._arrays[1:])
         return type(self)(
             (read_only(offsets - offsets[0]), *parts), self._quantities, self._n_points, False,
-            self._is_complete, self._is_in_order, self._origin, self._first_row + first,
+            self._is_complete, self._is_in_order, self._origin, self._numbers_from(first, end),
             self._entries_between(int(offsets[0]), int(offsets[-1])),
         )
+
+    def _chosen(self, rows: npt.NDArray[np.int64]) -> Self:
+        offsets, entries = entries_of(self._arrays[0], rows)
+        columns = (read_only(column[entries]) for column in self._arrays[1:])
+        first = self._first_row
+        return type(self)(
+            (read_only(offsets), *columns), self._quantities, self._n_points, False,
+            self._is_complete, self._is_in_order, self._origin,
+            rows + first if isinstance(first, int) else first[rows], self._entries_at(entries),
+        )
+
+    def _numbers_from(self, first: int, end: int) -> int | Array:
+        """What `_first_row` is for these rows."""
+        before = self._first_row
+        return before + first if isinstance(before, int) else before[first : max(first, end)]
+
+    def sum(self, values: npt.ArrayLike) -> Array:
+        """Add up the values of each row's entries.
+
+        Parameters
+        ----------
+        values : array_like of real numbers, shape (m,) or (m, ...)
+            One for each entry, in the order of `indices`.
+
+        Returns
+        -------
+        ndarray, shape (n_rows,) or (n_rows, ...)
+            0 for rows without entries. Bools and integers are added in int64, unsigned integers in
+            uint64, which both wrap as in NumPy; floats in float64.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If `values` are no real numbers of up to 64 bits, or not one for each entry.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> table = hs.neighbors([[0.0], [1.0], [3.0], [9.0]], 2.0, quantities="jd")
+        >>> table.sum(table.distances).tolist()
+        [1.0, 3.0, 2.0, 0.0]
+        """
+        return row_sums(self._arrays[0], values)
+
+    _shown = ("n_rows", "n_points", "n_entries", "quantities")
+    _repr_html_ = _show.html
 
     def __repr__(self) -> str:
         return (
@@ -188,7 +237,10 @@ class TableRows:
     def __reduce__(self) -> tuple[Any, ...]:
         origin, first_row, entries = self._origin, self._first_row, self._entries
         if origin is not None:  # of which pickles hold no more than their rows need
-            rows = slice(first_row, first_row + len(self))
+            rows: slice | Array = (
+                slice(first_row, first_row + len(self))
+                if isinstance(first_row, int) else first_row
+            )  # fmt: skip
             origin = origin.of_rows(rows, self.indices, entries, self._lacks_shifts())
             first_row, entries = 0, slice(None)
         return _restored, (
@@ -242,8 +294,10 @@ class TableRows:
             a, b = int(offsets[0]), int(offsets[-1])
             order[a:b] = order_by_distance(offsets - a, distances[a:b])
             order[a:b] += a
-            rows = np.repeat(np.arange(first, end) + self._first_row, np.diff(offsets))
-            settle(order[a:b], rows, places, distances, shifts, points, asking, vectors)
+            numbers = self._numbers_from(first, end)
+            asked = asking[numbers:] if isinstance(numbers, int) else asking[numbers]
+            rows = rows_of(offsets)  # from 0 on: two rows of one point are two
+            settle(order[a:b], rows, places, distances, shifts, points, asked, vectors)
         return order
 
     def _refuse_queries(self, what: str) -> None:

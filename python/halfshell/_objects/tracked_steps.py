@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from halfshell._convert.options import check_letters
 from halfshell._convert.types import Arrays
 from halfshell._objects.pair_changes import PairChanges, Step, compare
 
@@ -39,7 +40,7 @@ class TrackedSteps:
         now = self._steps[-1]
         nothing = Step(now.points[:0], now.vectors, now.bits)
         before = self._steps[0] if len(self._steps) == 2 else nothing
-        search(nothing, quantities, False, index_bytes, None)  # are there such quantities?
+        check_letters(quantities)
         letters = quantities + "".join(letter for letter in "ijS" if letter not in quantities)
         key = (letters, index_bytes)
         new: Arrays | None = self._pairs[-1].get(key)

@@ -10,7 +10,7 @@ from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell import _core, _show
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_length, as_skin
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes
@@ -393,8 +393,8 @@ class VerletList:
     def __reduce__(self) -> NoReturn:
         raise TypeError("a VerletList cannot be copied or pickled: make a new one")
 
+    _repr_html_ = _show.html
+
     def __repr__(self) -> str:
-        return (
-            f"VerletList({self._cutoff!r}, skin={self._skin!r}): {self.n_points} points, "
-            f"{self._n_builds} builds in {self._n_updates} updates"
-        )
+        done = f"{self.n_points} points, {self._n_builds} builds in {self._n_updates} updates"
+        return f"VerletList({self._cutoff!r}, skin={self._skin!r}): {done}"

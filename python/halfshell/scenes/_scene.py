@@ -9,6 +9,8 @@ from typing import Any, Literal, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell import _show
+
 __all__ = ["SIZES", "Floats", "Motion", "Rule", "Scene", "Size", "Updates", "pick"]
 
 Floats = NDArray[np.float64]
@@ -76,6 +78,9 @@ class Motion:
     lengths: Floats = field(default_factory=lambda: np.empty(0))
     stiffnesses: Floats = field(default_factory=lambda: np.empty(0))
 
+    __repr__ = _show.line
+    _repr_html_ = _show.html
+
 
 @dataclass(frozen=True, eq=False)
 class Updates:
@@ -104,6 +109,9 @@ class Updates:
     keys: NDArray[np.int64]
     positions: Floats
     removed: NDArray[np.bool_]
+
+    __repr__ = _show.line
+    _repr_html_ = _show.html
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +173,12 @@ class Scene:
     name: str = ""
     title: str = ""
     stresses: str = ""
+
+    _shown = (
+        "name", "title", "n_points", "ndim", "cutoff", "rule", "extent", "periodic", "inclusive"
+    )  # fmt: skip
+    __repr__ = _show.line
+    _repr_html_ = _show.html
 
     @property
     def n_points(self) -> int:

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import IO, Any
 
+from halfshell import _show
+
 __all__ = ["STATUSES", "ReportRow", "read_csv", "write_csv"]
 
 #: What can become of a method on a scene.
@@ -117,6 +119,12 @@ class ReportRow:
     steps: int | None = None
     builds: int | None = None
     drift_kinetic: float | None = None
+
+    _shown = (
+        "scene", "method", "status", "seconds", "pairs_true", "missed", "spurious", "duplicate"
+    )
+    __repr__ = _show.line
+    _repr_html_ = _show.html
 
     @property
     def wrong(self) -> int | None:

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How objects show themselves: in one line as text, in a small table in a notebook.
+
+A class takes ``__repr__ = _show.line`` and ``_repr_html_ = _show.html`` into its body; named tuples
+have methods that call these. What is shown are the attributes that `_shown` names, or else the
+fields, but not what is None or empty. Of arrays with more than a few numbers it is type and shape.
+Nothing is computed for it, and no colour is set: a notebook's own are used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+__all__ = ["facts", "html", "line"]
+
+_WIDTH = 60  # characters of one value
+_FEW = 9  # numbers of a tuple, or of an array, that are written out
+
+
+def line(value: Any) -> str:
+    """``Name(what=..., ...)``, on one line."""
+    told = ", ".join(f"{name}={text}" for name, text in facts(value))
+    return f"{type(value).__name__}({told})"
+
+
+def html(value: Any) -> str:
+    """A table with a row for each attribute; the repr of what names none."""
+    from html import escape
+
+    if not (told := facts(value)):
+        return f"<code>{escape(repr(value))}</code>"
+    rows = "".join(
+        f'<tr><th style="text-align: left">{escape(name)}</th>'
+        f'<td style="text-align: left">{escape(text)}</td></tr>'
+        for name, text in told
+    )
+    return (
+        '<table><thead><tr><th colspan="2" style="text-align: left">'
+        f"{escape(type(value).__name__)}</th></tr></thead><tbody>{rows}</tbody></table>"
+    )
+
+
+def facts(value: Any) -> list[tuple[str, str]]:
+    """The attributes to show, by name, as text; none for a class without `_shown` and fields."""
+    kind = type(value)
+    names = getattr(kind, "_shown", None) or getattr(kind, "_fields", None)
+    if names is None:
+        names = [field.name for field in fields(value)] if is_dataclass(value) else []
+    told = ((name, getattr(value, name)) for name in names)
+    return [(name, _brief(each)) for name, each in told if not _is_nothing(each)]
+
+
+def _is_nothing(value: Any) -> bool:
+    return value is None or (type(value) in (str, tuple, list, dict) and not value)
+
+
+def _brief(value: Any) -> str:
+    """A value in a few words."""
+    if hasattr(value, "shape") and hasattr(value, "dtype"):
+        return _of_array(value)
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if type(value) in (tuple, list):
+        if len(value) > _FEW:
+            return f"{len(value)} of {type(value[0]).__name__}"
+        inside = ", ".join(_brief(each) for each in value)
+        if type(value) is list:
+            return f"[{inside}]"
+        return f"({inside},)" if len(value) == 1 else f"({inside})"
+    if type(value) is dict:
+        return f"{len(value)} entries"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 3]}..."
+
+
+def _of_array(array: Any) -> str:
+    """Its numbers where they are few, else its type and shape; others' are not read."""
+    if isinstance(array, np.generic):
+        return _brief(array.item())
+    if isinstance(array, np.ndarray) and 0 < array.size <= _FEW:
+        text = _brief(array.tolist())
+        if len(text) <= _WIDTH:
+            return text
+    return f"{array.dtype} {tuple(array.shape)}"
