@@ -259,3 +259,14 @@ hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
     }
     return false;
 }
+
+int
+hs_zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM])
+{
+    integer_row ignored;
+    int         k = 0;
+    while (k < n_rows && load_row(ndim, rows[k], &ignored) >= 0) {
+        k++;
+    }
+    return k;
+}

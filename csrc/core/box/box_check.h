@@ -13,6 +13,9 @@
 /* rows: n_rows (0 ... ndim) rows of ndim finite doubles, of any magnitude. Allocates nothing. */
 bool hs_rows_independent(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
 
+/* The first of these rows that is zero, or n_rows. */
+int hs_zero_row(int ndim, int n_rows, const double rows[][HS_MAX_DIM]);
+
 /* The largest prime below p; p: odd, at most 2^62 and far above 2^61. A step of the above. */
 uint64_t hs_prime_below(uint64_t p);
 

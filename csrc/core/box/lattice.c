@@ -79,10 +79,13 @@ hs_box_check(const hs_box *box, hs_failure *failure)
         }
     }
     const int n_periodic = collect_periodic_rows(box, rows, vector_of_row);
-    return rows_are_aligned(box->ndim, n_periodic, rows, column) ||
-                   hs_rows_independent(box->ndim, n_periodic, rows)
-               ? HS_OK
-               : HS_ERR_BOX_DEPENDENT;
+    if (rows_are_aligned(box->ndim, n_periodic, rows, column) ||
+        hs_rows_independent(box->ndim, n_periodic, rows)) {
+        return HS_OK;
+    }
+    const int zero = hs_zero_row(box->ndim, n_periodic, rows);
+    failure->row = zero < n_periodic ? vector_of_row[zero] : -1;
+    return HS_ERR_BOX_DEPENDENT;
 }
 
 static double

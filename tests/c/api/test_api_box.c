@@ -229,7 +229,9 @@ failures_name_the_row_and_column(void)
     options.cutoff = -0.0;
     CHECK(find_status(&options, &failure) == HS_OK);
     memcpy(shared.box.rows[2], shared.box.rows[0], sizeof shared.box.rows[0]);
-    CHECK(find_status(&options, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(find_status(&options, &failure) == HS_ERR_BOX_DEPENDENT && failure.row == -1);
+    memset(shared.box.rows[1], 0, sizeof shared.box.rows[1]);
+    CHECK(find_status(&options, &failure) == HS_ERR_BOX_DEPENDENT && failure.row == 1);
     options.kernel = "no such kernel";
     CHECK(find_status(&options, &failure) == HS_ERR_KERNEL);
     for (int status = HS_OK; status < HS_STATUS_END; status++)

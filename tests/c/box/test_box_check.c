@@ -64,6 +64,18 @@ a_zero_row_is_dependent(void)
 }
 
 static void
+the_first_zero_row_is_named(void)
+{
+    double rows[3][HS_MAX_DIM] = {{0x1p-1074, 0, 0}, {0, -0.0, 0}, {0, 0, 0}};
+    CHECK(hs_zero_row(3, 3, rows) == 1 && hs_zero_row(3, 1, rows) == 1);
+    CHECK(hs_zero_row(3, 0, rows) == 0);
+    rows[1][2] = 1e300;
+    CHECK(hs_zero_row(3, 3, rows) == 2);
+    rows[2][0] = -1.0;
+    CHECK(hs_zero_row(3, 3, rows) == 3);
+}
+
+static void
 aligned_boxes_of_any_length_are_independent(void)
 {
     static const double lengths[] = {1.0, 5e-324, -1.7e308, 0x1p-1022, 0.1, -1e12, 3e-310, 1e300};
@@ -312,6 +324,7 @@ test_box_check(void)
     RUN(moduli_are_the_next_primes);
     RUN(no_rows_are_independent);
     RUN(a_zero_row_is_dependent);
+    RUN(the_first_zero_row_is_named);
     RUN(aligned_boxes_of_any_length_are_independent);
     RUN(equal_and_opposite_rows_are_dependent);
     RUN(one_ulp_tells_sums_apart);

@@ -413,3 +413,19 @@ def test_every_function_with_a_box_takes_one_number():
         if callable(value := getattr(hs, name)) and "box" in inspect.signature(value).parameters
     }  # fmt: skip
     assert takes <= set(WITH_BOX)
+
+
+@pytest.mark.parametrize(
+    "box", [[2.0, 2.0, 0.0], np.diag([2.0, 2.0, -0.0]), [[1, 0, 0], [1, 0, 0], [0, 0, 0]]]
+)
+def test_a_vector_of_no_length_is_named(box):
+    said = "vector 2 of box is zero; make that axis not periodic"
+    with pytest.raises(ValueError, match=said):
+        hs.Box(box)
+    with pytest.raises(ValueError, match=said):
+        hs.pairs(np.zeros((2, 3)), 1.0, box=box)
+    boxes = np.stack([np.eye(3), np.diag([1.0, 0.0, 0.0])])
+    with pytest.raises(ValueError, match=r"vector 1 of box\[1\] is zero"):
+        hs.pairs(np.zeros((2, 3)), 1.0, box=boxes, batch=[0, 1])
+    flat = hs.count_pairs(np.zeros((2, 3)), 0.5, box=[2, 2, 0], periodic=[True, True, False])
+    assert flat == 1
