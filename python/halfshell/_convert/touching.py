@@ -57,7 +57,7 @@ def pairs_touching(
     letters = "ij" + "".join(letter for letter in quantities if letter in "dDS")
     rows = _core.pairs_between(
         *search, letters, True, index_bytes, None, points[numbers],
-        _among(reach, numbers), algorithm,
+        asked_by(reach, numbers), algorithm,
     )  # fmt: skip
     columns = _half_list(dict(zip(letters, rows, strict=True)), numbers, len(points), sort)
     if "P" in quantities:
@@ -68,7 +68,7 @@ def pairs_touching(
     return arrays[0] if len(arrays) == 1 else arrays
 
 
-def _among(reach: Reach | None, numbers: npt.NDArray[np.int64]) -> Reach | None:
+def asked_by(reach: Reach | None, numbers: npt.NDArray[np.int64]) -> Reach | None:
     """The reach of points, for some of them as queries too."""
     if reach is None:
         return None

@@ -21,7 +21,9 @@ from halfshell._convert.types import (
     PeriodicLike,
     PointsLike,
     Precision,
+    Reach,
     Rule,
+    Search,
 )
 from halfshell._objects.box import Box
 from halfshell._objects.neighbor_table import NeighborTable
@@ -51,6 +53,7 @@ def neighbors(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    indices: npt.ArrayLike | None = None,
 ) -> NeighborTable:
     """Find all neighbours of each point, or of each query, as a table of rows.
 
@@ -84,6 +87,10 @@ def neighbors(
         vectors, shifts. Only these are computed, and the table has no others.
     box, periodic, inclusive, index_dtype, precision, algorithm, kernel, threads, memory_limit
         As in `pairs`.
+    indices : array_like of int, shape (r,), optional
+        Only the rows of these points, in this order: row k is that of point ``indices[k]``, as the
+        whole table has it, found at a cost after their number. Not beside `queries` or precision
+        "single".
 
     Returns
     -------
@@ -130,6 +137,11 @@ def neighbors(
     >>> [row.tolist() for row in hs.neighbors(points, 1.5, queries=[[2.0, 0.0], [9.0, 9.0]])]
     [[1, 2], []]
 
+    Rows of some of the points, which are no neighbours of themselves:
+
+    >>> [row.tolist() for row in hs.neighbors(points, 2.0, indices=[2, 1])]
+    [[1], [0, 2]]
+
     Each point looks as far as its own radius:
 
     >>> [row.tolist() for row in hs.neighbors(points, None, radii=[0.5, 1.5, 3.0], rule="gather")]
@@ -147,7 +159,7 @@ def neighbors(
     if (
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
-        and supports is None and query_supports is None and extent is None
+        and supports is None and query_supports is None and extent is None and indices is None
     ):  # fmt: skip
         arrays = _core.plain(
             _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -162,6 +174,10 @@ def neighbors(
             ),
             queries, directed=True,
         )  # fmt: skip
+        if indices is not None:
+            return _rows_alone(
+                search, indices, queries, quantities, as_index_bytes(index_dtype), reach, algorithm
+            )
         arrays = _core.neighbors(
             *search, quantities, as_index_bytes(index_dtype), asking, reach, algorithm
         )
@@ -172,6 +188,35 @@ def neighbors(
         origin = Origin(found, asking, vectors, periods, find_shifts)
     is_full = queries is None and rule not in DIRECTED
     return NeighborTable(arrays, quantities, len(found), is_full, origin=origin)
+
+
+def _rows_alone(
+    search: Search,
+    indices: Any,
+    queries: Any,
+    quantities: str,
+    index_bytes: int,
+    reach: Reach | None,
+    algorithm: str,
+) -> NeighborTable:
+    """The table of some points; sorting it exactly asks for what the search had found."""
+    from halfshell._convert.own_rows import rows_of_points  # here: others do without
+    from halfshell._convert.touching import asked_by
+
+    if queries is not None:
+        raise ValueError("indices are numbers of the points that ask: give no queries beside them")
+    arrays, numbers, entries = rows_of_points(
+        search, indices, quantities, index_bytes, reach, algorithm
+    )
+    origin = None
+    points, largest, vectors, bits, inclusive, precision = search[:6]
+    if "d" in quantities and "j" in quantities:  # else it cannot be sorted
+        by = asked_by(reach, numbers)
+        find_shifts = shifts_of_search(largest, inclusive, precision, search[9], by)
+        origin = Origin(points, points[numbers], vectors, bits, find_shifts)
+    return NeighborTable(
+        arrays, quantities, len(points), False, origin=origin, entries=entries
+    )
 
 
 def coordination(
@@ -195,6 +240,7 @@ def coordination(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    indices: npt.ArrayLike | None = None,
 ) -> npt.NDArray[np.int64]:
     """Count the neighbours of each point, or of each query, without listing them.
 
@@ -208,10 +254,12 @@ def coordination(
         As in `neighbors`.
     memory_limit : float, optional
         Bytes that the search may take.
+    indices : array_like of int, shape (r,), optional
+        Only these points, as in `neighbors`; their neighbours are listed one by one for this.
 
     Returns
     -------
-    ndarray of int64, shape (n,) or (q,)
+    ndarray of int64, shape (n,), (q,) or (r,)
         Length of each row of the full list; images count one by one. The sum is twice
         `count_pairs`, or with `queries` just that; but for rules with a direction.
 
@@ -237,7 +285,7 @@ def coordination(
     if (
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
-        and supports is None and query_supports is None and extent is None
+        and supports is None and query_supports is None and extent is None and indices is None
     ):  # fmt: skip
         counts: Any = _core.plain(
             _core.coordination, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -253,4 +301,6 @@ def coordination(
             ),
             queries, directed=True,
     )  # fmt: skip
+    if indices is not None:
+        return _rows_alone(search, indices, queries, "j", 4, reach, algorithm).counts
     return _core.coordination(*search, asking, reach, algorithm)

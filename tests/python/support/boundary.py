@@ -366,6 +366,11 @@ def calls():
         "pairs that touch": (hs.pairs, listed | {"out": None, "touching": [0, 2]}),
         "pairs in shells": (hs.pairs, listed | {"cutoff": [0.5, 1.0], "quantities": "ijk"} | room),
         "pairs of a batch": (hs.pairs, listed | {"out": None, "batch": numbers} | room),
+        "rows of points": (
+            hs.neighbors,
+            search | {"quantities": "jS", "index_dtype": np.int64, "queries": None,
+                      "indices": [0, 2]},
+        ),
         "count_pairs": (hs.count_pairs, search | {"batch": None}),
         "count_pairs of a batch": (hs.count_pairs, search | {"batch": numbers}),
         "explain": (hs.explain, listed | {"measure": False}),

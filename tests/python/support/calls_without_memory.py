@@ -204,6 +204,9 @@ CALLS = {
     "neighbors": lambda: list(hs.neighbors(POINTS, 1.5, **PERIODIC)),
     "neighbors, queries": lambda: hs.neighbors(
         POINTS, 1.5, queries=OTHER, quantities="jdDS", **PERIODIC)._arrays,
+    "neighbors, indices": lambda: hs.neighbors(
+        POINTS, 1.5, indices=[3, 0, 3], quantities="jdS", **PERIODIC
+    )._arrays,
     "neighbors, large": lambda: hs.neighbors(CROWD, 2.0, quantities="jdD")._arrays,
     "coordination": lambda: hs.coordination(POINTS, 1.5, **PERIODIC),
     "pairs of balls": lambda: hs.pairs(
