@@ -15,13 +15,20 @@ from halfshell._convert.options import check_letters
 from halfshell._convert.touching import asked_by
 
 if TYPE_CHECKING:
-    from halfshell._convert.types import Reach, Search
+    from halfshell._convert.types import PointArray, Reach, Search
 
 Array = npt.NDArray[Any]
 
 
+def check_alone(queries: Any) -> None:
+    """ValueError where there are queries as well."""
+    if queries is not None:
+        raise ValueError("indices are numbers of the points that ask: give no queries beside them")
+
+
 def rows_of_points(
     search: Search,
+    points: PointArray,
     indices: Any,
     quantities: str,
     index_bytes: int,
@@ -30,11 +37,11 @@ def rows_of_points(
 ) -> tuple[tuple[Array, ...], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Offsets and columns of the rows of these points, their numbers, and the entries kept.
 
-    The last are positions among the entries that a search for the same points as queries has.
+    `search` begins with the points, or with cells of them. The last result is positions among the
+    entries that a search for the same points as queries has.
     """
     if is_a(search[5], str) and search[5] == "single":
         raise ValueError("indices does not go with precision 'single'")
-    points = search[0]
     numbers = as_point_numbers(indices, "indices", len(points), "points")
     check_letters(quantities)
     letters = quantities if "j" in quantities else "j" + quantities

@@ -200,16 +200,15 @@ def _rows_alone(
     algorithm: str,
 ) -> NeighborTable:
     """The table of some points; sorting it exactly asks for what the search had found."""
-    from halfshell._convert.own_rows import rows_of_points  # here: others do without
+    from halfshell._convert.own_rows import check_alone, rows_of_points  # here: others do without
     from halfshell._convert.touching import asked_by
 
-    if queries is not None:
-        raise ValueError("indices are numbers of the points that ask: give no queries beside them")
+    check_alone(queries)
+    points, largest, vectors, bits, inclusive, precision = search[:6]
     arrays, numbers, entries = rows_of_points(
-        search, indices, quantities, index_bytes, reach, algorithm
+        search, points, indices, quantities, index_bytes, reach, algorithm
     )
     origin = None
-    points, largest, vectors, bits, inclusive, precision = search[:6]
     if "d" in quantities and "j" in quantities:  # else it cannot be sorted
         by = asked_by(reach, numbers)
         find_shifts = shifts_of_search(largest, inclusive, precision, search[9], by)
@@ -302,5 +301,5 @@ def coordination(
             queries, directed=True,
     )  # fmt: skip
     if indices is not None:
-        return _rows_alone(search, indices, queries, "j", 4, reach, algorithm).counts
+        return _rows_alone(search, indices, queries, "j", 4, reach, algorithm).counts.copy()
     return _core.coordination(*search, asking, reach, algorithm)

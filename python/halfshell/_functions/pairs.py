@@ -381,4 +381,5 @@ def pairs(
 
         return pairs_touching(search, search[0], touching, wanted, reach, algorithm)
     scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
-    return _core.batch_pairs(*(*scene, *rest, *wanted, *own, reach, algorithm, room))
+    end = (reach, algorithm) if room is None else (reach, algorithm, room)
+    return _core.batch_pairs(*(*scene, *rest, *wanted, *own, *end))

@@ -13,6 +13,7 @@ from halfshell import _core
 from halfshell._convert.lengths import as_cutoffs, as_edges
 from halfshell._convert.marks import as_marks, binned
 from halfshell._convert.options import AUTO
+from halfshell._convert.own_rows import check_alone, rows_of_points
 from halfshell._convert.search import count_within
 from halfshell._convert.types import Number, PointsLike
 from halfshell._objects.kept_cells import KeptCells
@@ -96,6 +97,7 @@ class CellCounts(KeptCells):
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
+        indices: npt.ArrayLike | None = None,
     ) -> npt.NDArray[np.int64]:
         """Count the neighbours of each point, or of each query.
 
@@ -105,10 +107,12 @@ class CellCounts(KeptCells):
             Default: that of the list.
         queries, inclusive, kernel, threads, memory_limit
             As in `count_pairs`.
+        indices : array_like of int, shape (r,), optional
+            As in `halfshell.coordination`.
 
         Returns
         -------
-        ndarray of int64, shape (n,) or (q,)
+        ndarray of int64, shape (n,), (q,) or (r,)
 
         Examples
         --------
@@ -116,9 +120,15 @@ class CellCounts(KeptCells):
         >>> hs.CellList([[0.0], [1.0], [3.0]], 2.0).coordination().tolist()
         [1, 2, 1]
         """
-        asking = None if queries is None else self._queries(queries)
         options = inclusive, kernel, threads, memory_limit
-        return _core.coordination(*self._arguments(cutoff, options), asking, None, AUTO)
+        search = self._arguments(cutoff, options)
+        if indices is not None:
+            check_alone(queries)
+            points = self._origin.scene()[0]
+            (offsets, _), _, _ = rows_of_points(search, points, indices, "j", 4, None, AUTO)
+            return np.diff(offsets)
+        asking = None if queries is None else self._queries(queries)
+        return _core.coordination(*search, asking, None, AUTO)
 
     def pair_histogram(
         self,

@@ -14,6 +14,7 @@ from halfshell._convert.foreign import of_argument
 from halfshell._convert.lengths import as_cutoff, as_radii
 from halfshell._convert.nearest import as_k, as_max_distance, in_rows
 from halfshell._convert.options import AUTO, as_index_bytes
+from halfshell._convert.own_rows import check_alone, rows_of_points
 from halfshell._convert.rules import reach_by_radii
 from halfshell._convert.types import Arrays, Number, PointArray, PointsLike
 from halfshell._objects.kept_cells import KeptCells, Options
@@ -38,6 +39,7 @@ class CellRows(KeptCells):
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
+        indices: npt.ArrayLike | None = None,
     ) -> NeighborTable:
         """All neighbours of each point, or of each query, as `halfshell.neighbors` finds them.
 
@@ -45,7 +47,7 @@ class CellRows(KeptCells):
         ----------
         cutoff : float, optional
             Default: that of the list.
-        queries, quantities, inclusive, index_dtype, kernel, memory_limit
+        queries, quantities, inclusive, index_dtype, kernel, memory_limit, indices
             As in `halfshell.neighbors`.
         threads : int, optional
             As in `halfshell.neighbors`. Default: that of the list.
@@ -53,7 +55,7 @@ class CellRows(KeptCells):
         Returns
         -------
         NeighborTable
-            A row for each point or query, ascending by (j, S).
+            A row for each point or query, ascending by (j, S), or for each of `indices`.
 
         See Also
         --------
@@ -66,8 +68,11 @@ class CellRows(KeptCells):
         >>> [row.tolist() for row in cells.neighbors()]
         [[1], [0, 2], [1]]
         """
-        asking = None if queries is None else self._queries(queries)
         options = inclusive, kernel, threads, memory_limit
+        if indices is not None:
+            check_alone(queries)
+            return self._rows_alone(indices, cutoff, quantities, index_dtype, options)
+        asking = None if queries is None else self._queries(queries)
         return self._rows(asking, cutoff, quantities, index_dtype, options)
 
     def query(
@@ -205,6 +210,27 @@ class CellRows(KeptCells):
             queries, cutoff, "S", index_dtype, options
         ))  # fmt: skip
         return NeighborTable(arrays, quantities, self._n_points, asking is None, origin=origin)
+
+    def _rows_alone(
+        self,
+        indices: Any,
+        cutoff: Any,
+        quantities: str,
+        index_dtype: npt.DTypeLike,
+        options: Options,
+    ) -> NeighborTable:
+        """The rows of some of the points."""
+        points = self._origin.scene()[0]
+        arrays, numbers, entries = rows_of_points(
+            self._arguments(cutoff, options), points, indices, quantities,
+            as_index_bytes(index_dtype), None, AUTO,
+        )  # fmt: skip
+        origin = self._origin_of(points[numbers], quantities, lambda queries: self._arrays(
+            queries, cutoff, "S", index_dtype, options
+        ))  # fmt: skip
+        return NeighborTable(
+            arrays, quantities, self._n_points, False, origin=origin, entries=entries
+        )
 
     def _origin_of(
         self,

@@ -27,6 +27,12 @@ def test_rows_are_those_of_the_whole_table(scene, data):
     table = hs.neighbors(scene.points, scene.cutoff, quantities="jdDS", indices=numbers, **how)
     same(table, whole, numbers)
     same(table.sort(), whole.sort(), numbers)
+    cells = hs.CellList(scene.points, scene.cutoff, box=scene.box, periodic=scene.periodic)
+    how_cells = {"inclusive": scene.inclusive, "indices": numbers}
+    table = cells.neighbors(quantities="jdDS", **how_cells)
+    same(table, whole, numbers)
+    same(table.sort(), whole.sort(), numbers)
+    assert cells.coordination(**how_cells).tolist() == whole.counts[numbers].tolist()
     counts = hs.coordination(scene.points, scene.cutoff, indices=numbers, **how)
     assert counts.dtype == np.int64 and counts.tolist() == whole.counts[numbers].tolist()
 
@@ -93,9 +99,16 @@ def test_nothing_is_within_an_open_cutoff_of_zero():
     ],
 )
 def test_wrong_indices(wrong, error, said):
+    points = np.zeros((3, 2))
+    cells = hs.CellList(points, 1.0)
     for search in (hs.neighbors, hs.coordination):
         with pytest.raises(error, match=said):
-            search(np.zeros((3, 2)), 1.0, indices=wrong)
+            search(points, 1.0, indices=wrong)
+    for search in (cells.neighbors, cells.coordination):
+        with pytest.raises(error, match=said):
+            search(indices=wrong)
+        with pytest.raises(ValueError, match="give no queries beside them"):
+            search(indices=[0], queries=points)
 
 
 def test_what_does_not_go_with_indices():
