@@ -16,7 +16,11 @@ from checkout import ROOT
 
 MODULES = ["halfshell", *(m.name for m in pkgutil.walk_packages(hs.__path__, "halfshell."))]
 MODULES = [m for m in MODULES if m not in ("halfshell.torch", "halfshell.jax")]  # frameworks/
-OWNERS = {"halfshell.compat.ase": "ase", "halfshell.compat.mdanalysis": "MDAnalysis"}
+OWNERS = {
+    "halfshell.compat.ase": "ase",
+    "halfshell.compat.mdanalysis": "MDAnalysis",
+    "halfshell.compat.scipy": "scipy",
+}
 
 
 @pytest.mark.parametrize("name", [m for m in MODULES if m != "halfshell.__main__"])

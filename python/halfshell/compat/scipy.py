@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Trees in place of those of ``scipy.spatial``.
+
+They are subclasses of SciPy's, with its arguments, attributes, dtypes, shapes and errors, and its
+rule: a pair counts up to the radius, that included (``<=``), and a nearest neighbour if it is
+closer than `distance_upper_bound` (``<``). Here that is decided for the real numbers that the
+floats are, where SciPy compares rounded squares; so the answers differ where rounding decides
+SciPy's.
+
+With `boxsize` the nearest image of a point counts, as there. SciPy itself answers what is not
+decided here: `p` other than 2, `eps` above 0, more than 8 dimensions, radii that are negative or
+infinite, and, with `boxsize`, distances of half a period or more.
+
+Lists of neighbours ascend, also where SciPy's have no order; among neighbours at the same distance
+`query` has the lowest numbers. `workers` is the number of threads; methods without it use as many
+as `halfshell.pairs`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+try:
+    import scipy.spatial as _owner
+    from scipy.sparse import coo_matrix
+except ImportError as error:  # pragma: no cover
+    message = "halfshell.compat.scipy needs scipy: pip install scipy"
+    raise ImportError(message) from error
+
+import halfshell as hs
+from halfshell import _core
+from halfshell._convert.marks import as_marks
+from halfshell._convert.scene import as_sets
+from halfshell._convert.search import as_rest
+from halfshell.compat._trees import (
+    TreeSearches,
+    as_bound,
+    as_lists,
+    as_ranks,
+    as_threads,
+    as_weights,
+    columns_of,
+)
+
+__all__ = ["KDTree", "cKDTree"]
+
+_ENTRY = np.dtype([("i", np.intp), ("j", np.intp), ("v", np.float64)], align=True)
+
+
+class _Searches(TreeSearches):
+    """The searches of a tree, to stand before one of SciPy's classes."""
+
+    _index: type = int
+
+    def query(
+        self,
+        x: Any,
+        k: Any = 1,
+        eps: Any = 0.0,
+        p: Any = 2.0,
+        distance_upper_bound: Any = np.inf,
+        workers: Any = 1,
+    ) -> Any:
+        """Find the nearest neighbours of each point of `x`.
+
+        Parameters
+        ----------
+        x : array_like of float, shape (..., m)
+            The points that ask.
+        k : int or sequence of int, default 1
+            How many neighbours, or which of them: 1 is the nearest.
+        eps, p
+            Others than 0 and 2 are for SciPy.
+        distance_upper_bound : float, default infinity
+            Only neighbours that are closer than this.
+        workers : int, default 1
+            Threads; -1 is all.
+
+        Returns
+        -------
+        d : float or ndarray of float64, shape (..., k)
+            Distances, ascending, infinity where there is no neighbour; without the last axis if k
+            is 1, as an int.
+        i : int or ndarray of intp, shape (..., k)
+            Numbers of the neighbours; n where there is none.
+        """
+        asked, threads, ranks = self._asked(x, p, eps), as_threads(workers), as_ranks(k)
+        bound = as_bound(distance_upper_bound)
+        if asked is None or threads is None or ranks is None or bound is None or not self.n:
+            return super().query(x, k, eps, p, distance_upper_bound, workers)  # type: ignore[misc]
+        columns, squeezed = ranks
+        shape = np.shape(x)[:-1]
+        i, d = self._nearest(asked, int(columns.max()), bound, threads)
+        i, d = columns_of(i, columns, self.n), columns_of(d, columns, np.inf)
+        if not squeezed:
+            return d.reshape(*shape, len(columns)), i.reshape(*shape, len(columns))
+        if not shape:
+            return float(d[0, 0]), self._index(i[0, 0])
+        return d.reshape(shape), i.reshape(shape)
+
+    def query_ball_point(
+        self,
+        x: Any,
+        r: Any,
+        p: Any = 2.0,
+        eps: Any = 0.0,
+        workers: Any = 1,
+        return_sorted: Any = None,
+        return_length: Any = False,
+    ) -> Any:
+        """Find all points within a distance of each point of `x`.
+
+        Parameters
+        ----------
+        x : array_like of float, shape (..., m)
+            The points that ask.
+        r : float or array_like of float
+            The largest distance, for all or, broadcast to ``x.shape[:-1]``, for each.
+        p, eps, workers
+            As for `query`.
+        return_sorted : bool, optional
+            Without effect: lists always ascend.
+        return_length : bool, default False
+            Whether to return how many they are.
+
+        Returns
+        -------
+        list of int, ndarray of lists, or numbers as intp
+            As SciPy's.
+        """
+        asked, threads = self._asked(x, p, eps), as_threads(workers)
+        radii = None if asked is None else self._radii(r, np.shape(x)[:-1])
+        if asked is None or threads is None or radii is None:
+            return super().query_ball_point(  # type: ignore[misc]
+                x, r, p, eps, workers, return_sorted, return_length
+            )
+        shape = np.shape(x)[:-1]
+        offsets, j = self._balls(asked, radii, threads)
+        if return_length:
+            lengths = np.diff(offsets).astype(np.intp).reshape(shape)
+            return lengths if shape else lengths[()]
+        lists = as_lists(offsets, j)
+        if not shape:
+            return lists[0]
+        result = np.empty(len(lists), object)
+        result[:] = lists
+        return result.reshape(shape)
+
+    def query_ball_tree(self, other: Any, r: Any, p: Any = 2.0, eps: Any = 0.0) -> Any:
+        """For each point of this tree list those of another one within a distance.
+
+        Parameters
+        ----------
+        other : KDTree
+            The other tree, which may be this one.
+        r : float
+            The largest distance.
+        p, eps
+            As for `query`.
+
+        Returns
+        -------
+        list of list of int
+            A list for each point of this tree, ascending.
+        """
+        if not self._is_for(p, eps) or not self._fits(other) or not self._is_near(r):
+            return super().query_ball_tree(other, r, p, eps)  # type: ignore[misc]
+        rows = hs.neighbors(other.data, float(r), queries=self.data, **self._box())
+        return as_lists(rows.offsets, rows.indices)
+
+    def query_pairs(self, r: Any, p: Any = 2.0, eps: Any = 0.0, output_type: Any = "set") -> Any:
+        """Find all pairs of points within a distance.
+
+        Parameters
+        ----------
+        r : float
+            The largest distance.
+        p, eps
+            As for `query`.
+        output_type : {"set", "ndarray"}
+            What to return.
+
+        Returns
+        -------
+        set of tuple of int, or ndarray of intp, shape (number of pairs, 2)
+            Each pair once, the lower number first.
+        """
+        known = output_type in ("set", "ndarray")
+        if not known or not self._is_for(p, eps) or not self._is_near(r):
+            return super().query_pairs(r, p, eps, output_type)  # type: ignore[misc]
+        if output_type == "ndarray":
+            both = hs.pairs(self.data, float(r), quantities="P", **self._box())
+            return both.astype(np.intp, copy=False)
+        i, j = hs.pairs(self.data, float(r), **self._box())
+        return set(zip(i.tolist(), j.tolist()))
+
+    def count_neighbors(
+        self, other: Any, r: Any, p: Any = 2.0, weights: Any = None, cumulative: Any = True
+    ) -> Any:
+        """Count the pairs of a point of this tree and one of another, or add up their weights.
+
+        Parameters
+        ----------
+        other : KDTree
+            The other tree, which may be this one.
+        r : float or array_like of float, shape (k,)
+            Largest distances.
+        p
+            As for `query`.
+        weights : array_like, or tuple of two, optional
+            Weights of the points of this tree and of the other, None for 1; one array is for both,
+            if they are the same tree. The weight of a pair is the product of the two.
+        cumulative : bool, default True
+            Whether to count up to each of `r`, or between it and the one before, that not included.
+
+        Returns
+        -------
+        int, float, or ndarray of intp or float64, shape (k,)
+            Integers without weights.
+        """
+        limits, marks = self._limits(r, cumulative), as_weights(weights, self, other)
+        if limits is None or marks is None or not self._is_for(p, 0.0) or not self._fits(other):
+            return super().count_neighbors(other, r, p, weights, cumulative)  # type: ignore[misc]
+        within, places = limits
+        asking, points, vectors, bits = as_sets(self.data, other.data, **self._box())
+        rest = as_rest(True, "exact", None, None, None, None)
+        of_each = as_marks(len(points), asking, None, None, marks[1], marks[0])
+        bins = _core.histogram(
+            points, 0.0, vectors, bits, *rest, within, True, asking, *of_each, "auto"
+        )[0, 0]
+        if cumulative:
+            found = np.cumsum(bins)[places]
+        else:  # an edge that is repeated has nothing between it and itself
+            found = bins[places]
+            found[1:][places[1:] == places[:-1]] = 0
+        counts = marks[0] is None and marks[1] is None
+        found = found.astype(np.intp if counts else np.float64, copy=False).reshape(np.shape(r))
+        if np.ndim(r):
+            return found
+        return int(found) if counts else found[()]
+
+    def sparse_distance_matrix(
+        self, other: Any, max_distance: Any, p: Any = 2.0, output_type: Any = "dok_matrix"
+    ) -> Any:
+        """The distances of all points of this tree and of another, up to a largest one.
+
+        Parameters
+        ----------
+        other : KDTree
+            The other tree, which may be this one.
+        max_distance : float
+            The largest distance.
+        p
+            As for `query`.
+        output_type : {"dok_matrix", "coo_matrix", "dict", "ndarray"}
+            What to return.
+
+        Returns
+        -------
+        dok_matrix, coo_matrix, dict or ndarray
+            As SciPy's, with distances within 1 ulp; the array has fields i, j and v and ascends by
+            i and j.
+        """
+        known = output_type in ("dok_matrix", "coo_matrix", "dict", "ndarray")
+        is_ours = known and self._is_for(p, 0.0) and self._fits(other)
+        if not is_ours or not self._is_near(max_distance):
+            return super().sparse_distance_matrix(  # type: ignore[misc]
+                other, max_distance, p, output_type
+            )
+        i, j, d = hs.pairs_between(
+            self.data, other.data, float(max_distance), quantities="ijd", **self._box()
+        )
+        if output_type == "dict":
+            return dict(zip(zip(i.tolist(), j.tolist()), d.tolist()))
+        if output_type == "ndarray":
+            entries = np.empty(len(i), _ENTRY)
+            entries["i"], entries["j"], entries["v"] = i, j, d
+            return entries
+        matrix = coo_matrix((d, (i, j)), shape=(self.n, other.n))
+        return matrix if output_type == "coo_matrix" else matrix.todok()
+
+    def _fits(self, other: Any) -> bool:
+        is_tree = isinstance(other, _owner.cKDTree) and other.m == self.m
+        return is_tree and self._has_box_of(other)
+
+
+class cKDTree(_Searches, _owner.cKDTree):
+    """In place of ``scipy.spatial.cKDTree``, of which it is a subclass.
+
+    Parameters and attributes are SciPy's; see `KDTree`.
+
+    Examples
+    --------
+    >>> from halfshell.compat.scipy import cKDTree
+    >>> cKDTree([[0.0], [1.0], [3.0]]).query([[0.9]])
+    (array([0.1]), array([1]))
+    """
+
+
+class KDTree(_Searches, _owner.KDTree):
+    """In place of ``scipy.spatial.KDTree``, of which it is a subclass.
+
+    Parameters and attributes are SciPy's, and so is the tree that `tree` shows.
+
+    Parameters
+    ----------
+    data : array_like of float, shape (n, m)
+        The points.
+    leafsize, compact_nodes, copy_data, balanced_tree
+        How SciPy's tree is built, with no effect on answers.
+    boxsize : float or array_like of float, shape (m,), optional
+        Periods; 0 for axes without one. The points are from 0 up to these, not included.
+
+    Examples
+    --------
+    >>> from halfshell.compat.scipy import KDTree
+    >>> tree = KDTree([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])
+    >>> tree.query_pairs(2.0) == {(0, 1), (1, 2)}
+    True
+    >>> tree.query_ball_point([2.0, 0.0], 1.0)
+    [1, 2]
+    >>> tree.count_neighbors(tree, [0.0, 1.0, 2.0]).tolist()
+    [3, 5, 7]
+    """
+
+    _index = np.intp
