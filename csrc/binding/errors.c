@@ -82,16 +82,14 @@ raise_dependent(const hs_failure *failure)
 {
     char        name[32];
     const char *box = name_box(failure, name, sizeof name);
-    if (failure->row >= 0) {
-        PyErr_Format(PyExc_ValueError, "vector %lld of %s is zero; make that axis not periodic",
-                     (long long)failure->row, box);
-    } else {
-        PyErr_Format(PyExc_ValueError,
-                     "the periodic vectors of %s must be linearly independent; these are exactly "
-                     "dependent",
-                     box);
-    }
-    return NULL;
+    return failure->row >= 0
+               ? PyErr_Format(PyExc_ValueError,
+                              "vector %lld of %s is zero; make that axis not periodic",
+                              (long long)failure->row, box)
+               : PyErr_Format(PyExc_ValueError,
+                              "the periodic vectors of %s must be linearly independent; these are "
+                              "exactly dependent",
+                              box);
 }
 
 static PyObject *

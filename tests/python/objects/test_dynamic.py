@@ -441,7 +441,8 @@ def test_many_queries_can_be_interrupted(rng):
         ((2, 1.0, {"storage": 1}), TypeError, "storage must be a string"),
         ((2, 1.0, {"periodic": True}), ValueError, "periodic needs a box"),
         ((2, 1.0, {"box": [1e-4, 1e-4]}), ValueError, "span at most"),
-        ((2, 1.0, {"box": [1.0, 0.0]}), ValueError, "dependent"),
+        ((2, 1.0, {"box": [[1.0, 2.0], [2.0, 4.0]]}), ValueError, "dependent"),
+        ((2, 1.0, {"box": [1.0, 0.0]}), ValueError, "vector 1 of box is zero"),
         ((2, 1.0, {"tagged": 1.5}), TypeError, "tagged"),
     ],
 )

@@ -320,8 +320,11 @@ def test_a_box_that_collapses_is_an_error_of_the_box_alone(rng):
     points = rng.random((30, 3))
     pair_list = hs.VerletList(0.4, 0.1, box=np.eye(3))
     pair_list.update(points)
-    with pytest.raises(ValueError, match="linearly independent"):
+    with pytest.raises(ValueError, match="vector 2 of box is zero"):
         pair_list.update(points, np.diag([1.0, 1.0, 0.0]))
+    check(pair_list, points, np.eye(3))
+    with pytest.raises(ValueError, match="linearly independent"):
+        pair_list.update(points, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
     check(pair_list, points, np.eye(3))
     thin = np.diag([1.0, 1.0, 0.3])
     assert pair_list.update(points, thin)

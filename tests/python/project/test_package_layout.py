@@ -22,7 +22,7 @@ ALLOWED = {
     "_report": {"", "_peers", "scenes"},
     "_cli": {"", "_convert", "_functions", "_check", "_peers", "_report", "scenes"},
     "scenes": {""},
-    "compat": {"", "_functions", "_objects"},
+    "compat": {"", "_convert", "_functions", "_objects"},
 }
 
 
