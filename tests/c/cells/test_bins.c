@@ -167,9 +167,46 @@ cells_are_cut_by_faces(void)
     CHECK(cut > 20);
 }
 
+/* A lattice with a point on each face, whose zeros are negative: they lie on a face, not before
+ * it. */
+static void
+a_zero_has_no_sign(void)
+{
+    for (int ndim = 1; ndim <= 2; ndim++) {
+        hs_account account;
+        hs_scene   scene;
+        hs_grid    grid;
+        hs_bins    bins;
+        const int  n = 64, length = ndim == 1 ? 64 : 8;
+        shared.scene = (brute_scene){.ndim = ndim,
+                                     .n = n,
+                                     .x = shared.x,
+                                     .box = &shared.box,
+                                     .cutoff = 1.0,
+                                     .inclusive = true};
+        shared.box = (hs_box){.ndim = ndim};
+        for (int k = 0; k < ndim; k++) {
+            shared.box.periodic[k] = true;
+            shared.box.rows[k][k] = (double)length;
+        }
+        for (int e = 0; e < n * ndim; e++) {
+            const int place = (e % ndim == 0 ? e / ndim % length : e / ndim / length) - length / 2;
+            shared.x[e] = place == 0 ? -0.0 : (double)place;
+        }
+        const hs_options options = options_of(&shared.scene);
+        CHECK(sort_scene(&account, &options, &scene, &grid, &bins));
+        CHECK(grid.by_faces[0] && grid.n_cells > 1);
+        check_order(&scene, &grid, &bins);
+        hs_bins_free(&account, &bins);
+        hs_scene_free(&account, &scene);
+        hs_account_close(&account);
+    }
+}
+
 void
 test_bins(void)
 {
+    RUN(a_zero_has_no_sign);
     RUN(every_point_is_once_in_its_own_cell);
     RUN(coordinates_and_turns_travel_with_their_point);
     RUN(cells_are_cut_by_faces);

@@ -44,6 +44,6 @@ def test_other_interpreters_are_refused():
         capture_output=True, text=True, check=True,
     )
     package, core, answer = done.stdout.splitlines()
-    assert "subinterpreters" in package and "numpy" in package
+    assert "subinterpreters" in package  # of NumPy or of the core: whichever comes first
     assert core == "module halfshell._core does not support loading in subinterpreters"
     assert answer == "1"

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A zero has no sign: -0.0 among coordinates, boxes and lengths gives the answers of 0.0.
+
+The points are lattices with a point on each face of the cells, where a wrong side loses pairs.
+"""
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+SHEAR = {1: [[1.0]], 2: [[1.0, 0.0], [0.5, 1.0]], 3: [[1.0, 0, 0], [0.5, 1.0, 0], [0, 0.5, 1.0]]}
+
+
+def lattice(ndim, length, origin):
+    along = np.arange(length, dtype=float) - origin
+    return np.stack(np.meshgrid(*[along] * ndim, indexing="ij"), axis=-1).reshape(-1, ndim)
+
+
+def negative(array):
+    """The same numbers, with every zero's sign the other way."""
+    return np.where(np.asarray(array) == 0.0, -0.0, array)
+
+
+def boxes(ndim, length):
+    yield {}
+    yield {"box": np.diag([float(length)] * ndim)}
+    yield {"box": np.diag([float(length)] * ndim), "periodic": [True] + [False] * (ndim - 1)}
+    yield {"box": length * np.array(SHEAR[ndim])}
+
+
+CASES = [
+    (ndim, length, origin, which, dtype)
+    for ndim in (1, 2, 3)
+    for length in (4, 9)
+    for origin in (0, length // 2, length - 1)
+    for which in range(4)
+    for dtype in (np.float64, np.float32)
+]
+
+
+def both(case):
+    """Points, the cutoff, options of the scene; and the same with negative zeros."""
+    ndim, length, origin, which, dtype = case
+    points = lattice(ndim, length, origin).astype(dtype)
+    options = list(boxes(ndim, length))[which]
+    turned = dict(options)
+    if "box" in options:
+        turned["box"] = negative(options["box"])
+    return (points, options), (negative(points).astype(dtype), turned)
+
+
+def of_all(points, **options):
+    """What each function says."""
+    q = points[::2]
+    for algorithm in ("auto", "grid", "hash", "all-pairs", "hierarchy"):
+        yield from hs.pairs(
+            points, 1.0, quantities="ijdDS", sort=True, algorithm=algorithm, **options
+        )
+        yield hs.count_pairs(points, 1.0, inclusive=False, algorithm=algorithm, **options)
+        yield hs.count_pairs(points, [0.0, 1.0, 2.0], algorithm=algorithm, **options)
+    yield from hs.pairs(points, [0.0, 1.0, 1.5], quantities="ijk", sort=True, **options)
+    yield from hs.pairs_between(q, points, 1.0, quantities="ijdDS", **options)
+    table = hs.neighbors(points, 1.0, quantities="jdDS", **options)
+    yield from (table.offsets, table.indices, table.distances, table.vectors, table.shifts)
+    yield hs.coordination(points, 1.0, **options)
+    yield hs.pair_histogram(points, [0.0, 1.0, 1.5, 2.0], **options)
+    yield from hs.nearest(points, 3, quantities="jdDS", **options)
+    yield from hs.pairs(points, None, radii=[0.5] * len(points), quantities="ijdDS", **options)
+    cells = hs.CellList(points, 1.0, **options)
+    yield from cells.pairs(quantities="ijdS")
+    yield cells.cell_of(points)
+    yield cells.count_pairs()
+    listed = hs.VerletList(1.0, 0.0, **options)
+    listed.update(points)
+    yield from listed.pairs(quantities="ijdS")
+    found = hs.clusters(points, 1.0, **options)
+    yield found.labels
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_the_sign_of_zero_changes_nothing(case):
+    (points, options), (turned, turned_options) = both(case)
+    for one, other in zip(
+        of_all(points, **options), of_all(turned, **turned_options), strict=True
+    ):
+        assert np.asarray(one).tobytes() == np.asarray(other).tobytes()
+
+
+@pytest.mark.parametrize("length", [4, 8, 16])
+@pytest.mark.parametrize("ndim", [1, 2, 3])
+@pytest.mark.parametrize("is_periodic", [False, True])
+def test_neighbours_of_a_lattice_are_counted(ndim, length, is_periodic):
+    points = negative(lattice(ndim, length, length // 2))
+    options = {"box": [float(length)] * ndim} if is_periodic else {}
+    each = length if is_periodic else length - 1
+    for algorithm in ("auto", "grid", "hash", "all-pairs"):
+        found = hs.count_pairs(points, 1.0, algorithm=algorithm, **options)
+        assert found == ndim * each * length ** (ndim - 1)
+
+
+@pytest.mark.parametrize("storage", ["hash", "dense", "all-pairs"])
+def test_dynamic_lists(storage):
+    points = lattice(2, 8, 4)
+    answers = []
+    for own in (points, negative(points)):
+        listed = hs.DynamicCellList(2, 1.0, box=[8.0, 8.0], storage=storage)
+        listed.insert_many(range(len(own)), own)
+        answers.append([sorted(listed.within(point, 1.0)) for point in own])
+    assert answers[0] == answers[1]
+    assert all(len(row) == 5 for row in answers[0])
+
+
+def test_node_lists():
+    points = lattice(2, 8, 4)
+    rows = []
+    for own in (points, negative(points)):
+        made = hs.Connectivity([hs.NodeList("all", own, np.ones(len(own)))], 1.0)
+        rows.append([made.offsets.tolist(), made.indices.tolist()])
+    assert rows[0] == rows[1]
