@@ -280,6 +280,32 @@ typedef struct hs_reach {
 } hs_reach;
 
 /*
+ * Which pairs count, of those within reach; all is borrowed, by a stream only until it is open. No
+ * array, and 0, mean that all do. Distances that are returned are not below min_distance.
+ *
+ * The nearest image of a pair is decided for the real numbers that were given. Of images that are
+ * equally near it is the one with the lexicographically least S, as seen from the query, or else
+ * from the point of the lower number. Other images of the pair count, and so do images of one
+ * point; a point and a query are excluded like any pair.
+ */
+typedef struct hs_selection {
+    const int64_t *groups;        /* n: both points of a pair must be of one group */
+    const int64_t *query_groups;  /* of queries, if there are any */
+    const int64_t *labels;        /* n: pairs whose labels differ by at most `within` are excluded,
+                                  * in their nearest image */
+    const int64_t *query_labels;  /* of queries, if there are any */
+    const int64_t *query_numbers; /* in place of these two and for `excluded`: of queries that are
+                                   * points themselves, their numbers. They then pair as points do:
+                                   * a point is not excluded from itself at S = 0, nor too near */
+    int64_t        within;        /* not negative */
+    int64_t        n_excluded;    /* not negative */
+    const int64_t *excluded;      /* n_excluded * 2, in place of labels: numbers of points, or of a
+                                  * query and a point, whose pair is excluded likewise */
+    double         min_distance; /* finite, not negative: pairs that are nearer do not count; 0 with
+                                  * HS_SINGLE */
+} hs_selection;
+
+/*
  * What a search looks among: points in a box, or cells, which have both. All borrowed: points must
  * not move during the call (a concurrent write may change the answer, it cannot corrupt memory:
  * each number is read once). With cells, counters tell what the call took, not what the cells hold;
@@ -287,13 +313,15 @@ typedef struct hs_reach {
  * counted as memory of the call.
  */
 typedef struct hs_among {
-    const hs_points *points;
-    const hs_box    *box;     /* NULL: open space */
-    const hs_points *queries; /* where neighbours are looked for; NULL: at each of the points */
-    const hs_cells  *cells;   /* in place of points and box, which are NULL then; or NULL */
-    const hs_reach  *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
+    const hs_points    *points;
+    const hs_box       *box;     /* NULL: open space */
+    const hs_points    *queries; /* where neighbours are looked for; NULL: at each of the points */
+    const hs_cells     *cells;   /* in place of points and box, which are NULL then; or NULL */
+    const hs_reach     *reach;   /* NULL: the cutoff holds for all pairs. Else for hs_pairs_find,
                                * hs_pairs_count, hs_neighbors_*, hs_stream_open, hs_pairs_visit,
                                * hs_clusters_find, hs_plan_make */
+    const hs_selection *selection; /* NULL: all of them count. Else for hs_pairs_histogram and the
+                                    * same functions, but for hs_plan_make */
 } hs_among;
 
 /* A finished search: opaque, owned by the caller. */
@@ -571,12 +599,13 @@ hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
  * with another. All arrays are borrowed.
  */
 typedef struct hs_systems {
-    int64_t         n;       /* 0 <= n < 2^31 */
-    const int64_t  *first;   /* n + 1; from 0, not descending, to the number of points */
-    const hs_box   *box;     /* of all; NULL: open space */
-    const double   *rows;    /* n * ndim * ndim, in place of box->rows: of each; or NULL */
-    const double   *cutoffs; /* n, in place of options->cutoff; or NULL */
-    const hs_reach *reach;   /* of all points; the cutoffs are further limits; or NULL */
+    int64_t             n;         /* 0 <= n < 2^31 */
+    const int64_t      *first;     /* n + 1; from 0, not descending, to the number of points */
+    const hs_box       *box;       /* of all; NULL: open space */
+    const double       *rows;      /* n * ndim * ndim, in place of box->rows: of each; or NULL */
+    const double       *cutoffs;   /* n, in place of options->cutoff; or NULL */
+    const hs_reach     *reach;     /* of all points; the cutoffs are further limits; or NULL */
+    const hs_selection *selection; /* of all points; or NULL */
 } hs_systems;
 
 /*

@@ -33,7 +33,7 @@ extern "C" {
 
 /* Of the structs, enums and signatures in halfshell.h. It grows when one changes such that modules
  * that were compiled before would misread it; not when functions are appended to the table. */
-#define HS_CAPI_VERSION 5
+#define HS_CAPI_VERSION 6
 
 #define HS_CAPI_NAME "halfshell._core._C_API"
 

@@ -157,6 +157,7 @@ take_batch(PyObject *const *arguments, const hs_py_call *call, batch *given)
     }
     systems->box = call->among.box;
     systems->reach = call->among.reach;
+    systems->selection = call->among.selection;
     if (systems->rows != NULL) {
         const npy_intp *shape = PyArray_DIMS((PyArrayObject *)arguments[2]);
         if (systems->box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1] ||

@@ -9,6 +9,7 @@
 #include "outputs.h"
 #include "plain.h"
 #include "reach.h"
+#include "selection.h"
 #include "threads.h"
 
 #include <math.h>
@@ -184,10 +185,22 @@ take_out(PyObject *object, hs_py_call *call)
     return hs_out_of(object, call->letters, call->points.ndim, options->index_bytes, &call->arrays);
 }
 
+/* A reach, or a tuple of two: that or None, and a selection. */
 static bool
 take_reach(PyObject *object, hs_py_call *call)
 {
     const int64_t n_queries = call->among.queries != NULL ? call->queries.n : 0;
+    if (PyTuple_CheckExact(object) && PyTuple_GET_SIZE(object) == 2) {
+        call->among.selection = &call->selection;
+        if (!hs_selection_of(PyTuple_GET_ITEM(object, 1), call->points.n, n_queries,
+                             &call->selection)) {
+            return false;
+        }
+        object = PyTuple_GET_ITEM(object, 0);
+        if (object == Py_None) {
+            return true;
+        }
+    }
     call->among.reach = &call->reach;
     return hs_reach_of(object, call->points.n, n_queries, call->points.ndim, &call->reach);
 }

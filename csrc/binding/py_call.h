@@ -20,6 +20,7 @@ typedef struct hs_py_call {
     hs_points      points, queries;
     hs_box         box;
     hs_reach       reach;
+    hs_selection   selection;
     hs_options     options;
     hs_failure     failure;
     const char    *letters;  /* borrowed: the quantities */
@@ -49,7 +50,7 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  *   Q  queries, or None                      o  out, or None
  *   R  queries                               f, i, x  `flag`, `integer`, `real` of the call
  *   a  anything: left to the function, which runs no Python code for it
- *   h  reach (reach.h), or None: may be left out
+ *   h  reach (reach.h), or None; or a tuple of that and a selection (selection.h): may be left out
  *   g  name of an algorithm, which may be left out
  *   c  capacity: an int, negative where the number of pairs is returned too, and pairs that do not
  *      fit are no error; or None. Comes last, and may be left out

@@ -78,7 +78,7 @@ hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argum
     hs_py_call   call;
     hs_histogram wanted;
     (void)module;
-    if (!hs_py_call_take(&call, "histogram", "afQiaaaag", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "histogram", "afQiaaaagh", arguments, n_arguments) ||
         !take_histogram(arguments + HS_CALL_ARGUMENTS, &call, &wanted)) {
         return NULL;
     }

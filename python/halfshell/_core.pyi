@@ -19,7 +19,7 @@ _Queries = npt.NDArray[Any] | None
 # gather, scatter), radii of points and queries, types of both and a table of cutoffs by types, of
 # which a negative one is none, supports of points and queries and their extent, which is how many
 # times radii count where there are none; or None where all pairs have the cutoff. The name of an
-# algorithm comes last.
+# algorithm comes last. A tuple of a reach or None and a selection may stand in its place.
 _Ints = npt.NDArray[np.int32] | None
 _Reach = tuple[
     int, _Floats | None, _Floats | None, _Ints, _Ints, _Floats | None,
@@ -70,7 +70,7 @@ def histogram(
     *arguments: *tuple[
         *_Search, _Floats, bool, _Queries, int,
         npt.NDArray[np.int32] | None, _Floats | None, npt.NDArray[np.int32] | None, _Floats | None,
-        str,
+        str, _Reach,
     ]
 ) -> npt.NDArray[Any]: ...  # fmt: skip
 

@@ -82,9 +82,9 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
                        .of_spot = k < INT32_MAX - 1 ? (int32_t)k + 1 : INT32_MAX,
                        .omits_self = sets->queries == NULL,
                        .rows = &rows->output};
-    hs_status  status = request.reach == NULL
+    hs_status  status = request.reach == NULL && request.selection == NULL
                             ? check_nearest(sets, request.box, k, &of_rows, failure)
-                            : HS_ERR_ARGUMENT; /* which this search does not know */
+                            : HS_ERR_ARGUMENT; /* which this search knows neither of */
     if (status == HS_OK) {
         hs_pairs_open(rows, sets->points->ndim);
         status = find_nearest(&near, sets, request.box, failure);

@@ -92,7 +92,7 @@ hs_status
 hs_plan_make(const hs_among *among, const hs_options *options, hs_plan *plan, hs_failure *failure)
 {
     const hs_request request = hs_request_among(among, HS_HALF_LIST, options);
-    if (options == NULL || plan == NULL) {
+    if (options == NULL || plan == NULL || request.selection != NULL) {
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     hs_plan   made = {.ndim = 0};

@@ -3,6 +3,7 @@
  * how far that has come, and the pairs that were found and not yet handed out. */
 #include "by_reach.h"
 
+#include "../search/choice.h"
 #include "../collect/result.h"
 #include "../collect/parallel.h"
 #include "../base/poll.h"
@@ -248,6 +249,18 @@ options_of_stream(const hs_options *options)
     return of_stream;
 }
 
+/* Labels last until hs_stream_open returns. */
+static hs_status
+keep_labels(const hs_request *request, hs_stream *stream)
+{
+    const hs_status status = hs_choice_keep_labels(&request->sets, &stream->call);
+    if (status != HS_OK) {
+        close_search(stream);
+        hs_by_reach_close(&stream->call, &stream->by);
+    }
+    return status;
+}
+
 /* The search of a request, or the steps of one with a reach. */
 static hs_status
 open_search(const hs_request *request, hs_stream *stream, hs_failure *failure)
@@ -289,7 +302,10 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     }
     hs_call *call = &stream->call;
     failure = hs_call_enter(&of_stream, failure, call);
-    const hs_status status = open_search(&request, stream, failure);
+    hs_status status = open_search(&request, stream, failure);
+    if (status == HS_OK) {
+        status = keep_labels(&request, stream);
+    }
     hs_call_leave(call, 0);
     hs_call_detach(call);
     if (status != HS_OK) {
@@ -315,7 +331,7 @@ hs_stream_free(hs_stream *stream)
     }
     hs_output_free(&stream->held);
     close_search(stream);
-    hs_by_reach_close(&stream->call.account, &stream->by);
+    hs_by_reach_close(&stream->call, &stream->by);
     hs_account_close(&stream->call.account);
     hs_free(NULL, stream);
 }

@@ -2,6 +2,7 @@
 /* api_systems.c: the public searches of many systems: find and count. Threads take ranges of
  * them. */
 #include "by_reach.h"
+#include "../search/choice.h"
 #include "../search/estimate.h"
 #include "../collect/result.h"
 #include "../box/lattice.h"
@@ -73,20 +74,34 @@ tell_shortage(const hs_systems_job *job, hs_failure *failure)
     hs_shortage_tell(&shortage, &total->options, job->points->ndim, total->account.limit, failure);
 }
 
+/* Which pairs count. Boxes are looked at with their systems. */
+static hs_status
+open_choice(const hs_systems_job *job, hs_failure *failure)
+{
+    const hs_sets sets = {.points = job->points};
+    hs_status     status = hs_choice_open(job->systems->selection, &sets, job->total, failure);
+    if (status == HS_OK && job->total->choice != NULL && job->systems->box != NULL &&
+        hs_choice_excludes(job->total->choice)) {
+        status = hs_choice_keep_points(&sets, job->total, failure);
+    }
+    return status;
+}
+
 /* Both public functions once all is checked. */
 static hs_status
 search_systems(hs_systems_job *job, hs_failure *failure)
 {
     hs_call          *total = job->total;
     const hs_options *options = &total->options;
-    hs_status         status = HS_OK;
-    if (job->systems->n > 0) {
+    hs_status         status = open_choice(job, failure);
+    if (status == HS_OK && job->systems->n > 0) {
         const int n_threads = hs_call_threads((double)job->points->n, options);
         const int most = job->systems->n < n_threads ? (int)job->systems->n : n_threads;
         total->team = hs_team_create(most);
         share_limit(&total->options, hs_team_size(total->team));
         status = hs_systems_search(job, failure);
     }
+    hs_choice_close(total);
     if (status == HS_ERR_MEMORY) {
         const double found = job->output != NULL ? (double)job->output->n_pairs : 0.0;
         failure->expected_pairs = fmax(failure->expected_pairs, found);

@@ -3,6 +3,7 @@
 #include "by_reach.h"
 
 #include "../exact/support.h"
+#include "../search/choice.h"
 
 #include <math.h>
 
@@ -110,15 +111,20 @@ hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach *by, hs_f
                                       request->options->cutoff, request->options->algorithm,
                                       &by->plan);
     }
+    if (status == HS_OK) {
+        status = hs_choice_of_request(request, INFINITY, call, failure);
+    }
     if (status != HS_OK) {
-        hs_by_reach_close(&call->account, by);
+        hs_by_reach_close(call, by);
     }
     return status;
 }
 
 void
-hs_by_reach_close(hs_account *account, hs_by_reach *by)
+hs_by_reach_close(hs_call *call, hs_by_reach *by)
 {
+    hs_account *account = &call->account;
+    hs_choice_close(call);
     hs_level_plan_free(account, &by->plan);
     hs_levels_free(account, &by->levels);
 }
@@ -175,7 +181,7 @@ hs_by_reach_use(const hs_request *request, hs_use_fn use, void *context, hs_fail
     if (status == HS_OK) {
         status =
             hs_by_reach_each(&by, request->sets.keeps_none, &call, use, context, &n_pairs, failure);
-        hs_by_reach_close(&call.account, &by);
+        hs_by_reach_close(&call, &by);
     }
     hs_call_tell_limit(&call, status, failure);
     hs_call_leave(&call, n_pairs);

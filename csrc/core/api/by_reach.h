@@ -27,7 +27,7 @@ hs_status hs_by_reach_open(const hs_request *request, hs_call *call, hs_by_reach
                            hs_failure *failure);
 
 /* Harmless twice. */
-void hs_by_reach_close(hs_account *account, hs_by_reach *by);
+void hs_by_reach_close(hs_call *call, hs_by_reach *by);
 
 /* Uses each search in turn, as long as that gives HS_OK; *n_pairs, zero before, is how many all of
  * them found. keeps_none: pairs are not kept. */

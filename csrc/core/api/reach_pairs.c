@@ -160,7 +160,7 @@ begin(const hs_request *request, hs_by_reach *by, hs_status *status, hs_failure 
 static hs_status
 finish(hs_by_reach *by, hs_pairs *pairs, hs_status status, hs_pairs **result, hs_failure *failure)
 {
-    hs_by_reach_close(&pairs->call.account, by);
+    hs_by_reach_close(&pairs->call, by);
     status = hs_pairs_conclude(&pairs->output, status, failure);
     hs_call_tell_limit(&pairs->call, status, failure);
     return hs_pairs_finish(pairs, status, pairs->output.n_pairs, result);
@@ -309,7 +309,7 @@ hs_by_reach_count_rows(const hs_request *request, hs_use_fn count, int64_t *coun
     } else if (status == HS_OK) {
         status = count_rows(request, &by, &call, counts, &n_entries, failure);
     }
-    hs_by_reach_close(&call.account, &by);
+    hs_by_reach_close(&call, &by);
     hs_call_tell_limit(&call, status, failure);
     hs_call_leave(&call, n_entries);
     hs_account_close(&call.account);

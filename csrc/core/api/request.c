@@ -5,6 +5,7 @@
 #include "api_cells.h"
 
 #include "../search/estimate.h"
+#include "../search/choice.h"
 #include "../search/search_open.h"
 
 /* Fills the failure when memory is short. Where no pairs are kept, their number is not the
@@ -27,6 +28,7 @@ hs_request_among(const hs_among *among, hs_list_kind kind, const hs_options *opt
         return request;
     }
     request.reach = among->reach;
+    request.selection = among->selection;
     request.sets.queries = among->queries;
     request.sets.is_full = kind == HS_FULL_LIST || among->queries != NULL;
     if (among->cells == NULL) {
@@ -57,7 +59,39 @@ hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_
         sets.is_plain = true;
         sets.least_cutoff = hs_least_length(options->shells, options->n_shells);
     }
-    return sound == HS_OK ? hs_search_open(&sets, request->box, call, search, failure) : sound;
+    if (sound == HS_OK) {
+        sound = hs_choice_of_request(request, options->cutoff, call, failure);
+    }
+    if (sound != HS_OK) {
+        hs_search_begin(call, search); /* an empty one */
+        return sound;
+    }
+    sound = hs_search_open(&sets, request->box, call, search, failure);
+    if (sound != HS_OK) {
+        hs_choice_close(call);
+    }
+    return sound;
+}
+
+hs_status
+hs_choice_of_request(const hs_request *request, double cutoff, hs_call *call, hs_failure *failure)
+{
+    const hs_sets *sets = &request->sets;
+    hs_status      status = hs_choice_open(request->selection, sets, call, failure);
+    if (status == HS_OK) {
+        status = hs_choice_set_scene(sets, request->box, cutoff, call, failure);
+    }
+    if (status != HS_OK) {
+        hs_choice_close(call);
+    }
+    return status;
+}
+
+void
+hs_request_close(hs_call *call, hs_search *search)
+{
+    hs_search_close(search);
+    hs_choice_close(call);
 }
 
 hs_status
@@ -70,7 +104,7 @@ hs_request_use(const hs_request *request, hs_use_fn use, void *context, hs_failu
     hs_status status = hs_request_open(request, &call, &search, failure);
     if (status == HS_OK) {
         status = use(context, &search, &n_pairs, failure);
-        hs_search_close(&search);
+        hs_request_close(&call, &search);
     }
     if (status == HS_ERR_MEMORY) {
         tell_shortage(request, &search, failure);
@@ -114,7 +148,7 @@ hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result, h
     if (status == HS_OK) {
         hs_pairs_open(pairs, search.scene.ndim);
         status = fill(&search, pairs, failure);
-        hs_search_close(&search);
+        hs_request_close(&pairs->call, &search);
     }
     if (status == HS_ERR_MEMORY) {
         tell_shortage(request, &search, failure);

@@ -12,10 +12,11 @@
 
 /* What to search for, all borrowed. */
 typedef struct hs_request {
-    hs_sets           sets;
-    const hs_box     *box;
-    const hs_options *options;
-    const hs_reach   *reach; /* NULL: the cutoff holds for all pairs */
+    hs_sets             sets;
+    const hs_box       *box;
+    const hs_options   *options;
+    const hs_reach     *reach;     /* NULL: the cutoff holds for all pairs */
+    const hs_selection *selection; /* NULL: all pairs within reach count */
 } hs_request;
 
 /* Which pairs a search is for: each once, among the points alone; every neighbour of each point or
@@ -29,6 +30,14 @@ hs_request hs_request_among(const hs_among *among, hs_list_kind kind, const hs_o
  * closed. */
 hs_status hs_request_open(const hs_request *request, hs_call *call, hs_search *search,
                           hs_failure *failure);
+
+/* Closes it, and what was opened with it. */
+void hs_request_close(hs_call *call, hs_search *search);
+
+/* Which pairs count: the request's selection, made ready for the call, of which no pair is further
+ * apart than the cutoff. To be freed by hs_choice_close; on failure there is none. */
+hs_status hs_choice_of_request(const hs_request *request, double cutoff, hs_call *call,
+                               hs_failure *failure);
 
 /* Uses an open search; *n_pairs, zero before, is how many it found. */
 typedef hs_status (*hs_use_fn)(void *context, hs_search *search, int64_t *n_pairs,

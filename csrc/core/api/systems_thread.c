@@ -3,6 +3,7 @@
  * turn. */
 #include "systems_thread.h"
 
+#include "../search/choice.h"
 #include "../search/estimate.h"
 #include "../search/form.h"
 #include "../base/poll.h"
@@ -35,6 +36,7 @@ typedef struct worker {
     hs_level_plan         plan;
     hs_level_search       step;
     hs_kept_form          forms[HS_FORMS];
+    hs_choice             choice; /* the job's with the present box, where pairs are excluded */
     hs_box                box;    /* of the present system, where each has its own */
     hs_output            *target; /* the job's output, or the backlog's */
     hs_backlog            backlog;
@@ -232,6 +234,18 @@ search_plainly(worker *me, int64_t s, const hs_points *points, const hs_box *box
     return status;
 }
 
+/* Which pairs of a system count, in its box. */
+static hs_status
+choose_in(worker *me, const hs_box *box)
+{
+    const hs_choice *shared = me->job->total->choice;
+    if (shared == NULL || !hs_choice_excludes(shared)) {
+        return HS_OK;
+    }
+    const hs_status status = hs_box_check(box, &me->committer.failure);
+    return status == HS_OK ? hs_choice_set_box(box, me->job->points->ndim, &me->choice) : status;
+}
+
 /* After a system: what it took, and sometimes a poll. */
 static hs_status
 count_work(worker *me, int64_t s, int64_t n_candidates)
@@ -256,8 +270,11 @@ search_system(worker *me, int64_t s)
     if (job->output == NULL) {
         job->counts[s] = 0;
     }
-    hs_status status = job->systems->reach != NULL ? search_by_reach(me, s, &points, box)
-                                                   : search_plainly(me, s, &points, box);
+    hs_status status = choose_in(me, box);
+    if (status == HS_OK) {
+        status = job->systems->reach != NULL ? search_by_reach(me, s, &points, box)
+                                             : search_plainly(me, s, &points, box);
+    }
     if (status == HS_OK && me->call.options.sorted) {
         status = sort_system(me, job->systems->first[s], points.n);
     }
@@ -302,6 +319,10 @@ open_worker(void *context, void *place)
     worker               *me = place;
     me->job = job;
     hs_call_begin(options, &me->call);
+    if (job->total->choice != NULL) {
+        me->choice = *job->total->choice;
+        me->call.choice = &me->choice;
+    }
     me->call.options = *options; /* their poll counts already, for the whole call */
     hs_search_begin(&me->call, &me->search);
     me->search.kept_forms = me->forms;

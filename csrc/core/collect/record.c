@@ -6,6 +6,7 @@
 #include "record_measures.h"
 #include "record_write.h"
 #include "record_shells.h"
+#include "../search/choice.h"
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
 
@@ -75,8 +76,9 @@ put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits 
     }
 }
 
-hs_status
-hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+/* All columns of hits. */
+static hs_status
+put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     const int32_t  n = hits->end[hits->n - 1];
     const int32_t *id = scanner->block.id;
@@ -98,6 +100,27 @@ hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, cons
     }
     status = hs_put_measures(recorder, scanner, first, hits);
     return status == HS_OK ? hs_put_shells(recorder, scanner, first, hits) : status;
+}
+
+/* Distances of pairs that are this far apart or further are not below that. */
+static void
+keep_apart(const hs_output *output, int32_t n, double least)
+{
+    double *distance = hs_output_next(output, HS_WANT_DISTANCE);
+    for (int32_t h = 0; distance != NULL && h < n; h++) {
+        distance[h] = hs_larger(distance[h], least);
+    }
+}
+
+hs_status
+hs_record_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
+{
+    const hs_choice *choice = scanner->search->call->choice;
+    const hs_status  status = put_places(recorder, scanner, first, hits);
+    if (status == HS_OK && choice != NULL && scanner->options.precision == HS_EXACT) {
+        keep_apart(recorder->output, hits->end[hits->n - 1], choice->min_distance);
+    }
+    return status;
 }
 
 hs_status

@@ -219,7 +219,7 @@ hs_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         }
     }
     scanner->n_ambiguous += scan->n_unsure;
-    if (n_beyond > 0 && scanner->use == HS_BLOCK_COUNTS) {
+    if (n_beyond > 0 && scanner->scans == HS_BLOCK_COUNTS) {
         remove_counts(scan, n_beyond, first, next);
     } else if (n_beyond > 0) {
         remove_hits(scan, n_beyond, first, next);

@@ -59,7 +59,7 @@ static void
 set_support_form(const hs_scanner *scanner, hs_form *form)
 {
     const hs_kernel *kernel = scanner->search->call->kernel;
-    const bool       counts = scanner->use == HS_BLOCK_COUNTS;
+    const bool       counts = scanner->scans == HS_BLOCK_COUNTS;
     form->scan = counts ? kernel->count_supports : kernel->list_supports;
     set_thresholds(scanner, form);
     form->limits = hs_support_form_of(scanner->search->scene.ndim, form->extent,
@@ -90,7 +90,7 @@ static void
 set_form(const hs_scanner *scanner, hs_form *form)
 {
     const hs_kernel *kernel = scanner->search->call->kernel;
-    const bool       counts = scanner->use == HS_BLOCK_COUNTS;
+    const bool       counts = scanner->scans == HS_BLOCK_COUNTS;
     form->expanded = (hs_expanded){0.0, 0.0}; /* unless it pays */
     if (scanner->search->limits != NULL && scanner->search->limits->supports != NULL) {
         set_support_form(scanner, form);
@@ -113,7 +113,7 @@ set_form(const hs_scanner *scanner, hs_form *form)
     if (scanner->search->limits != NULL) {
         form->limits = hs_limit_form_of(scanner->search->scene.ndim, form->extent,
                                         scanner->search->filter_error);
-    } else if (scanner->use == HS_BLOCK_LISTS_SQUARES) {
+    } else if (scanner->scans == HS_BLOCK_LISTS_SQUARES) {
         form->scan = kernel->squares;
     } else if (hs_expanded_pays(scanner->search->scene.cutoff, form->extent)) {
         form->scan = counts ? kernel->count : kernel->list;

@@ -2,6 +2,8 @@
 /* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided. */
 #include "scan.h"
 
+#include "choice.h"
+#include "choose.h"
 #include "decide.h"
 #include "form.h"
 #include "limits.h"
@@ -36,15 +38,15 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
 {
     const hs_limits *limits = scanner->search->limits;
     const hs_block  *block = &scanner->block;
-    const bool       lists_places = scanner->use == HS_BLOCK_LISTS_PLACES;
+    const bool       lists_places = scanner->scans == HS_BLOCK_LISTS_PLACES;
     scan->ndim = scanner->search->scene.ndim;
     for (int k = 0; k < scan->ndim; k++) {
         scan->y[k] = block->y[k];
         scan->q[k] = scanner->group.q[k];
     }
-    scan->label = block->place == NULL  ? block->id
-                  : scanner->is_ordered ? block->origin
-                                        : block->place;
+    scan->label = block->place == NULL                       ? block->id
+                  : scanner->is_ordered && !scanner->chooses ? block->origin
+                                                             : block->place;
     scan->n = block->n;
     scan->n_points = scanner->group.last - scanner->group.first;
     scan->triangular = scanner->block_is_first;
@@ -130,8 +132,8 @@ fill_block(hs_scanner *scanner)
     if (!scanner->is_ordered) {
         return HS_OK;
     }
-    status = hs_order_block(&scanner->search->scene.lattice, &scanner->options, scanner->use, block,
-                            &scanner->order);
+    status = hs_order_block(&scanner->search->scene.lattice, &scanner->options, scanner->scans,
+                            block, &scanner->order);
     if (status == HS_ERR_SHIFT_RANGE) {
         scanner->failed_point = hs_search_asking(scanner->search)->order[scanner->group.first];
     }
@@ -227,6 +229,9 @@ hs_scan_block(hs_scanner *scanner)
             (scanner->options.precision != HS_SINGLE || scanner->search->limits != NULL)) {
             status = hs_decide(scanner, &scan, first, next);
         }
+        if (HS_UNLIKELY(scanner->chooses) && status == HS_OK) {
+            status = hs_choose(scanner, &scan, first, next);
+        }
         scanner->n_found += scan.n_hits;
         if (status == HS_OK && scanner->visit != NULL && scan.n_hits > 0) {
             status = visit_hits(scanner, &scan, first, next);
@@ -288,6 +293,28 @@ hs_scanner_finish(hs_scanner *scanner)
     return status;
 }
 
+/* What a choice looks at must be listed: numbers for labels, else places. */
+static hs_block_use
+use_of_scans(const hs_scanner *scanner)
+{
+    const bool lists_less = scanner->use == HS_BLOCK_COUNTS || scanner->use == HS_BLOCK_LISTS_IDS;
+    if (!scanner->chooses || !lists_less) {
+        return scanner->use;
+    }
+    return hs_choice_needs_places(scanner->search->call->choice, scanner->options.cutoff)
+               ? HS_BLOCK_LISTS_PLACES
+               : HS_BLOCK_LISTS_IDS;
+}
+
+/* Whether S of hits is looked up. */
+static bool
+needs_shifts(const hs_scanner *scanner)
+{
+    return scanner->use == HS_BLOCK_LISTS_PLACES ||
+           (scanner->chooses &&
+            hs_choice_compares(scanner->search->call->choice, scanner->options.cutoff));
+}
+
 hs_status
 hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
                 bool is_ordered, hs_scanner *scanner)
@@ -299,17 +326,19 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
     scanner->search = search;
     scanner->options = search->call->options;
     scanner->use = use;
+    scanner->chooses = search->call->choice != NULL && use != HS_BLOCK_SIZES;
+    scanner->scans = use_of_scans(scanner);
     scanner->is_ordered = is_ordered;
     hs_forms_init(scanner);
     scanner->candidate_limit = INT64_MAX;
-    hs_status status =
-        hs_block_init(account, search->scene.ndim, use, capacity, most_runs, &scanner->block);
+    hs_status status = hs_block_init(account, search->scene.ndim, scanner->scans, capacity,
+                                     most_runs, &scanner->block);
     if (status == HS_OK && search->limits != NULL) {
         status = hs_block_add_radii(account, hs_limits_rows(search), &scanner->block);
     }
     if (status == HS_OK) {
-        status = hs_trace_init(search, &scanner->block, &scanner->options,
-                               use == HS_BLOCK_LISTS_PLACES, &scanner->trace);
+        status = hs_trace_init(search, &scanner->block, &scanner->options, needs_shifts(scanner),
+                               &scanner->trace);
     }
     if (status == HS_OK && is_ordered) {
         status = hs_order_init(account, &scanner->block, &scanner->order);

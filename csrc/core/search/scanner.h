@@ -47,9 +47,11 @@ struct hs_scanner {
     hs_block block;
     hs_trace trace;
     /* From here on all begins as zero. */
-    const hs_search *search;  /* borrowed, read only */
-    hs_options       options; /* the call's, with a poll only for the caller's own thread */
-    hs_block_use     use;
+    const hs_search *search;     /* borrowed, read only */
+    hs_options       options;    /* the call's, with a poll only for the caller's own thread */
+    hs_block_use     use;        /* what the visitor gets */
+    hs_block_use     scans;      /* what scans list: places, where these are looked at before */
+    bool             chooses;    /* pairs that do not count are taken out (choose.h) */
     bool             is_ordered; /* candidates are put in order before they are tested */
     hs_order         order;
     hs_visit_fn      visit; /* NULL when counting */

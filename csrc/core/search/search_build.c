@@ -6,6 +6,7 @@
 #include "../base/outcome.h"
 #include "../cells/sparse_grid.h"
 
+#include "choice.h"
 #include "estimate.h"
 
 /* Stores occupied cells only, in place of the grid that was chosen; nothing for a width of 0. */
@@ -103,17 +104,28 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
     return status;
 }
 
+/* Those of the call for its scene. Where images are compared, S is needed of all pairs. */
+static hs_options
+options_of_scene(const hs_call *call)
+{
+    hs_options options = call->options;
+    if (call->choice != NULL && hs_choice_compares(call->choice, options.cutoff)) {
+        options.want |= HS_WANT_SHIFT;
+    }
+    return options;
+}
+
 hs_status
 hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
 {
-    const hs_options *options = &search->call->options;
-    hs_scene          queries, *asking = sets->queries != NULL ? &queries : NULL;
+    const hs_options options = options_of_scene(search->call);
+    hs_scene         queries, *asking = sets->queries != NULL ? &queries : NULL;
     if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
     hs_search_set_asking(sets, search);
     hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
-                                          options, &search->scene, asking, failure);
+                                          &options, &search->scene, asking, failure);
     if (status == HS_OK) {
         status = hs_scene_narrow(&search->scene, sets->narrowing);
         status = status == HS_OK ? build_cells(search, asking, failure) : status;

@@ -33,6 +33,7 @@ hs_call_begin(const hs_options *options, hs_call *call)
     call->kernel = hs_kernel_select(options->kernel);
     call->team = NULL;
     call->done = (hs_counters){.pairs = 0};
+    call->choice = NULL;
     hs_call_set_poll(options->poll, options->poll_context, call);
     hs_account_init(&call->account, options);
 }

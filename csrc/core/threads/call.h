@@ -20,14 +20,15 @@ typedef struct hs_entry {
 } hs_entry;
 
 typedef struct hs_call {
-    hs_account       account;
-    hs_options       options;      /* the caller's; their poll counts how often it is called */
-    const hs_kernel *kernel;       /* NULL: this CPU has none of that name */
-    hs_team         *team;         /* owned; NULL: the caller's thread alone */
-    hs_counters      done;         /* by walkers that have finished */
-    hs_poll_fn       callers_poll; /* behind options.poll */
-    void            *callers_context;
-    hs_entry         entry;
+    hs_account        account;
+    hs_options        options;      /* the caller's; their poll counts how often it is called */
+    const hs_kernel  *kernel;       /* NULL: this CPU has none of that name */
+    hs_team          *team;         /* owned; NULL: the caller's thread alone */
+    hs_counters       done;         /* by walkers that have finished */
+    hs_poll_fn        callers_poll; /* behind options.poll */
+    void             *callers_context;
+    struct hs_choice *choice; /* owned, search/choice.h; NULL: all pairs within reach count */
+    hs_entry          entry;
 } hs_call;
 
 /* Into the library's floating-point environment. Returns where the failure is to be written,

@@ -10,7 +10,7 @@ import numpy as np
 
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a
-from halfshell._convert.given import Given, Sets
+from halfshell._convert.given import Chosen, Given, Sets
 from halfshell._convert.memory import refuse_large
 from halfshell._convert.scene import MAX_DIM, as_points, as_scene, brings_its_box, vectors_of
 
@@ -114,7 +114,14 @@ def _as_limits(
 
 
 def as_systems(
-    points: Any, cutoff: Any, box: Any, periodic: Any, batch: Any, given: Given
+    points: Any,
+    cutoff: Any,
+    box: Any,
+    periodic: Any,
+    batch: Any,
+    given: Given,
+    chosen: Chosen | None = None,
+    precision: Any = "exact",
 ) -> tuple[Scene, Systems, Reach | None]:
     """Everything that makes up the systems, in the order of the core's arguments."""
     array, vectors, bits, boxes = _scene(points, box, periodic)
@@ -125,4 +132,8 @@ def as_systems(
             "box and cutoff must be given for the same number of systems, got "
             f"{len(boxes)} and {len(cutoffs)}"
         )
+    if chosen is not None and not chosen.is_nothing:
+        from halfshell._convert.selection import with_selection  # here: others do without
+
+        reach = with_selection(reach, chosen, len(array), None, precision)
     return (array, one, vectors, bits), (numbers, cutoffs, boxes), reach

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What users give for a reach of each pair, before it is looked at, and whose it is."""
+"""What users give for a reach of each pair, and for which pairs count, before it is looked at."""
 
 from __future__ import annotations
 
@@ -17,6 +17,21 @@ class Given(NamedTuple):
     supports: Any = None
     query_supports: Any = None
     extent: Any = None
+
+    @property
+    def is_nothing(self) -> bool:
+        return all(value is None for value in self)
+
+
+class Chosen(NamedTuple):
+    """What users say of which pairs count."""
+
+    groups: Any = None
+    exclude: Any = None
+    exclude_within: Any = None
+    min_distance: Any = None
+    query_groups: Any = None
+    query_exclude: Any = None
 
     @property
     def is_nothing(self) -> bool:

@@ -12,7 +12,7 @@ from halfshell import _core
 from halfshell._convert.arrays import as_array, as_real_array, one_each
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.types import Algorithm, FloatArray, PointArray, Search
+from halfshell._convert.types import Algorithm, FloatArray, PointArray, Reach, Search
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
 _COPIES = 4
@@ -82,16 +82,17 @@ def binned(
     marks: Marks,
     name: str = "edges[-1]",
     algorithm: Algorithm = "auto",
+    selection: Reach | None = None,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of points or cells, given as the first arguments of every search.
 
-    name: what a message calls the largest distance.
+    name: what a message calls the largest distance. selection: which pairs count, without a reach.
     """
     refuse_unavailable(
         _COPIES * 8 * marks.n_types**2 * len(edges),
         f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
     )
     with of_argument(name):
-        found = _core.histogram(*search, edges, True, queries, *marks, algorithm)
+        found = _core.histogram(*search, edges, True, queries, *marks, algorithm, selection)
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])

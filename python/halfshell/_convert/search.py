@@ -10,7 +10,7 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.foreign import is_a
-from halfshell._convert.given import Given, Sets
+from halfshell._convert.given import Chosen, Given, Sets
 from halfshell._convert.lengths import as_cutoff, refuse_none
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_sets
@@ -57,10 +57,12 @@ def as_search_of_each(
     given: Given,
     queries: Any = None,
     directed: bool = False,
+    chosen: Chosen | None = None,
 ) -> tuple[Search, PointArray | None, Reach | None]:
     """As `as_search`, and the reach of each pair, or None where all have the cutoff.
 
-    directed: the result has a direction, so that the rule may have one.
+    directed: the result has a direction, so that the rule may have one. chosen: which pairs count;
+    the selection then comes with the reach.
     """
     asking, array, vectors, bits = as_sets(queries, points, box, periodic)
     reach = None
@@ -73,6 +75,11 @@ def as_search_of_each(
         n_queries = None if asking is None else len(asking)
         sets = Sets(points, queries, len(array), n_queries, array.shape[1])
         largest, reach = as_reach(cutoff, given, sets, directed)
+    if chosen is not None and not chosen.is_nothing:
+        from halfshell._convert.selection import with_selection  # here, as above
+
+        n_asking = None if asking is None else len(asking)
+        reach = with_selection(reach, chosen, len(array), n_asking, rest[1])
     return (array, largest, vectors, bits, *rest), asking, reach
 
 
@@ -134,11 +141,11 @@ def count_within(
     if isinstance(cutoffs, float):
         return count(cutoffs)
     is_exact = isinstance(rest[1], str) and rest[1] == "exact"
-    if is_exact and len(cutoffs) > 1 and reach is None:
+    if is_exact and len(cutoffs) > 1 and (reach is None or reach[0] is None):
         edges = np.ascontiguousarray(cutoffs)
         between: npt.NDArray[np.int64] = _core.histogram(
             points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None,
-            algorithm,
+            algorithm, reach,
         )
         return np.cumsum(between[0, 0])
     # Without any, all else is checked as ever.

@@ -72,6 +72,10 @@ def asked_by(reach: Reach | None, numbers: npt.NDArray[np.int64]) -> Reach | Non
     """The reach of points, for some of them as queries too."""
     if reach is None:
         return None
+    if len(reach) == 2:
+        from halfshell._convert.selection import for_points
+
+        return for_points(reach, asked_by(reach[0], numbers), numbers)
     fields: list[Any] = list(reach)
     for own in (1, 3, 6):  # radii, types and supports, before those of queries
         fields[own + 1] = None if fields[own] is None else fields[own][numbers]

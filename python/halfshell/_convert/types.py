@@ -36,6 +36,11 @@ Reach = tuple[
     FloatArray | None, FloatArray | None, float | None,
 ]  # fmt: skip
 
+# Groups of points and queries, labels of both, numbers of queries that are points, the most that
+# labels differ by, excluded pairs, least distance.
+_Labels = npt.NDArray[np.int64] | None
+Selection = tuple[_Labels, _Labels, _Labels, _Labels, _Labels, int, _Labels, float]
+
 # What the core takes from `inclusive` to `threads`.
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
 
@@ -126,6 +131,10 @@ class ReachOptions(SearchOptions, total=False):
     types: npt.ArrayLike | None
     supports: ArrayLike | None
     extent: float | None
+    groups: npt.ArrayLike | None
+    exclude: npt.ArrayLike | None
+    exclude_within: int | None
+    min_distance: float | None
 
 
 class PairOptions(ReachOptions, total=False):
@@ -146,6 +155,8 @@ class BetweenOptions(ReachOptions, total=False):
     query_radii: ArrayLike | None
     query_types: npt.ArrayLike | None
     query_supports: ArrayLike | None
+    query_groups: npt.ArrayLike | None
+    query_exclude: npt.ArrayLike | None
     index_dtype: npt.DTypeLike
     out: Out | None
     capacity: int | None
@@ -162,6 +173,12 @@ class CountOptions(SearchOptions, total=False):
     supports: ArrayLike | None
     query_supports: ArrayLike | None
     extent: float | None
+    groups: npt.ArrayLike | None
+    query_groups: npt.ArrayLike | None
+    exclude: npt.ArrayLike | None
+    query_exclude: npt.ArrayLike | None
+    exclude_within: int | None
+    min_distance: float | None
     batch: None
 
 

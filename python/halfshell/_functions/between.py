@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 
 from halfshell import _core
-from halfshell._convert.given import Given
+from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import AUTO, RAISE, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
@@ -101,6 +101,12 @@ def pairs_between(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    groups: npt.ArrayLike | None = None,
+    query_groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    query_exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> Arrays | tuple[Any, ...]:
     """Find every pair of a query and a point within a cutoff.
 
@@ -132,6 +138,11 @@ def pairs_between(
         How far supports reach, as in `pairs`.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``, each at most once, as in `pairs`.
+    groups, exclude, exclude_within, min_distance
+        As in `pairs`.
+    query_groups, query_exclude : array_like of int or str, shape (q,), optional
+        Labels of the queries, beside those of the points. Pairs of numbers in `exclude` are
+        of a query and a point.
 
     Returns
     -------
@@ -183,6 +194,8 @@ def pairs_between(
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
         and supports is None and query_supports is None and extent is None
+        and groups is None and exclude is None and exclude_within is None and min_distance is None
+        and query_groups is None and query_exclude is None
     ):  # fmt: skip
         result: Any = _core.plain(
             _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -194,10 +207,16 @@ def pairs_between(
     given = Given(
         radii, query_radii, rule, types, query_types, supports, query_supports, extent
     )
-    check_apart(out, queries=queries, points=points, box=box, cutoff=cutoff, **given._asdict())
+    chosen = Chosen(
+        groups, exclude, exclude_within, min_distance, query_groups, query_exclude
+    )
+    check_apart(
+        out, queries=queries, points=points, box=box, cutoff=cutoff, **given._asdict(),
+        **chosen._asdict(),
+    )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
     search, asking, reach = as_search_of_each(
-        points, cutoff, box, periodic, rest, given, queries, directed=True
+        points, cutoff, box, periodic, rest, given, queries, directed=True, chosen=chosen
     )
     return _core.pairs_between(
         *search, quantities, True, as_index_bytes(index_dtype), out, asking, reach, algorithm,

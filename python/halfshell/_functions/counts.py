@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.foreign import is_a
-from halfshell._convert.given import Given
+from halfshell._convert.given import Chosen, Given
 from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import AUTO
@@ -103,6 +103,12 @@ def count_pairs(
     threads: int | None = None,
     memory_limit: float | None = None,
     batch: npt.ArrayLike | None = None,
+    groups: npt.ArrayLike | None = None,
+    query_groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    query_exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> int | npt.NDArray[np.int64]:
     """Count the pairs of points within one or several cutoffs.
 
@@ -124,6 +130,11 @@ def count_pairs(
         Bytes that the search may take.
     batch : array_like of int, shape (n,), optional
         Count many systems in one call, as in `pairs`; not with `queries`.
+    groups, exclude, exclude_within, min_distance
+        As in `pairs`.
+    query_groups, query_exclude : array_like of int or str, shape (q,), optional
+        Labels of the queries, beside those of the points. With queries the pairs of
+        numbers in `exclude` are of a query and a point.
 
     Returns
     -------
@@ -165,6 +176,8 @@ def count_pairs(
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
         and supports is None and query_supports is None and extent is None
+        and groups is None and exclude is None and exclude_within is None and min_distance is None
+        and query_groups is None and query_exclude is None
     ):  # fmt: skip
         result: Any = (
             _core.plain(
@@ -181,16 +194,22 @@ def count_pairs(
     given = Given(
         radii, query_radii, rule, types, query_types, supports, query_supports, extent
     )
+    chosen = Chosen(
+        groups, exclude, exclude_within, min_distance, query_groups, query_exclude
+    )
     if batch is not None:
         if queries is not None:
             raise ValueError("batch and queries cannot be given together")
-        scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
+        scene, own, reach = as_systems(
+            points, cutoff, box, periodic, batch, given, chosen, precision
+        )
         _refuse_systems(*own)
         return _core.batch_count(*(*scene, *rest, *own, reach, algorithm))
     several = _several(cutoff, given)
     one = cutoff if several is None else 0.0
     search, asking, reach = as_search_of_each(
-        points, one, box, periodic, rest, given, queries, directed=queries is not None
+        points, one, box, periodic, rest, given, queries, directed=queries is not None,
+        chosen=chosen,
     )
     array, largest, vectors, bits = search[:4]
     within = largest if several is None else several

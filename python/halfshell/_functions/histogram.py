@@ -6,9 +6,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from halfshell._convert.given import Chosen
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.marks import as_marks, binned
 from halfshell._convert.search import as_search
+from halfshell._convert.selection import with_selection
 from halfshell._convert.types import Algorithm, BoxLike, PeriodicLike, PointsLike
 
 
@@ -27,6 +29,11 @@ def pair_histogram(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    groups: npt.ArrayLike | None = None,
+    query_groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    query_exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """Count pairs in bins of distance, always exact, without storing them.
 
@@ -51,6 +58,11 @@ def pair_histogram(
         The weights of the queries. Where only one set has weights, those of the other are 1.
     memory_limit : float, optional
         Bytes that the search and the counts of each thread may take.
+    groups, exclude, exclude_within
+        As in `pairs`.
+    query_groups, query_exclude : array_like of int or str, shape (q,), optional
+        Labels of the queries, beside those of the points. With queries the pairs of
+        numbers in `exclude` are of a query and a point.
 
     Returns
     -------
@@ -102,4 +114,9 @@ def pair_histogram(
         points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
     marks = as_marks(len(search[0]), asking, types, query_types, weights, query_weights)
-    return binned(search, as_edges(edges), asking, marks, algorithm=algorithm)
+    chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
+    n_asking = None if asking is None else len(asking)
+    selection = with_selection(None, chosen, len(search[0]), n_asking)
+    return binned(
+        search, as_edges(edges), asking, marks, algorithm=algorithm, selection=selection
+    )

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.given import Given
+from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import AUTO, as_index_bytes
 from halfshell._convert.rules import DIRECTED
 from halfshell._convert.search import as_rest, as_search_of_each
@@ -54,6 +54,12 @@ def neighbors(
     threads: int | None = None,
     memory_limit: float | None = None,
     indices: npt.ArrayLike | None = None,
+    groups: npt.ArrayLike | None = None,
+    query_groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    query_exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> NeighborTable:
     """Find all neighbours of each point, or of each query, as a table of rows.
 
@@ -91,6 +97,11 @@ def neighbors(
         Only the rows of these points, in this order: row k is that of point ``indices[k]``, as the
         whole table has it, found at a cost after their number. Not beside `queries` or precision
         "single".
+    groups, exclude, exclude_within, min_distance
+        As in `pairs`.
+    query_groups, query_exclude : array_like of int or str, shape (q,), optional
+        Labels of the queries, beside those of the points. With queries the pairs of
+        numbers in `exclude` are of a query and a point.
 
     Returns
     -------
@@ -160,6 +171,8 @@ def neighbors(
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
         and supports is None and query_supports is None and extent is None and indices is None
+        and groups is None and exclude is None and exclude_within is None and min_distance is None
+        and query_groups is None and query_exclude is None
     ):  # fmt: skip
         arrays = _core.plain(
             _core.neighbors, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -172,7 +185,9 @@ def neighbors(
             Given(
                 radii, query_radii, rule, types, query_types, supports, query_supports, extent
             ),
-            queries, directed=True,
+            queries, directed=True, chosen=Chosen(
+                groups, exclude, exclude_within, min_distance, query_groups, query_exclude
+            ),
         )  # fmt: skip
         if indices is not None:
             return _rows_alone(
@@ -240,6 +255,12 @@ def coordination(
     threads: int | None = None,
     memory_limit: float | None = None,
     indices: npt.ArrayLike | None = None,
+    groups: npt.ArrayLike | None = None,
+    query_groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    query_exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> npt.NDArray[np.int64]:
     """Count the neighbours of each point, or of each query, without listing them.
 
@@ -255,6 +276,11 @@ def coordination(
         Bytes that the search may take.
     indices : array_like of int, shape (r,), optional
         Only these points, as in `neighbors`; their neighbours are listed one by one for this.
+    groups, exclude, exclude_within, min_distance
+        As in `pairs`.
+    query_groups, query_exclude : array_like of int or str, shape (q,), optional
+        Labels of the queries, beside those of the points. With queries the pairs of
+        numbers in `exclude` are of a query and a point.
 
     Returns
     -------
@@ -285,6 +311,8 @@ def coordination(
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
         and supports is None and query_supports is None and extent is None and indices is None
+        and groups is None and exclude is None and exclude_within is None and min_distance is None
+        and query_groups is None and query_exclude is None
     ):  # fmt: skip
         counts: Any = _core.plain(
             _core.coordination, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -298,7 +326,9 @@ def coordination(
         Given(
                 radii, query_radii, rule, types, query_types, supports, query_supports, extent
             ),
-            queries, directed=True,
+            queries, directed=True, chosen=Chosen(
+                groups, exclude, exclude_within, min_distance, query_groups, query_exclude
+            ),
     )  # fmt: skip
     if indices is not None:
         return _rows_alone(search, indices, queries, "j", 4, reach, algorithm).counts.copy()

@@ -9,7 +9,7 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.batch import as_systems
-from halfshell._convert.given import Given
+from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import AUTO, RAISE, as_flag, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
@@ -100,6 +100,10 @@ def pairs(
     progress: Callable[[float], object] | None = None,
     batch: npt.ArrayLike | None = None,
     touching: npt.ArrayLike | None = None,
+    groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> Arrays | tuple[Any, ...]:
     """Find every pair of points within a cutoff, each once.
 
@@ -210,6 +214,18 @@ def pairs(
         ``sort=False`` they come in the order of `touching`, those of one point by the other one; a
         pair of two of these points comes with the lower one. Not with `batch`, the letter ``k`` or
         `precision` "single".
+    groups : array_like of int or str, shape (n,), optional
+        A label for each point: only pairs of equal labels count.
+    exclude : array_like of int, shape (k, 2), or of int or str, shape (n,), optional
+        Pairs of point numbers, in any order, that do not count, such as bonds; or a label for each
+        point: pairs of equal labels do not. They are left out in their nearest image alone,
+        decided exactly; of images that are equally near in that with the lexicographically least
+        S, as seen from the point of the lower number. Images of a point itself count.
+    exclude_within : int, optional
+        With numbers as labels: pairs whose labels differ by at most so much do not count.
+    min_distance : float, optional
+        Pairs that are nearer than this, decided exactly, do not count; finite, not negative. Not
+        with `precision` "single".
 
     Returns
     -------
@@ -250,7 +266,9 @@ def pairs(
         `radii`, or has a direction, as those of `neighbors` may; if a table of cutoffs is not
         symmetric, a dict is in contradiction or names no element, or a type is none of the table;
         if a support is not finite, not symmetric or, decided exactly, not positive definite, or
-        reaches further than 2**1022; if two of `radii`, `types` and `supports` are given together.
+        reaches further than 2**1022; if two of `radii`, `types` and `supports` are given together;
+        if labels are not one a point, `exclude` has a number that is no point's, `exclude_within`
+        is negative or without labels, or `min_distance` is negative or not finite.
     CapacityError
         If `capacity` or an array of `out` is too small; it carries ``needed``. What `out` holds is
         unspecified then.
@@ -308,13 +326,6 @@ def pairs(
     >>> i.tolist(), j.tolist()
     ([1], [2])
 
-    Ellipsoids, twice as long along y as along x: the second point is above the first.
-
-    >>> long = [[[2.0, 0.0], [0.0, 1.0]]] * 3
-    >>> i, j = hs.pairs([[0.0, 0.0], [0.0, 1.5], [1.5, 0.0]], None, supports=long, extent=2.0)
-    >>> i.tolist(), j.tolist()
-    ([0], [1])
-
     Arrays of a fixed length, with what is needed:
 
     >>> i, j, d, needed = hs.pairs([[0.0], [1.0], [3.0]], 1.5, quantities="ijd", capacity=3,
@@ -322,17 +333,17 @@ def pairs(
     >>> i.tolist(), j.tolist(), d.tolist(), needed
     ([0, 3, 3], [1, 3, 3], [1.0, inf, inf], 1)
 
-    Two shells around each point, in one search:
-
-    >>> d, k = hs.pairs([[0.0], [1.0], [3.0]], [1.0, 2.5], quantities="dk", sort=True)
-    >>> d.tolist(), k.tolist()
-    ([1.0, 2.0], [0, 1])
-
     Only the pairs of a point that has moved:
 
     >>> i, j = hs.pairs([[0.0], [1.0], [2.0], [3.0]], 1.0, touching=[2])
     >>> i.tolist(), j.tolist()
     ([1, 2], [2, 3])
+
+    A bonded pair is left out, and no pair is nearer than 0.5:
+
+    >>> i, j = hs.pairs([[0.0], [1.0], [2.0], [2.25]], 1.5, exclude=[[0, 1]], min_distance=0.5)
+    >>> i.tolist(), j.tolist()
+    ([1, 1], [2, 3])
 
     Two systems in one call, which do not see each other:
 
@@ -340,10 +351,6 @@ def pairs(
     ...                 batch=[0, 0, 1, 1])
     >>> i.tolist(), j.tolist()
     ([0, 2], [1, 3])
-    >>> i, j = hs.pairs([[0.0], [1.0], [0.0], [1.0]], None, radii=[0.5, 0.5, 0.25, 0.5],
-    ...                 batch=[0, 0, 1, 1])
-    >>> i.tolist(), j.tolist()
-    ([0], [1])
     """
     if type(box) is Box:
         box = box.vectors
@@ -353,6 +360,7 @@ def pairs(
     if batch is None and touching is None and (
         radii is None and types is None and rule is None and supports is None and extent is None
         and algorithm is AUTO
+        and groups is None and exclude is None and exclude_within is None and min_distance is None
     ):
         # A small search takes as long as a handful of Python operations: none are made where the
         # arguments need no conversion.
@@ -364,22 +372,27 @@ def pairs(
             return cast("Arrays", result)
     check_apart(
         out, points=points, cutoff=cutoff, box=box, batch=batch, radii=radii, types=types,
-        supports=supports, touching=touching,
+        supports=supports, touching=touching, groups=groups, exclude=exclude,
     )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
+    chosen = Chosen(groups, exclude, exclude_within, min_distance)
     cutoff, shells = as_shells(cutoff, quantities, precision, given, batch)
     wanted = quantities, as_flag(sort, "sort"), as_index_bytes(index_dtype), out
     if touching is not None and not (batch is None and shells is None and room is None):
         other = "batch" if batch is not None else "capacity" if shells is None else "the letter k"
         raise ValueError(f"touching does not go with {other}")
     if batch is None:
-        search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+        search, _, reach = as_search_of_each(
+            points, cutoff, box, periodic, rest, given, chosen=chosen
+        )
         if touching is None:
             return _core.pairs(*(*search, *wanted, reach, algorithm, shells, room))
         from halfshell._convert.touching import pairs_touching  # here: others do without
 
         return pairs_touching(search, search[0], touching, wanted, reach, algorithm)
-    scene, own, reach = as_systems(points, cutoff, box, periodic, batch, given)
+    scene, own, reach = as_systems(
+        points, cutoff, box, periodic, batch, given, chosen, precision
+    )
     end = (reach, algorithm) if room is None else (reach, algorithm, room)
     return _core.batch_pairs(*(*scene, *rest, *wanted, *own, *end))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.given import Given
+from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import as_flag, as_index_bytes, most_pairs
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.shells import as_shells
@@ -75,6 +75,10 @@ def iter_pairs(
     threads: int | None = None,
     memory_limit: float | None = None,
     progress: Callable[[float], object] | None = None,
+    groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> PairBlocks[Any]:
     """Iterate over all pairs of points within a cutoff, in blocks of bounded size.
 
@@ -98,6 +102,8 @@ def iter_pairs(
         ``progress(fraction)``: the part of the points that has been dealt with, from 0 to 1. It
         never falls, for any number of threads, and is 1 once all pairs have been found; without
         points it is not called. An exception ends the call, and the iterator can go on.
+    groups, exclude, exclude_within, min_distance
+        As in `pairs`.
 
     Returns
     -------
@@ -145,8 +151,11 @@ def iter_pairs(
     most = most_pairs(max_pairs)
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
+    chosen = Chosen(groups, exclude, exclude_within, min_distance)
     cutoff, shells = as_shells(cutoff, quantities, precision, given)
-    search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+    search, _, reach = as_search_of_each(
+        points, cutoff, box, periodic, rest, given, chosen=chosen
+    )
     blocks = _core.iter_pairs(
         *search, quantities, as_index_bytes(index_dtype), most, reach, algorithm, shells
     )
@@ -173,6 +182,10 @@ def for_each_pair(
     threads: int | None = None,
     memory_limit: float | None = None,
     thread_safe: bool = False,
+    groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
+    min_distance: float | None = None,
 ) -> int:
     """Call a function for each pair of points within a cutoff, storing none of them.
 
@@ -203,6 +216,8 @@ def for_each_pair(
     thread_safe : bool, default False
         Declares that several threads may call the function at once. Then the order of the pairs
         is unspecified, and what it writes to must be atomic or guarded.
+    groups, exclude, exclude_within, min_distance
+        As in `pairs`.
 
     Returns
     -------
@@ -256,7 +271,10 @@ def for_each_pair(
     target = target_of(callback, user_data)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
-    search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)
+    chosen = Chosen(groups, exclude, exclude_within, min_distance)
+    search, _, reach = as_search_of_each(
+        points, cutoff, box, periodic, rest, given, chosen=chosen
+    )
     return _core.for_each_pair(
         *search, target.function, target.user, as_flag(thread_safe, "thread_safe"), reach,
         algorithm,

@@ -159,7 +159,7 @@ def shifts_of_search(
     largest, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
     own: Any = None  # the caller's arrays may change
     if reach is not None:
-        own = tuple(part.copy() if isinstance(part, np.ndarray) else part for part in reach)
+        own = _copied(reach)
 
     def find(origin: Origin) -> npt.NDArray[Any]:
         points, vectors, bits = origin.scene()
@@ -170,3 +170,10 @@ def shifts_of_search(
         return found[1]
 
     return find
+
+
+def _copied(part: Any) -> Any:
+    """A tuple with copies of the arrays in it."""
+    if isinstance(part, tuple):
+        return tuple(_copied(one) for one in part)
+    return part.copy() if isinstance(part, np.ndarray) else part

@@ -13,7 +13,7 @@ systems_are_ranges_of_the_points(void)
 {
     const int64_t    first[] = {0, 2, 2, 5};
     const hs_points  points = {x, 5, 1, HS_FLOAT64, 8, 8}, none = {NULL, 0, 1, HS_FLOAT64, 8, 8};
-    const hs_systems systems = {3, first, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {3, first, NULL, NULL, NULL, NULL, NULL};
     hs_systems_job   job = {.points = &points, .systems = &systems};
     hs_points        own;
     hs_box           box;
@@ -33,9 +33,9 @@ each_system_has_its_box(void)
     const double     rows[] = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0}, y[4] = {0.0};
     const hs_points  points = {y, 2, 2, HS_FLOAT64, 16, 8};
     const hs_box     box = {.ndim = 2, .periodic = {true, false}, .rows = {{9.0}, {0.0, 9.0}}};
-    const hs_systems one = {2, first, &box, NULL, NULL, NULL},
-                     each = {2, first, &box, rows, NULL, NULL};
-    const hs_systems open = {2, first, NULL, rows, NULL, NULL};
+    const hs_systems one = {2, first, &box, NULL, NULL, NULL, NULL},
+                     each = {2, first, &box, rows, NULL, NULL, NULL};
+    const hs_systems open = {2, first, NULL, rows, NULL, NULL, NULL};
     hs_systems_job   job = {.points = &points, .systems = &one};
     hs_points        own;
     hs_box           own_box;
@@ -76,7 +76,7 @@ small_systems_are_polled_between_now_and_then(void)
     const hs_points points = {many, N, 1, HS_FLOAT64, 8, 8};
     for (int s = 0; s <= N; s++)
         first[s] = s;
-    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL};
     hs_options       options = hs_options_default();
     polls            noted = {0, 0.0};
     options.cutoff = 1.0;
@@ -101,7 +101,7 @@ work_of_all_threads_is_added_up(void)
         first[s] = s * POINTS;
     for (int e = 0; e < N * POINTS; e++)
         many[e] = random_unit(&random);
-    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL};
     hs_options       options = hs_options_default();
     options.cutoff = 0.125;
     options.threads = 1;

@@ -204,3 +204,52 @@ def test_sizes_are_exact_or_fixed_and_never_cut():
         points, 0.3, box=[1.0] * 3, inclusive=False, capacity=m - 1, on_overflow="flag"
     )
     assert needed == m and (i == 100).all() and (j == 100).all()  # nothing of it is used unseen
+
+
+def nearest_image(points, i, j, box, near):
+    """The first image, in ascending order, of those that are nearest to point i."""
+    rows = [[Fraction(x) for x in row] for row in np.asarray(box, float).tolist()]
+    along = [Fraction(b) - Fraction(a) for a, b in zip(points[i].tolist(), points[j].tolist())]
+    sizes = {
+        S: sum((along[k] + sum(s * row[k] for s, row in zip(S, rows))) ** 2 for k in range(3))
+        for S in near
+    }
+    return min(near, key=lambda S: (sizes[S], S))
+
+
+@pytest.mark.parametrize("ratio", [0.37, 0.88])
+@pytest.mark.parametrize("name", LOSSY)
+def test_labels_are_those_of_the_original(ratio, name):
+    """Edges within one inclusion label, without the minimum images of equal exclusion labels."""
+    box = LOSSY[name][0] / 4.0
+    cutoff = ratio * float(hs.Box(box).perpendicular_heights.min())
+    points = np.random.default_rng(4).random((6, 3)) @ box
+    inclusion, exclusion = [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2]
+    images = list(itertools.product(range(-2, 3), repeat=3))
+    expected = {
+        (i, j, S)
+        for i, j, S in by_rule(points, cutoff, box)
+        if inclusion[i] == inclusion[j]
+        and not (
+            i != j and exclusion[i] == exclusion[j]
+            and S == nearest_image(points, i, j, box, images)
+        )
+    }  # fmt: skip
+    found = edges(points, cutoff, box=box, groups=inclusion, exclude=exclusion)
+    assert found == expected
+    # Labels of their own take out (i, i, 0) alone, which is no edge here.
+    assert edges(points, cutoff, box=box, exclude=range(6)) == edges(points, cutoff, box=box)
+
+
+def test_edges_of_some_points():
+    """Edges that touch these ids: of rows in one direction, as pairs each once."""
+    points, box = np.random.default_rng(5).random((40, 3)) * 3.0, [3.0] * 3
+    ids = [3, 17, 8]
+    every = edges(points, 1.0, box=box, exclude=np.arange(40) // 2)
+    options = {"box": box, "inclusive": False, "exclude": np.arange(40) // 2}
+    half = both_ways(*hs.pairs(points, 1.0, touching=ids, quantities="ijS", **options))
+    assert half == {edge for edge in every if edge[0] in ids or edge[1] in ids}
+    table = hs.neighbors(points, 1.0, indices=ids, quantities="jS", **options)
+    row, j, S = table.to_pairs(quantities="ijS")
+    found = zip(np.array(ids)[row].tolist(), j.tolist(), map(tuple, S.tolist()))
+    assert set(found) == {edge for edge in every if edge[0] in ids}

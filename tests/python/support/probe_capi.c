@@ -14,7 +14,7 @@ count(PyObject *module, PyObject *arguments)
     int        ndim;
     int64_t    n_pairs;
     hs_points  points;
-    hs_among   among = {&points, NULL, NULL, NULL, NULL};
+    hs_among   among = {&points, NULL, NULL, NULL, NULL, NULL};
     hs_failure failure;
     hs_status  status;
     hs_options options = halfshell->options_default();

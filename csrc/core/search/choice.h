@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/*
+ * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
+ * call. Labels stay in the caller's order and arrays; excluded pairs become rows of partners. Where
+ * twice the cutoff may reach from one image of a point to another, points and box are kept as given
+ * besides, so that it can be decided which image is the nearest. choose.h applies it to hits.
+ */
+#ifndef HS_CHOICE_H
+#define HS_CHOICE_H
+
+#include "../box/near_image.h"
+#include "../scene/scene.h"
+#include "../threads/call.h"
+
+#include <math.h>
+
+typedef struct hs_choice {
+    /* Borrowed. Labels of asking points and of points; NULL where they do not matter. */
+    const int64_t *asking_group, *group;
+    const int64_t *asking_label, *label;
+    const int64_t *number;       /* of asking points among the points, where they are not these
+                                  * in their order, and not queries of their own; or NULL */
+    uint64_t       within;       /* most difference of labels whose pairs are excluded */
+    double         min_distance; /* in the caller's unit; 0: there is none */
+    bool           has_queries;  /* asking points are no points themselves */
+    /* Owned. */
+    int64_t     *copies;   /* of the labels, where the caller's do not last; or NULL */
+    int64_t     *first;    /* of the partners of each asking point, one more than these; or NULL */
+    int32_t     *partner;  /* points whose pairs are excluded; ascending for each asking point */
+    double       shortest; /* no vector of the lattice is shorter; infinity in open space */
+    hs_cloud     asking_cloud, cloud; /* as given; empty where the shortest is far enough */
+    hs_image_box images;
+} hs_choice;
+
+/*
+ * Sets call->choice for searches among these sets, to be freed with hs_choice_close; selection NULL
+ * leaves it as it is. HS_ERR_ARGUMENT for arrays that are missing, numbers that are no point's
+ * (failure->row), or a min_distance that is negative or not finite, or not 0 with HS_SINGLE;
+ * HS_ERR_MEMORY. On failure there is none.
+ */
+hs_status hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
+                         hs_failure *failure);
+
+/* Frees the choice of a call, if it has one; harmless twice. */
+void hs_choice_close(hs_call *call);
+
+/* Whether pairs are excluded, in their nearest image. */
+HS_ALWAYS_INLINE bool
+hs_choice_excludes(const hs_choice *choice)
+{
+    return choice->label != NULL || choice->first != NULL;
+}
+
+/* The box of a choice that excludes pairs, in place of one before: HS_OK or HS_ERR_BOX_SKEWED. */
+hs_status hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice);
+
+/* Keeps the points, for a choice that compares images; any status of hs_cloud_load. */
+hs_status hs_choice_keep_points(const hs_sets *sets, hs_call *call, hs_failure *failure);
+
+/* Copies the labels, for a choice that outlives the caller's; HS_OK or HS_ERR_MEMORY. */
+hs_status hs_choice_keep_labels(const hs_sets *sets, hs_call *call);
+
+/* Box and points, as far as the call's choice needs them, for a search of one scene; cutoff: no
+ * pair is further apart. */
+hs_status hs_choice_set_scene(const hs_sets *sets, const hs_box *box, double cutoff, hs_call *call,
+                              hs_failure *failure);
+
+/* Whether a pair as far apart as this may be excluded in one image and count in another. */
+HS_ALWAYS_INLINE bool
+hs_choice_compares(const hs_choice *choice, double cutoff)
+{
+    /* More than rounding changes both. */
+    return hs_choice_excludes(choice) && choice->shortest < INFINITY &&
+           !(2.02 * cutoff < choice->shortest);
+}
+
+/* Whether pairs are looked at one by one, besides their labels. */
+HS_ALWAYS_INLINE bool
+hs_choice_needs_places(const hs_choice *choice, double cutoff)
+{
+    return choice->min_distance > 0.0 || hs_choice_compares(choice, cutoff);
+}
+
+/* The least distance in the unit of the scene's metric. */
+HS_ALWAYS_INLINE double
+hs_choice_least(const hs_choice *choice, const hs_scene *scene)
+{
+    return scene->extreme ? choice->min_distance
+                          : hs_scale_apply(scene->scale, choice->min_distance);
+}
+
+#endif

@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which pairs count: groups, excluded pairs, a least distance, against fractions in every box."""
+
+import itertools
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+# ---- the rule, in fractions ------------------------------------------------------------------
+
+
+def square(p, q, S, box):
+    along = [b - a for a, b in zip(p, q, strict=True)]
+    for times, row in zip(S, box, strict=True):
+        if times:
+            along = [x + times * y for x, y in zip(along, row, strict=True)]
+    return sum(x * x for x in along)
+
+
+def fractions_of(array):
+    return [[Fraction(float(x)) for x in row] for row in array]
+
+
+def least_image(p, q, box, images):
+    """Of images that are equally near the first one: they ascend."""
+    return min(images, key=lambda S: square(p, q, S, box))
+
+
+class Rule:
+    """What counts in a scene; entries are (i, j, S) of rows of points or of queries."""
+
+    def __init__(self, scene, chosen, of_queries=None):
+        points, cutoff, options = scene
+        self.own = of_queries is None
+        self.chosen = chosen
+        self.points = fractions_of(points)
+        self.asking = self.points if self.own else fractions_of(of_queries["queries"])
+        self.of_asking = chosen if self.own else of_queries
+        ndim = points.shape[1]
+        box = options.get("box")
+        periodic = options.get("periodic", [False] * ndim)
+        self.box = fractions_of(np.zeros((ndim, ndim)) if box is None else box)
+        self.images = list(
+            itertools.product(*[range(-5, 6) if axis else (0,) for axis in periodic])
+        )
+        self.largest = Fraction(float(cutoff)) ** 2
+        self.least = Fraction(float(chosen["min_distance"] or 0)) ** 2
+        self.inclusive = options["inclusive"]
+
+    def is_excluded(self, i, j):
+        exclude = self.chosen["exclude"]
+        if exclude is None:
+            return False
+        if exclude.ndim == 2:
+            pairs = {tuple(pair) for pair in exclude.tolist()}
+            return (i, j) in pairs or (self.own and (j, i) in pairs)
+        label = (exclude if self.own else self.of_asking["query_exclude"])[i]
+        return abs(int(label) - int(exclude[j])) <= (self.chosen["exclude_within"] or 0)
+
+    def nearest(self, i, j):
+        p, q = self.asking[i], self.points[j]
+        if self.own and j < i:
+            return tuple(-s for s in least_image(q, p, self.box, self.images))
+        return least_image(p, q, self.box, self.images)
+
+    def row(self, i, j):
+        groups = self.chosen["groups"]
+        if groups is not None:
+            label = (groups if self.own else self.of_asking["query_groups"])[i]
+            if label != groups[j]:
+                return
+        excluded = self.is_excluded(i, j) and not (self.own and i == j)
+        for S in self.images:
+            if self.own and i == j and not any(S):
+                continue
+            size = square(self.asking[i], self.points[j], S, self.box)
+            near = size < self.largest or (self.inclusive and size == self.largest)
+            if near and size >= self.least and not (excluded and S == self.nearest(i, j)):
+                yield (i, j, S)
+
+    def entries(self):
+        found = (
+            self.row(i, j) for i in range(len(self.asking)) for j in range(len(self.points))
+        )
+        return set(itertools.chain.from_iterable(found))
+
+
+# ---- scenes ----------------------------------------------------------------------------------
+
+
+def points_of(draw, n, ndim, length):
+    if draw.random() < 0.6:
+        rows = [[draw.randint(-2, 6) * 0.5 for _ in range(ndim)] for _ in range(n)]
+    else:
+        rows = [[draw.uniform(-1, length + 1) for _ in range(ndim)] for _ in range(n)]
+    dtype = np.float32 if draw.random() < 0.3 else np.float64
+    return np.array(rows, dtype).reshape(n, ndim)
+
+
+def scene_of(draw):
+    ndim = draw.choice([1, 2, 2, 3])
+    n, length = draw.randint(0, 8 if ndim == 3 else 11), draw.choice([2.0, 3.0, 4.0])
+    points = points_of(draw, n, ndim, length)
+    options = {
+        "inclusive": draw.random() < 0.6,
+        "algorithm": draw.choice(["auto", "grid", "hash", "all-pairs", "hierarchy"]),
+        "kernel": draw.choice(hs.kernels()),
+        "threads": draw.choice([1, 2]),
+    }
+    if draw.random() < 0.75:
+        box = np.diag([length * draw.choice([1, 1, 1.5]) for _ in range(ndim)])
+        if draw.random() < 0.5 and ndim > 1:
+            box[1, 0] = draw.choice([0.5, 1.0, -1.0])
+            box[-1, -2] += draw.choice([0.5, -0.5, 0.0])
+        options["box"] = box
+        options["periodic"] = [draw.random() < 0.8 for _ in range(ndim)]
+    cutoff = draw.choice([0.5, 1.0, 1.5, 2.0, draw.uniform(0.3, 2.2)])
+    return points, cutoff, options
+
+
+def labels_of(draw, n, low=-2):
+    return np.array([draw.randint(low, 2) for _ in range(n)], np.int64)
+
+
+def chosen_of(draw, n, q, cutoff):
+    chosen = dict.fromkeys(("groups", "exclude", "exclude_within"))
+    of_queries = {"query_groups": None, "query_exclude": None}
+    if draw.random() < 0.4:
+        chosen["groups"], of_queries["query_groups"] = labels_of(draw, n, 0), labels_of(draw, q, 0)
+    kind = draw.random()
+    if kind < 0.35:
+        chosen["exclude"], of_queries["query_exclude"] = labels_of(draw, n), labels_of(draw, q)
+        chosen["exclude_within"] = draw.choice([None, 0, 1])
+    elif kind < 0.7 and n and q:
+        pairs = [[draw.randrange(min(n, q)), draw.randrange(n)] for _ in range(draw.randint(0, n))]
+        chosen["exclude"] = np.array(pairs, np.int64).reshape(-1, 2)
+    chosen["min_distance"] = draw.choice([None, None, 0.0, 0.5, 1.0, cutoff])
+    return chosen, of_queries
+
+
+def entries_of(i, j, S):
+    listed = list(zip(i.tolist(), j.tolist(), map(tuple, S.tolist()), strict=True))
+    assert len(listed) == len(set(listed))
+    return set(listed)
+
+
+def of_table(table, numbers=None):
+    numbers = np.arange(len(table)) if numbers is None else numbers
+    return entries_of(np.repeat(numbers, table.counts), table.indices, table.shifts)
+
+
+SEEDS = range(250)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_set(seed):
+    draw = random.Random(seed)
+    points, cutoff, options = scene_of(draw)
+    n = len(points)
+    chosen, _ = chosen_of(draw, n, n, cutoff)
+    full = Rule((points, cutoff, options), chosen).entries()
+    half = {(i, j, S) for i, j, S in full if i < j or (i == j and any(S) and S > (0,) * len(S))}
+    every = {**chosen, **options}
+    assert entries_of(*hs.pairs(points, cutoff, quantities="ijS", **every)) == half
+    i, j, d, _, S = hs.pairs(points, cutoff, quantities="ijdDS", **every)
+    assert entries_of(i, j, S) == half
+    assert (d >= (chosen["min_distance"] or 0.0)).all() and (d <= cutoff).all()
+    found = hs.pairs(points, cutoff, quantities="P", **every).tolist()
+    assert sorted(map(tuple, found)) == sorted(entry[:2] for entry in half)
+    assert hs.count_pairs(points, cutoff, **every) == len(half)
+    counts = hs.count_pairs(points, [cutoff / 2, cutoff], **every)
+    assert counts[1] == len(half)
+    table = hs.neighbors(points, cutoff, quantities="jS", **every)
+    assert of_table(table) == full
+    assert hs.neighbors(points, cutoff, **every).indices.tolist() == table.indices.tolist()
+    assert hs.coordination(points, cutoff, **every).tolist() == table.counts.tolist()
+    blocks = list(hs.iter_pairs(points, cutoff, quantities="ijS", max_pairs=3, **every))
+    assert set().union(*(entries_of(*block) for block in blocks)) == half
+    radii = hs.pairs(
+        points, None, radii=np.full(n, cutoff), rule="max", quantities="ijS", **every
+    )
+    assert entries_of(*radii) == half
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_some_points_of_one_set(seed):
+    draw = random.Random(seed)
+    points, cutoff, options = scene_of(draw)
+    n = len(points)
+    chosen, _ = chosen_of(draw, n, n, cutoff)
+    full = Rule((points, cutoff, options), chosen).entries()
+    half = {(i, j, S) for i, j, S in full if i < j or (i == j and S > (0,) * len(S))}
+    every = {**chosen, **options}
+    some = np.array(sorted(draw.sample(range(n), draw.randint(0, n))), np.int64)
+    table = hs.neighbors(points, cutoff, quantities="jS", indices=some, **every)
+    assert of_table(table, some) == {entry for entry in full if entry[0] in some}
+    if chosen["exclude"] is None or chosen["exclude"].ndim == 1 or n:
+        found = hs.pairs(points, cutoff, quantities="ijS", touching=some, **every)
+        assert entries_of(*found) == {e for e in half if e[0] in some or e[1] in some}
+    batch = np.sort(labels_of(draw, n, 0))
+    found = hs.pairs(points, cutoff, quantities="ijS", batch=batch, **every)
+    assert entries_of(*found) == {e for e in half if batch[e[0]] == batch[e[1]]}
+    assert hs.count_pairs(points, cutoff, batch=batch, **every).sum() == len(found[0])
+    if options["inclusive"] and not chosen["min_distance"]:
+        del chosen["min_distance"]
+        scene = {key: options[key] for key in options if key != "inclusive"}
+        bins = hs.pair_histogram(points, [0.0, cutoff / 2, cutoff], **chosen, **scene)
+        assert bins.sum() == len(half)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_two_sets(seed):
+    draw = random.Random(seed)
+    points, cutoff, options = scene_of(draw)
+    queries = points_of(draw, draw.randint(0, 6), points.shape[1], 3.0)
+    chosen, of_queries = chosen_of(draw, len(points), len(queries), cutoff)
+    rule = Rule((points, cutoff, options), chosen, {"queries": queries, **of_queries})
+    expected = rule.entries()
+    every = {**chosen, **of_queries, **options}
+    found = hs.pairs_between(queries, points, cutoff, quantities="ijS", **every)
+    assert entries_of(*found) == expected
+    assert hs.count_pairs(points, cutoff, queries=queries, **every) == len(expected)
+    table = hs.neighbors(points, cutoff, queries=queries, quantities="jS", **every)
+    assert of_table(table) == expected
+    counts = hs.coordination(points, cutoff, queries=queries, **every)
+    assert counts.tolist() == table.counts.tolist()
+
+
+def test_large_scenes_are_those_of_a_filter():
+    rng = np.random.default_rng(3)
+    points, box = rng.random((20000, 3)) * 10.0, [10.0] * 3
+    molecule = np.arange(20000) // 4
+    i, j, d = hs.pairs(points, 0.6, box=box, quantities="ijd", sort=True)
+    other = molecule[i] != molecule[j]
+    for threads in (1, 2):
+        found = hs.pairs(
+            points, 0.6, box=box, quantities="ijd", sort=True, exclude=molecule, threads=threads
+        )
+        for column, all_of_it in zip(found, (i, j, d), strict=True):
+            assert column.tobytes() == all_of_it[other].tobytes()
+        found = hs.pairs(
+            points, 0.6, box=box, quantities="ij", sort=True, min_distance=0.3, threads=threads
+        )
+        assert found[0].tobytes() == i[d >= 0.3].tobytes()
+        found = hs.pairs(
+            points, 0.6, box=box, quantities="ij", sort=True, groups=molecule % 7, threads=threads
+        )
+        assert found[0].tobytes() == i[molecule[i] % 7 == molecule[j] % 7].tobytes()
+
+
+def test_names_are_labels_too():
+    points = [[0.0], [1.0], [2.0]]
+    for labels in (["a", "a", "b"], np.array(["a", "a", "b"]), np.array(["a", "a", "b"], object)):
+        assert hs.pairs(points, 1.0, groups=labels, quantities="P").tolist() == [[0, 1]]
+        assert hs.pairs(points, 1.0, exclude=labels, quantities="P").tolist() == [[1, 2]]
+    found = hs.pairs_between(
+        [[0.0]], points, 5.0, groups=["a", "b", "a"], query_groups=["b"], quantities="j"
+    )
+    assert found.tolist() == [1]
+
+
+def test_the_largest_labels():
+    labels = [np.iinfo(np.int64).min, np.iinfo(np.int64).max]
+    points = [[0.0], [1.0]]
+    assert hs.count_pairs(points, 1.0, exclude=labels, exclude_within=2**63 - 1) == 1
+    assert hs.count_pairs(points, 1.0, exclude=[0, labels[1]], exclude_within=2**63 - 1) == 0
+
+
+@pytest.mark.parametrize("scale", [2.0**-1030, 2.0**-500, 1.0, 2.0**500, 2.0**1000])
+def test_extreme_units(scale):
+    points = np.array([[0.0], [1.0], [2.0], [3.0]]) * scale
+    found = hs.pairs(points, 2.0 * scale, box=[4.0 * scale], exclude=[[0, 1], [0, 2]],
+                     min_distance=scale, quantities="ijS", sort=True)
+    assert [column.tolist() for column in found] == [
+        [0, 0, 1, 1, 1, 2], [2, 3, 2, 3, 3, 3], [[0], [-1], [0], [-1], [0], [0]]
+    ]
+    nearer = hs.count_pairs(points, 2.0 * scale, min_distance=np.nextafter(scale, np.inf))
+    assert nearer == 2
+
+
+BAD = [
+    ({"groups": [0, 1]}, ValueError, r"groups must have shape \(3,\), one a point"),
+    ({"groups": [0.0, 1.0, 2.0]}, TypeError, "groups must hold integers or names"),
+    ({"groups": [True, False, True]}, TypeError, "groups must hold integers or names"),
+    ({"groups": np.array([2**64 - 1, 0, 0], np.uint64)}, ValueError, "groups must be less than"),
+    ({"query_groups": [0]}, ValueError, "query_groups needs queries"),
+    ({"exclude": [0.5, 1, 2]}, TypeError, "exclude must hold integers"),
+    ({"exclude": [0, 1]}, ValueError, r"exclude must have shape \(3,\)"),
+    ({"exclude": [[0, 1, 2]]}, ValueError, r"exclude must have shape \(k, 2\)"),
+    ({"exclude": [[0, 3]]}, ValueError, r"exclude\[:, 1\] must be numbers of points, from 0 to 2"),
+    ({"exclude": [[-1, 0]]}, ValueError, r"exclude\[:, 0\] must be numbers of points"),
+    ({"exclude": [[0.0, 1.0]]}, TypeError, "must hold integers"),
+    ({"exclude": [[0, 1]], "query_exclude": [0]}, ValueError, "query_exclude goes with labels"),
+    ({"exclude_within": 1}, ValueError, "exclude_within goes with labels"),
+    ({"exclude": [[0, 1]], "exclude_within": 1}, ValueError, "exclude_within goes with labels"),
+    ({"exclude": [0, 1, 2], "exclude_within": -1}, ValueError, "exclude_within must be from 0"),
+    ({"exclude": [0, 1, 2], "exclude_within": 2**63}, ValueError, "exclude_within must be from 0"),
+    ({"exclude": [0, 1, 2], "exclude_within": 0.5}, TypeError, "whole number"),
+    ({"exclude": ["a", "b", "c"], "exclude_within": 1}, TypeError, "exclude must hold integers"),
+    ({"min_distance": -1.0}, ValueError, "min_distance must be finite and not negative"),
+    ({"min_distance": np.nan}, ValueError, "min_distance must be finite and not negative"),
+    ({"min_distance": np.inf}, ValueError, "min_distance must be finite and not negative"),
+    ({"min_distance": "1"}, TypeError, "min_distance must"),
+    ({"min_distance": 0.5, "precision": "single"}, ValueError, "does not go with precision"),
+]
+
+
+@pytest.mark.parametrize(("chosen", "kind", "words"), BAD, ids=lambda value: str(value)[:40])
+def test_bad_choices(chosen, kind, words):
+    points = [[0.0], [1.0], [2.0]]
+    alone = {name: value for name, value in chosen.items() if not name.startswith("query_")}
+    if alone == chosen:
+        with pytest.raises(kind, match=words):
+            hs.pairs(points, 1.0, **chosen)
+        with pytest.raises(kind, match=words):
+            hs.pairs(points, 1.0, batch=[0, 0, 0], **chosen)
+        with pytest.raises(kind, match=words):
+            hs.iter_pairs(points, 1.0, **chosen)
+    for search in (hs.neighbors, hs.count_pairs, hs.coordination):
+        with pytest.raises(kind, match=words):
+            search(points, 1.0, **chosen)
+
+
+def test_labels_of_both_sets():
+    points, queries = [[0.0], [1.0]], [[0.5]]
+    with pytest.raises(ValueError, match="groups and query_groups must be given together"):
+        hs.pairs_between(queries, points, 1.0, groups=[0, 1])
+    with pytest.raises(ValueError, match="exclude and query_exclude must be given together"):
+        hs.pairs_between(queries, points, 1.0, query_exclude=[0])
+    with pytest.raises(TypeError, match="both be numbers or both be names"):
+        hs.pairs_between(queries, points, 1.0, groups=[0, 1], query_groups=["a"])
+    with pytest.raises(ValueError, match=r"exclude\[:, 0\] must be numbers of queries"):
+        hs.pairs_between(queries, points, 1.0, exclude=[[1, 0]])
+
+
+def test_inputs_stay_and_empty_ones_are_nothing():
+    points = np.array([[0.0], [1.0]])
+    exclude = np.array([[1, 0], [0, 1]])
+    before = exclude.copy()
+    assert hs.count_pairs(points, 1.0, exclude=exclude) == 0
+    assert (exclude == before).all()
+    for nothing in ([], np.empty((0, 2), int)):
+        assert hs.count_pairs(points, 1.0, exclude=nothing) == 1
+    empty = np.empty((0, 3))
+    assert hs.count_pairs(empty, 1.0, groups=[], exclude=[], min_distance=0.5) == 0
