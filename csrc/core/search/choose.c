@@ -96,18 +96,15 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
     return status;
 }
 
-/* Whether pair e of the trace is that of a point with itself. */
+/* Whether pair e of the trace, of a point with itself, is in the image S = 0. */
 static bool
 is_itself(const hs_trace *trace, int32_t e)
 {
-    bool same = true;
-    for (int k = 0; k < trace->search->scene.ndim; k++) {
-        same = same && trace->p[k][e] == trace->q[k][e];
-    }
+    int moved = 0;
     for (int r = 0; r < trace->search->scene.lattice.n_periodic && trace->is_shifted; r++) {
-        same = same && trace->times[r][e] == 0.0;
+        moved += trace->times[r][e] != 0.0;
     }
-    return same;
+    return moved == 0;
 }
 
 /* Drops the pairs of the batch that are nearer than the least distance. */

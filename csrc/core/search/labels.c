@@ -85,7 +85,6 @@ bool
 hs_labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test)
 {
     switch (test) {
-    case HS_OF_OTHER_GROUP: return is_left_out(asking, number, HS_OF_OTHER_GROUP);
     case HS_OF_EQUAL_LABEL: return is_left_out(asking, number, HS_OF_EQUAL_LABEL);
     case HS_OF_NEAR_LABEL: return is_left_out(asking, number, HS_OF_NEAR_LABEL);
     default: return is_left_out(asking, number, HS_OF_PARTNER);

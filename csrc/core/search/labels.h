@@ -44,7 +44,7 @@ hs_hit_number(const hs_scanner *scanner, int32_t hit)
 /* The test by which pairs of this point are excluded; false where none are. */
 bool hs_labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_label_test *test);
 
-/* Whether the test leaves out the pair of the asking point with another one. */
+/* Whether a test that excludes leaves out the pair of the asking point with another one. */
 bool hs_labels_leave_out(const hs_asking *asking, int32_t number, hs_label_test test);
 
 /* Moves hits [from, end) that the test does not leave out to `to`, which is not behind them;
