@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from halfshell import _show
 from halfshell._convert.foreign import shown
+from halfshell._convert.options import as_count, as_flag
 from halfshell._objects.exact_order import settle
 from halfshell._objects.origin import Origin
 from halfshell._objects.table_choice import as_rows, entries_of, row_sums
@@ -221,6 +222,59 @@ class TableRows:
         [1.0, 3.0, 2.0, 0.0]
         """
         return row_sums(self._arrays[0], values)
+
+    @overload
+    def triplets(
+        self, *, ordered: bool = False, block: None = None
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]: ...
+    @overload
+    def triplets(self, *, ordered: bool = False, block: int) -> Iterator[Any]: ...
+    def triplets(self, *, ordered: bool = False, block: int | None = None) -> Any:
+        """Pairs of entries that share a row: two neighbours of one point, for angles.
+
+        Parameters
+        ----------
+        ordered : bool, default False
+            Whether both orders of two entries are there, and not the earlier one first alone.
+        block : int, optional
+            Give an iterator of blocks of whole rows, of at most so many triplets each, or of one
+            row that has more.
+
+        Returns
+        -------
+        first, second : ndarray of int64, shape (t,)
+            Positions among the entries, in the order of `indices`: ``indices[first]`` and
+            ``indices[second]`` are neighbours of one point. Ascending by (first, second). With
+            `block` an iterator of such pairs.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If `ordered` is no bool, or `block` no whole number above 0.
+        MemoryError
+            If they would not fit.
+
+        Examples
+        --------
+        The angle at the corner of a right triangle:
+
+        >>> import numpy as np
+        >>> import halfshell as hs
+        >>> table = hs.neighbors([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 1.0, quantities="jdD")
+        >>> first, second = table.triplets()
+        >>> table.indices[first].tolist(), table.indices[second].tolist()
+        ([1], [2])
+        >>> d, D = table.distances, table.vectors
+        >>> cosine = (D[first] * D[second]).sum(axis=1) / (d[first] * d[second])
+        >>> np.degrees(np.arccos(cosine)).tolist()
+        [90.0]
+        """
+        from halfshell._objects.table_triplets import blocks_of_triplets, triplets
+
+        offsets, in_order = self._arrays[0], as_flag(ordered, "ordered")
+        if block is None:
+            return triplets(offsets, in_order)
+        return blocks_of_triplets(offsets, in_order, as_count(block, "block"))
 
     _shown = ("n_rows", "n_points", "n_entries", "quantities")
     _repr_html_ = _show.html

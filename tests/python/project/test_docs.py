@@ -18,8 +18,10 @@ MODULES = ["halfshell", *(m.name for m in pkgutil.walk_packages(hs.__path__, "ha
 MODULES = [m for m in MODULES if m not in ("halfshell.torch", "halfshell.jax")]  # frameworks/
 OWNERS = {
     "halfshell.compat.ase": "ase",
+    "halfshell.compat.matscipy": "ase",
     "halfshell.compat.mdanalysis": "MDAnalysis",
     "halfshell.compat.scipy": "scipy",
+    "halfshell.compat.sklearn": "sklearn",
 }
 
 

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Graphs of neighbours in place of those of ``sklearn.neighbors``.
+
+The transformers are subclasses of scikit-learn's, with its parameters, attributes, checks and
+sparse matrices, and its rule: a sample is a neighbour if its distance is at most the radius
+(``<=``). Here that is decided for the real numbers that the floats are, and no tree is built.
+
+Euclidean distances of dense samples with at most 8 features are found by `halfshell`; other metrics
+and more features go on to scikit-learn.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from joblib import effective_n_jobs
+from scipy import sparse
+from sklearn import neighbors as _owner
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+import halfshell as hs
+
+__all__ = ["KNeighborsTransformer", "RadiusNeighborsTransformer"]
+
+try:  # what scikit-learn returns: an array or a matrix, by its configuration
+    from sklearn.utils._sparse import _align_api_if_sparse as _as_configured
+except ImportError:  # before 1.9
+
+    def _as_configured(graph: Any) -> Any:
+        return sparse.csr_matrix(graph)
+
+
+_MOST_FEATURES = 8
+
+
+class _Graphs:
+    """What both transformers share; their owner's methods come behind it."""
+
+    def _fit(self: Any, X: Any, y: Any = None) -> Any:
+        """Without a tree, where none is used."""
+        algorithm = self.algorithm
+        if self._goes_by_distance() and algorithm in ("auto", "kd_tree", "ball_tree"):
+            shape: tuple[int, ...] = tuple(getattr(X, "shape", ()))
+            few = len(shape) == 2 and 0 < shape[1] <= _MOST_FEATURES
+            self.algorithm = "brute" if few else algorithm
+        try:
+            return super()._fit(X, y)  # type: ignore[misc]
+        finally:
+            self.algorithm = algorithm
+
+    def _goes_by_distance(self: Any) -> bool:
+        of_points = self.metric == "euclidean" or (self.metric == "minkowski" and self.p == 2)
+        return of_points and self.metric_params is None
+
+    def _samples(self: Any, X: Any) -> tuple[Any, Any] | None:
+        """Samples that were fitted and those that ask, or None where this is not for us."""
+        check_is_fitted(self)
+        own = self._fit_X
+        usual = self._goes_by_distance() and not sparse.issparse(own) and not sparse.issparse(X)
+        if not usual or own.shape[1] > _MOST_FEATURES or own.dtype not in (np.float32, np.float64):
+            return None
+        if X is None:
+            return own, None
+        return own, validate_data(self, X, dtype=own.dtype, reset=False, order="C")
+
+    def _graph(self: Any, data: Any, indices: Any, starts: Any) -> Any:
+        # Copies: matrices are the caller's to change.
+        data = np.ones(len(indices)) if data is None else np.array(data)
+        shape = (len(starts) - 1, self.n_samples_fit_)
+        columns = data, np.array(indices), np.array(starts)
+        return _as_configured(sparse.csr_array(columns, shape=shape))
+
+
+class RadiusNeighborsTransformer(_Graphs, _owner.RadiusNeighborsTransformer):
+    """In place of ``sklearn.neighbors.RadiusNeighborsTransformer``, of which it is a subclass.
+
+    Parameters, attributes and methods are scikit-learn's. Rows ascend by distance, and neighbours
+    at one distance by their number; with mode "connectivity" by their number alone.
+
+    Parameters
+    ----------
+    mode : {"distance", "connectivity"}, default "distance"
+        What the graph holds: distances, or 1 for each neighbour.
+    radius : float, default 1.0
+        Samples that are no further apart are neighbours.
+    algorithm, leaf_size, metric, p, metric_params, n_jobs
+        As there; the first two say how other metrics are searched.
+
+    Examples
+    --------
+    >>> from halfshell.compat.sklearn import RadiusNeighborsTransformer
+    >>> graph = RadiusNeighborsTransformer(radius=1.5).fit_transform([[0.0], [1.0], [3.0]])
+    >>> graph.toarray().tolist()
+    [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    """
+
+    def radius_neighbors_graph(
+        self,
+        X: Any = None,
+        radius: float | None = None,
+        mode: str = "connectivity",
+        sort_results: bool = False,
+    ) -> Any:
+        """The graph of samples within the radius, as scikit-learn documents it."""
+        samples = self._samples(X) if mode in ("distance", "connectivity") else None
+        if samples is None:
+            return super().radius_neighbors_graph(X, radius, mode, sort_results)
+        radius = self.radius if radius is None else radius
+        if not radius >= 0.0:  # there it has no neighbours
+            return super().radius_neighbors_graph(X, radius, mode, sort_results)
+        own, asking = samples
+        table = hs.neighbors(
+            own, float(radius), queries=asking, quantities="jd" if mode == "distance" else "j",
+            threads=effective_n_jobs(self.n_jobs),
+        )  # fmt: skip
+        if sort_results and mode == "distance":
+            table = table.sort(by="distance")
+        data = table.distances if mode == "distance" else None
+        return self._graph(data, table.indices, table.offsets)
+
+
+class KNeighborsTransformer(_Graphs, _owner.KNeighborsTransformer):
+    """In place of ``sklearn.neighbors.KNeighborsTransformer``, of which it is a subclass.
+
+    Parameters, attributes and methods are scikit-learn's. Rows ascend by distance, and neighbours
+    at one distance by their number.
+
+    Parameters
+    ----------
+    mode : {"distance", "connectivity"}, default "distance"
+        What the graph holds: distances, with each sample itself besides, or 1 for each neighbour.
+    n_neighbors : int, default 5
+        How many neighbours each sample has.
+    algorithm, leaf_size, metric, p, metric_params, n_jobs
+        As there; the first two say how other metrics are searched.
+
+    Examples
+    --------
+    >>> from halfshell.compat.sklearn import KNeighborsTransformer
+    >>> graph = KNeighborsTransformer(n_neighbors=1).fit_transform([[0.0], [1.0], [3.0]])
+    >>> graph.toarray().tolist()
+    [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
+    """
+
+    def kneighbors_graph(
+        self, X: Any = None, n_neighbors: int | None = None, mode: str = "connectivity"
+    ) -> Any:
+        """The graph of the nearest samples, as scikit-learn documents it."""
+        samples = self._samples(X) if mode in ("distance", "connectivity") else None
+        k = self.n_neighbors if n_neighbors is None else n_neighbors
+        most = self.n_samples_fit_ - (X is None) if samples is not None else 0
+        if samples is None or not isinstance(k, int | np.integer) or not 0 < k <= most:
+            return super().kneighbors_graph(X, n_neighbors, mode)  # also for its errors
+        own, asking = samples
+        j, d = hs.nearest(
+            own, int(k), queries=asking, quantities="jd", threads=effective_n_jobs(self.n_jobs)
+        )
+        starts = np.arange(0, j.size + 1, k)
+        return self._graph(d.ravel() if mode == "distance" else None, j.ravel(), starts)
