@@ -19,7 +19,9 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+import halfshell as hs
 from halfshell._cli.numpy_files import Unreadable, read_arrays
+from halfshell._cli.text_files import BadLine, read_points
 from halfshell._extras import needs
 from halfshell._terminal import printable
 
@@ -112,8 +114,8 @@ def read_scene(
     ----------
     file : str or None
         A ``.npy`` file with an array (n, d), a ``.npz`` file with ``points`` and perhaps
-        ``box`` and ``periodic``, or anything that `ase.io.read` reads. None: the block of
-        alpha-quartz that ships with the package.
+        ``box`` and ``periodic``, text with one point a line (.csv, .txt, .dat, .tsv), or anything
+        that `ase.io.read` reads. None: the block of alpha-quartz that ships with the package.
     file_format : str, optional
         Name of an ASE format; default: told from the file.
     index : int, optional
@@ -139,6 +141,8 @@ def read_scene(
         try:
             if file_format is None and suffix in (".npy", ".npz"):
                 scene = _read_numpy(file, index)
+            elif file_format is None and suffix in (".csv", ".txt", ".dat", ".tsv"):
+                scene = _read_text(file, index)
             else:
                 scene = _read_ase(file, file_format, index)
         except MemoryError:
@@ -187,6 +191,18 @@ def _read_numpy(file: str, index: int | None) -> Scene:
         raise InputError(f"{file}: 'periodic' must be one bool, or one for each column of points")
     flags = np.broadcast_to(periodic, points.shape[1])
     return Scene(points, box, tuple(bool(flag) for flag in flags), file)
+
+
+def _read_text(file: str, index: int | None) -> Scene:
+    if index is not None:
+        raise InputError(f"{file}: --index is for formats with several frames")
+    try:
+        points = read_points(file)
+    except (BadLine, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: {one_line(error)}") from None
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
+    return Scene(points, None, (False,) * points.shape[1], file)
 
 
 def _read_ase(file: str, file_format: str | None, index: int | None) -> Scene:
@@ -270,11 +286,16 @@ def _with_overrides(
     ndim = scene.points.shape[1]
     if box is not None:
         box = np.repeat(box, ndim) if box.size == 1 else box
+        if box.size == 6 and ndim == 3:
+            try:
+                box = hs.Box.from_dimensions(box).vectors.ravel()
+            except ValueError as error:
+                raise InputError(f"--box: {one_line(error)}") from None
         if box.size not in (ndim, ndim * ndim):
             raise InputError(
                 f"--box has {box.size} numbers; points with {ndim} coordinates need "
                 f"{ndim} (lengths) or {ndim * ndim} (vectors)"
-                + (", not lengths and angles" if box.size == 6 else "")
+                + (", or 6 (lengths and angles)" if ndim == 3 else "")
             )
         box = box if box.size == ndim else box.reshape(ndim, ndim)
         scene = replace(scene, box=box, periodic=(True,) * ndim)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``halfshell pairs``, ``verify``, ``report``, ``info`` and ``selftest``.
+"""The command line: ``halfshell pairs``, ``neighbors``, ``coordination``, ``nearest``, ``rdf``,
+``verify``, ``report``, ``info`` and ``selftest``; without any of these, the help.
 
 Exit status: 0 done; 1 a check failed (``verify``, ``report``, ``selftest``); 2 the input or an
 option is wrong, said in one line on standard error; 130 interrupted.
@@ -79,8 +80,10 @@ def _parser() -> _Parser:
         description="Every pair of points within a cutoff, each decided exactly.",
     )
     parser.add_argument("--version", action="version", version=f"halfshell {hs.__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser.set_defaults(run=lambda args: _run_help(parser))
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     _add_pairs(commands)
+    _add_lists(commands)
     _add_verify(commands)
     _add_report(commands)
     info = commands.add_parser("info", help="what this installation consists of")
@@ -93,25 +96,30 @@ def _parser() -> _Parser:
     return parser
 
 
-def _add_scene_options(command: argparse.ArgumentParser) -> None:
+def _add_scene_options(
+    command: argparse.ArgumentParser, has_cutoff: bool = True, has_rule: bool = True
+) -> None:
     """Add what says which points are meant, in which box."""
     command.add_argument(
         "file",
         nargs="?",
         metavar="FILE",
-        help=".npy, .npz, or anything that ase.io.read reads; without it, alpha-quartz",
+        help=".npy, .npz, text with a point a line, or anything that ase.io.read reads; without "
+        "it, alpha-quartz",
     )
-    command.add_argument(
-        "--cutoff",
-        type=_cutoff,
-        metavar="R",
-        help="largest distance of a pair; without it, one with about 50 neighbours",
-    )
+    if has_cutoff:
+        command.add_argument(
+            "--cutoff",
+            type=_cutoff,
+            metavar="R",
+            help="largest distance of a pair; without it, one with about 50 neighbours",
+        )
     command.add_argument(
         "--box",
         type=_box,
         metavar="LX,LY,LZ",
-        help="edge lengths, or one for all edges, or all components of the edge vectors",
+        help="edge lengths, or one for all edges; lengths and angles (six numbers); or all "
+        "components of the edge vectors",
     )
     command.add_argument(
         "--periodic",
@@ -121,9 +129,18 @@ def _add_scene_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--format", metavar="NAME", help="ase format, where it is not guessed")
     command.add_argument("--index", type=int, metavar="N", help="frame; default: the last")
-    command.add_argument("--strict", action="store_true", help="d < cutoff; default: d <= cutoff")
+    if has_rule:
+        command.add_argument(
+            "--strict", action="store_true", help="d < cutoff; default: d <= cutoff"
+        )
     command.add_argument("--kernel", type=_kernel, metavar="NAME", help="one of `halfshell info`")
     command.add_argument("--json", action="store_true", help="print JSON for machines")
+
+
+def _add_threads(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--threads", type=_count, metavar="N", help="at most so many; default: as many as pay"
+    )
 
 
 def _add_pairs(commands: Any) -> None:
@@ -131,7 +148,11 @@ def _add_pairs(commands: Any) -> None:
         "pairs", help="find the pairs of a file, sum them up, save them, plot g(r)"
     )
     _add_scene_options(command)
-    command.add_argument("-o", "--output", metavar="OUT", help="write the pairs: .npz or .csv")
+    _add_threads(command)
+    command.add_argument(
+        "-o", "--output", metavar="OUT",
+        help="write the pairs: .npz, .csv, or - for CSV on standard output"
+    )
     command.add_argument(
         "--quantities",
         type=_quantities,
@@ -150,6 +171,35 @@ def _add_pairs(commands: Any) -> None:
         "--no-progress", dest="progress", action="store_false", help="no progress bar"
     )
     command.set_defaults(run=_run_pairs)
+
+
+def _add_lists(commands: Any) -> None:
+    """Commands that write columns, and sum them up."""
+    told = {
+        "neighbors": "find all neighbours of each point",
+        "coordination": "count the neighbours of each point",
+        "nearest": "find the nearest neighbours of each point",
+        "rdf": "the radial distribution function g(r), up to the cutoff",
+    }
+    for name, words in told.items():
+        command = commands.add_parser(name, help=words)
+        _add_scene_options(command, name != "nearest", name in ("neighbors", "coordination"))
+        _add_threads(command)
+        command.add_argument(
+            "-o", "--output", metavar="OUT", help="write the columns: .npz, .csv, or - for CSV here"
+        )
+        command.set_defaults(run=_run_list, name=name)
+        if name == "neighbors":
+            command.add_argument(
+                "--quantities", type=_quantities, metavar="LETTERS",
+                help="columns of OUT, any of i j d D S; default: ijdS, or ijd without a box",
+            )  # fmt: skip
+        if name == "nearest":
+            command.add_argument("-k", type=_count, default=1, help="how many; default: 1")
+        if name == "rdf":
+            command.add_argument(
+                "--bins", type=_count, default=100, metavar="N", help="default: 100"
+            )
 
 
 def _add_verify(commands: Any) -> None:
@@ -224,6 +274,12 @@ def _kernel(text: str) -> str:
     return text
 
 
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
+    return int(text)
+
+
 def _sample(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
@@ -233,10 +289,22 @@ def _sample(text: str) -> int:
 # Commands ----------------------------------------------------------------------------------
 
 
+def _run_help(parser: argparse.ArgumentParser) -> int:
+    parser.print_help()
+    return 0
+
+
 def _run_pairs(args: argparse.Namespace) -> int:
     from halfshell._cli.pairs import run
 
     return run(args)
+
+
+def _run_list(args: argparse.Namespace) -> int:
+    from halfshell._cli import lists
+
+    run = getattr(lists, f"run_{args.name}")
+    return int(run(args))
 
 
 def _run_verify(args: argparse.Namespace) -> int:

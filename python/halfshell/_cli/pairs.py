@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
 from argparse import Namespace
@@ -13,14 +12,15 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell import _core
-from halfshell._cli.files import InputError, Scene, one_line, replacing
+from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.output import open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,
     load_scene,
@@ -30,7 +30,7 @@ from halfshell._cli.scene import (
 )
 from halfshell._terminal import printable
 
-__all__ = ["run", "write_csv"]
+__all__ = ["run"]
 
 BAR_AFTER = 0.5  # seconds without a progress bar
 
@@ -69,8 +69,8 @@ def run(args: Namespace) -> int:
         raise InputError("--plot needs a cutoff above 0")
 
     with ExitStack() as stack:
-        output = _open_output(args.output, args.file, (".npz", ".csv"), stack)
-        plot = _open_output(args.plot, args.file, (".png", ".pdf", ".svg"), stack)
+        output = open_output(args.output, args.file, stack, json=args.json)
+        plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
         if plot:
             require_matplotlib()
         start = time.perf_counter()
@@ -79,11 +79,8 @@ def run(args: Namespace) -> int:
         d = columns["d"]
         if output:
             chosen = {letter: columns[letter] for letter in wanted}
-            if args.output.lower().endswith(".csv"):
-                write_csv(output, chosen)
-            else:
-                extra: dict[str, Any] = {"n": len(scene.points), "cutoff": cutoff}
-                np.savez(output, **chosen, **extra, inclusive=not args.strict)  # type: ignore[arg-type]
+            extra = {"n": len(scene.points), "cutoff": cutoff, "inclusive": not args.strict}
+            write_columns(output, args.output, chosen, **extra)
         if plot:
             plot_distribution(plot, Path(args.plot).suffix[1:], d, scene, cutoff)
 
@@ -109,7 +106,8 @@ def run(args: Namespace) -> int:
         output=args.output,
         plot=args.plot,
     )
-    print(json.dumps(vars(summary), indent=2) if args.json else _text(summary, scene, reason))
+    if args.output != "-":
+        print(json.dumps(vars(summary), indent=2) if args.json else _text(summary, scene, reason))
     return 0
 
 
@@ -126,6 +124,7 @@ def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[
         "sort": args.sort,
         "precision": args.precision,
         "kernel": args.kernel,
+        "threads": args.threads,
     }
     try:
         with _progress_bar(args.progress and not args.json) as advance:
@@ -169,45 +168,6 @@ def _progress_bar(wanted: bool) -> Iterator[Callable[[float], None] | None]:
     finally:
         if bar is not None:
             bar.stop()
-
-
-# Output ------------------------------------------------------------------------------------
-
-
-def _open_output(
-    target: str | None, source: str | None, suffixes: tuple[str, ...], stack: ExitStack
-) -> IO[bytes] | None:
-    """Open the file that will replace `target`, before the search."""
-    if target is None:
-        return None
-    if not target.lower().endswith(suffixes):
-        raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
-    if source is not None and os.path.exists(target) and os.path.samefile(target, source):
-        raise InputError(f"{target}: is the input; it is not overwritten")
-    return stack.enter_context(replacing(target))
-
-
-def write_csv(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
-    """Write one line a pair; vectors take a column for each component: ``S0,S1,S2``.
-
-    Floats are written with the fewest digits that read back as the same number.
-    """
-    names: list[str] = []
-    series: list[NDArray[Any]] = []
-    for letter, column in columns.items():
-        if column.ndim == 1:
-            names.append(letter)
-            series.append(column)
-        else:
-            names += [f"{letter}{k}" for k in range(column.shape[1])]
-            series += list(column.T)
-    stream.write((",".join(names) + "\n").encode())
-    line = ",".join(["%r"] * len(names))
-    block = 1 << 16  # pairs turned into text at a time: some megabytes
-    for start in range(0, len(series[0]), block):
-        parts = [values[start : start + block].tolist() for values in series]
-        rows = zip(*parts, strict=True)
-        stream.writelines((line % row + "\n").encode() for row in rows)
 
 
 # The summary -------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ __all__ = [
     "load_scene",
     "plot_distribution",
     "radial_distribution",
+    "read_points",
     "require_matplotlib",
     "unit_suffix",
 ]
@@ -34,6 +35,14 @@ BINS = 200  # of g(r): a percent of the cutoff is two bins
 
 def load_scene(args: Namespace) -> tuple[Scene, float, str]:
     """Return the scene that the options name, the cutoff, and how it was chosen if it was."""
+    scene = read_points(args)
+    if args.cutoff is not None:
+        return scene, args.cutoff, ""
+    return scene, *choose_cutoff(scene)
+
+
+def read_points(args: Namespace) -> Scene:
+    """Return the scene that the options name; what its reader warned of is said."""
     scene = read_scene(
         args.file,
         file_format=args.format,
@@ -43,9 +52,7 @@ def load_scene(args: Namespace) -> tuple[Scene, float, str]:
     )
     for remark in scene.remarks:
         print(printable(f"halfshell: warning: {scene.source}: {remark}"), file=sys.stderr)
-    if args.cutoff is not None:
-        return scene, args.cutoff, ""
-    return scene, *choose_cutoff(scene)
+    return scene
 
 
 def choose_cutoff(scene: Scene) -> tuple[float, str]:

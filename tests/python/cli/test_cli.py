@@ -21,6 +21,7 @@ from halfshell._cli import peers as cli_peers
 from halfshell._cli import scene as cli_scene
 from halfshell._cli import verify as cli_verify
 from halfshell._cli.files import InputError, Scene, read_scene, replacing
+from halfshell._cli.output import write_csv
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
@@ -303,7 +304,7 @@ def test_csv_output_reads_back_to_the_same_numbers(summary, npz, tmp_path):
 def test_csv_is_written_in_blocks_without_loss():
     columns = {"i": np.arange(150_000), "D": np.arange(300_000.0).reshape(-1, 2) / 3}
     stream = io.BytesIO()
-    cli_pairs.write_csv(stream, columns)
+    write_csv(stream, columns)
     lines = stream.getvalue().decode().splitlines()
     assert lines[0] == "i,D0,D1"
     assert len(lines) == 150_001
@@ -484,7 +485,6 @@ def test_nan_in_a_structure_file_is_refused(refusal, tmp_path):
 @pytest.mark.parametrize(
     "args",
     [
-        [],
         ["unheard-of"],
         ["pairs", "--unheard-of"],
         ["pairs", "--cutoff"],

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``halfshell neighbors``, ``coordination``, ``nearest`` and ``rdf``: full lists, counts, g(r).
+
+Each finds its columns, says in a few lines what they are, and writes them where that is asked for.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from argparse import Namespace
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import halfshell as hs
+from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.output import open_output, write_columns
+from halfshell._cli.scene import describe_box, load_scene, read_points, unit_suffix
+from halfshell._terminal import printable
+
+__all__ = ["run_coordination", "run_nearest", "run_neighbors", "run_rdf"]
+
+Columns = dict[str, NDArray[Any]]
+MOST_SHOWN = 12  # lines of a histogram
+
+
+class Found(NamedTuple):
+    """What a command found: columns for a file, facts for the summary, lines for people."""
+
+    columns: Columns
+    facts: dict[str, Any]
+    lines: list[tuple[str, str]]
+
+
+def run_neighbors(args: Namespace) -> int:
+    """Carry out ``halfshell neighbors``."""
+
+    def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
+        letters = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
+        if not set(letters) <= set("ijdDS"):
+            raise InputError(f"--quantities {letters}: rows have some of the letters i j d D S")
+        wanted = letters.replace("i", "") or "j"
+        table = hs.neighbors(scene.points, cutoff, quantities=wanted, **options)
+        arrays = table.to_pairs(quantities=letters)
+        columns = dict(zip(letters, (arrays,) if len(letters) == 1 else arrays, strict=True))
+        return Found(columns, *_of_counts(table.counts, scene))
+
+    return _run(args, find)
+
+
+def run_coordination(args: Namespace) -> int:
+    """Carry out ``halfshell coordination``."""
+
+    def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
+        counts = hs.coordination(scene.points, cutoff, **options)
+        columns: Columns = {"i": np.arange(len(counts)), "count": counts}
+        if scene.species is not None:
+            columns["species"] = scene.species
+        return Found(columns, *_of_counts(counts, scene))
+
+    return _run(args, find)
+
+
+def run_nearest(args: Namespace) -> int:
+    """Carry out ``halfshell nearest``."""
+    scene = read_points(args)
+    options = _options(scene, args)
+    del options["inclusive"]
+    letters = "jdS" if any(scene.periodic) else "jd"
+    with ExitStack() as stack:
+        output = open_output(args.output, args.file, stack, json=args.json)
+        start = time.perf_counter()
+        found = _call(
+            scene, lambda: hs.nearest(scene.points, args.k, quantities=letters, **options)
+        )
+        seconds = time.perf_counter() - start
+        n, k = found[0].shape
+        columns = {"i": np.repeat(np.arange(n), k), "rank": np.tile(np.arange(1, k + 1), n)}
+        for letter, array in zip(letters, found, strict=True):
+            columns[letter] = array.reshape(n * k, *array.shape[2:])
+        real = columns["j"] >= 0
+        columns = {name: array[real] for name, array in columns.items()}
+        if output:
+            write_columns(output, args.output, columns)
+    d, unit = columns["d"], unit_suffix(scene)
+    largest = float(d.max()) if len(d) else None
+    facts = {"points": n, "k": k, "entries": len(d), "largest_distance": largest}
+    lines = [
+        ("nearest points", f"{k:,} of each of {n:,} points: {len(d):,} entries"),
+        ("largest distance", "none" if largest is None else f"{largest:.6g}{unit}"),
+    ]
+    _print(args, scene, facts, lines, seconds)
+    return 0
+
+
+def run_rdf(args: Namespace) -> int:
+    """Carry out ``halfshell rdf``."""
+
+    def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
+        del options["inclusive"]
+        if scene.box is None or not all(scene.periodic):
+            raise InputError(f"{scene.source}: g(r) needs a box that repeats along every axis")
+        result = hs.rdf(scene.points, cutoff, args.bins, **options)
+        columns: Columns = {"r": result.r, "g": result.g, "counts": result.counts}
+        highest = int(result.g.argmax())
+        peak = [float(result.r[highest]), float(result.g[highest])]
+        facts = {"bins": args.bins, "pairs": int(result.counts.sum()), "highest": peak}
+        unit = unit_suffix(scene)
+        lines = [
+            ("bins", f"{args.bins:,}, of {cutoff / args.bins:.6g}{unit}"),
+            ("pairs", f"{facts['pairs']:,}   (each once)"),
+            ("highest g(r)", f"{peak[1]:.6g} at r = {peak[0]:.6g}{unit}"),
+        ]
+        return Found(columns, facts, lines)
+
+    return _run(args, find)
+
+
+# ---- what they share -------------------------------------------------------------------------
+
+
+def _run(args: Namespace, find: Callable[[Scene, float, dict[str, Any]], Found]) -> int:
+    """A command with a cutoff."""
+    scene, cutoff, reason = load_scene(args)
+    with ExitStack() as stack:
+        output = open_output(args.output, args.file, stack, json=args.json)
+        start = time.perf_counter()
+        found = _call(scene, lambda: find(scene, cutoff, _options(scene, args)))
+        seconds = time.perf_counter() - start
+        if output:
+            write_columns(output, args.output, found.columns)
+    chosen = f"   (chosen: {reason}; --cutoff sets it)" if reason else ""
+    facts = {"cutoff": cutoff, "cutoff_chosen": args.cutoff is None, **found.facts}
+    line = ("cutoff", f"{cutoff:.6g}{unit_suffix(scene)}{chosen}")
+    _print(args, scene, facts, [line, *found.lines], seconds)
+    return 0
+
+
+def _options(scene: Scene, args: Namespace) -> dict[str, Any]:
+    return {
+        "box": scene.box,
+        "periodic": scene.periodic if scene.box is not None else None,
+        "inclusive": not getattr(args, "strict", False),
+        "kernel": args.kernel,
+        "threads": args.threads,
+    }
+
+
+def _call(scene: Scene, function: Callable[[], Any]) -> Any:
+    try:
+        return function()
+    except (ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise InputError(f"{scene.source}: {one_line(error)}") from None
+
+
+def _of_counts(
+    counts: NDArray[np.int64], scene: Scene
+) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Facts and lines of the number of neighbours of each point."""
+    numbers, times = np.unique(counts, return_counts=True)
+    facts: dict[str, Any] = {
+        "entries": int(counts.sum()), "mean_coordination": float(counts.mean()),
+        "least": int(counts.min()), "most": int(counts.max()),
+    }  # fmt: skip
+    lines = [
+        ("neighbours", f"{facts['entries']:,}   (of all points together)"),
+        ("of a point", f"{facts['mean_coordination']:.6g} on average, "
+                       f"{facts['least']:,} to {facts['most']:,}"),
+    ]  # fmt: skip
+    if scene.species is not None:
+        means = {
+            str(name): float(counts[scene.species == name].mean())
+            for name in np.unique(scene.species)
+        }
+        facts["by_species"] = means
+        lines += [(f"  of {name}", f"{mean:.6g} on average") for name, mean in means.items()]
+    if len(numbers) <= MOST_SHOWN:
+        facts["points_by_coordination"] = {
+            str(number): int(n) for number, n in zip(numbers, times, strict=True)
+        }
+        lines += [
+            (f"  {number:,}", f"{n:,} points") for number, n in zip(numbers, times, strict=True)
+        ]
+    return facts, lines
+
+
+def _print(
+    args: Namespace, scene: Scene, facts: dict[str, Any], lines: list[tuple[str, str]], took: float
+) -> None:
+    """The summary, unless the columns went to standard output."""
+    if args.output == "-":
+        return
+    if args.json:
+        first = {"file": scene.source, "points": len(scene.points)}
+        print(json.dumps({**first, **facts, "seconds": took, "output": args.output}, indent=2))
+        return
+    shown = [("points", f"{len(scene.points):,}"), ("box", describe_box(scene)), *lines]
+    shown.append(("time", f"{took:.3g} s" if took >= 1 else f"{took * 1e3:.3g} ms"))
+    if args.output:
+        shown.append(("written to", args.output))
+    text = [scene.source, *(f"  {name:<18}{value}" for name, value in shown)]
+    print("\n".join(map(printable, text)))

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``halfshell neighbors``, ``coordination``, ``nearest``, ``rdf``; points in text; boxes of six."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from halfshell import cli
+
+POINTS = np.random.default_rng(5).random((60, 3)) * 8
+LENGTHS = [8.0, 7.5, 9.0]
+
+
+@pytest.fixture
+def text(tmp_path):
+    path = tmp_path / "points.csv"
+    lines = [",".join(map(repr, row)) for row in POINTS.tolist()]
+    path.write_text("x,y,z\n" + "\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def run(capfdbinary):
+    def call(*args):
+        status = cli.main([str(arg) for arg in args])
+        out, err = capfdbinary.readouterr()
+        return status, out.decode(), err.decode()
+
+    return call
+
+
+@pytest.fixture
+def told(run):
+    def call(*args):
+        status, out, err = run(*args, "--json")
+        assert (status, err) == (0, ""), err
+        return json.loads(out)
+
+    return call
+
+
+def columns_of(path):
+    names, *rows = path.read_text().splitlines() if hasattr(path, "read_text") else path
+    names, cells = names.split(","), [row.split(",") for row in rows]
+    return {name: [row[k] for row in cells] for k, name in enumerate(names)}
+
+
+def numbers(column):
+    return [float(cell) for cell in column]
+
+
+def test_neighbors(told, text, tmp_path):
+    out = tmp_path / "rows.csv"
+    facts = told("neighbors", text, "--cutoff", 2, "--box", "8,7.5,9", "-o", out, "--threads", 1)
+    table = hs.neighbors(POINTS, 2.0, box=LENGTHS, quantities="jdS")
+    i, j, d, S = table.to_pairs(quantities="ijdS")
+    found = columns_of(out)
+    assert list(found) == ["i", "j", "d", "S0", "S1", "S2"]
+    assert numbers(found["i"]) == i.tolist() and numbers(found["j"]) == j.tolist()
+    assert numbers(found["d"]) == d.tolist() and numbers(found["S2"]) == S[:, 2].tolist()
+    assert facts["entries"] == len(j) and facts["mean_coordination"] == len(j) / 60
+    archive = tmp_path / "rows.npz"
+    told("neighbors", text, "--cutoff", 2, "--strict", "-o", archive, "--quantities", "Di")
+    with np.load(archive) as held:
+        assert sorted(held) == ["D", "i"]
+        assert np.array_equal(held["D"], hs.neighbors(POINTS, 2.0, quantities="D").vectors)
+
+
+def test_coordination(told, run, text, tmp_path):
+    out = tmp_path / "counts.csv"
+    facts = told("coordination", text, "--cutoff", 1.5, "-o", out)
+    counts = hs.coordination(POINTS, 1.5)
+    assert numbers(columns_of(out)["count"]) == counts.tolist()
+    assert (facts["least"], facts["most"]) == (counts.min(), counts.max())
+    shipped = told("coordination", "--cutoff", 1.7)
+    assert shipped["by_species"] == {"O": 2.0, "Si": 4.0}
+    assert shipped["points_by_coordination"] == {"2": 3072, "4": 1536}
+    status, out, _ = run("coordination", "--cutoff", "1.7", "-o", "-")
+    found = columns_of(out.splitlines())
+    assert status == 0 and list(found) == ["i", "count", "species"]
+    assert set(zip(found["count"], found["species"], strict=True)) == {("2", "O"), ("4", "Si")}
+
+
+def test_nearest(told, text, tmp_path):
+    out = tmp_path / "nearest.csv"
+    facts = told("nearest", text, "-k", 3, "--box", "8,7.5,9", "-o", out)
+    j, d = hs.nearest(POINTS, 3, box=LENGTHS)
+    found = columns_of(out)
+    assert numbers(found["j"]) == j.ravel().tolist() and numbers(found["d"]) == d.ravel().tolist()
+    assert numbers(found["rank"]) == [1, 2, 3] * 60
+    assert facts["largest_distance"] == d.max() and facts["entries"] == 180
+    # Where there are fewer points, rows are shorter.
+    few = tmp_path / "few.txt"
+    few.write_text("0 0\n1 0\n")
+    assert told("nearest", few, "-k", 5)["entries"] == 2
+    few.write_text("0 0\n")
+    assert told("nearest", few)["largest_distance"] is None
+
+
+def test_rdf(told, run, text, tmp_path):
+    out = tmp_path / "g.csv"
+    facts = told("rdf", text, "--cutoff", 3, "--bins", 30, "--box", "8 7.5 9", "-o", out)
+    result = hs.rdf(POINTS, 3.0, 30, box=LENGTHS)
+    found = columns_of(out)
+    assert numbers(found["g"]) == result.g.tolist() and numbers(found["r"]) == result.r.tolist()
+    assert numbers(found["counts"]) == result.counts.tolist()
+    assert facts["pairs"] == int(result.counts.sum()) and facts["bins"] == 30
+    status, out, err = run("rdf", text, "--cutoff", "3")
+    assert (status, out) == (2, "") and "needs a box that repeats" in err
+
+
+def test_summaries_for_people(run, text):
+    for command in ("neighbors", "coordination", "rdf", "nearest"):
+        status, out, err = run(command, text, "--box", "8,7.5,9")
+        assert (status, err) == (0, "") and "points            60" in out
+        assert all(len(line) < 120 for line in out.splitlines())
+
+
+def test_pairs_on_standard_output(run, text):
+    wanted = ["--quantities", "ij", "--sort"]
+    status, out, err = run("pairs", text, "--cutoff", "2", "-o", "-", *wanted)
+    assert (status, err) == (0, "")
+    i, j = hs.pairs(POINTS, 2.0, sort=True)
+    found = columns_of(out.splitlines())
+    assert numbers(found["i"]) == i.tolist() and numbers(found["j"]) == j.tolist()
+
+
+def test_a_reader_that_goes_away_is_no_error(text):
+    command = f"{sys.executable} -m halfshell pairs -o - | head -n 1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True)
+    assert done.stdout == "i,j,d,S0,S1,S2\n" and done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("content", "rows"),
+    [
+        ("0 0 0\n1 2 3\n", 2), ("x y z\n0 0 0\n", 1), ("# a remark\n\n0;1;2 # and one\n", 1),
+        ("\ufeff0,1,2\n", 1), ("0.5\t1e3\t-2\r\n", 1), ("1\n2\n3\n", 3),
+    ],
+)  # fmt: skip
+def test_forms_of_text(told, tmp_path, content, rows):
+    for suffix in ("txt", "csv", "dat", "tsv"):
+        path = tmp_path / f"points.{suffix}"
+        path.write_text(content, encoding="utf-8")
+        assert told("pairs", path, "--cutoff", 1)["points"] == rows
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("0 0 0\n1 x 3\n", "line 2: 'x' is not a number"),
+        ("0 0 0\n\n1 2\n", "line 3: has 2 numbers, lines before 3"),
+        ("x y\nz w\n1 2\n", "line 2: 'z' is not a number"),
+        ("0 y z\n", "line 1: 'y' is not a number"),
+        ("0 nan 1\n", "point 0, coordinate 1 is nan"),
+        ("# nothing\n", "holds no points"),
+    ],
+)
+def test_bad_text(run, tmp_path, content, words):
+    path = tmp_path / "points.txt"
+    path.write_text(content)
+    status, out, err = run("pairs", path, "--cutoff", "1")
+    assert (status, out) == (2, "") and words in err and err.count("\n") == 1
+
+
+def test_text_that_is_none(run, tmp_path):
+    path = tmp_path / "points.txt"
+    path.write_bytes(b"\xff\xfe\x00\x01")
+    status, _, err = run("pairs", path, "--cutoff", "1")
+    assert status == 2 and err.count("\n") == 1
+    status, _, err = run("pairs", path, "--index", "0")
+    assert status == 2 and "--index is for formats with several frames" in err
+
+
+def test_lengths_and_angles(told, run, text):
+    box = hs.Box.from_dimensions([9.0, 8.0, 10.0, 80.0, 75.0, 100.0])
+    found = told("pairs", text, "--cutoff", 2, "--box", "9,8,10,80,75,100")
+    assert np.allclose(found["box"], box.vectors, rtol=0.0, atol=0.0)
+    assert found["pairs"] == hs.count_pairs(POINTS, 2.0, box=box)
+    status, _, err = run("pairs", text, "--box", "9,8,10,80,75,300")
+    assert status == 2 and "--box" in err
+    status, _, err = run("pairs", text, "--box", "9,8")
+    assert status == 2 and "or 6 (lengths and angles)" in err
+
+
+def test_without_a_command_there_is_help(run):
+    status, out, err = run()
+    assert (status, err) == (0, "") and "commands:" in out
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["nearest", "--cutoff", "3"], ["nearest", "--strict"], ["rdf", "--strict"],
+        ["rdf", "--bins", "0"], ["nearest", "-k", "0"], ["nearest", "-k", "x"],
+        ["pairs", "--threads", "0"], ["verify", "--threads", "2"],
+        ["neighbors", "--quantities", "ijP"], ["coordination", "-o", "out.txt"],
+        ["pairs", "-o", "-", "--json"], ["coordination", "-o", "-", "--json"],
+        ["rdf", "--cutoff", "0"],
+    ],
+)  # fmt: skip
+def test_options_that_cannot_be(run, args):
+    status, out, err = run(*args)
+    assert (status, out) == (2, "") and err.startswith("halfshell: error: ")
+    assert err.count("\n") == 1
