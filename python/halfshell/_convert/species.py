@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.arrays import as_array, one_each
+from halfshell._convert.atom_groups import elements_of
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown, told, whole_number
 from halfshell._convert.labels import as_names
 from halfshell._convert.lengths import as_number
@@ -109,7 +110,9 @@ def _elements_of(owner: Any, owners: str) -> _Kinds | None:
         return _Kinds(array.astype(np.int32), are_elements=True)
     symbols = attribute(owner, "get_chemical_symbols", owners)
     if symbols is None:
-        return None
+        elements = elements_of(owner, owners)
+        names = None if elements is None else as_names(as_array(elements, owners, "hold names"))
+        return None if names is None else _Kinds(names)
     try:
         return _Kinds(np.array(symbols(), np.str_))
     except MemoryError:
