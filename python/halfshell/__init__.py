@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from halfshell._functions.measure import measure
     from halfshell._functions.nearest import nearest
     from halfshell._functions.neighbors import coordination, neighbors
+    from halfshell._functions.plot_pairs import plot_pairs
     from halfshell._functions.rdf import rdf
     from halfshell._functions.report import report
     from halfshell._functions.stream import for_each_pair, iter_pairs
@@ -75,6 +76,7 @@ __all__ = [
     "pair_histogram",
     "pairs",
     "pairs_between",
+    "plot_pairs",
     "rdf",
     "report",
     "set_cache_limit",
@@ -108,6 +110,7 @@ _LATER = {
     "nearest": "_functions.nearest",
     "neighbors": "_functions.neighbors",
     "pair_histogram": "_functions.histogram",
+    "plot_pairs": "_functions.plot_pairs",
     "rdf": "_functions.rdf",
     "report": "_functions.report",
     "trajectory_pairs": "_functions.trajectory",

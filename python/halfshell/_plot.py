@@ -19,6 +19,8 @@ def new_axes(ndim: int = 2, **size: Any) -> Axes:
         from matplotlib import pyplot
     except ImportError as error:
         raise ImportError(needs("plot", "matplotlib")) from error
-    how = {"projection": "3d"} if ndim == 3 else {}
-    axes: Axes = pyplot.subplots(layout="constrained", subplot_kw=how, **size)[1]
+    flat = ndim != 3  # in three dimensions the layout would cut off labels
+    how = {} if flat else {"projection": "3d"}
+    layout = "constrained" if flat else None
+    axes: Axes = pyplot.subplots(layout=layout, subplot_kw=how, **size)[1]
     return axes

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.arrays import as_array
+from halfshell._convert.arrays import as_array, one_each
 from halfshell._convert.foreign import is_a
 
 #: Types of points and of queries as numbers, and the name of each number, if they have names.
@@ -22,6 +22,16 @@ def as_names(array: npt.NDArray[Any]) -> npt.NDArray[np.str_] | None:
     ):
         return array.astype(np.str_)
     return array if array.dtype.kind == "U" else None
+
+
+def as_kinds(types: Any, n: int) -> npt.NDArray[Any]:
+    """Integers or names, one for each of n points, for pictures."""
+    array = as_array(types, "types", "hold integers or names")
+    one_each("types", n)(array.shape)
+    names = as_names(array)
+    if names is None and array.dtype.kind not in "iu" and n:
+        raise TypeError(f"types must hold integers or names, got dtype {array.dtype}")
+    return array if names is None else names
 
 
 def as_labels(types: Any, query_types: Any) -> Labels:
