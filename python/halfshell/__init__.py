@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from halfshell._functions.measure import measure
     from halfshell._functions.nearest import nearest
     from halfshell._functions.neighbors import coordination, neighbors
-    from halfshell._functions.rdf import RadialDistribution, rdf
+    from halfshell._functions.plot_pairs import plot_pairs
+    from halfshell._functions.rdf import rdf
     from halfshell._functions.report import report
     from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._functions.trajectory import trajectory_pairs
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from halfshell._objects.pair_changes import PairChanges
     from halfshell._objects.pair_field import PairField
     from halfshell._objects.pair_table import PairTable
+    from halfshell._objects.radial_distribution import RadialDistribution
     from halfshell._objects.verlet_list import VerletList
 
 __version__ = "0.1.0"
@@ -74,6 +76,7 @@ __all__ = [
     "pair_histogram",
     "pairs",
     "pairs_between",
+    "plot_pairs",
     "rdf",
     "report",
     "set_cache_limit",
@@ -94,7 +97,7 @@ _LATER = {
     "PairChanges": "_objects.pair_changes",
     "PairField": "_objects.pair_field",
     "PairTable": "_objects.pair_table",
-    "RadialDistribution": "_functions.rdf",
+    "RadialDistribution": "_objects.radial_distribution",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
     "clusters": "_functions.clusters",
@@ -107,6 +110,7 @@ _LATER = {
     "nearest": "_functions.nearest",
     "neighbors": "_functions.neighbors",
     "pair_histogram": "_functions.histogram",
+    "plot_pairs": "_functions.plot_pairs",
     "rdf": "_functions.rdf",
     "report": "_functions.report",
     "trajectory_pairs": "_functions.trajectory",

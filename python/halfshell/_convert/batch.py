@@ -12,7 +12,7 @@ from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a
 from halfshell._convert.given import Chosen, Given, Sets
 from halfshell._convert.memory import refuse_large
-from halfshell._convert.scene import MAX_DIM, as_points, as_scene, brings_its_box, vectors_of
+from halfshell._convert.scene import as_points, as_scene, brings_its_box, vectors_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -64,10 +64,10 @@ def _scene(
     if box is not None:
         array = as_real_array(vectors_of(box), "box", check_shape=_check_box)
         if array.ndim == 3:
-            rows = np.eye(MAX_DIM)
+            rows = np.eye(3)
             if not brings_its_box(points):
                 points = as_points(points)
-                rows = rows[: points.shape[1], : points.shape[1]]
+                rows = np.eye(points.shape[1])
             # Any box will do for the axes that repeat; objects with a box of their own refuse it.
             points, box, bits = as_scene(points, rows, periodic)
             return points, box, bits, _as_boxes(array, points.shape[1])

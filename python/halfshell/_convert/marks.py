@@ -11,6 +11,7 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.arrays import as_array, as_real_array, one_each
 from halfshell._convert.foreign import of_argument
+from halfshell._convert.labels import as_labels
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.types import Algorithm, FloatArray, PointArray, Reach, Search
 
@@ -56,23 +57,37 @@ def as_marks(
     weights: Any = None,
     query_weights: Any = None,
 ) -> Marks:
-    """Types and weights of n points and of the queries."""
+    """Types and weights of n points and of the queries; names count in ascending order."""
+    return as_named_marks(n, queries, types, query_types, weights, query_weights)[0]
+
+
+def as_named_marks(
+    n: int,
+    queries: PointArray | None,
+    types: Any,
+    query_types: Any,
+    weights: Any = None,
+    query_weights: Any = None,
+) -> tuple[Marks, tuple[str, ...] | None]:
+    """The same, and what the types are called, if they are names."""
     if queries is None and (query_types is not None or query_weights is not None):
         name = "query_types" if query_types is not None else "query_weights"
         raise ValueError(f"{name} needs queries")
     if queries is not None and (types is None) != (query_types is None):
         raise ValueError("with queries, types and query_types must be given together")
     q = 0 if queries is None else len(queries)
+    types, query_types, names = as_labels(types, query_types)
     own = None if types is None else as_types(types, "types", n)
     asking = None if query_types is None else as_types(query_types, "query_types", q)
     largest = max((int(t.max(initial=0)) for t in (own, asking) if t is not None), default=0)
-    return Marks(
+    marks = Marks(
         1 + largest,
         own,
         None if weights is None else _as_weights(weights, "weights", n),
         asking,
         None if query_weights is None else _as_weights(query_weights, "query_weights", q),
     )
+    return marks, names
 
 
 def binned(

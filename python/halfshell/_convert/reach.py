@@ -43,7 +43,7 @@ def as_reach(cutoff: Any, given: Given, sets: Sets, directed: bool) -> tuple[flo
     For a cutoff that is a dict, or where something else is given. directed: the result has a
     direction, so that rules may have one.
     """
-    _check_alone(given)
+    check_alone_given(given)
     if given.supports is not None or given.query_supports is not None or given.extent is not None:
         return _by_supports(cutoff, given, sets, directed)
     if given.radii is not None or given.query_radii is not None:
@@ -63,7 +63,7 @@ def as_reach(cutoff: Any, given: Given, sets: Sets, directed: bool) -> tuple[flo
     return largest, reach_by_types(types, query_types, table)
 
 
-def _check_alone(given: Given) -> None:
+def check_alone_given(given: Given) -> None:
     """ValueError where several things say how far pairs reach."""
     said = [
         name

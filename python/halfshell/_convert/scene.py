@@ -21,6 +21,7 @@ LENGTHS_AND_ANGLES = (
     "six numbers may be lengths and angles: use Box.from_dimensions((a, b, c, alpha, ...))"
 )
 _MISSING = object()
+_UNTOLD = -1  # bits of a box that does not say which axes repeat
 
 
 def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
@@ -138,11 +139,27 @@ def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
 
 
 def brings_its_box(points: Any, name: str = "points") -> bool:
-    """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms."""
-    return type(points) not in (np.ndarray, list) and all(
+    """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms.
+
+    Or a universe or a group of atoms of MDAnalysis.
+    """
+    if type(points) in (np.ndarray, list, tuple):
+        return False
+    if all(
         attribute(points, part, name, _MISSING) is not _MISSING
         for part in ("positions", "cell", "pbc")
-    )
+    ):
+        return True
+    from halfshell._convert.atom_groups import is_group  # which few calls need
+
+    return is_group(points, name)
+
+
+def _group(points: Any, name: str) -> tuple[Any, Any] | None:
+    """Positions and box vectors of a group of MDAnalysis; None for what is like ASE's Atoms."""
+    from halfshell._convert.atom_groups import is_group, of_group
+
+    return of_group(points, name) if is_group(points, name) else None
 
 
 def _own_scene(
@@ -163,9 +180,14 @@ def as_scene(
     """Points, box and periodic bits; from an ASE-like object all three. `ndim`: of an empty list.
 
     An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an
-    error.
+    error. Groups of MDAnalysis may bring none, and do not say which axes repeat.
     """
     if brings_its_box(points):
+        group = _group(points, "points")
+        if group is not None and (group[1] is None or box is None):
+            array = as_points(group[0], ndim=ndim)
+            own = box if group[1] is None else group[1]
+            return array, *as_own_box(own, periodic, array.shape[1])
         if box is not None or periodic is not None:
             given = "box" if box is not None else "periodic"
             raise ValueError(
@@ -181,6 +203,11 @@ def as_queries(
 ) -> tuple[PointArray, OwnBox | None]:
     """Queries as points, and the box that they bring, if they are an ASE-like object."""
     if brings_its_box(queries, name):
+        group = _group(queries, name)
+        if group is not None:
+            array = as_points(group[0], name, ndim)
+            own = None if group[1] is None else (as_box(group[1], array.shape[1]), _UNTOLD)
+            return array, own
         array, vectors, bits = _own_scene(queries, name, ndim)
         return array, (vectors, bits)
     return as_points(queries, name, ndim), None
@@ -225,6 +252,10 @@ def as_sets(
 
 def _same_box(one: OwnBox, other: OwnBox) -> bool:
     """Whether the same axes repeat by the same vectors."""
+    if one[1] == _UNTOLD:
+        if other[0] is None:
+            return False
+        one = one[0], other[1]
     if one[1] != other[1]:
         return False
     if one[0] is None or other[0] is None:

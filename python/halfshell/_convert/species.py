@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.arrays import as_array, one_each
+from halfshell._convert.atom_groups import elements_of
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown, told, whole_number
+from halfshell._convert.labels import as_names
 from halfshell._convert.lengths import as_number
 from halfshell._convert.marks import as_types
 from halfshell._convert.scene import brings_its_box
@@ -86,11 +88,8 @@ def _kinds(values: Any, name: str, owner: Any, owners: str, n: int) -> _Kinds:
         kinds, name = found, f"elements of {owners}"
     else:
         array = as_array(values, name, "hold integers or names")
-        if array.dtype.kind == "T" or (
-            array.dtype.kind == "O" and all(is_a(one, str) for one in array.flat)
-        ):
-            array = array.astype(np.str_)
-        kinds = _Kinds(array if array.dtype.kind == "U" else as_types(array, name, n))
+        names = as_names(array)
+        kinds = _Kinds(as_types(array, name, n) if names is None else names)
     one_each(name, n)(kinds.values.shape)
     return kinds
 
@@ -111,7 +110,9 @@ def _elements_of(owner: Any, owners: str) -> _Kinds | None:
         return _Kinds(array.astype(np.int32), are_elements=True)
     symbols = attribute(owner, "get_chemical_symbols", owners)
     if symbols is None:
-        return None
+        elements = elements_of(owner, owners)
+        names = None if elements is None else as_names(as_array(elements, owners, "hold names"))
+        return None if names is None else _Kinds(names)
     try:
         return _Kinds(np.array(symbols(), np.str_))
     except MemoryError:

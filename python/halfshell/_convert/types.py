@@ -70,6 +70,15 @@ class _BringsBox(Protocol):
     def pbc(self) -> Any: ...
 
 
+class _HasAtoms(Protocol):
+    """A universe or a group of atoms of MDAnalysis."""
+
+    @property
+    def universe(self) -> Any: ...
+    @property
+    def atoms(self) -> Any: ...
+
+
 class _HasVectors(Protocol):
     """An object like `Box`."""
 
@@ -99,7 +108,7 @@ class _HasDimensions(Protocol):
 
 Number = float | np.floating[Any] | np.integer[Any]
 ArrayLike = npt.ArrayLike | _HandsOver
-PointsLike = ArrayLike | _BringsBox
+PointsLike = ArrayLike | _BringsBox | _HasAtoms
 # A cutoff; one for each pair of types; none but what radii say.
 PairCutoff = (
     Number | Sequence[float] | Sequence[Sequence[float]] | npt.NDArray[Any]

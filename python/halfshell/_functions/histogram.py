@@ -48,9 +48,9 @@ def pair_histogram(
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
         finds them.
-    types : array_like of int, shape (n,), optional
-        The type of each point, from 0 on: one histogram for each pair of types.
-    query_types : array_like of int, shape (q,), optional
+    types : array_like of int or str, shape (n,), optional
+        The type of each point, a number from 0 on or a name: one histogram for each pair of types.
+    query_types : array_like of int or str, shape (q,), optional
         The types of the queries: given if both `types` and `queries` are.
     weights : array_like of float, shape (n,), optional
         Add up the product of the weights of both points instead of counting; finite.
@@ -67,7 +67,8 @@ def pair_histogram(
     Returns
     -------
     ndarray of int64, or with weights float64
-        Shape (bins,), or (t, t, bins) with types, t being one more than the largest of them.
+        Shape (bins,), or (t, t, bins) with types, t being one more than the largest of them. Types
+        that are names have an entry each, in ascending order, that of ``np.unique``.
 
         Bins are half-open and the last one is closed, as in ``numpy.histogram``: bin k counts
         ``edges[k] <= d < edges[k + 1]``, each pair decided exactly for the real numbers that all

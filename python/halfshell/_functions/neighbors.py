@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from halfshell import _core
 from halfshell._convert.given import Chosen, Given
-from halfshell._convert.options import AUTO, as_index_bytes
+from halfshell._convert.options import AUTO, as_flag, as_index_bytes
 from halfshell._convert.rules import DIRECTED
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
@@ -243,6 +243,7 @@ def coordination(
     rule: Rule | None = None,
     types: npt.ArrayLike | None = None,
     query_types: npt.ArrayLike | None = None,
+    by_type: bool | None = None,
     supports: ArrayLike | None = None,
     query_supports: ArrayLike | None = None,
     extent: float | None = None,
@@ -266,8 +267,13 @@ def coordination(
 
     Parameters
     ----------
-    points, cutoff, queries, radii, query_radii, rule, types, query_types
+    points, cutoff, queries, radii, query_radii, rule, query_types
         As in `neighbors`.
+    types : array_like of int or str, shape (n,), optional
+        The type of each point, a number from 0 on or a name, such as ``atoms.symbols`` of ASE.
+    by_type : bool, optional
+        Count neighbours of each type by themselves. Default: where `types` are given with one
+        cutoff for all; with a cutoff for each pair of types these only say how far pairs reach.
     supports, query_supports, extent
         As in `neighbors`.
     box, periodic, inclusive, precision, algorithm, kernel, threads
@@ -288,10 +294,15 @@ def coordination(
         Length of each row of the full list; images count one by one. The sum is twice
         `count_pairs`, or with `queries` just that; but for rules with a direction.
 
+        By type the shape is (n, t), (q, t) or (r, t): column k counts the neighbours of type k, or
+        those with name k of ``np.unique(types)``. A row adds up to what is returned otherwise.
+
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `neighbors`; MemoryError only if the search itself would not fit.
+        As `neighbors`; MemoryError only if the search itself or the counts would not fit.
+        ValueError also if `by_type` is set without `types`, or `query_types` are given with one
+        cutoff for all.
 
     See Also
     --------
@@ -304,9 +315,29 @@ def coordination(
     [1, 2, 1]
     >>> hs.coordination([[0.0], [1.0], [3.0]], None, radii=[1.0, 0.5, 1.0], rule="max").tolist()
     [1, 1, 0]
+
+    How many neighbours of each element:
+
+    >>> names = ["Si", "O", "O"]  # columns: O, Si
+    >>> hs.coordination([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 2.0, types=names).tolist()
+    [[1, 0], [1, 1], [1, 0]]
     """
     if type(box) is Box:
         box = box.vectors
+    if types is not None or by_type is not None:
+        from halfshell._functions.by_type import count_by_type, is_one_cutoff  # few need it
+
+        given = Given(
+            radii, query_radii, rule, types, query_types, supports, query_supports, extent
+        )
+        if is_one_cutoff(cutoff) if by_type is None else as_flag(by_type, "by_type"):
+            rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
+            chosen = Chosen(
+                groups, exclude, exclude_within, min_distance, query_groups, query_exclude
+            )
+            return count_by_type(
+                points, cutoff, box, periodic, rest, given, chosen, queries, algorithm, indices
+            )
     if (
         radii is None and query_radii is None and rule is None
         and types is None and query_types is None and algorithm is AUTO
@@ -324,11 +355,11 @@ def coordination(
         points, cutoff, box, periodic,
         as_rest(inclusive, precision, kernel, memory_limit, None, threads),
         Given(
-                radii, query_radii, rule, types, query_types, supports, query_supports, extent
-            ),
-            queries, directed=True, chosen=Chosen(
-                groups, exclude, exclude_within, min_distance, query_groups, query_exclude
-            ),
+            radii, query_radii, rule, types, query_types, supports, query_supports, extent
+        ),
+        queries, directed=True, chosen=Chosen(
+            groups, exclude, exclude_within, min_distance, query_groups, query_exclude
+        ),
     )  # fmt: skip
     if indices is not None:
         return _rows_alone(search, indices, queries, "j", 4, reach, algorithm).counts.copy()

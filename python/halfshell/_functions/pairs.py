@@ -114,7 +114,7 @@ def pairs(
         are; integers, booleans and float16 are converted exactly or refused. Points may lie
         anywhere, also outside the box. ``[]`` counts as shape (0, 3). An object with
         ``positions``, ``cell`` and ``pbc``, such as ``ase.Atoms``, brings its own box and
-        periodicity.
+        periodicity; an ``AtomGroup`` or ``Universe`` of MDAnalysis the box of its present frame.
     cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be
         larger than the box. With `radii` or `supports` a further limit, or None; with `types` one

@@ -4,18 +4,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core, _show
+from halfshell import _core
+from halfshell._convert.given import Chosen
 from halfshell._convert.lengths import as_positive
-from halfshell._convert.marks import Marks, as_marks, binned
+from halfshell._convert.marks import Marks, as_named_marks, binned
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_count
 from halfshell._convert.search import as_search
+from halfshell._convert.selection import with_selection
 from halfshell._convert.types import (
     BoxLike,
     FloatArray,
@@ -24,90 +25,10 @@ from halfshell._convert.types import (
     PointArray,
     PointsLike,
 )
-from halfshell._extras import needs
+from halfshell._objects.radial_distribution import RadialDistribution, ratio
 
-_COLUMNS = 10
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-
-@dataclass(frozen=True)
-class RadialDistribution:
-    """What `rdf` returns.
-
-    Attributes
-    ----------
-    r : ndarray of float64, shape (bins,)
-        The middle of each bin, in the unit of the points.
-    g : ndarray of float64, shape (bins,) or (t, t, bins)
-        g(r): 1 on average where points ignore each other. 0 in each bin without pairs: so also
-        where there are no points, or none of a type, and the density to divide by is 0 as well.
-        Infinite where a bin has pairs, but its shell is so small a part of the box that float64
-        does not hold it.
-    counts : ndarray of int64, the shape of `g`
-        Pairs in each bin, as `pair_histogram` counts them.
-    edges : ndarray of float64, shape (bins + 1,)
-        Limits of the bins.
-
-    Examples
-    --------
-    >>> import halfshell as hs
-    >>> result = hs.rdf([[0.0], [1.0], [2.0], [3.0]], 2.5, bins=5, box=[4.0])
-    >>> result.r.tolist(), result.counts.tolist(), result.g.tolist()
-    ([0.25, 0.75, 1.25, 1.75, 2.25], [0, 0, 4, 0, 4], [0.0, 0.0, 2.0, 0.0, 2.0])
-    """
-
-    r: npt.NDArray[np.float64]
-    g: npt.NDArray[np.float64]
-    counts: npt.NDArray[np.int64]
-    edges: npt.NDArray[np.float64]
-
-    __repr__ = _show.line
-    _repr_html_ = _show.html
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw g(r), with types one line for each pair of them.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw. Default: axes of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            What has been drawn on.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib is not installed: ``pip install matplotlib``.
-        """
-        if ax is None:
-            ax = _new_axes()
-        if self.g.ndim == 1:
-            ax.step(self.r, self.g, where="mid")
-        else:
-            twice = np.array_equal(self.g, self.g.swapaxes(0, 1))
-            for a, b in np.ndindex(self.g.shape[:2]):
-                if a <= b or not twice:
-                    ax.step(self.r, self.g[a, b], where="mid", label=f"{a}-{b}")
-            ax.legend(title="types")
-        ax.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
-        ax.set_xlim(float(self.edges[0]), float(self.edges[-1]))
-        ax.set_ylim(bottom=0.0)
-        ax.set_xlabel("distance r")
-        ax.set_ylabel("g(r)")
-        return ax
-
-
-def _new_axes() -> Axes:
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise ImportError(needs("plot", "matplotlib")) from error
-    return pyplot.subplots(layout="constrained")[1]
+_COLUMNS = 12  # of a result without types, and what makes them
+_OF_TYPES = 6
 
 
 def rdf(
@@ -123,6 +44,11 @@ def rdf(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    groups: npt.ArrayLike | None = None,
+    query_groups: npt.ArrayLike | None = None,
+    exclude: npt.ArrayLike | None = None,
+    query_exclude: npt.ArrayLike | None = None,
+    exclude_within: int | None = None,
 ) -> RadialDistribution:
     """Compute the radial distribution function g(r) of a periodic box; counts are always exact.
 
@@ -138,20 +64,26 @@ def rdf(
     queries : array_like of float, shape (q, d), optional
         g(r) of the points around these instead. A query that lies on a point finds it at distance
         0, in the first bin.
-    types : array_like of int, shape (n,), optional
-        The type of each point, from 0 on: g(r) for each pair of types.
-    query_types : array_like of int, shape (q,), optional
+    types : array_like of int or str, shape (n,), optional
+        The type of each point, a number from 0 on or a name, such as ``atoms.symbols`` of ASE: g(r)
+        for each pair of types. Names count in ascending order.
+    query_types : array_like of int or str, shape (q,), optional
         The types of the queries: given if both `types` and `queries` are. [a, b] is then g(r) of
         points of type b around queries of type a.
     box : float, array_like of float, shape (d,) or (d, d), or Box
         As in `pairs`. It must repeat along every axis, for a density is needed.
     periodic : bool or sequence of bool, shape (d,), optional
         As in `pairs`; all True, which is the default.
+    groups, query_groups, exclude, query_exclude, exclude_within
+        Which pairs count, as in `pair_histogram`: with molecules in `exclude` g(r) is that between
+        molecules, with `groups` that within them. It is over the same ideal gas, of all pairs.
 
     Returns
     -------
     RadialDistribution
-        An object with ``r``, ``g``, ``counts``, ``edges`` and ``plot()``.
+        An object with ``r``, ``g``, ``counts``, ``edges``, the coordination numbers ``n_r``,
+        ``types`` and ``plot()``. Results of several frames add up: ``sum(rdf(x, 5.0, box=box) for x
+        in frames)``.
 
         g is the mean number of neighbours in a shell over what the density of all points, n / V,
         would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two different types it
@@ -187,17 +119,40 @@ def rdf(
     True
     >>> int(result.counts.sum()) == hs.count_pairs(points, 0.4, box=[1.0, 1.0, 1.0])
     True
+
+    By the names of the types, over ten frames:
+
+    >>> names = np.where(np.arange(2000) < 500, "Si", "O")
+    >>> frames = np.random.default_rng(1).random((10, 2000, 3))
+    >>> result = sum(hs.rdf(x, 0.4, 4, types=names, box=[1.0, 1.0, 1.0]) for x in frames)
+    >>> result.types, result.n_frames
+    (('O', 'Si'), 10)
+    >>> partial = result["Si", "O"]
+    >>> bool(abs(partial.g - 1.0).max() < 0.02)
+    True
+    >>> partial.n_r.round().tolist()  # oxygens within 0.1, 0.2, 0.3 and 0.4 of a silicon
+    [6.0, 50.0, 170.0, 402.0]
     """
     edges = _edges(r_max, bins)
     search, asking = as_search(
         points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
     n, shares = len(search[0]), shell_shares(search[2], search[3], edges)
-    marks = as_marks(n, asking, types, query_types)
-    counts = binned(search, edges, asking, marks, "r_max")
-    g = over_ideal_gas(counts, _partners(n, asking, marks), shares)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    return RadialDistribution(middle, g, counts.astype(np.int64, copy=False), edges)
+    marks, names = as_named_marks(n, asking, types, query_types)
+    chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
+    selection = with_selection(None, chosen, n, None if asking is None else len(asking))
+    if marks.types is not None:
+        refuse_unavailable(_OF_TYPES * 8 * marks.n_types**2 * len(shares), "g(r) of all types")
+    found = binned(search, edges, asking, marks, "r_max", selection=selection)
+    counts = found.astype(np.int64, copy=False)
+    expected = _in_shells(_partners(n, asking, marks), shares)
+    known: tuple[str, ...] | tuple[int, ...] | None = names
+    if marks.types is not None and names is None:
+        known = tuple(range(marks.n_types))
+    centers = _centers(n, asking, marks)
+    return RadialDistribution(
+        counts, edges, known, expected, centers, is_half=asking is None
+    )
 
 
 def _edges(r_max: Any, bins: Any) -> FloatArray:
@@ -209,13 +164,18 @@ def _edges(r_max: Any, bins: Any) -> FloatArray:
 
 
 def over_ideal_gas(
-    counts: npt.NDArray[Any], partners: FloatArray | float, shares: FloatArray
+    counts: npt.NDArray[Any], partners: float, shares: FloatArray
 ) -> FloatArray:
     """g(r): counts over what each shell would have of so many pairs; 0 where there are none."""
-    g = np.zeros(counts.shape)
-    with np.errstate(over="ignore", under="ignore", divide="ignore"):
-        np.divide(counts, partners * shares, out=g, where=counts > 0)
-    return g
+    return ratio(counts, _in_shells(np.array([partners]), shares))
+
+
+def _in_shells(partners: FloatArray, shares: FloatArray) -> FloatArray:
+    """What each shell has of them. Shares may be infinite: none of them are none everywhere."""
+    found = np.zeros(np.broadcast_shapes(partners.shape, shares.shape))
+    with np.errstate(over="ignore", under="ignore"):
+        np.multiply(partners, shares, out=found, where=partners > 0.0)
+    return found
 
 
 def shell_shares(
@@ -245,6 +205,14 @@ def unit_ball(ndim: int) -> float:
     for k in range(2 + ndim % 2, ndim + 1, 2):
         volume *= 2.0 * math.pi / k
     return volume
+
+
+def _centers(n: int, queries: PointArray | None, marks: Marks) -> npt.NDArray[np.int64]:
+    """How many points, or queries, have neighbours that are counted; with types, of each."""
+    asking = marks.types if queries is None else marks.query_types
+    if asking is None:
+        return np.array(n if queries is None else len(queries))
+    return np.bincount(asking, minlength=marks.n_types)
 
 
 def _partners(

@@ -22,6 +22,7 @@ from halfshell._convert.scene import (
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+    from matplotlib.axes import Axes
 
     from halfshell._convert.types import ArrayLike, BoxLike, PeriodicLike, PointsLike
 
@@ -330,6 +331,33 @@ class Box:
         from halfshell import _show
 
         return _show.html(self)
+
+    def plot(self, ax: Axes | None = None, *, unit: str | None = None) -> Axes:
+        """Draw the edges of the box, with a corner at the origin, and name its vectors.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; for three dimensions with ``projection="3d"``. Default: axes of a new
+            figure.
+        unit : str, optional
+            The unit of the vectors, for the labels of the axes: "Å".
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            What has been drawn on.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed: ``pip install matplotlib``.
+        ValueError
+            If the box has more than three dimensions, or axes do not fit.
+        """
+        from halfshell._objects.pictures import draw_whole_box
+
+        return draw_whole_box(self._vectors, ax, unit)
 
 
 def _cosine(degrees: float) -> float:

@@ -7,7 +7,7 @@ cells; `cell_pairs`, `cell_rows` and `cell_counts` have the searches, by what th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Self, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,9 @@ from halfshell._objects.cell_counts import CellCounts
 from halfshell._objects.cell_pairs import CellPairs
 from halfshell._objects.cell_rows import CellRows
 from halfshell._objects.origin import Origin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Candidates(NamedTuple):
@@ -250,3 +253,41 @@ class CellList(CellPairs, CellRows, CellCounts):
         asking = None if queries is None else self._queries(queries)
         search = self._arguments(None, (True, None, None, None))
         return Candidates(*_core.cells_candidates(*search, asking))
+
+    def plot(self, ax: Axes | None = None, *, unit: str | None = None) -> Axes:
+        """Draw the points in the colours of their cells, and the cells.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; for points in three dimensions with ``projection="3d"``. Default: axes
+            of a new figure.
+        unit : str, optional
+            The unit of the points, for the labels of the axes: "Å".
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            What has been drawn on.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed: ``pip install matplotlib``.
+        ValueError
+            If there are more than 500 000 points or three dimensions, or axes do not fit.
+
+        Notes
+        -----
+        Points are drawn wrapped into the box, as the cells hold them. In up to two dimensions
+        cells are areas, white where only occupied cells are stored; in three each cell has the
+        bounds of its points, the first 2000 of them.
+
+        Examples
+        --------
+        >>> import halfshell as hs
+        >>> ax = hs.CellList([[0.5, 0.5], [1.5, 0.5]], 1.0).plot()  # doctest: +SKIP
+        """
+        from halfshell._objects.cell_plot import draw_cells
+
+        return draw_cells(self, ax, unit)

@@ -11,10 +11,11 @@ import numpy.typing as npt
 from halfshell._convert.options import as_choice, as_flag, check_letters
 from halfshell._objects import table_forms
 from halfshell._objects.graph import Graph, check_complete, turned
-from halfshell._objects.table_rows import Array, Row, TableRows
+from halfshell._objects.table_plot import TablePictures
+from halfshell._objects.table_rows import Array, Row
 
 
-class NeighborTable(TableRows):
+class NeighborTable(TablePictures):
     """All neighbours of each point, or of each query, row after row.
 
     Made by `neighbors`; it does not change, and all its arrays are read-only.

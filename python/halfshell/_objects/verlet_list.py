@@ -20,6 +20,7 @@ from halfshell._objects.alone import Alone
 from halfshell._objects.pair_changes import PairChanges, Step
 from halfshell._objects.skin import AutoSkin
 from halfshell._objects.tracked_steps import TrackedSteps
+from halfshell._objects.verlet_rows import VerletRows
 
 
 class _PairOptions(TypedDict, total=False):
@@ -30,7 +31,7 @@ class _PairOptions(TypedDict, total=False):
     out: Out | None
 
 
-class VerletList:
+class VerletList(VerletRows):
     """A list of pairs that is kept over many steps, and always exact.
 
     The list is built with a larger cutoff, `cutoff` + `skin`. As long as no point can have come
@@ -72,8 +73,7 @@ class VerletList:
     needed (other points, another number or type of them, a box that deformed too much), it is
     built; that is no error.
 
-    A search is so fast that a list saves less than elsewhere, and only where it lasts for some
-    steps. ``docs/verlet.md`` has measurements.
+    A list saves something only where it lasts for some steps: ``docs/verlet.md`` has measurements.
 
     Several threads may use one list, one at a time: the others wait. It cannot be copied or
     pickled.

@@ -347,3 +347,39 @@ def test_inputs_stay_and_empty_ones_are_nothing():
         assert hs.count_pairs(points, 1.0, exclude=nothing) == 1
     empty = np.empty((0, 3))
     assert hs.count_pairs(empty, 1.0, groups=[], exclude=[], min_distance=0.5) == 0
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_counts_by_type(seed):
+    draw = random.Random(seed)
+    points, cutoff, options = scene_of(draw)
+    n = len(points)
+    chosen, of_queries = chosen_of(draw, n, n, cutoff)
+    types = labels_of(draw, n, 0)
+    every = {**chosen, **options}
+    table = hs.neighbors(points, cutoff, **every)
+    wanted = np.zeros((n, 1 + types.max(initial=0)), int)
+    np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
+    assert hs.coordination(points, cutoff, types=types, **every).tolist() == wanted.tolist()
+    some = [k for k in range(n) if draw.random() < 0.5]
+    found = hs.coordination(points, cutoff, types=types, indices=some, **every)
+    assert found.tolist() == wanted[some].tolist()
+    queried = {**every, **of_queries}
+    if chosen["exclude"] is None or chosen["exclude"].ndim == 1:
+        table = hs.neighbors(points, cutoff, queries=points, **queried)
+        wanted = np.zeros_like(wanted)
+        np.add.at(wanted, (np.repeat(np.arange(n), table.counts), types[table.indices]), 1)
+        found = hs.coordination(points, cutoff, queries=points, types=types, **queried)
+        assert found.tolist() == wanted.tolist()
+
+
+def test_g_of_r_between_molecules():
+    points = np.random.default_rng(6).random((600, 3)) * 5.0
+    molecule = np.arange(600) // 3
+    whole = hs.rdf(points, 2.0, 20, box=[5.0] * 3)
+    parts = [hs.rdf(points, 2.0, 20, box=[5.0] * 3, exclude=molecule),
+             hs.rdf(points, 2.0, 20, box=[5.0] * 3, groups=molecule)]  # fmt: skip
+    assert (parts[0].counts + parts[1].counts == whole.counts).all() and parts[1].counts.sum() > 0
+    assert np.allclose(parts[0].g + parts[1].g, whole.g)
+    named = hs.rdf(points, 2.0, 20, box=[5.0] * 3, exclude=molecule, types=["a", "b", "a"] * 200)
+    assert (np.array(named.counts).shape) == (2, 2, 20)

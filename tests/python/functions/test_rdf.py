@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The radial distribution function: the histogram over that of an ideal gas, and its plot."""
+"""The radial distribution function: the histogram over that of an ideal gas."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -110,35 +109,6 @@ REFUSED = {
 def test_what_has_no_density_is_refused(how, error, text):
     with pytest.raises(error, match=text):
         hs.rdf([[0.0, 0.0], [0.5, 0.5]], **{"r_max": 0.5, **how})
-
-
-def test_plots(rng):
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    points = rng.random((200, 3))
-    result = hs.rdf(points, 0.4, bins=20, box=[1.0] * 3)
-    axes = result.plot()
-    assert axes.get_lines()[0].get_ydata().tolist() == result.g.tolist()
-    assert axes.get_xlim() == (0.0, 0.4)
-    pyplot.close(axes.figure)
-    figure, own = pyplot.subplots()
-    typed = hs.rdf(points, 0.4, bins=20, types=np.arange(200) % 3, box=[1.0] * 3)
-    assert typed.plot(own) is own
-    assert len(own.get_legend().get_texts()) == 6
-    own.clear()
-    queries = {"queries": points[:50], "query_types": np.arange(50) % 2}
-    typed = hs.rdf(points, 0.4, bins=20, types=np.arange(200) % 2, box=[1.0] * 3, **queries)
-    assert len(typed.plot(own).get_legend().get_texts()) == 4  # [a, b] is not [b, a]
-    pyplot.close(figure)
-
-
-def test_without_matplotlib_an_error_names_it(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    result = hs.rdf([[0.0], [0.5]], 0.4, bins=2, box=[1.0])
-    with pytest.raises(ImportError, match=r"plot needs matplotlib: pip install matplotlib$"):
-        result.plot()
 
 
 @pytest.mark.parametrize("bins", [2**40, 2**63, 10**400])

@@ -102,7 +102,8 @@ def test_what_is_told():
     assert repr(found) == "Clusters(labels=[0, 0, 1], sizes=[2, 1], core=[True, True, True])"
     assert repr(hs.rdf(POINTS, 0.4, box=BOX)) == (
         "RadialDistribution(r=float64 (100,), g=float64 (100,), counts=int64 (100,), "
-        "edges=float64 (101,))"
+        "edges=float64 (101,), n_r=float64 (100,), expected=float64 (100,), n_centers=40, "
+        "n_frames=1, is_half=True)"
     )
     row = ROWS[0]
     assert row.scene in repr(row) and "missed=0" in repr(row) and "box" not in repr(row)

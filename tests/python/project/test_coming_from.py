@@ -76,7 +76,8 @@ def test_mdanalysis():
     from MDAnalysis.analysis.rdf import InterRDF
     from MDAnalysis.lib.distances import calc_bonds
 
-    group, box, dimensions = names["group"], names["box"], names["u"].dimensions
+    group, dimensions = names["group"], names["u"].dimensions
+    box = hs.Box.from_dimensions(dimensions)
     x, i, j = group.positions, np.arange(100), np.arange(100, 200)
     d = calc_bonds(x[i], x[j], box=dimensions)
     assert np.allclose(d, hs.measure(x, i, j, box=box, quantities="d"), atol=1e-5)

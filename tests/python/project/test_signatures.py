@@ -88,7 +88,7 @@ def test_methods_have_the_keywords_of_the_functions(name):
     if name.startswith("CellList."):  # the rest belongs to the list
         of_the_list = {"box", "periodic", "precision", "algorithm", "batch"}
         of_pairs = {"radii", "query_radii", "rule", "types", "query_types"}  # cells have one cutoff
-        of_pairs |= {"supports", "query_supports", "extent"}
+        of_pairs |= {"supports", "query_supports", "extent", "by_type"}
         of_pairs |= {"groups", "query_groups", "exclude", "query_exclude", "exclude_within"}
         of_pairs |= {"min_distance"}
         assert set(keywords(function)) - set(keywords(method)) <= of_the_list | of_pairs

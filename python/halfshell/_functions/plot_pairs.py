@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`plot_pairs`: points and the lines of their pairs, drawn with matplotlib."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._convert.labels import as_kinds
+from halfshell._convert.scene import as_scene
+from halfshell._convert.types import BoxLike, PeriodicLike, PointsLike
+from halfshell._functions.measure import measure
+from halfshell._objects.pictures import (
+    MOST_LINES,
+    axes_for,
+    draw_box,
+    draw_dots,
+    draw_lines,
+    finish,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def plot_pairs(
+    points: PointsLike,
+    i: npt.ArrayLike,
+    j: npt.ArrayLike,
+    S: npt.ArrayLike | None = None,
+    *,
+    types: npt.ArrayLike | None = None,
+    box: BoxLike | None = None,
+    periodic: PeriodicLike | None = None,
+    ax: Axes | None = None,
+    unit: str | None = None,
+) -> Axes:
+    """Draw points and a line for each pair, in up to three dimensions; images are always exact.
+
+    Parameters
+    ----------
+    points, box, periodic
+        As in `pairs`.
+    i, j : array_like of int, shape (m,)
+        The points of each pair.
+    S : array_like of int, shape (m, d), optional
+        The shift of each pair. Default: that of the nearest image, as `measure` finds it.
+    types : array_like of int or str, shape (n,), optional
+        A colour, and an entry of the legend, for each.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; for points in three dimensions with ``projection="3d"``. Default: axes of a
+        new figure.
+    unit : str, optional
+        The unit of the points, for the labels of the axes: "Å".
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        What has been drawn on.
+
+    Raises
+    ------
+    ImportError
+        If matplotlib is not installed: ``pip install matplotlib``.
+    TypeError, ValueError, OverflowError
+        As `measure`; ValueError also for points of more than three dimensions, axes that do not
+        fit, more than 200 000 pairs, or not one type for each point.
+
+    Notes
+    -----
+    Points are drawn where they are given. A line goes from point i to the image of j that it is
+    paired with: those to an image (S is not 0) are dotted, and end where no point is drawn.
+
+    Examples
+    --------
+    >>> import halfshell as hs
+    >>> points, box = [[0.5, 0.5], [1.5, 0.5], [3.5, 0.5]], [4.0, 4.0]
+    >>> i, j, S = hs.pairs(points, 1.0, box=box, quantities="ijS")
+    >>> ax = hs.plot_pairs(points, i, j, S, box=box)  # doctest: +SKIP
+    """
+    array, vectors, _ = as_scene(points, box, periodic)
+    ndim = array.shape[1]
+    D, shifts = measure(points, i, j, S, box=box, periodic=periodic, quantities="DS")
+    if len(D) > MOST_LINES:
+        raise ValueError(f"at most {MOST_LINES} pairs can be drawn, got {len(D)}")
+    kinds = None if types is None else as_kinds(types, len(array))
+    ax = axes_for(ndim, ax)
+    start = array[np.asarray(i, dtype=np.int64).reshape(-1)].astype(np.float64)
+    inside = ~shifts.any(axis=1)
+    draw_lines(ax, start[inside], (start + D)[inside], colors="0.45")
+    draw_lines(ax, start[~inside], (start + D)[~inside], colors="0.5", linestyles="dotted")
+    if vectors is not None:
+        draw_box(ax, vectors)
+    if kinds is None:
+        draw_dots(ax, array)
+    else:
+        for kind in np.unique(kinds):
+            draw_dots(ax, array[kinds == kind], label=str(kind))
+        if len(kinds):
+            ax.legend()
+    return finish(ax, ndim, unit)

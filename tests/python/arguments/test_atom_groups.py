@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Universes and groups of atoms of MDAnalysis in place of points."""
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+DIMENSIONS = [4.0, 5.0, 6.0, 80.0, 90.0, 70.0]
+POINTS = (np.random.default_rng(0).random((60, 3)) * 9.0 - 2.0).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def mda():
+    return pytest.importorskip("MDAnalysis")
+
+
+@pytest.fixture(scope="module")
+def universe(mda):
+    made = mda.Universe.empty(60, trajectory=True)
+    made.add_TopologyAttr("elements", ["Si", "O", "O"] * 20)
+    made.load_new(POINTS[None], dimensions=[DIMENSIONS])
+    return made
+
+
+@pytest.fixture(scope="module")
+def box(mda):
+    return mda.lib.mdamath.triclinic_vectors(DIMENSIONS)
+
+
+@pytest.fixture(scope="module")
+def boxless(mda):
+    made = mda.Universe.empty(60, trajectory=True)
+    made.load_new(POINTS[None])
+    return made
+
+
+def same(ours, theirs):
+    assert len(theirs[0]) > 0
+    for a, b in zip(ours, theirs, strict=True):
+        assert a.dtype == b.dtype and np.array_equal(a, b)
+
+
+def test_a_universe_and_its_groups(universe, box):
+    how = {"quantities": "ijdDS"}
+    expected = hs.pairs(POINTS, 1.5, box=box, **how)
+    same(hs.pairs(universe, 1.5, **how), expected)
+    same(hs.pairs(universe.atoms, 1.5, **how), expected)
+    some = universe.atoms[[5, 40, 3, *range(10, 30)]]
+    same(hs.pairs(some, 2.5, **how), hs.pairs(some.positions, 2.5, box=box, **how))
+    updating = universe.select_atoms("prop x > 1", updating=True)
+    same(hs.pairs(updating, 2.5, **how), hs.pairs(updating.positions, 2.5, box=box, **how))
+
+
+def test_wherever_points_are_taken(universe, box):
+    group, how = universe.atoms, {"box": box}
+    assert hs.count_pairs(group, 2.0) == hs.count_pairs(POINTS, 2.0, **how) > 0
+    assert np.array_equal(hs.coordination(group, 2.0), hs.coordination(POINTS, 2.0, **how))
+    same((hs.neighbors(group, 2.0).indices,), (hs.neighbors(POINTS, 2.0, **how).indices,))
+    same(hs.nearest(group, 3), hs.nearest(POINTS, 3, **how))
+    same(hs.CellList(group, 2.0).pairs(sort=True), hs.pairs(POINTS, 2.0, sort=True, **how))
+    assert np.array_equal(hs.rdf(group, 3.0).g, hs.rdf(POINTS, 3.0, **how).g)
+    pair_list = hs.VerletList(2.0, 0.2)
+    pair_list.update(group)
+    same(pair_list.pairs(sort=True), hs.pairs(POINTS, 2.0, sort=True, **how))
+    ((i, j),) = hs.trajectory_pairs([group], 2.0, sort=True)
+    same((i, j), hs.pairs(POINTS, 2.0, sort=True, **how))
+    assert hs.verify(group, 2.0, i, j, np.zeros((len(i), 3), int)).missed is not None
+
+
+def test_cutoffs_and_types_by_element(universe, box):
+    names, cutoffs = universe.atoms.elements, {("Si", "O"): 2.0, ("O", "O"): 1.0}
+    expected = hs.pairs(POINTS, cutoffs, types=names, box=box)
+    same(hs.pairs(universe, cutoffs), expected)
+    same(hs.pairs(universe.atoms, cutoffs), expected)
+    assert hs.rdf(universe, 3.0, types=names).types == ("O", "Si")
+    assert hs.coordination(universe.atoms, 2.0, types=names).shape == (60, 2)
+
+
+def test_without_elements_types_are_needed(boxless):
+    with pytest.raises(TypeError, match="types must be given where cutoff is a dict"):
+        hs.pairs(boxless, {("Si", "O"): 2.0})
+
+
+def test_periodicity_is_the_callers(universe, box):
+    flags = [True, True, False]
+    expected = hs.pairs(POINTS, 2.0, box=box, periodic=flags)
+    same(hs.pairs(universe.atoms, 2.0, periodic=flags), expected)
+    two = hs.pairs_between(universe.atoms[:20], universe.atoms, 2.0, periodic=flags)
+    same(two, hs.pairs_between(POINTS[:20], POINTS, 2.0, box=box, periodic=flags))
+
+
+def test_queries(universe, boxless, box):
+    asking = universe.atoms[:20]
+    expected = hs.pairs_between(POINTS[:20], POINTS, 2.0, box=box)
+    for queries, points, how in (
+        (asking, universe, {}), (asking, POINTS, {"box": box}), (POINTS[:20], universe.atoms, {}),
+        (boxless.atoms[:20], universe, {}),
+    ):  # fmt: skip
+        same(hs.pairs_between(queries, points, 2.0, **how), expected)
+    same(hs.CellList(universe, 2.0).neighbors(queries=asking).to_pairs(), expected)
+    for other in ({}, {"box": 2.0 * box}):
+        with pytest.raises(ValueError, match="queries bring a box that is not that of points"):
+            hs.pairs_between(asking, POINTS, 2.0, **other)
+
+
+def test_without_a_box(boxless, box):
+    same(hs.pairs(boxless.atoms, 2.0), hs.pairs(POINTS, 2.0))
+    same(hs.pairs(boxless.atoms, 2.0, box=box), hs.pairs(POINTS, 2.0, box=box))
+    batch, boxes = np.repeat([0, 1], 30), np.stack([box, 1.1 * box])
+    same(
+        hs.pairs(boxless, 2.0, batch=batch, box=boxes),
+        hs.pairs(POINTS, 2.0, batch=batch, box=boxes),
+    )
+
+
+def test_a_box_given_twice_is_refused(universe, box):
+    with pytest.raises(ValueError, match="box comes from the AtomGroup object itself"):
+        hs.pairs(universe.atoms, 2.0, box=box)
+    with pytest.raises(ValueError, match="box comes from the Universe object itself"):
+        hs.pairs(universe, 2.0, batch=np.zeros(60, int), box=box[None])
+
+
+def test_objects_with_no_positions_are_none(mda):
+    bare = mda.Universe.empty(3)
+    for points in (bare, bare.atoms, SimpleNamespace(universe=1, atoms=2)):
+        with pytest.raises((TypeError, ValueError), match="points"):
+            hs.pairs(points, 1.0)
+
+
+def test_nothing_is_imported():
+    code = (
+        "import sys, numpy, halfshell as hs; hs.pairs(numpy.zeros((3, 3)), 1.0); "
+        "hs.pairs(((0.0, 0.0), (1.0, 0.0)), 1.0); assert 'MDAnalysis' not in sys.modules; "
+        "assert 'halfshell._convert.atom_groups' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
