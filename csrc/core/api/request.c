@@ -66,6 +66,7 @@ hs_request_open(const hs_request *request, hs_call *call, hs_search *search, hs_
         hs_search_begin(call, search); /* an empty one */
         return sound;
     }
+    sets.least_cutoff = hs_choice_least_length(call->choice, sets.least_cutoff);
     sound = hs_search_open(&sets, request->box, call, search, failure);
     if (sound != HS_OK) {
         hs_choice_close(call);

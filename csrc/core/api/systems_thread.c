@@ -72,8 +72,9 @@ static hs_status
 build_system(worker *me, const hs_points *points, const hs_box *box, int64_t first)
 {
     hs_failure     *failure = &me->committer.failure;
-    const hs_status status =
-        hs_search_build(&(hs_sets){.points = points}, box, &me->search, failure);
+    const hs_sets   sets = {.points = points,
+                            .least_cutoff = hs_choice_least_length(me->call.choice, 0.0)};
+    const hs_status status = hs_search_build(&sets, box, &me->search, failure);
     if (status == HS_OK) {
         hs_search_renumber(first, me->job->points->n, &me->search);
     } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE ||

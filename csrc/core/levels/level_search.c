@@ -3,6 +3,7 @@
  * brings their radii into the order of the cells. */
 #include "level_search.h"
 
+#include "../search/choice.h"
 #include "../search/search_open.h"
 #include "support_width.h"
 
@@ -266,7 +267,7 @@ hs_level_open(const hs_levels *levels, const hs_level_plan *plan, int64_t number
                                   .queries = step->is_own ? NULL : &queries,
                                   .is_full = !step->is_own || !plan->is_half,
                                   .keeps_none = keeps_none,
-                                  .least_cutoff = step->least,
+                                  .least_cutoff = hs_choice_least_length(call->choice, step->least),
                                   .narrowing = levels->has_supports ? &narrowing : NULL};
     open->of_asking = open->of_points = open->table = NULL;
     open->limits.table.n_types = step->by_table ? levels->n : 0;

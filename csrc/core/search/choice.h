@@ -81,6 +81,15 @@ hs_choice_needs_places(const hs_choice *choice, double cutoff)
     return choice->min_distance > 0.0 || hs_choice_compares(choice, cutoff);
 }
 
+/* The smallest positive length that pairs are compared with besides the cutoff: `least`, if it is
+ * not 0, or the least distance of a choice, if there is one; 0 where there is neither. */
+HS_ALWAYS_INLINE double
+hs_choice_least_length(const hs_choice *choice, double least)
+{
+    const double apart = choice != NULL ? choice->min_distance : 0.0;
+    return apart > 0.0 && (least == 0.0 || apart < least) ? apart : least;
+}
+
 /* The least distance in the unit of the scene's metric. */
 HS_ALWAYS_INLINE double
 hs_choice_least(const hs_choice *choice, const hs_scene *scene)
