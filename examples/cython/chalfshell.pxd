@@ -39,12 +39,16 @@ cdef extern from "halfshell_capi.h" nogil:
     ctypedef struct hs_reach:
         pass
 
+    ctypedef struct hs_selection:
+        pass
+
     ctypedef struct hs_among:
         const hs_points *points
         const hs_box *box
         const hs_points *queries
         const hs_cells *cells
         const hs_reach *reach
+        const hs_selection *selection
 
     ctypedef struct hs_options:
         double cutoff

@@ -53,6 +53,7 @@ def energy(const double[:, :] points, double cutoff, const double[:] lengths):
     among.queries = NULL
     among.cells = NULL
     among.reach = NULL
+    among.selection = NULL
 
     cdef hs_options options = halfshell.options_default()
     options.cutoff = cutoff

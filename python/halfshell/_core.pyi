@@ -70,7 +70,7 @@ def histogram(
     *arguments: *tuple[
         *_Search, _Floats, bool, _Queries, int,
         npt.NDArray[np.int32] | None, _Floats | None, npt.NDArray[np.int32] | None, _Floats | None,
-        str, _Reach,
+        str, *tuple[_Reach, ...],
     ]
 ) -> npt.NDArray[Any]: ...  # fmt: skip
 

@@ -108,6 +108,8 @@ def binned(
         f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
     )
     with of_argument(name):
-        found = _core.histogram(*search, edges, True, queries, *marks, algorithm, selection)
+        # CPython 3.11 keeps the tuple of 20 arguments, of which this would be one.
+        end = (algorithm,) if selection is None else (algorithm, selection)
+        found = _core.histogram(*(*search, edges, True, queries, *marks, *end))
     # What the core counts first are the pairs closer than the first edge.
     return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])

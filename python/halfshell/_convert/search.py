@@ -143,9 +143,10 @@ def count_within(
     is_exact = isinstance(rest[1], str) and rest[1] == "exact"
     if is_exact and len(cutoffs) > 1 and (reach is None or reach[0] is None):
         edges = np.ascontiguousarray(cutoffs)
+        end = (algorithm,) if reach is None else (algorithm, reach)  # as in `binned`
         between: npt.NDArray[np.int64] = _core.histogram(
-            points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None,
-            algorithm, reach,
+            *(points, 0.0, box, bits, *rest, edges, rest[0], queries, 1, None, None, None, None),
+            *end,
         )
         return np.cumsum(between[0, 0])
     # Without any, all else is checked as ever.

@@ -228,7 +228,7 @@ class _Searches(TreeSearches):
         rest = as_rest(True, "exact", None, None, None, None)
         of_each = as_marks(len(points), asking, None, None, marks[1], marks[0])
         bins = _core.histogram(
-            points, 0.0, vectors, bits, *rest, within, True, asking, *of_each, "auto", None
+            points, 0.0, vectors, bits, *rest, within, True, asking, *of_each, "auto"
         )[0, 0]
         if cumulative:
             found = np.cumsum(bins)[places]
