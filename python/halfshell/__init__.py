@@ -14,6 +14,7 @@ from halfshell._objects.box import Box
 
 if TYPE_CHECKING:
     from halfshell._check.verify import Verdict, verify
+    from halfshell._functions.bricks import bricks
     from halfshell._functions.clusters import clusters
     from halfshell._functions.explain import Explanation, explain
     from halfshell._functions.histogram import pair_histogram
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._functions.trajectory import trajectory_pairs
     from halfshell._include import get_include
+    from halfshell._objects.brick import Brick, Bricks
     from halfshell._objects.cell_list import CellList
     from halfshell._objects.clusters import Clusters
     from halfshell._objects.connectivity import Connectivity
@@ -43,6 +45,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Box",
+    "Brick",
+    "Bricks",
     "CacheInfo",
     "CapacityError",
     "CellList",
@@ -60,6 +64,7 @@ __all__ = [
     "StaleError",
     "Verdict",
     "VerletList",
+    "bricks",
     "cache_info",
     "clear_cache",
     "clusters",
@@ -86,6 +91,8 @@ __all__ = [
 
 #: Where names are that are imported when they are first used, for a quick start.
 _LATER = {
+    "Brick": "_objects.brick",
+    "Bricks": "_objects.brick",
     "CellList": "_objects.cell_list",
     "Clusters": "_objects.clusters",
     "Connectivity": "_objects.connectivity",
@@ -100,6 +107,7 @@ _LATER = {
     "RadialDistribution": "_objects.radial_distribution",
     "Verdict": "_check.verify",
     "VerletList": "_objects.verlet_list",
+    "bricks": "_functions.bricks",
     "clusters": "_functions.clusters",
     "coordination": "_functions.neighbors",
     "explain": "_functions.explain",

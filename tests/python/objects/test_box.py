@@ -383,6 +383,7 @@ WITH_BOX = {
     "nearest": lambda p, box: hs.nearest(p, 3, box=box, quantities="jdS"),
     "measure": lambda p, box: hs.measure(p, [0, 1], [2, 3], box=box, quantities="dDS"),
     "clusters": lambda p, box: tuple(hs.clusters(p, 0.5, box=box, winding=True)),
+    "bricks": lambda p, box: hs.bricks(p, 0.5, 3, box=box)[1].pairs(p, quantities="ijS"),
     "verify": lambda p, box: hs.verify(p, 0.5, [0], [1], [[0] * p.shape[1]], box=box),
     "explain": lambda p, box: hs.explain(p, 0.5, box=box),
     "CellList": lambda p, box: hs.CellList(p, 0.5, box=box).pairs(quantities="ijd"),

@@ -43,6 +43,8 @@ CELLS = hs.CellList(POINTS, 0.2, box=BOX)
 
 SHOWN = {
     "Box": hs.Box(BOX),
+    "Brick": hs.bricks(POINTS, 0.1, 2, box=BOX)[0],
+    "Bricks": hs.bricks(POINTS, 0.1, 2, box=BOX),
     "CacheInfo": hs.cache_info(),
     "Candidates": CELLS.candidates(POINTS),
     "CellList": CELLS,

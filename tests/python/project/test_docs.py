@@ -56,8 +56,9 @@ def test_public_functions_have_examples(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "clusters", "coordination", "count_pairs", "explain", "for_each_pair", "iter_pairs",
-        "nearest", "neighbors", "pair_histogram", "pairs", "pairs_between", "rdf", "verify",
+        "bricks", "clusters", "coordination", "count_pairs", "explain", "for_each_pair",
+        "iter_pairs", "nearest", "neighbors", "pair_histogram", "pairs", "pairs_between", "rdf",
+        "verify",
     ],
 )
 def test_every_argument_is_documented(name):
@@ -204,6 +205,12 @@ def test_example_of_histograms_runs():
     exec(compile(ast.parse(code), "histograms.md", "exec"), names)
     assert names["counts"].sum() == names["within"][-1] == names["result"].counts.sum()
     assert names["near"].sum() == names["within"][1] and names["far"].shape == (2, 2, 50)
+
+
+def test_examples_of_bricks_run():
+    text, names = (ROOT / "docs/bricks.md").read_text(), {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(block, names)
 
 
 def test_example_of_clusters_runs():

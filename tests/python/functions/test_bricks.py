@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bricks: all of them together say what one search of everything says, byte for byte."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+
+
+def shear(ndim, length, step):
+    return length * np.eye(ndim) + step * length * np.eye(ndim, k=-1)
+
+
+def scenes():
+    rng = np.random.default_rng(0)
+    for ndim in (1, 2, 3, 5):
+        points = rng.random((120, ndim)) * 6.0 - 1.0
+        yield f"open-{ndim}", points, 0.4 * ndim, {}
+        yield f"box-{ndim}", points, 0.4 * ndim, {"box": [4.0] * ndim}
+        mixed = {"box": shear(ndim, 4.0, 0.4), "periodic": [k % 2 == 0 for k in range(ndim)]}
+        yield f"mixed-{ndim}", points, 0.4 * ndim, mixed
+    points = rng.random((90, 3))
+    yield "skewed", points * 9.0 - 4.0, 0.7, {"box": shear(3, 2.5, 1.7)}
+    yield "images", points[:9] * 2.0, 2.3, {"box": shear(3, 1.0, 0.3)}
+    yield "single", (points * 5.0).astype(np.float32), 0.8, {"box": [5.0] * 3}
+    far = np.repeat([0.0, 1e9, -3e12], 30)[:, None]
+    yield "clusters", points + far, 0.3, {}
+    yield "clusters in a box", points + far, 0.3, {"box": [7.0] * 3}
+    lattice = np.stack(np.meshgrid(*[np.arange(6.0)] * 2), -1).reshape(-1, 2)
+    yield "on the cuts", lattice, 1.0, {"box": [6.0, 6.0]}
+    yield "negative zeros", np.where(lattice == 0.0, -0.0, lattice), 1.0, {"box": [6.0, 6.0]}
+    yield "one place", np.zeros((20, 2)), 0.0, {"box": [1.0, 1.0]}
+    yield "one point", np.ones((1, 3)), 1.5, {"box": [1.0] * 3}
+    yield "none", np.empty((0, 3)), 1.0, {"box": [1.0] * 3}
+    yield "huge", points * 1e300, 1e299, {}
+    yield "tiny", points * 1e-300, 1e-301, {"box": [1e-300] * 3}
+    yield "far from the box", points[:, :2] + [1e14, 0.0], 0.2, {"box": [1.0, 1.0]}
+
+
+SCENES = {name: rest for name, *rest in scenes()}
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 40])
+@pytest.mark.parametrize("name", SCENES)
+def test_together_they_are_one_search(name, n):
+    points, cutoff, options = SCENES[name]
+    parts = hs.bricks(points, cutoff, n, **options)
+    assert len(parts) == n
+    owned = np.concatenate([part.owned for part in parts])
+    assert np.array_equal(np.sort(owned), np.arange(len(points)))
+    assert max(parts.sizes) - min(parts.sizes) <= 1 or len(points) < n
+    letters = "ijdDS"
+    whole = hs.pairs(points, cutoff, quantities=letters, sort=True, **options)
+    found = [part.pairs(points, quantities=letters) for part in parts]
+    columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+    place = np.lexsort((*columns[4].T[::-1], columns[1], columns[0]))
+    for column, expected in zip(columns, whole, strict=True):
+        assert column.dtype == expected.dtype
+        assert column[place].tobytes() == expected.tobytes()
+    assert sum(part.count_pairs(points) for part in parts) == len(whole[0])
+    table = hs.neighbors(points, cutoff, quantities="jdS", **options)
+    for part in parts:
+        assert (np.diff(part.owned) > 0).all() and (np.diff(part.needed) > 0).all()
+        assert not set(part.owned.tolist()) & set(part.needed.tolist())
+        rows = part.neighbors(points[part.members], quantities="jdS")  # those alone will do
+        assert len(rows) == len(part.owned)
+        for k, number in enumerate(part.owned):
+            for one, other in zip(rows[k], table[number], strict=True):
+                assert one.tobytes() == other.tobytes()
+
+
+@pytest.mark.parametrize("inclusive", [False, True])
+def test_rules_and_quantities(inclusive):
+    points, cutoff, options = SCENES["on the cuts"]
+    how = {"inclusive": inclusive, "threads": 2, "kernel": "scalar"}
+    whole = hs.pairs(points, cutoff, sort=True, quantities="P", **options, **how)
+    parts = hs.bricks(points, cutoff, 5, **options)
+    found = np.concatenate([part.pairs(points, quantities="P", **how) for part in parts])
+    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, whole.tolist()))
+    assert sum(part.count_pairs(points, **how) for part in parts) == len(whole)
+    assert [len(part.pairs(points, quantities="d", **how)) for part in parts] == [
+        part.count_pairs(points, **how) for part in parts
+    ]
+
+
+def test_bricks_follow_the_points():
+    rng = np.random.default_rng(1)
+    points = np.concatenate((rng.random((900, 3)), 1e6 + rng.random((100, 3))))
+    parts = hs.bricks(points, 0.05, 10)
+    assert parts.sizes == [100] * 10
+    assert sum(900 <= part.owned.min() for part in parts) == 1  # the far ones are one brick
+    assert parts.overhead < 2.0
+    uniform = rng.random((20000, 3))
+    assert hs.bricks(uniform, 0.02, 8, box=[1.0] * 3).overhead < 1.3
+    assert hs.bricks(uniform, 0.6, 8, box=[1.0] * 3).overhead == 8.0
+
+
+def test_they_are_sent_elsewhere():
+    points, cutoff, options = SCENES["skewed"]
+    for part in hs.bricks(points, cutoff, 4, **options):
+        copy = pickle.loads(pickle.dumps(part))
+        held = points[copy.members].copy()
+        for one, other in zip(copy.pairs(held), part.pairs(points), strict=True):
+            assert np.array_equal(one, other)
+
+
+def test_they_show_themselves():
+    parts = hs.bricks(np.zeros((10, 2)), 1.0, 3)
+    assert repr(parts) == "Bricks(3 of 10 points, overhead 3)"
+    assert "<table>" in parts._repr_html_() and "n_points" in repr(parts[0])
+    assert [len(part.owned) for part in parts[1:]] == parts.sizes[1:]
+    assert len(hs.bricks(np.empty((0, 2)), 1.0, 3)) == 3
+    assert hs.bricks(np.empty((0, 2)), 1.0, 3).overhead == 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kind", "words"),
+    [
+        (([[np.nan]], 1.0, 2), ValueError, r"points\[0, 0\]"),
+        (([[0.0]], -1.0, 2), ValueError, "cutoff"), (([[0.0]], np.inf, 2), ValueError, "cutoff"),
+        (([[0.0]], "1", 2), TypeError, "cutoff"), (([[0.0]], 1.0, 0), ValueError, "n must be 1"),
+        (([[0.0]], 1.0, 1.5), TypeError, "n must be"), (([["a"]], 1.0, 2), TypeError, "points"),
+    ],
+)
+def test_bad_arguments(arguments, kind, words):
+    with pytest.raises(kind, match=words):
+        hs.bricks(*arguments)
+
+
+def test_bad_boxes_and_other_points():
+    with pytest.raises(ValueError, match="vector 0 of box is zero"):
+        hs.bricks([[0.0]], 1.0, 2, box=[0.0])
+    part = hs.bricks(np.arange(10.0)[:, None], 1.0, 2)[0]
+    for bad in (np.zeros((3, 1)), np.zeros(10), np.zeros((11, 1))):
+        with pytest.raises(ValueError, match="points must have shape"):
+            part.pairs(bad)
+    with pytest.raises(ValueError, match="quantities"):
+        part.pairs(np.zeros((10, 1)), quantities="x")
