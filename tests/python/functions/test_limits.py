@@ -44,6 +44,9 @@ CHOOSES = {
     "several cutoffs": lambda **how: hs.count_pairs(POINTS, [1.0, 5.0], **how)[1],
     "verify": lambda **how: hs.verify(POINTS, 5.0, [], [], **how).n_expected,
     "clusters": lambda **how: 2 - len(hs.clusters(POINTS, 5.0, **how).sizes),
+    "bricks": lambda **how: sum(
+        part.count_pairs(POINTS, **how) for part in hs.bricks(POINTS, 5.0, 2)
+    ),
     "explain": lambda **how: hs.explain(POINTS, 5.0, measure=True, **how).measured["pairs"],
     "CellList.pairs": lambda **how: len(BALL.pairs(quantities="i", **how)),
     "CellList.iter_pairs": lambda **how: len([*CELLS.iter_pairs(5.0, quantities="i", **how)]),
