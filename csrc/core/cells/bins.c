@@ -53,9 +53,9 @@ add_index(const hs_grid *grid, int k, const double *HS_RESTRICT t, int64_t n,
     }
     const double bias = HS_GRID_BIAS * (double)grid->shape[k];
     for (int64_t i = 0; i < n; i++) {
-        const double   place = (t[i] - lower) * cells_per_length + bias;
-        const double   below = place < last ? place : last;
-        const double   cell = (double)(int32_t)(below > 0.0 ? below : 0.0);
+        const double place = (t[i] - lower) * cells_per_length + bias;
+        const double below = place < last ? place : last;
+        const double cell = (double)(int32_t)(below > 0.0 ? below : 0.0);
         /* Plus zero: t = -0 on a face at 0 is not before it, and the difference of these is -0. */
         const uint64_t beyond = hs_bits_of_double(t[i] - (lower + cell * size) + 0.0);
         id[i] += (uint32_t)((int32_t)cell - (int32_t)(beyond >> 63)) * stride; /* its sign */
