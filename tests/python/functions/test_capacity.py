@@ -214,7 +214,7 @@ def test_what_fails_otherwise_fails_as_it_does_without():
         raise KeyError("stop")
 
     with pytest.raises(KeyError, match="stop"):
-        hs.pairs(scene(30_000), 1.0, capacity=9, on_overflow="flag", progress=stop)
+        hs.pairs(scene(200_000), 1.0, capacity=9, on_overflow="flag", progress=stop)
 
 
 def test_arrays_are_of_the_caller():

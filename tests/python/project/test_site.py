@@ -16,6 +16,8 @@ DOCS = ROOT / "docs"
 FOLDERS = ["start", "recipes", "explanation", "reference", "systems"]
 NEEDED = ["sphinx", "numpydoc", "myst_nb", "furo", "ipykernel", "matplotlib", "numba", "ase"]
 NOTEBOOKS = [path for path in sorted(DOCS.rglob("*.md")) if "{code-cell}" in path.read_text()]
+#: What makes a cell of a notebook end with a figure.
+DRAWS = r"plt\.(figure|subplots)\(|\bplot_pairs\(|\.plot\("
 
 #: What newcomers ask -> where the start page sends them.
 QUESTIONS = {
@@ -59,7 +61,8 @@ def check_links(page):
 def check_outputs(page, source):
     text = page.read_text()
     assert "cell_output" in text, page
-    drawn = source.count("plt.figure(") + source.count("plt.subplots(")
+    cells = re.findall(r"```\{code-cell\} ipython3\n(.*?)```", source, re.DOTALL)
+    drawn = sum(bool(re.search(DRAWS, cell)) for cell in cells)
     assert len(re.findall(r"<img [^>]*_images/", text)) == drawn, page
 
 
