@@ -599,13 +599,14 @@ hs_status hs_cells_candidates(const hs_cells *cells, const hs_points *queries,
  * with another. All arrays are borrowed.
  */
 typedef struct hs_systems {
-    int64_t             n;         /* 0 <= n < 2^31 */
-    const int64_t      *first;     /* n + 1; from 0, not descending, to the number of points */
-    const hs_box       *box;       /* of all; NULL: open space */
-    const double       *rows;      /* n * ndim * ndim, in place of box->rows: of each; or NULL */
-    const double       *cutoffs;   /* n, in place of options->cutoff; or NULL */
-    const hs_reach     *reach;     /* of all points; the cutoffs are further limits; or NULL */
-    const hs_selection *selection; /* of all points; or NULL */
+    int64_t             n;           /* 0 <= n < 2^31 */
+    const int64_t      *first;       /* n + 1; from 0, not descending, to the number of points */
+    const hs_box       *box;         /* of all; NULL: open space */
+    const double       *rows;        /* n * ndim * ndim, in place of box->rows: of each; or NULL */
+    const double       *cutoffs;     /* n, in place of options->cutoff; or NULL */
+    const hs_reach     *reach;       /* of all points; the cutoffs are further limits; or NULL */
+    const hs_selection *selection;   /* of all points; or NULL */
+    const int64_t      *first_query; /* as first, of queries, where there are any; or NULL */
 } hs_systems;
 
 /*
@@ -620,6 +621,25 @@ hs_status hs_systems_find(const hs_points *points, const hs_systems *systems,
 /* The number of pairs of each system; counts: n, unspecified on failure. */
 hs_status hs_systems_count(const hs_points *points, const hs_systems *systems,
                            const hs_options *options, int64_t *counts, hs_failure *failure);
+
+/* As hs_neighbors_find, hs_neighbors_count and hs_nearest_find for one system after the other:
+ * rows of all points, or of all queries, with numbers among all. queries: NULL, or with
+ * systems->first_query. A selection has no query_numbers. */
+hs_status hs_systems_neighbors(const hs_points *points, const hs_points *queries,
+                               const hs_systems *systems, const hs_options *options,
+                               hs_pairs **rows, hs_failure *failure);
+hs_status hs_systems_coordination(const hs_points *points, const hs_points *queries,
+                                  const hs_systems *systems, const hs_options *options,
+                                  int64_t *counts, hs_failure *failure);
+hs_status hs_systems_nearest(const hs_points *points, const hs_points *queries,
+                             const hs_systems *systems, int64_t k, const hs_options *options,
+                             hs_pairs **rows, hs_failure *failure);
+
+/* As hs_pairs_histogram for one system after the other: marks are of all points or queries, counts
+ * and sums have n times as many entries. No cutoff is looked at; there is no reach. */
+hs_status hs_systems_histogram(const hs_points *points, const hs_points *queries,
+                               const hs_systems *systems, const hs_options *options,
+                               const hs_histogram *histogram, hs_failure *failure);
 
 /*
  * A list of pairs that is used for many steps: built with a skin, kept as long as no pair within

@@ -264,7 +264,7 @@ static int
 count_needed(const char *more, int n_letters)
 {
     int n = n_letters;
-    while (n > 0 && strchr("hgec", more[n - 1]) != NULL) {
+    while (n > 0 && strchr("hgecm", more[n - 1]) != NULL) {
         n--;
     }
     return n;
@@ -290,7 +290,7 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
     *options = hs_options_default();
     call->among = (hs_among){.points = NULL};
     call->letters = "ij";
-    call->out = call->room = NULL;
+    call->out = call->room = call->batch = NULL;
     call->capacity = 0;
     call->thread = NULL;
     if (!take_shared(arguments, call)) {
@@ -303,6 +303,7 @@ hs_py_call_take(hs_py_call *call, const char *name, const char *more, PyObject *
         queries = more[k] == 'R' || (more[k] == 'Q' && own[k] != Py_None) ? own[k] : queries;
         out = more[k] == 'o' && own[k] != Py_None ? own[k] : out;
         reach = more[k] == 'h' && own[k] != Py_None ? own[k] : reach;
+        call->batch = more[k] == 'm' && own[k] != Py_None ? own[k] : call->batch;
         shells = more[k] == 'e' && own[k] != Py_None ? own[k] : shells;
     }
     if (!take_shells(shells, options) || !take_scene(arguments[0], arguments[2], repeats, call) ||

@@ -31,6 +31,7 @@ typedef struct hs_py_call {
     bool           flag;
     int64_t        integer;
     double         real;
+    PyObject      *batch;    /* borrowed: what letter m is, for many_systems.h; or NULL */
     PyObject      *progress; /* borrowed; called with the fraction done, or NULL */
     PyThreadState *thread;   /* saved while the GIL is released, else NULL */
 } hs_py_call;
@@ -54,6 +55,7 @@ bool hs_expect_arguments(const char *name, Py_ssize_t n_arguments, int expected)
  *   g  name of an algorithm, which may be left out
  *   c  capacity: an int, negative where the number of pairs is returned too, and pairs that do not
  *      fit are no error; or None. Comes last, and may be left out
+ *   m  many systems: a tuple for many_systems.h, or None: comes behind these, and may be left out
  *
  * Returns false with an exception set, or without one where HS_PLAIN is set: see plain.h.
  */

@@ -2,9 +2,11 @@
 /* py_histogram.c: _core.histogram: pairs by distance, counted or weighted. */
 #include "py_functions.h"
 
+#include "many_systems.h"
 #include "convert.h"
-#include "py_call.h"
 #include "errors.h"
+
+#include <string.h>
 
 /* A C-contiguous array of this type and length; None, where that may be, leaves *data alone. */
 static bool
@@ -57,13 +59,16 @@ take_histogram(PyObject *const *more, const hs_py_call *call, hs_histogram *want
                       call->among.queries != NULL ? call->queries.n : 0, &wanted->of_queries);
 }
 
-/* Zeros of shape (n_types, n_types, n_edges); of float64 where there are weights. */
+/* Zeros of shape (n_types, n_types, n_edges), before these the systems if there is a batch; of
+ * float64 where there are weights. */
 static PyObject *
-new_result(hs_histogram *wanted)
+new_result(const hs_batch *batch, hs_histogram *wanted)
 {
     npy_intp   shape[3] = {wanted->n_types, wanted->n_types, (npy_intp)wanted->n_edges};
     const bool sums = wanted->of_points.weights != NULL || wanted->of_queries.weights != NULL;
-    PyObject  *array = PyArray_ZEROS(3, shape, sums ? NPY_DOUBLE : NPY_INT64, 0);
+    const int  type = sums ? NPY_DOUBLE : NPY_INT64;
+    PyObject  *array = batch->is_given ? hs_batch_zeros(batch, 3, shape, type)
+                                       : PyArray_ZEROS(3, shape, type, 0);
     if (array != NULL && sums) {
         wanted->sums = PyArray_DATA((PyArrayObject *)array);
     } else if (array != NULL) {
@@ -72,26 +77,58 @@ new_result(hs_histogram *wanted)
     return array;
 }
 
+/* The results of systems that have points stand one behind the other: moves each to the place of
+ * its number, the last one first. */
+static void
+spread(const hs_batch *batch, const hs_histogram *wanted)
+{
+    const size_t bytes = (size_t)wanted->n_types * (size_t)wanted->n_types *
+                         (size_t)wanted->n_edges * sizeof(int64_t);
+    char *data = wanted->sums != NULL ? (char *)wanted->sums : (char *)wanted->counts;
+    for (int64_t s = batch->systems.n - 1; batch->number != NULL && s >= 0; s--) {
+        if (batch->number[s] != s) {
+            memcpy(data + (size_t)batch->number[s] * bytes, data + (size_t)s * bytes, bytes);
+            memset(data + (size_t)s * bytes, 0, bytes);
+        }
+    }
+}
+
+/* False with an exception set. */
+static bool
+fill_result(hs_py_call *call, hs_batch *batch, const hs_histogram *wanted)
+{
+    hs_py_call_release(call);
+    const hs_status status =
+        batch->is_given ? hs_systems_histogram(&call->points, call->among.queries, &batch->systems,
+                                               &call->options, wanted, &call->failure)
+                        : hs_pairs_histogram(&call->among, &call->options, wanted, &call->failure);
+    hs_py_call_acquire(call);
+    if (status == HS_OK && batch->is_given) {
+        spread(batch, wanted);
+    }
+    hs_batch_forget_system(batch, &call->failure);
+    if (status != HS_OK) {
+        (void)hs_raise(status, &call->failure, &call->options);
+    }
+    return status == HS_OK;
+}
+
 PyObject *
 hs_py_histogram(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments)
 {
     hs_py_call   call;
     hs_histogram wanted;
+    hs_batch     batch;
     (void)module;
-    if (!hs_py_call_take(&call, "histogram", "afQiaaaagh", arguments, n_arguments) ||
-        !take_histogram(arguments + HS_CALL_ARGUMENTS, &call, &wanted)) {
+    if (!hs_py_call_take(&call, "histogram", "afQiaaaaghm", arguments, n_arguments) ||
+        !take_histogram(arguments + HS_CALL_ARGUMENTS, &call, &wanted) ||
+        !hs_batch_take_optional(&call, &batch)) {
         return NULL;
     }
-    PyObject *array = new_result(&wanted);
-    if (array == NULL) {
-        return NULL;
+    PyObject *array = new_result(&batch, &wanted);
+    if (array != NULL && !fill_result(&call, &batch, &wanted)) {
+        Py_CLEAR(array);
     }
-    hs_py_call_release(&call);
-    const hs_status status = hs_pairs_histogram(&call.among, &call.options, &wanted, &call.failure);
-    hs_py_call_acquire(&call);
-    if (status != HS_OK) {
-        Py_DECREF(array);
-        return hs_raise(status, &call.failure, &call.options);
-    }
+    hs_batch_free(&batch);
     return array;
 }

@@ -2,7 +2,7 @@
 /* py_nearest.c: _core.nearest. */
 #include "py_functions.h"
 
-#include "py_call.h"
+#include "many_systems.h"
 #include "errors.h"
 
 #include <math.h>
@@ -36,18 +36,27 @@ hs_py_nearest(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argumen
 {
     hs_py_call call;
     hs_pairs  *rows = NULL;
+    hs_batch   batch;
     (void)module;
-    if (!hs_py_call_take(&call, "nearest", "rbQi", arguments, n_arguments)) {
+    if (!hs_py_call_take(&call, "nearest", "rbQim", arguments, n_arguments)) {
         return NULL;
     }
     if (call.integer < 1) {
         PyErr_SetString(PyExc_ValueError, "k must be 1 or more");
         return NULL;
     }
+    if (!hs_batch_take_optional(&call, &batch)) {
+        return NULL;
+    }
     hs_py_call_release(&call);
     const hs_status status =
-        hs_nearest_find(&call.among, call.integer, &call.options, &rows, &call.failure);
+        batch.is_given
+            ? hs_systems_nearest(&call.points, call.among.queries, &batch.systems, call.integer,
+                                 &call.options, &rows, &call.failure)
+            : hs_nearest_find(&call.among, call.integer, &call.options, &rows, &call.failure);
     hs_py_call_acquire(&call);
+    hs_batch_forget_system(&batch, &call.failure);
+    hs_batch_free(&batch);
     return status == HS_ERR_MEMORY ? raise_memory(&call.failure)
                                    : hs_py_call_pairs(&call, status, rows);
 }

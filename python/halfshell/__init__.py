@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from halfshell._check.verify import Verdict, verify
     from halfshell._functions.bricks import bricks
     from halfshell._functions.clusters import clusters
+    from halfshell._functions.coordination import coordination
     from halfshell._functions.explain import Explanation, explain
     from halfshell._functions.histogram import pair_histogram
     from halfshell._functions.measure import measure
     from halfshell._functions.nearest import nearest
-    from halfshell._functions.neighbors import coordination, neighbors
+    from halfshell._functions.neighbors import neighbors
     from halfshell._functions.plot_pairs import plot_pairs
     from halfshell._functions.rdf import rdf
     from halfshell._functions.report import report
@@ -109,7 +110,7 @@ _LATER = {
     "VerletList": "_objects.verlet_list",
     "bricks": "_functions.bricks",
     "clusters": "_functions.clusters",
-    "coordination": "_functions.neighbors",
+    "coordination": "_functions.coordination",
     "explain": "_functions.explain",
     "for_each_pair": "_functions.stream",
     "get_include": "_include",

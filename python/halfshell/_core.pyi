@@ -27,21 +27,27 @@ _Reach = tuple[
 ] | None  # fmt: skip
 # Functions that return arrays go on with quantities, sort, index_bytes, out.
 _Result = tuple[str, bool, int, Any]
-# Those for many systems go on with batch, cutoffs, boxes.
-_Batch = tuple[npt.NDArray[np.int64], _Floats | None, _Floats | None]
+# Many systems: batch, cutoffs, boxes, and the batch of queries, all but the first of which may be
+# None. Functions that take them as one tuple have it at their very end.
+_Batch = tuple[
+    npt.NDArray[np.int64], _Floats | None, _Floats | None, npt.NDArray[np.int64] | None
+]
 # Functions that find pairs may have a capacity at their very end, negative where the number of
 # pairs is returned as well.
 _Room = tuple[int | None, ...]
+_Last = tuple[_Batch | None, ...]
 
 def pairs(
     *arguments: *tuple[*_Search, *_Result, _Reach, str, _Floats | None, *_Room]
 ) -> _Arrays: ...
 def count_pairs(*arguments: *tuple[*_Search, _Reach, str]) -> int: ...
 def pairs_between(
-    *arguments: *tuple[*_Search, *_Result, _Queries, _Reach, str, *_Room]
+    *arguments: *tuple[*_Search, *_Result, _Queries, _Reach, str, *tuple[Any, ...]]
 ) -> _Arrays: ...
 def count_between(*arguments: *tuple[*_Search, _Queries, _Reach, str]) -> int: ...
-def coordination(*arguments: *tuple[*_Search, _Queries, _Reach, str]) -> npt.NDArray[np.int64]: ...
+def coordination(
+    *arguments: *tuple[*_Search, _Queries, _Reach, str, *_Last]
+) -> npt.NDArray[np.int64]: ...
 def batch_pairs(
     *arguments: *tuple[*_Search, *_Result, *_Batch, _Reach, str, *_Room]
 ) -> _Arrays: ...
@@ -49,7 +55,7 @@ def batch_count(*arguments: *tuple[*_Search, *_Batch, _Reach, str]) -> npt.NDArr
 
 # quantities, index_bytes, queries -> offsets first
 def neighbors(
-    *arguments: *tuple[*_Search, str, int, _Queries, _Reach, str]
+    *arguments: *tuple[*_Search, str, int, _Queries, _Reach, str, *_Last]
 ) -> tuple[npt.NDArray[Any], ...]: ...
 
 # quantities, index_bytes, max_pairs; last the cutoffs of shells -> a PairBlocks
@@ -70,7 +76,7 @@ def histogram(
     *arguments: *tuple[
         *_Search, _Floats, bool, _Queries, int,
         npt.NDArray[np.int32] | None, _Floats | None, npt.NDArray[np.int32] | None, _Floats | None,
-        str, *tuple[_Reach, ...],
+        str, *tuple[Any, ...],
     ]
 ) -> npt.NDArray[Any]: ...  # fmt: skip
 
@@ -146,7 +152,7 @@ def measure(
         *_Search, str, npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64] | None
     ]
 ) -> _Arrays: ...
-def nearest(*arguments: *tuple[*_Search, str, int, _Queries, int]) -> _Arrays: ...
+def nearest(*arguments: *tuple[*_Search, str, int, _Queries, int, *_Last]) -> _Arrays: ...
 def verlet_new() -> Any: ...  # a capsule, which comes before the arguments of a search
 
 # skin, rebuild

@@ -5,15 +5,6 @@
 #include "../collect/parallel.h"
 #include "../histogram/tally.h"
 
-static hs_status
-check_histogram(const hs_histogram *histogram, hs_failure *failure)
-{
-    if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
-        return HS_ERR_ARGUMENT;
-    }
-    return hs_check_lengths(histogram->edges, histogram->n_edges, failure);
-}
-
 /* What the threads share. */
 typedef struct counting {
     hs_search          *search;
@@ -138,7 +129,7 @@ static hs_status
 find_histogram(const hs_among *among, const hs_options *options, const hs_histogram *histogram,
                hs_failure *failure)
 {
-    const hs_status status = options != NULL ? check_histogram(histogram, failure)
+    const hs_status status = options != NULL ? hs_check_histogram(histogram, failure)
                                              : HS_ERR_ARGUMENT;
     if (status != HS_OK) {
         hs_clear_counters(options);

@@ -67,12 +67,8 @@ hs_nearest_find(const hs_among *among, int64_t k, const hs_options *options, hs_
         return hs_end_early(HS_ERR_ARGUMENT, options, failure);
     }
     sets->is_plain = sets->is_wide = true;
-    hs_options of_rows = *options;
-    of_rows.sorted = false;
-    of_rows.out = NULL;
-    of_rows.precision = HS_EXACT;
-    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    hs_pairs *rows = hs_pairs_begin(&of_rows, &failure);
+    const hs_options of_rows = hs_options_of_nearest(options);
+    hs_pairs        *rows = hs_pairs_begin(&of_rows, &failure);
     if (rows == NULL) {
         return HS_ERR_MEMORY;
     }

@@ -1,61 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* api_systems.c: the public searches of many systems: find and count. Threads take ranges of
  * them. */
-#include "by_reach.h"
 #include "../search/choice.h"
 #include "../search/estimate.h"
-#include "../collect/result.h"
 #include "../box/lattice.h"
+#include "request.h"
+#include "systems_check.h"
 #include "systems_thread.h"
 
 #include <math.h>
-
-/* What all systems share is checked also where there are none. */
-static hs_status
-check_shared(const hs_systems_job *job, hs_failure *failure)
-{
-    const hs_points  *points = job->points;
-    const hs_systems *systems = job->systems;
-    const hs_options *options = &job->total->options;
-    const hs_box     *box = systems != NULL ? systems->box : NULL;
-    hs_status         status = hs_check_arguments(points, NULL, box, options, failure);
-    if (status == HS_OK) {
-        status = hs_check_systems(systems, points->n, failure);
-    }
-    if (status != HS_OK) {
-        return status;
-    }
-    if (job->total->kernel == NULL) {
-        return HS_ERR_KERNEL;
-    }
-    if (systems->reach != NULL) {
-        /* Limits of each system are looked at with it. */
-        hs_options       without = *options;
-        const hs_request request = {
-            .sets.points = points, .options = &without, .reach = systems->reach};
-        without.cutoff = systems->cutoffs != NULL ? 0.0 : options->cutoff;
-        status = hs_by_reach_check(&request, failure);
-    } else if (systems->cutoffs == NULL && !(options->cutoff >= 0.0 && isfinite(options->cutoff))) {
-        failure->value = options->cutoff;
-        status = HS_ERR_CUTOFF;
-    }
-    if (status != HS_OK) {
-        return status;
-    }
-    return systems->rows == NULL ? hs_box_check(systems->box, failure) : HS_OK;
-}
-
-/* Each thread has an account of its own: together they must not pass the limit of the call. */
-static void
-share_limit(hs_options *options, int n_threads)
-{
-    if (n_threads > 1 && options->find_limit != NULL) {
-        options->memory_limit =
-            fmin(options->memory_limit, options->find_limit(options->find_context));
-        options->find_limit = NULL;
-    }
-    options->memory_limit /= n_threads;
-}
 
 /* What a search that was refused memory would have taken, all systems together. */
 static void
@@ -64,14 +17,22 @@ tell_shortage(const hs_systems_job *job, hs_failure *failure)
     const hs_call *total = job->total;
     hs_shortage    shortage = {0.0, 0.0};
     for (int64_t s = 0; s < job->systems->n; s++) {
-        hs_box        own_box;
-        hs_points     points;
-        const hs_box *box = hs_systems_take(job, s, &points, &own_box);
-        const double  cutoff = job->systems->cutoffs != NULL ? job->systems->cutoffs[s]
-                                                             : total->options.cutoff;
+        hs_box          own_box;
+        const hs_points points = hs_points_of_system(job->points, job->systems->first, s);
+        const hs_box   *box = hs_box_of_system(job->systems, points.ndim, s, &own_box);
+        const double    cutoff = hs_cutoff_of_system(job->systems, s, total->options.cutoff);
         hs_shortage_add(&points, box, cutoff, &shortage);
     }
     hs_shortage_tell(&shortage, &total->options, job->points->ndim, total->account.limit, failure);
+}
+
+static hs_status
+check_arguments(const hs_systems_job *job, hs_failure *failure)
+{
+    const hs_system_sets sets = {.points = job->points, .systems = job->systems};
+    const hs_status      status = hs_systems_check(&sets, job->total, failure);
+    return status == HS_OK ? hs_systems_check_limit(&sets, false, &job->total->options, failure)
+                           : status;
 }
 
 /* Which pairs count. Boxes are looked at with their systems. */
@@ -98,7 +59,7 @@ search_systems(hs_systems_job *job, hs_failure *failure)
         const int n_threads = hs_call_threads((double)job->points->n, options);
         const int most = job->systems->n < n_threads ? (int)job->systems->n : n_threads;
         total->team = hs_team_create(most);
-        share_limit(&total->options, hs_team_size(total->team));
+        hs_share_limit(&total->options, hs_team_size(total->team));
         status = hs_systems_search(job, failure);
     }
     hs_choice_close(total);
@@ -127,7 +88,7 @@ hs_systems_find(const hs_points *points, const hs_systems *systems, const hs_opt
     }
     hs_systems_job job = {
         .points = points, .systems = systems, .total = &pairs->call, .output = &pairs->output};
-    hs_status status = check_shared(&job, failure);
+    hs_status status = check_arguments(&job, failure);
     if (status == HS_OK) {
         hs_pairs_open(pairs, points->ndim);
         status = search_systems(&job, failure);
@@ -148,7 +109,7 @@ hs_systems_count(const hs_points *points, const hs_systems *systems, const hs_op
     }
     const hs_options counting = hs_options_of_count(options);
     failure = hs_call_enter(&counting, failure, &total);
-    hs_status status = check_shared(&job, failure);
+    hs_status status = check_arguments(&job, failure);
     if (status == HS_OK) {
         status = search_systems(&job, failure);
     }

@@ -182,6 +182,15 @@ hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure)
     return HS_OK;
 }
 
+hs_status
+hs_check_histogram(const hs_histogram *histogram, hs_failure *failure)
+{
+    if (histogram == NULL || histogram->edges == NULL || histogram->n_types < 1) {
+        return HS_ERR_ARGUMENT;
+    }
+    return hs_check_lengths(histogram->edges, histogram->n_edges, failure);
+}
+
 double
 hs_least_length(const double *lengths, int64_t n)
 {

@@ -47,6 +47,9 @@ hs_status hs_check_options(const hs_options *options);
 /* HS_OK, or HS_ERR_EDGES unless there are some, finite, not negative and not descending. */
 hs_status hs_check_lengths(const double *lengths, int64_t n, hs_failure *failure);
 
+/* HS_OK, HS_ERR_ARGUMENT, or HS_ERR_EDGES. */
+hs_status hs_check_histogram(const hs_histogram *histogram, hs_failure *failure);
+
 /* The first of such lengths that is above 0, or 0. */
 double hs_least_length(const double *lengths, int64_t n);
 

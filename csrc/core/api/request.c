@@ -128,6 +128,17 @@ hs_pairs_begin(const hs_options *options, hs_failure **failure)
 }
 
 hs_options
+hs_options_of_nearest(const hs_options *options)
+{
+    hs_options of_rows = *options;
+    of_rows.sorted = false;
+    of_rows.out = NULL;
+    of_rows.precision = HS_EXACT;
+    of_rows.want &= HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+    return of_rows;
+}
+
+hs_options
 hs_options_of_count(const hs_options *options)
 {
     hs_options counting = *options;

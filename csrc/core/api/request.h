@@ -58,6 +58,9 @@ hs_pairs *hs_pairs_begin(const hs_options *options, hs_failure **failure);
 /* These options for a search that only counts. */
 hs_options hs_options_of_count(const hs_options *options);
 
+/* These options for a search of nearest points, as far as they count there. */
+hs_options hs_options_of_nearest(const hs_options *options);
+
 /* A search whose pairs the caller gets, to be freed by hs_pairs_free; NULL on failure. */
 hs_status hs_request_fill(const hs_request *request, hs_fill_fn fill, hs_pairs **result,
                           hs_failure *failure);

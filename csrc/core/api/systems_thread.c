@@ -3,6 +3,8 @@
  * turn. */
 #include "systems_thread.h"
 
+#include "system_part.h"
+
 #include "../search/choice.h"
 #include "../search/estimate.h"
 #include "../search/form.h"
@@ -43,28 +45,6 @@ typedef struct worker {
     hs_output             found; /* pairs of one system before they are sorted */
     int64_t               work;  /* since the last poll */
 } worker;
-
-const hs_box *
-hs_systems_take(const hs_systems_job *job, int64_t s, hs_points *points, hs_box *own_box)
-{
-    const hs_systems *systems = job->systems;
-    const int64_t     first = systems->first[s];
-    const int         d = job->points->ndim;
-    *points = *job->points;
-    points->n = systems->first[s + 1] - first;
-    if (points->n > 0) { /* without points there is no first row */
-        points->data = (const char *)points->data + first * points->row_stride;
-    }
-    if (systems->box == NULL || systems->rows == NULL) {
-        return systems->box;
-    }
-    for (int l = 0; l < d; l++) {
-        own_box->periodic[l] = systems->box->periodic[l];
-        memcpy(own_box->rows[l], systems->rows + (s * d + l) * d, (size_t)d * sizeof(double));
-    }
-    own_box->ndim = d;
-    return own_box;
-}
 
 /* Makes the scene of a system ready; its points keep their numbers among the points of all
  * systems. */
@@ -156,13 +136,8 @@ static hs_status
 reach_of(const worker *me, int64_t s, hs_reach *reach, double *bound, hs_failure *failure)
 {
     const hs_systems *systems = me->job->systems;
-    const int64_t     first = systems->first[s];
-    *reach = *systems->reach;
-    *bound = systems->cutoffs != NULL ? systems->cutoffs[s] : me->job->total->options.cutoff;
-    const int d = me->job->points->ndim;
-    reach->supports = reach->supports != NULL ? reach->supports + first * d * d : NULL;
-    reach->radii = reach->radii != NULL ? reach->radii + first : NULL;
-    reach->types = reach->types != NULL ? reach->types + first : NULL;
+    *reach = hs_reach_of_system(systems, me->job->points->ndim, s);
+    *bound = hs_cutoff_of_system(systems, s, me->job->total->options.cutoff);
     if (!(*bound >= 0.0) || (reach->n_types > 0 && !isfinite(*bound))) {
         failure->value = *bound;
         return HS_ERR_CUTOFF;
@@ -265,8 +240,9 @@ search_system(worker *me, int64_t s)
 {
     const hs_systems_job *job = me->job;
     const int64_t         before = me->call.done.candidates;
-    hs_points             points;
-    const hs_box         *box = hs_systems_take(job, s, &points, &me->box);
+    const hs_systems     *systems = job->systems;
+    const hs_points       points = hs_points_of_system(job->points, systems->first, s);
+    const hs_box         *box = hs_box_of_system(systems, points.ndim, s, &me->box);
     me->found.n_pairs = 0;
     if (job->output == NULL) {
         job->counts[s] = 0;

@@ -20,10 +20,6 @@ typedef struct hs_systems_job {
     bool              is_direct; /* the one thread writes to the output itself; set there, too */
 } hs_systems_job;
 
-/* The points of system s and its box: own_box, if each has its own. */
-const hs_box *hs_systems_take(const hs_systems_job *job, int64_t s, hs_points *points,
-                              hs_box *own_box);
-
 /* Searches all systems, by the team of `total`. */
 hs_status hs_systems_search(hs_systems_job *job, hs_failure *failure);
 

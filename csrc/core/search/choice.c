@@ -82,34 +82,15 @@ transpose(const row_list *from, int64_t n_from, int64_t n_to, row_list *to)
 }
 
 static hs_status
-check_excluded(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-               hs_failure *failure)
+open_partners(const hs_selection *selection, const hs_sets *sets, hs_call *call, hs_choice *choice)
 {
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        const int64_t i = number_in(selection, e, 0), j = number_in(selection, e, 1);
-        if (i < 0 || i >= n_asking || j < 0 || j >= n_points) {
-            failure->row = e;
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    return HS_OK;
-}
-
-static hs_status
-open_partners(const hs_selection *selection, const hs_sets *sets, hs_call *call, hs_choice *choice,
-              hs_failure *failure)
-{
-    const int64_t   n_points = sets->points->n;
-    const int64_t   n_asking = choice->has_queries ? sets->queries->n : n_points;
-    hs_account     *account = &call->account;
-    const int       n_ways = choice->has_queries ? 1 : 2;
-    const int64_t   n_numbers = selection->n_excluded * n_ways;
-    row_list        by_second = {NULL, NULL}, rows = {NULL, NULL};
-    const hs_status status = check_excluded(selection, n_asking, n_points, failure);
-    if (status != HS_OK) {
-        return status;
-    }
-    const bool is_open = open_rows(account, n_asking, n_numbers, &rows) &&
+    const int64_t n_points = sets->points->n;
+    const int64_t n_asking = choice->has_queries ? sets->queries->n : n_points;
+    hs_account   *account = &call->account;
+    const int     n_ways = choice->has_queries ? 1 : 2;
+    const int64_t n_numbers = selection->n_excluded * n_ways;
+    row_list      by_second = {NULL, NULL}, rows = {NULL, NULL};
+    const bool    is_open = open_rows(account, n_asking, n_numbers, &rows) &&
                          open_rows(account, n_points, n_numbers, &by_second);
     if (is_open) {
         fill_by_second(selection, n_ways, n_points, &by_second);
@@ -242,6 +223,31 @@ is_sound(const hs_selection *selection, const hs_sets *sets, const hs_options *o
            has_both(selection->labels, selection->query_labels, sets, are_points);
 }
 
+static hs_status
+check_excluded(const hs_selection *selection, int64_t n_asking, int64_t n_points,
+               hs_failure *failure)
+{
+    for (int64_t e = 0; e < selection->n_excluded; e++) {
+        const int64_t i = number_in(selection, e, 0), j = number_in(selection, e, 1);
+        if (i < 0 || i >= n_asking || j < 0 || j >= n_points) {
+            failure->row = e;
+            return HS_ERR_ARGUMENT;
+        }
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_selection_check(const hs_selection *selection, const hs_sets *sets, const hs_options *options,
+                   hs_failure *failure)
+{
+    const bool has_queries = sets->queries != NULL && selection->query_numbers == NULL;
+    return is_sound(selection, sets, options)
+               ? check_excluded(selection, has_queries ? sets->queries->n : sets->points->n,
+                                sets->points->n, failure)
+               : HS_ERR_ARGUMENT;
+}
+
 hs_status
 hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                hs_failure *failure)
@@ -249,8 +255,9 @@ hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call
     if (selection == NULL) {
         return HS_OK;
     }
-    if (!is_sound(selection, sets, &call->options)) {
-        return HS_ERR_ARGUMENT;
+    hs_status status = hs_selection_check(selection, sets, &call->options, failure);
+    if (status != HS_OK) {
+        return status;
     }
     const bool has_queries = sets->queries != NULL && selection->query_numbers == NULL;
     hs_choice *choice = hs_alloc(&call->account, HS_FOR_CANDIDATES, 1, sizeof *choice);
@@ -269,8 +276,7 @@ hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call
         .shortest = INFINITY,
     };
     call->choice = choice;
-    const hs_status status =
-        selection->n_excluded > 0 ? open_partners(selection, sets, call, choice, failure) : HS_OK;
+    status = selection->n_excluded > 0 ? open_partners(selection, sets, call, choice) : HS_OK;
     if (status != HS_OK) {
         hs_choice_close(call);
     }

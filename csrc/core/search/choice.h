@@ -32,11 +32,15 @@ typedef struct hs_choice {
     hs_image_box images;
 } hs_choice;
 
+/* HS_OK, or HS_ERR_ARGUMENT for arrays that are missing, numbers that are no point's
+ * (failure->row), or a min_distance that is negative or not finite, or not 0 with HS_SINGLE. */
+hs_status hs_selection_check(const hs_selection *selection, const hs_sets *sets,
+                             const hs_options *options, hs_failure *failure);
+
 /*
  * Sets call->choice for searches among these sets, to be freed with hs_choice_close; selection NULL
- * leaves it as it is. HS_ERR_ARGUMENT for arrays that are missing, numbers that are no point's
- * (failure->row), or a min_distance that is negative or not finite, or not 0 with HS_SINGLE;
- * HS_ERR_MEMORY. On failure there is none.
+ * leaves it as it is. Any status of hs_selection_check, or HS_ERR_MEMORY. On failure there is
+ * none.
  */
 hs_status hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call,
                          hs_failure *failure);

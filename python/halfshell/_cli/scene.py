@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from halfshell._cli.files import InputError, Scene, missing_extra, read_scene
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._functions.rdf import over_ideal_gas, shell_shares, unit_ball
+from halfshell._functions.ideal_gas import over_ideal_gas, shell_shares, unit_ball
 from halfshell._terminal import printable
 
 __all__ = [

@@ -11,32 +11,41 @@ import numpy as np
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import is_a
 from halfshell._convert.given import Chosen, Given, Sets
-from halfshell._convert.memory import refuse_large
-from halfshell._convert.scene import as_points, as_scene, brings_its_box, vectors_of
+from halfshell._convert.memory import refuse_large, refuse_unavailable
+from halfshell._convert.scene import (
+    as_points,
+    as_queries,
+    as_scene,
+    brings_its_box,
+    vectors_of,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import FloatArray, PointArray, Reach
+    from halfshell._convert.types import FloatArray, PointArray, Reach, Systems
 
     # What all systems share: points; the cutoff of all, or 0; the box of all, or any of the right
     # shape; periodic bits.
     Scene = tuple[PointArray, float, FloatArray | None, int]
 
-    # What each system has of its own: numbers, one a point; cutoffs and boxes, one a system.
-    Systems = tuple[npt.NDArray[np.int64], FloatArray | None, FloatArray | None]
+_MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 
 
-def as_numbers(values: Any, n: int) -> npt.NDArray[np.int64]:
+def as_numbers(
+    values: Any, n: int, name: str = "batch", of_each: str = "point"
+) -> npt.NDArray[np.int64]:
     """System numbers as int64; whether they ascend is checked in the core."""
-    array = as_array(values, "batch", "hold integers")
+    array = as_array(values, name, "hold integers")
     if array.shape != (n,):
-        raise ValueError(f"batch must have shape ({n},), one number a point, got {array.shape}")
+        raise ValueError(
+            f"{name} must have shape ({n},), one number a {of_each}, got {array.shape}"
+        )
     if array.dtype.kind not in "iu" and n > 0:
-        raise TypeError(f"batch must hold integers, got dtype {array.dtype}")
+        raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
     if array.dtype == np.uint64:
         for k in np.flatnonzero(array >= np.uint64(2**62)):
-            raise ValueError(f"batch must be less than 2**62, got batch[{k}] = {array[k]}")
+            raise ValueError(f"{name} must be less than 2**62, got {name}[{k}] = {array[k]}")
     return in_order(array, np.int64)
 
 
@@ -96,21 +105,39 @@ def _as_cutoffs(value: Any) -> tuple[float, FloatArray | None]:
 
 
 def _as_limits(
-    cutoff: Any, given: Given, points: Any, n: int, ndim: int
+    cutoff: Any, given: Given, sets: Sets, directed: bool
 ) -> tuple[float, FloatArray | None, Reach | None]:
     """The cutoff of all systems, or one a system; and the reach of each pair, or None."""
     if given.is_nothing and not is_a(cutoff, Mapping):
         return *_as_cutoffs(cutoff), None
     from halfshell._convert.reach import as_reach  # here: plain searches do without
 
-    sets = Sets(points, None, n, None, ndim)
-    has_own = given.radii is not None or given.supports is not None or given.extent is not None
-    if cutoff is None or not has_own:
-        largest, reach = as_reach(cutoff, given, sets, directed=False)
+    of_types = given.types is not None or given.query_types is not None
+    if cutoff is None or of_types or is_a(cutoff, Mapping):
+        largest, reach = as_reach(cutoff, given, sets, directed)
         return largest, None, reach
     one, cutoffs = _as_cutoffs(cutoff)
-    largest, reach = as_reach(one if cutoffs is None else None, given, sets, directed=False)
+    largest, reach = as_reach(one if cutoffs is None else None, given, sets, directed)
     return largest, cutoffs, reach
+
+
+def _as_queries(
+    queries: Any, numbers: Any, points: PointArray
+) -> tuple[PointArray | None, npt.NDArray[np.int64] | None]:
+    """Queries, and the system of each."""
+    if (queries is None) != (numbers is None):
+        raise ValueError("with batch, queries and query_batch must be given together")
+    if queries is None:
+        return None, None
+    array, own = as_queries(queries, ndim=points.shape[1])
+    if own is not None:
+        raise ValueError("with batch, queries must be an array: box is that of the points")
+    if array.shape[1] != points.shape[1]:
+        raise ValueError(
+            "queries and points must have the same number of columns, got shapes "
+            f"{array.shape} and {points.shape}"
+        )
+    return array, as_numbers(numbers, len(array), "query_batch", "query")
 
 
 def as_systems(
@@ -122,11 +149,20 @@ def as_systems(
     given: Given,
     chosen: Chosen | None = None,
     precision: Any = "exact",
-) -> tuple[Scene, Systems, Reach | None]:
-    """Everything that makes up the systems, in the order of the core's arguments."""
+    queries: Any = None,
+    query_batch: Any = None,
+    directed: bool = False,
+) -> tuple[Scene, Systems, Reach | None, PointArray | None]:
+    """Everything that makes up the systems, as the core takes it, and the queries or None.
+
+    directed: the result has a direction, so that rules may have one.
+    """
     array, vectors, bits, boxes = _scene(points, box, periodic)
     numbers = as_numbers(batch, array.shape[0])
-    one, cutoffs, reach = _as_limits(cutoff, given, points, *array.shape)
+    asking, of_queries = _as_queries(queries, query_batch, array)
+    n, q = len(array), None if asking is None else len(asking)
+    sets = Sets(points, queries, n, q, array.shape[1])
+    one, cutoffs, reach = _as_limits(cutoff, given, sets, directed)
     if boxes is not None and cutoffs is not None and len(boxes) != len(cutoffs):
         raise ValueError(
             "box and cutoff must be given for the same number of systems, got "
@@ -135,5 +171,27 @@ def as_systems(
     if chosen is not None and not chosen.is_nothing:
         from halfshell._convert.selection import with_selection  # here: others do without
 
-        reach = with_selection(reach, chosen, len(array), None, precision)
-    return (array, one, vectors, bits), (numbers, cutoffs, boxes), reach
+        reach = with_selection(reach, chosen, n, q, precision)
+    return (array, one, vectors, bits), (numbers, cutoffs, boxes, of_queries), reach, asking
+
+
+def check_no_batch(query_batch: Any) -> None:
+    """ValueError for systems of queries alone."""
+    if query_batch is not None:
+        raise ValueError("query_batch needs batch")
+
+
+def refuse_indices(indices: Any) -> None:
+    """ValueError for rows of some points, which are found in one system."""
+    if indices is not None:
+        raise ValueError("indices does not go with batch")
+
+
+def refuse_many(own: Systems) -> None:
+    """MemoryError before results of more systems than memory holds; the core checks all else."""
+    numbers, cutoffs, boxes, _ = own
+    if cutoffs is not None or boxes is not None or len(numbers) == 0:
+        return
+    last = int(numbers[-1])
+    if _MANY_SYSTEMS < last < 2**62 and bool((numbers[1:] >= numbers[:-1]).all()):
+        refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")

@@ -13,7 +13,7 @@ from halfshell._convert.arrays import as_array, as_real_array, one_each
 from halfshell._convert.foreign import of_argument
 from halfshell._convert.labels import as_labels
 from halfshell._convert.memory import refuse_unavailable
-from halfshell._convert.types import Algorithm, FloatArray, PointArray, Reach, Search
+from halfshell._convert.types import Algorithm, FloatArray, PointArray, Reach, Search, Systems
 
 # The counts of one thread, of two numbers for each bin; their sum; and the result.
 _COPIES = 4
@@ -90,6 +90,16 @@ def as_named_marks(
     return marks, names
 
 
+def number_of(systems: Systems) -> int:
+    """How many there are: those with a box or cutoff, or up to the largest number."""
+    numbers, cutoffs, boxes, of_queries = systems
+    for own in (cutoffs, boxes):
+        if own is not None:
+            return len(own)
+    last = [int(one[-1]) for one in (numbers, of_queries) if one is not None and len(one)]
+    return 1 + max(last, default=-1)
+
+
 def binned(
     search: Search,
     edges: FloatArray,
@@ -98,18 +108,24 @@ def binned(
     name: str = "edges[-1]",
     algorithm: Algorithm = "auto",
     selection: Reach | None = None,
+    systems: Systems | None = None,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """The histogram of points or cells, given as the first arguments of every search.
 
     name: what a message calls the largest distance. selection: which pairs count, without a reach.
+    systems: of a batch, which the histogram then has an axis for, the first one.
     """
+    n_systems = 1 if systems is None else number_of(systems)
     refuse_unavailable(
-        _COPIES * 8 * marks.n_types**2 * len(edges),
-        f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types",
+        _COPIES * 8 * n_systems * marks.n_types**2 * len(edges),
+        f"counts for {len(edges) - 1} bins between edges and {marks.n_types}**2 pairs of types"
+        + ("" if systems is None else f" of {n_systems} systems"),
     )
     with of_argument(name):
         # CPython 3.11 keeps the tuple of 20 arguments, of which this would be one.
-        end = (algorithm,) if selection is None else (algorithm, selection)
+        end: Any = (algorithm,) if selection is None else (algorithm, selection)
+        if systems is not None:
+            end = (algorithm, selection, systems)
         found = _core.histogram(*(*search, edges, True, queries, *marks, *end))
     # What the core counts first are the pairs closer than the first edge.
-    return np.ascontiguousarray(found[0, 0, 1:] if marks.types is None else found[:, :, 1:])
+    return np.ascontiguousarray(found[..., 0, 0, 1:] if marks.types is None else found[..., 1:])

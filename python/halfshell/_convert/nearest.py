@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from halfshell._convert.foreign import shown
+import numpy as np
+
+from halfshell._convert.arrays import as_real_array
+from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.lengths import as_number
 from halfshell._convert.options import as_count
 from halfshell._convert.types import Arrays
@@ -27,6 +30,24 @@ def as_max_distance(value: Any) -> float:
     if not number >= 0.0:
         raise ValueError(f"max_distance must not be negative or NaN, got {number}")
     return number
+
+
+def check_max_distances(values: Any) -> Any:
+    """One for all systems or one a system, which are returned: as cutoffs they are converted."""
+    if is_a(values, float):
+        return as_max_distance(values)
+    array = as_real_array(values, "max_distance", "be a number")
+    if array.ndim == 0:
+        return as_max_distance(values)
+    if array.ndim > 1:
+        raise ValueError(
+            f"max_distance must be a number or, one a system, have shape (s,), got {array.shape}"
+        )
+    for s in np.flatnonzero(~(array >= 0.0)):
+        raise ValueError(
+            f"max_distance must not be negative or NaN, got max_distance[{s}] = {array[s]}"
+        )
+    return array
 
 
 def in_rows(arrays: Arrays, n_rows: int, k: int) -> Arrays:

@@ -42,6 +42,12 @@ _Labels = npt.NDArray[np.int64] | None
 Selection = tuple[_Labels, _Labels, _Labels, _Labels, _Labels, int, _Labels, float]
 
 # What the core takes from `inclusive` to `threads`.
+# What each system of a batch has of its own: numbers, one a point; cutoffs and boxes, one a
+# system; numbers of the queries, where there are any.
+Systems = tuple[
+    npt.NDArray[np.int64], FloatArray | None, FloatArray | None, npt.NDArray[np.int64] | None
+]
+
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
 
 # The first arguments of all its searches: points, cutoff, box and periodic before these, or cells
@@ -169,6 +175,8 @@ class BetweenOptions(ReachOptions, total=False):
     index_dtype: npt.DTypeLike
     out: Out | None
     capacity: int | None
+    batch: npt.ArrayLike | None
+    query_batch: npt.ArrayLike | None
 
 
 class CountOptions(SearchOptions, total=False):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 
 from halfshell import _core
+from halfshell._convert.batch import as_systems, check_no_batch
 from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import AUTO, RAISE, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
@@ -107,6 +108,8 @@ def pairs_between(
     query_exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
     min_distance: float | None = None,
+    batch: npt.ArrayLike | None = None,
+    query_batch: npt.ArrayLike | None = None,
 ) -> Arrays | tuple[Any, ...]:
     """Find every pair of a query and a point within a cutoff.
 
@@ -143,6 +146,12 @@ def pairs_between(
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
         Labels of the queries, beside those of the points. Pairs of numbers in `exclude` are
         of a query and a point.
+    batch : array_like of int, shape (n,), optional
+        Many systems in one call, as in `pairs`: the system of each point, ascending. Neighbours are
+        of the same system, and the result is that of one call for each system, in ascending order,
+        with numbers among all queries and points.
+    query_batch : array_like of int, shape (q,), optional
+        The system of each query, ascending; with `batch` and `queries`, and only then.
 
     Returns
     -------
@@ -196,6 +205,7 @@ def pairs_between(
         and supports is None and query_supports is None and extent is None
         and groups is None and exclude is None and exclude_within is None and min_distance is None
         and query_groups is None and query_exclude is None
+        and batch is None and query_batch is None
     ):  # fmt: skip
         result: Any = _core.plain(
             _core.pairs_between, points, cutoff, box, periodic, inclusive, precision, kernel,
@@ -212,9 +222,19 @@ def pairs_between(
     )
     check_apart(
         out, queries=queries, points=points, box=box, cutoff=cutoff, **given._asdict(),
-        **chosen._asdict(),
+        **chosen._asdict(), batch=batch, query_batch=query_batch,
     )  # fmt: skip
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
+    if batch is not None:
+        scene, own, reach, asking = as_systems(
+            points, cutoff, box, periodic, batch, given, chosen, precision, queries, query_batch,
+            directed=True,
+        )  # fmt: skip
+        wanted = (quantities, True, as_index_bytes(index_dtype), out)
+        return _core.pairs_between(
+            *(*scene, *rest, *wanted, asking, reach, algorithm, room, own)
+        )
+    check_no_batch(query_batch)
     search, asking, reach = as_search_of_each(
         points, cutoff, box, periodic, rest, given, queries, directed=True, chosen=chosen
     )

@@ -35,13 +35,40 @@ _Counts = npt.NDArray[np.int64]
 _NONE = -1.0  # the cutoff of types that are no pairs
 
 
-def is_one_cutoff(cutoff: Any) -> bool:
-    """Whether it is a number, and no table or dict."""
+def is_one_cutoff(cutoff: Any, batch: Any = None) -> bool:
+    """Whether it is a number, or with a batch one a system, and no table or dict."""
     if type(cutoff) in (float, int):
         return True
     if cutoff is None or is_a(cutoff, Mapping):
         return False
-    return as_array(cutoff, "cutoff", "be a number").ndim == 0
+    return as_array(cutoff, "cutoff", "be a number").ndim <= (0 if batch is None else 1)
+
+
+def types_for_counts(types: Any, n: int, n_rows: int) -> tuple[npt.NDArray[np.int32], int]:
+    """The type of each point, and how many there are: columns that memory can hold."""
+    if types is None:
+        raise ValueError("by_type needs types")
+    numbers, _, names = as_labels(types, None)
+    found = as_types(numbers, "types", n)
+    n_types = 1 + int(found.max(initial=0)) if names is None else len(names)
+    refuse_unavailable(8 * n_types * (n_rows + 2 * n_types), f"counts for {n_types} types")
+    return found, n_types
+
+
+def refuse_other_reaches(given: Given) -> None:
+    """ValueError beside types that only sort, with one cutoff for all."""
+    check_alone_given(given)
+    if given.query_types is not None:
+        raise ValueError("query_types need a cutoff for each pair of types")
+
+
+def counted(
+    offsets: npt.NDArray[Any], j: npt.NDArray[Any], types: npt.NDArray[np.int32], n_types: int
+) -> _Counts:
+    """How many of each row are of each type."""
+    n = len(offsets) - 1
+    places = np.repeat(np.arange(n) * n_types, np.diff(offsets)) + types[j]
+    return np.bincount(places, minlength=n * n_types).reshape(n, n_types)
 
 
 def count_by_type(
@@ -49,20 +76,13 @@ def count_by_type(
     queries: Any, algorithm: Any, indices: Any,
 ) -> _Counts:  # fmt: skip
     """`coordination` with a column for each type of a neighbour."""
-    if given.types is None:
-        raise ValueError("by_type needs types")
     asking, array, vectors, bits = as_sets(queries, points, box, periodic)
     n, q = len(array), None if asking is None else len(asking)
-    numbers, _, names = as_labels(given.types, None)
-    types = as_types(numbers, "types", n)
-    n_types = 1 + int(types.max(initial=0)) if names is None else len(names)
     n_rows = n if q is None else q
-    refuse_unavailable(8 * n_types * (n_rows + 2 * n_types), f"counts for {n_types} types")
+    types, n_types = types_for_counts(given.types, n, n_rows)
     reach = None
     if is_one_cutoff(cutoff):
-        check_alone_given(given)
-        if given.query_types is not None:
-            raise ValueError("query_types need a cutoff for each pair of types")
+        refuse_other_reaches(given)
         largest = as_cutoff(cutoff)
     else:
         largest, reach = as_reach(cutoff, given, Sets(points, queries, n, q, array.shape[1]), True)
@@ -85,10 +105,8 @@ def _of_rows(
     types: npt.NDArray[np.int32], n_types: int,
 ) -> _Counts:  # fmt: skip
     """Those of some points, which are listed for this."""
-    (offsets, j), numbers, _ = rows_of_points(search, points, indices, "j", 4, reach, algorithm)
-    places = np.repeat(np.arange(len(numbers)) * n_types, np.diff(offsets)) + types[j]
-    counts = np.bincount(places, minlength=len(numbers) * n_types)
-    return counts.reshape(len(numbers), n_types)
+    (offsets, j), _, _ = rows_of_points(search, points, indices, "j", 4, reach, algorithm)
+    return counted(offsets, j, types, n_types)
 
 
 def _cutoffs(

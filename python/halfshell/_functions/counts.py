@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, overload
 
 from halfshell import _core
-from halfshell._convert.batch import as_systems
+from halfshell._convert.batch import as_systems, refuse_many
 from halfshell._convert.foreign import is_a
 from halfshell._convert.given import Chosen, Given
 from halfshell._convert.lengths import as_cutoffs
-from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import AUTO
 from halfshell._convert.search import as_rest, as_search_of_each, count_within
 from halfshell._objects.box import Box
@@ -37,8 +36,6 @@ if TYPE_CHECKING:
         ReachOptions,
         Rule,
     )
-
-_MANY_SYSTEMS = 1 << 20  # counts of fewer always fit
 
 
 @overload
@@ -200,10 +197,10 @@ def count_pairs(
     if batch is not None:
         if queries is not None:
             raise ValueError("batch and queries cannot be given together")
-        scene, own, reach = as_systems(
+        scene, own, reach, _ = as_systems(
             points, cutoff, box, periodic, batch, given, chosen, precision
         )
-        _refuse_systems(*own)
+        refuse_many(own)
         return _core.batch_count(*(*scene, *rest, *own, reach, algorithm))
     several = _several(cutoff, given)
     one = cutoff if several is None else 0.0
@@ -223,14 +220,3 @@ def _several(cutoff: Any, given: Given) -> FloatArray | None:
         return None
     cutoffs = as_cutoffs(cutoff)
     return None if isinstance(cutoffs, float) else cutoffs
-
-
-def _refuse_systems(
-    numbers: npt.NDArray[np.int64], cutoffs: FloatArray | None, boxes: FloatArray | None
-) -> None:
-    """MemoryError before counts of more systems than memory holds; the core checks all else."""
-    if cutoffs is not None or boxes is not None or len(numbers) == 0:
-        return
-    last = int(numbers[-1])
-    if _MANY_SYSTEMS < last < 2**62 and bool((numbers[1:] >= numbers[:-1]).all()):
-        refuse_unavailable(8 * (last + 1), f"counts of the systems up to {last} in batch")

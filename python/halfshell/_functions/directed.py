@@ -29,25 +29,18 @@ def entries_of(
     inclusive: bool,
 ) -> Entries:
     """Return i, j and S of a list, ascending by (i, j, S)."""
-    if half or batch is not None:
+    if half:
         i, j, S = pairs(
             points, cutoff, box=box, periodic=periodic, quantities="ijS", sort=True,
             inclusive=inclusive, batch=batch,
         )  # fmt: skip
-        return (i, j, S) if half else _both_ways(i, j, S)
+        return i, j, S
     table = neighbors(
-        points, cutoff, box=box, periodic=periodic, quantities="jS", inclusive=inclusive
-    )
+        points, cutoff, box=box, periodic=periodic, quantities="jS", inclusive=inclusive,
+        batch=batch,
+    )  # fmt: skip
     i, j, S = table.to_pairs(quantities="ijS")
     return i, j, S
-
-
-def _both_ways(i: npt.NDArray[Any], j: npt.NDArray[Any], S: npt.NDArray[Any]) -> Entries:
-    if S.min(initial=0) == np.iinfo(S.dtype).min:
-        raise OverflowError("a shift of -2**31 has no opposite in int32")
-    i, j, S = np.concatenate((i, j)), np.concatenate((j, i)), np.concatenate((S, -S))
-    order = np.lexsort((*S.T[::-1], j, i))
-    return i[order], j[order], S[order]
 
 
 def entries_between(
@@ -59,37 +52,13 @@ def entries_between(
     inclusive: bool,
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Return queries i and points j of the same system, ascending by (i, j), in open space."""
-    if query_batch is None and batch is None:
-        found = [_between(queries, points, cutoff, inclusive)]
-    else:
-        ends = [_ends(query_batch, len(queries)), _ends(batch, len(points))]
-        found = []
-        for k in sorted({*ends[0], *ends[1]}):
-            (a, b), (c, e) = (of.get(k, (0, 0)) for of in ends)
-            i, j = _between(queries[a:b], points[c:e], cutoff, inclusive)
-            found.append((i + a, j + c))
-    empty = np.empty(0, np.int64)
-    i, j = (np.concatenate([empty, *(pair[k] for pair in found)]) for k in range(2))
+    if batch is not None or query_batch is not None:  # a set without numbers is all of system 0
+        batch = np.zeros(len(points), np.int64) if batch is None else batch
+        query_batch = np.zeros(len(queries), np.int64) if query_batch is None else query_batch
+    i, j = pairs_between(
+        queries, points, cutoff, inclusive=inclusive, batch=batch, query_batch=query_batch
+    )
     return i, j
-
-
-def _between(queries: Any, points: Any, cutoff: float, inclusive: bool) -> tuple[Any, Any]:
-    i, j = pairs_between(queries, points, cutoff, inclusive=inclusive)
-    order = np.lexsort((j, i))
-    return i[order], j[order]
-
-
-def _ends(batch: npt.NDArray[Any] | None, n: int) -> dict[int, tuple[int, int]]:
-    """Where each system begins and ends; a set without `batch` is all of system 0."""
-    if batch is None:
-        return {0: (0, n)}
-    if batch.shape != (n,):
-        raise ValueError(f"batch must have shape ({n},), one number a point, got {batch.shape}")
-    if n and (batch[0] < 0 or (np.diff(batch) < 0).any()):
-        raise ValueError("batch must be ascending from 0 or above")
-    names, starts, counts = np.unique(batch, return_index=True, return_counts=True)
-    rows = zip(names.tolist(), starts.tolist(), counts.tolist())
-    return {name: (start, start + count) for name, start, count in rows}
 
 
 def check_rows(i: npt.NDArray[Any], most: int | None) -> None:

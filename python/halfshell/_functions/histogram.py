@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._convert.given import Chosen
+from halfshell._convert.batch import as_systems, check_no_batch
+from halfshell._convert.given import Chosen, Given
 from halfshell._convert.lengths import as_edges
 from halfshell._convert.marks import as_marks, binned
-from halfshell._convert.search import as_search
+from halfshell._convert.search import as_rest, as_search
 from halfshell._convert.selection import with_selection
 from halfshell._convert.types import Algorithm, BoxLike, PeriodicLike, PointsLike
 
@@ -34,6 +35,8 @@ def pair_histogram(
     exclude: npt.ArrayLike | None = None,
     query_exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
+    batch: npt.ArrayLike | None = None,
+    query_batch: npt.ArrayLike | None = None,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """Count pairs in bins of distance, always exact, without storing them.
 
@@ -63,6 +66,12 @@ def pair_histogram(
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
         Labels of the queries, beside those of the points. With queries the pairs of
         numbers in `exclude` are of a query and a point.
+    batch : array_like of int, shape (n,), optional
+        Many systems in one call, as in `pairs`: the system of each point, ascending. Pairs are of
+        one system, and the result has an axis for the systems before all others: those that `box`
+        is given for, or up to the largest number.
+    query_batch : array_like of int, shape (q,), optional
+        The system of each query, ascending; with `batch` and `queries`, and only then.
 
     Returns
     -------
@@ -111,11 +120,22 @@ def pair_histogram(
     >>> hs.pair_histogram(points, [0.0, 1.5, 3.0], weights=[1.0, -1.0, 0.5]).tolist()
     [-1.0, 0.0]
     """
+    chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
+    if batch is not None:
+        scene, own, selection, asking = as_systems(
+            points, 0.0, box, periodic, batch, Given(), chosen, "exact", queries, query_batch
+        )
+        marks = as_marks(len(scene[0]), asking, types, query_types, weights, query_weights)
+        rest = as_rest(False, "exact", kernel, memory_limit, None, threads)
+        return binned(
+            (*scene, *rest), as_edges(edges), asking, marks, algorithm=algorithm,
+            selection=selection, systems=own,
+        )  # fmt: skip
+    check_no_batch(query_batch)
     search, asking = as_search(
         points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
     marks = as_marks(len(search[0]), asking, types, query_types, weights, query_weights)
-    chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
     n_asking = None if asking is None else len(asking)
     selection = with_selection(None, chosen, len(search[0]), n_asking)
     return binned(

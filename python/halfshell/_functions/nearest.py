@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell import _core
-from halfshell._convert.nearest import as_k, as_max_distance, in_rows
+from halfshell._convert.batch import as_systems, check_no_batch
+from halfshell._convert.given import Given
+from halfshell._convert.nearest import as_k, as_max_distance, check_max_distances, in_rows
 from halfshell._convert.options import as_index_bytes
 from halfshell._convert.scene import as_sets
 from halfshell._convert.types import Arrays, BoxLike, Number, PeriodicLike, PointsLike
@@ -26,6 +28,8 @@ class _NearestOptions(TypedDict, total=False):
     kernel: str | None
     threads: int | None
     memory_limit: float | None
+    batch: npt.ArrayLike | None
+    query_batch: npt.ArrayLike | None
 
 
 @overload
@@ -61,6 +65,8 @@ def nearest(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    batch: npt.ArrayLike | None = None,
+    query_batch: npt.ArrayLike | None = None,
 ) -> Arrays:
     """Find the k nearest points of each point or query, in an order that is always exact.
 
@@ -83,6 +89,11 @@ def nearest(
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
+    batch : array_like of int, shape (n,), optional
+        Many systems in one call, as in `pairs`: the system of each point, ascending. The nearest
+        are of the same system, with numbers among all points; `max_distance` may have shape (s,).
+    query_batch : array_like of int, shape (q,), optional
+        The system of each query, ascending; with `batch` and `queries`, and only then.
 
     Returns
     -------
@@ -150,10 +161,19 @@ def nearest(
     >>> j.tolist(), d.tolist(), S.tolist()
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
-    k, reach = as_k(k), as_max_distance(max_distance)
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+    k, own = as_k(k), None
+    if batch is None:
+        check_no_batch(query_batch)
+        reach = as_max_distance(max_distance)
+        asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+    else:
+        scene, own, _, asking = as_systems(
+            points, check_max_distances(max_distance), box, periodic, batch, Given(),
+            queries=queries, query_batch=query_batch,
+        )  # fmt: skip
+        array, reach, vectors, bits = scene
     result = _core.nearest(
         array, reach, vectors, bits, True, "exact", kernel, memory_limit, None, threads,
-        quantities, as_index_bytes(index_dtype), asking, k,
+        quantities, as_index_bytes(index_dtype), asking, k, own,
     )
     return in_rows(result, len(array if asking is None else asking), k)

@@ -391,7 +391,7 @@ def pairs(
         from halfshell._convert.touching import pairs_touching  # here: others do without
 
         return pairs_touching(search, search[0], touching, wanted, reach, algorithm)
-    scene, own, reach = as_systems(
+    scene, own, reach, _ = as_systems(
         points, cutoff, box, periodic, batch, given, chosen, precision
     )
     end = (reach, algorithm) if room is None else (reach, algorithm, room)

@@ -3,32 +3,37 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _core
+from halfshell._convert.batch import check_no_batch
 from halfshell._convert.given import Chosen
 from halfshell._convert.lengths import as_positive
-from halfshell._convert.marks import Marks, as_named_marks, binned
+from halfshell._convert.marks import as_named_marks, binned
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.options import as_count
-from halfshell._convert.search import as_search
+from halfshell._convert.search import as_rest, as_search
 from halfshell._convert.selection import with_selection
 from halfshell._convert.types import (
     BoxLike,
     FloatArray,
     Number,
     PeriodicLike,
-    PointArray,
     PointsLike,
 )
-from halfshell._objects.radial_distribution import RadialDistribution, ratio
+from halfshell._functions.ideal_gas import (
+    centers,
+    in_shells,
+    known_types,
+    partners,
+    refuse_types,
+    shell_shares,
+)
+from halfshell._objects.radial_distribution import RadialDistribution
 
 _COLUMNS = 12  # of a result without types, and what makes them
-_OF_TYPES = 6
 
 
 def rdf(
@@ -49,6 +54,8 @@ def rdf(
     exclude: npt.ArrayLike | None = None,
     query_exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
+    batch: npt.ArrayLike | None = None,
+    query_batch: npt.ArrayLike | None = None,
 ) -> RadialDistribution:
     """Compute the radial distribution function g(r) of a periodic box; counts are always exact.
 
@@ -77,6 +84,11 @@ def rdf(
     groups, query_groups, exclude, query_exclude, exclude_within
         Which pairs count, as in `pair_histogram`: with molecules in `exclude` g(r) is that between
         molecules, with `groups` that within them. It is over the same ideal gas, of all pairs.
+    batch : array_like of int, shape (n,), optional
+        Many systems in one call, as in `pair_histogram`; each that has points counts as a frame,
+        and the result is that of all of them.
+    query_batch : array_like of int, shape (q,), optional
+        The system of each query, ascending; with `batch` and `queries`, and only then.
 
     Returns
     -------
@@ -134,25 +146,30 @@ def rdf(
     [6.0, 50.0, 170.0, 402.0]
     """
     edges = _edges(r_max, bins)
+    chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
+    if batch is not None:
+        from halfshell._functions.rdf_of_systems import rdf_of_systems  # here: few need it
+
+        rest = as_rest(False, "exact", kernel, memory_limit, None, threads)
+        return rdf_of_systems(
+            points, edges, box, periodic, batch, rest, chosen, queries, query_batch, types,
+            query_types,
+        )  # fmt: skip
+    check_no_batch(query_batch)
     search, asking = as_search(
         points, 0.0, box, periodic, False, "exact", kernel, memory_limit, None, threads, queries
     )
     n, shares = len(search[0]), shell_shares(search[2], search[3], edges)
     marks, names = as_named_marks(n, asking, types, query_types)
-    chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
     selection = with_selection(None, chosen, n, None if asking is None else len(asking))
-    if marks.types is not None:
-        refuse_unavailable(_OF_TYPES * 8 * marks.n_types**2 * len(shares), "g(r) of all types")
+    refuse_types(marks, len(shares))
     found = binned(search, edges, asking, marks, "r_max", selection=selection)
     counts = found.astype(np.int64, copy=False)
-    expected = _in_shells(_partners(n, asking, marks), shares)
-    known: tuple[str, ...] | tuple[int, ...] | None = names
-    if marks.types is not None and names is None:
-        known = tuple(range(marks.n_types))
-    centers = _centers(n, asking, marks)
+    expected = in_shells(partners(n, None if asking is None else len(asking), marks), shares)
     return RadialDistribution(
-        counts, edges, known, expected, centers, is_half=asking is None
-    )
+        counts, edges, known_types(marks, names), expected, centers(n, asking, marks),
+        is_half=asking is None,
+    )  # fmt: skip
 
 
 def _edges(r_max: Any, bins: Any) -> FloatArray:
@@ -161,71 +178,3 @@ def _edges(r_max: Any, bins: Any) -> FloatArray:
     # Of float64: edges, what numpy needs to make them, r, g and the shells.
     refuse_unavailable(_COLUMNS * 8 * n_bins, "r, g and counts for so many bins")
     return np.linspace(0.0, largest, n_bins + 1)
-
-
-def over_ideal_gas(
-    counts: npt.NDArray[Any], partners: float, shares: FloatArray
-) -> FloatArray:
-    """g(r): counts over what each shell would have of so many pairs; 0 where there are none."""
-    return ratio(counts, _in_shells(np.array([partners]), shares))
-
-
-def _in_shells(partners: FloatArray, shares: FloatArray) -> FloatArray:
-    """What each shell has of them. Shares may be infinite: none of them are none everywhere."""
-    found = np.zeros(np.broadcast_shapes(partners.shape, shares.shape))
-    with np.errstate(over="ignore", under="ignore"):
-        np.multiply(partners, shares, out=found, where=partners > 0.0)
-    return found
-
-
-def shell_shares(
-    vectors: FloatArray | None, bits: int, edges: FloatArray
-) -> FloatArray:
-    """The part of the box that lies between two spheres, for each bin.
-
-    In a unit of about the size of the box, a power of two: volumes of boxes in other units may be
-    too large or too small for a float64.
-    """
-    if vectors is None or bits != (1 << len(vectors)) - 1:
-        raise ValueError(
-            "rdf needs a box that repeats along every axis, for the density of the points; "
-            "pair_histogram counts without one"
-        )
-    power = -int(np.frexp(np.abs(vectors).max())[1])
-    volume: float = _core.box_measure(np.ldexp(vectors, power), bits)[1]
-    ndim = len(vectors)
-    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        shells: FloatArray = np.diff(np.ldexp(edges, power) ** ndim)
-        return unit_ball(ndim) * shells / volume
-
-
-def unit_ball(ndim: int) -> float:
-    """The volume of a ball of radius 1."""
-    volume = 2.0 if ndim % 2 else 1.0
-    for k in range(2 + ndim % 2, ndim + 1, 2):
-        volume *= 2.0 * math.pi / k
-    return volume
-
-
-def _centers(n: int, queries: PointArray | None, marks: Marks) -> npt.NDArray[np.int64]:
-    """How many points, or queries, have neighbours that are counted; with types, of each."""
-    asking = marks.types if queries is None else marks.query_types
-    if asking is None:
-        return np.array(n if queries is None else len(queries))
-    return np.bincount(asking, minlength=marks.n_types)
-
-
-def _partners(
-    n: int, queries: PointArray | None, marks: Marks
-) -> npt.NDArray[np.float64]:
-    """Pairs that each shell would share out, with types of each two of them; one axis more for
-    shells."""
-    if marks.types is None:
-        return np.array([0.5 * n * n if queries is None else float(len(queries)) * n])
-    of_points = np.bincount(marks.types, minlength=marks.n_types).astype(np.float64)
-    if marks.query_types is not None:
-        of_queries = np.bincount(marks.query_types, minlength=marks.n_types)
-        return np.outer(of_queries, of_points)[:, :, np.newaxis]
-    pairs: npt.NDArray[np.float64] = np.outer(of_points, of_points)
-    pairs[np.diag_indices(len(of_points))] *= 0.5
-    return pairs[:, :, np.newaxis]

@@ -41,8 +41,8 @@ def settle(
         Of the entries. Entries at the same distance are left by their numbers. `shifts` is None
         where all are zero.
     points, asking : ndarray of float, shape (n, d) and (q, d)
-    vectors : ndarray of float64, shape (d, d)
-        What shifts multiply.
+    vectors : ndarray of float64, shape (d, d) or (d, q, d)
+        What shifts multiply: the same for all, or vector k of each in `asking` as ``vectors[k]``.
     """
     d = distances[order]
     with np.errstate(invalid="ignore"):
@@ -60,7 +60,8 @@ def settle(
         p = asking[rows[place]].astype(np.float64)
         q = points[indices[entries]].astype(np.float64)
         steps = None if shifts is None else shifts[entries]
-        order[place] = entries[_exact(groups[part], entries, p, q, steps, vectors)]
+        of_each = vectors if vectors.ndim == 2 else vectors[:, rows[place]]
+        order[place] = entries[_exact(groups[part], entries, p, q, steps, of_each)]
 
 
 def _exact(
@@ -76,7 +77,8 @@ def _exact(
         what = f"{n} neighbours at the same distance, compared exactly,"
         refuse_unavailable(8 * of_each * n, what)
         steps = None if shifts is None else shifts[part]
-        keys = _squares(p[part], q[part], steps, vectors, scale)
+        rows = vectors if vectors.ndim == 2 else vectors[:, part]
+        keys = _squares(p[part], q[part], steps, rows, scale)
         order[part] = order[part][np.lexsort((entries[part], *keys, groups[part]))]
     return order
 

@@ -159,7 +159,7 @@ def shifts_of_search(
     largest, includes_cutoff = as_cutoff(cutoff), as_flag(inclusive, "inclusive")
     own: Any = None  # the caller's arrays may change
     if reach is not None:
-        own = _copied(reach)
+        own = copied(reach)
 
     def find(origin: Origin) -> npt.NDArray[Any]:
         points, vectors, bits = origin.scene()
@@ -172,8 +172,8 @@ def shifts_of_search(
     return find
 
 
-def _copied(part: Any) -> Any:
+def copied(part: Any) -> Any:
     """A tuple with copies of the arrays in it."""
     if isinstance(part, tuple):
-        return tuple(_copied(one) for one in part)
+        return tuple(copied(one) for one in part)
     return part.copy() if isinstance(part, np.ndarray) else part

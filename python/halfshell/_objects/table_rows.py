@@ -349,9 +349,11 @@ class TableRows:
             order[a:b] = order_by_distance(offsets - a, distances[a:b])
             order[a:b] += a
             numbers = self._numbers_from(first, end)
-            asked = asking[numbers:] if isinstance(numbers, int) else asking[numbers]
+            these = slice(numbers, None) if isinstance(numbers, int) else numbers
+            asked = asking[these]
+            of_rows = vectors if vectors.ndim == 2 else vectors[:, these]
             rows = rows_of(offsets)  # from 0 on: two rows of one point are two
-            settle(order[a:b], rows, places, distances, shifts, points, asked, vectors)
+            settle(order[a:b], rows, places, distances, shifts, points, asked, of_rows)
         return order
 
     def _refuse_queries(self, what: str) -> None:

@@ -123,8 +123,13 @@ typedef struct fault {
     F(first_long, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[3]++)                                   \
     F(first_longest, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[3] = INT64_MAX)                      \
     F(first_short, USES_SYSTEMS, HS_ERR_ARGUMENT, s->first[3]--)                                  \
+    F(first_query_null, USES_SYSTEMS | USES_QUERIES, HS_ERR_ARGUMENT,                             \
+      s->systems.first_query = NULL)                                                              \
+    F(first_query_descends, USES_SYSTEMS | USES_QUERIES, HS_ERR_ARGUMENT,                         \
+      s->first_query[1] = s->first_query[2] + 1)                                                  \
+    F(first_query_long, USES_SYSTEMS | USES_QUERIES, HS_ERR_ARGUMENT, s->first_query[3]++)        \
     F(rows_nan, USES_SYSTEMS, HS_ERR_BOX_FINITE, s->systems.rows = s->rows; s->rows[13] = NAN)    \
-    F(cutoffs_nan, USES_SYSTEMS, HS_ERR_CUTOFF, s->systems.cutoffs = s->cutoffs;                  \
+    F(cutoffs_nan, USES_SYSTEMS | USES_CUTOFF, HS_ERR_CUTOFF, s->systems.cutoffs = s->cutoffs;    \
       s->cutoffs[2] = NAN)                                                                        \
     F(cells_null, USES_CELLS, HS_ERR_ARGUMENT, hs_cells_free(s->c.cells); s->c.cells = NULL)      \
     F(list_null, USES_LIST, HS_ERR_ARGUMENT, hs_verlet_free(s->c.list); s->c.list = NULL)         \
@@ -243,6 +248,7 @@ numbers_that_are_only_large_are_fine(void)
             s.points.row_stride = s.queries.row_stride = strides[t];
             s.first[0] = 0;
             s.first[1] = s.first[2] = s.first[3] = 1;
+            s.first_query[1] = s.first_query[2] = s.first_query[3] = 1;
             call_make_objects(&s.c, call_kinds[k].uses);
             if (call_kinds[k].run(&s.c, NULL) != HS_OK)
                 complain(&call_kinds[k], "one point", "stride");

@@ -96,7 +96,7 @@ static struct {
     int64_t        counts[CALL_ROOM];
     double         sums[CALL_ROOM];
     hs_histogram   histogram;
-    int64_t        first[N_SYSTEMS + 1];
+    int64_t        first[N_SYSTEMS + 1], first_query[N_SYSTEMS + 1];
     hs_systems     systems;
     hs_visit       visit;
     call           c;
@@ -157,7 +157,10 @@ make_call(const scene_of_calls *kind)
     s.options.out = kind->into ? &s.out : NULL;
     for (int n = 0; n <= N_SYSTEMS; n++)
         s.first[n] = n * kind->n / N_SYSTEMS;
-    s.systems = (hs_systems){.n = N_SYSTEMS, .first = s.first, .box = s.of.scene.box};
+    for (int n = 0; n <= N_SYSTEMS; n++)
+        s.first_query[n] = n * N_QUERIES / N_SYSTEMS;
+    s.systems = (hs_systems){
+        .n = N_SYSTEMS, .first = s.first, .box = s.of.scene.box, .first_query = s.first_query};
     s.visit = (hs_visit){.pair = call_note_pair, .thread_safe = true};
     s.c = (call){.points = &s.points,
                  .queries = &s.queries,

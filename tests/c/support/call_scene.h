@@ -12,7 +12,7 @@ enum { N_OF_CALL = 12, N_QUERIES_OF_CALL = 5, N_SYSTEMS_OF_CALL = 3, N_EDGES_OF_
 
 typedef struct call_scene {
     double         x[N_OF_CALL * 3], q[N_QUERIES_OF_CALL * 3];
-    int64_t        first[N_SYSTEMS_OF_CALL + 1];
+    int64_t        first[N_SYSTEMS_OF_CALL + 1], first_query[N_SYSTEMS_OF_CALL + 1];
     double         rows[N_SYSTEMS_OF_CALL * 9], cutoffs[N_SYSTEMS_OF_CALL];
     double         edges[N_EDGES_OF_CALL];
     int32_t        types[N_OF_CALL], query_types[N_QUERIES_OF_CALL];
@@ -58,8 +58,10 @@ call_fill_numbers(call_scene *s)
         s->query_types[p] = p % 2;
         s->query_weights[p] = random_unit(&random);
     }
-    for (int n = 0; n <= N_SYSTEMS_OF_CALL; n++)
+    for (int n = 0; n <= N_SYSTEMS_OF_CALL; n++) {
         s->first[n] = n * N_OF_CALL / N_SYSTEMS_OF_CALL;
+        s->first_query[n] = n * N_QUERIES_OF_CALL / N_SYSTEMS_OF_CALL;
+    }
     for (int n = 0; n < N_SYSTEMS_OF_CALL; n++) {
         s->cutoffs[n] = 1.0;
         for (int k = 0; k < 3; k++)
@@ -91,7 +93,8 @@ call_fill_scene(call_scene *s)
                                   .of_queries = {s->query_types, s->query_weights},
                                   .counts = s->counts,
                                   .sums = s->sums};
-    s->systems = (hs_systems){.n = N_SYSTEMS_OF_CALL, .first = s->first, .box = &s->box};
+    s->systems = (hs_systems){
+        .n = N_SYSTEMS_OF_CALL, .first = s->first, .box = &s->box, .first_query = s->first_query};
     s->visit = (hs_visit){.pair = call_note_pair};
     s->c = (call){.points = &s->points,
                   .queries = &s->queries,

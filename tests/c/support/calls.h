@@ -347,6 +347,41 @@ call_systems_count(call *c, hs_failure *failure)
 }
 
 static inline hs_status
+call_systems_neighbors(call *c, hs_failure *failure)
+{
+    hs_pairs       *rows = CALL_NOTHING;
+    const hs_status status =
+        hs_systems_neighbors(c->points, c->queries, c->systems, c->options, RESULT(rows), failure);
+    return call_take_pairs(c, status, rows);
+}
+
+static inline hs_status
+call_systems_coordination(call *c, hs_failure *failure)
+{
+    int64_t         counts[CALL_ROOM];
+    const hs_status status = hs_systems_coordination(c->points, c->queries, c->systems, c->options,
+                                                     RESULT(counts[0]), failure);
+    return call_take_counts(c, status, counts, c->queries != NULL ? c->queries->n : c->n_points);
+}
+
+static inline hs_status
+call_systems_nearest(call *c, hs_failure *failure)
+{
+    hs_pairs       *rows = CALL_NOTHING;
+    const hs_status status = hs_systems_nearest(c->points, c->queries, c->systems, c->k, c->options,
+                                                RESULT(rows), failure);
+    return call_take_pairs(c, status, rows);
+}
+
+/* Condenses the histogram of the first system. */
+static inline hs_status
+call_systems_histogram(call *c, hs_failure *failure)
+{
+    return call_take_histogram(c, hs_systems_histogram(c->points, c->queries, c->systems,
+                                                       c->options, c->histogram, failure));
+}
+
+static inline hs_status
 call_plan(call *c, hs_failure *failure)
 {
     const hs_among among = call_among(c, NULL);

@@ -161,6 +161,16 @@ static const call_kind call_kinds[] = {
     {"cells_candidates", call_cells_candidates, USES_CELLS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
     {"systems_find", call_systems_find, OF_SCENE | USES_SYSTEMS | OF_SEARCH | OF_ARRAYS},
     {"systems_count", call_systems_count, OF_SCENE | USES_SYSTEMS | OF_SEARCH},
+    {"systems_neighbors", call_systems_neighbors,
+     OF_SCENE | USES_SYSTEMS | USES_QUERIES | OF_SEARCH | OF_ARRAYS},
+    {"systems_coordination", call_systems_coordination,
+     OF_SCENE | USES_SYSTEMS | USES_QUERIES | OF_SEARCH},
+    {"systems_nearest", call_systems_nearest,
+     OF_SCENE | USES_SYSTEMS | USES_QUERIES | (OF_SEARCH & ~(NEEDS_FINITE | USES_PRECISION)) |
+         USES_INDEX_BYTES | USES_K},
+    {"systems_histogram", call_systems_histogram,
+     OF_SCENE | USES_SYSTEMS | USES_QUERIES | USES_OPTIONS | USES_CELL_SIZE | USES_KERNEL |
+         USES_COUNTERS | USES_HISTOGRAM},
     {"verlet_update", call_verlet_update, OF_VERLET | USES_SKIN},
     {"verlet_find", call_verlet_find,
      USES_LIST | USES_OPTIONS | USES_CELL_SIZE | OF_ARRAYS | USES_KERNEL | USES_COUNTERS |

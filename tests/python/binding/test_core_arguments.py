@@ -26,8 +26,8 @@ def count(points, box=None, periodic=0):
 def batch(name, numbers, cutoffs=None, boxes=None, box=None, periodic=0):
     shared = (POINTS, 1.5, box, periodic, True, "exact", None, None, None, None)
     if name == "batch_pairs":
-        return _core.batch_pairs(*shared, "ij", False, 8, None, numbers, cutoffs, boxes)
-    return _core.batch_count(*shared, numbers, cutoffs, boxes)
+        return _core.batch_pairs(*shared, "ij", False, 8, None, numbers, cutoffs, boxes, None)
+    return _core.batch_count(*shared, numbers, cutoffs, boxes, None)
 
 
 @pytest.mark.parametrize("points", NO_ARRAYS, ids=lambda value: type(value).__name__)
@@ -86,7 +86,7 @@ def test_periodic_is_bits(periodic):
     ids=["none", "list", "int32", "float", "swapped", "short", "strided"],
 )  # fmt: skip
 def test_numbers_are_int64_one_a_point(name, numbers):
-    with pytest.raises(TypeError, match="batch must be an int64 array with a number a point"):
+    with pytest.raises(TypeError, match="batch must be an int64 array with a number for each"):
         batch(name, numbers)
 
 

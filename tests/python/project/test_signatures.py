@@ -86,7 +86,7 @@ def test_methods_have_the_keywords_of_the_functions(name):
     known = parameters(function)
     assert all(keyword in known for keyword in keywords(method))
     if name.startswith("CellList."):  # the rest belongs to the list
-        of_the_list = {"box", "periodic", "precision", "algorithm", "batch"}
+        of_the_list = {"box", "periodic", "precision", "algorithm", "batch", "query_batch"}
         of_pairs = {"radii", "query_radii", "rule", "types", "query_types"}  # cells have one cutoff
         of_pairs |= {"supports", "query_supports", "extent", "by_type"}
         of_pairs |= {"groups", "query_groups", "exclude", "query_exclude", "exclude_within"}

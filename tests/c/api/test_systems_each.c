@@ -1,0 +1,257 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* test_systems_each.c: one call for each of many systems: polls, threads, and what failures say. */
+#include "../support/harness.h"
+#include "../support/poll_checks.h"
+
+#include "../../../csrc/halfshell.h"
+
+void test_systems_each(void);
+
+enum { N_SYSTEMS = 50, POINTS = 60, N = N_SYSTEMS * POINTS, N_QUERIES = 2 * N_SYSTEMS };
+
+static struct {
+    double     x[N * 3], q[N_QUERIES * 3];
+    int64_t    first[N_SYSTEMS + 1], first_query[N_SYSTEMS + 1], counts[N];
+    hs_points  points, queries;
+    hs_systems systems;
+    hs_options options;
+} s;
+
+static void
+make_scene(void)
+{
+    harness_random random = {77};
+    for (int e = 0; e < N * 3; e++)
+        s.x[e] = random_unit(&random);
+    for (int e = 0; e < N_QUERIES * 3; e++)
+        s.q[e] = random_unit(&random);
+    for (int n = 0; n <= N_SYSTEMS; n++) {
+        s.first[n] = n * POINTS;
+        s.first_query[n] = 2 * n;
+    }
+    s.points = (hs_points){s.x, N, 3, HS_FLOAT64, 24, 8};
+    s.queries = (hs_points){s.q, N_QUERIES, 3, HS_FLOAT64, 24, 8};
+    s.systems = (hs_systems){.n = N_SYSTEMS, .first = s.first, .first_query = s.first_query};
+    s.options = hs_options_default();
+    s.options.cutoff = 0.4;
+    s.options.want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT;
+}
+
+typedef struct polls {
+    int64_t n;
+    double  last;
+} polls;
+
+static bool
+note_poll(void *context, double fraction)
+{
+    polls *noted = context;
+    CHECK(fraction >= noted->last && fraction <= 1.0);
+    noted->last = fraction;
+    noted->n++;
+    return true;
+}
+
+/* The fraction is that of all systems, and never falls. */
+static void
+polls_tell_how_far_it_is(void)
+{
+    for (int threads = 1; threads <= 3; threads++) {
+        polls noted = {0, 0.0};
+        make_scene();
+        s.options.threads = threads;
+        s.options.poll = note_poll;
+        s.options.poll_context = &noted;
+        CHECK(hs_systems_coordination(&s.points, NULL, &s.systems, &s.options, s.counts, NULL) ==
+              HS_OK);
+        CHECK(noted.n >= 3 && (noted.last > 0.7 || threads > 1));
+    }
+}
+
+static hs_status
+find_rows(void *context)
+{
+    hs_pairs       *rows;
+    hs_failure      failure;
+    const hs_status status =
+        hs_systems_neighbors(&s.points, context, &s.systems, &s.options, &rows, &failure);
+    hs_pairs_free(rows);
+    return status;
+}
+
+static void
+a_poll_may_stop_it(void)
+{
+    for (int threads = 1; threads <= 2; threads++) {
+        for (int64_t nth = 0; nth < 4; nth++) {
+            int64_t left = nth;
+            make_scene();
+            s.options.threads = threads;
+            s.options.poll = stop_after;
+            s.options.poll_context = &left;
+            CHECK(find_rows(NULL) == HS_ERR_INTERRUPTED);
+        }
+    }
+}
+
+static void
+memory_may_be_short(void)
+{
+    make_scene();
+    s.systems.n = 6;
+    s.points.n = s.first[6];
+    s.queries.n = s.first_query[6];
+    for (s.options.threads = 1; s.options.threads <= 2; s.options.threads++) {
+        CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
+        CHECK(fail_each_allocation(find_rows, &s.queries, 2000) > 10);
+        CHECK(raise_memory_limit(find_rows, NULL, &s.options.memory_limit) > 3);
+    }
+}
+
+/* What a system is refused for names it, and the row among all. */
+static void
+failures_name_the_row_among_all(void)
+{
+    hs_failure failure;
+    hs_pairs  *rows;
+    const int  bad = 17 * POINTS + 5;
+    for (int threads = 1; threads <= 2; threads++) {
+        make_scene();
+        s.options.threads = threads;
+        s.x[3 * bad + 1] = NAN;
+        CHECK(hs_systems_neighbors(&s.points, NULL, &s.systems, &s.options, &rows, &failure) ==
+              HS_ERR_NOT_FINITE);
+        CHECK(rows == NULL && failure.row == bad && failure.column == 1 && !failure.in_queries);
+        CHECK(failure.system == 17);
+        make_scene();
+        s.options.threads = threads;
+        s.q[3 * 41 + 2] = INFINITY;
+        CHECK(hs_systems_neighbors(&s.points, &s.queries, &s.systems, &s.options, &rows,
+                                   &failure) == HS_ERR_NOT_FINITE);
+        CHECK(failure.row == 41 && failure.in_queries && failure.system == 20);
+    }
+}
+
+/* The row of a box is not that of a point. */
+static void
+rows_of_boxes_stay(void)
+{
+    static double boxes[N_SYSTEMS * 9];
+    const hs_box  box = {.ndim = 3, .periodic = {true, true, true}};
+    hs_failure    failure;
+    make_scene();
+    for (int n = 0; n < N_SYSTEMS; n++) {
+        for (int k = 0; k < 3; k++)
+            boxes[9 * n + 4 * k] = 3.0;
+    }
+    s.systems.box = &box;
+    s.systems.rows = boxes;
+    boxes[9 * 7 + 8] = 0.0;
+    CHECK(hs_systems_coordination(&s.points, NULL, &s.systems, &s.options, s.counts, &failure) ==
+          HS_ERR_BOX_DEPENDENT);
+    CHECK(failure.row == 2 && failure.system == 7);
+    boxes[9 * 7 + 8] = INFINITY;
+    CHECK(hs_systems_coordination(&s.points, NULL, &s.systems, &s.options, s.counts, &failure) ==
+          HS_ERR_BOX_FINITE);
+    CHECK(failure.row == 2 && failure.column == 2 && failure.system == 7);
+}
+
+/* What all systems share is looked at where there are none. */
+static void
+without_systems_all_else_is_checked(void)
+{
+    const hs_selection numbered = {.n_excluded = 1, .excluded = (const int64_t[]){0, 0}};
+    const hs_reach     reach = {.rule = HS_RULE_END};
+    hs_counters        counters = {.pairs = 7};
+    make_scene();
+    s.systems.n = s.points.n = 0;
+    s.options.counters = &counters;
+    CHECK(find_rows(NULL) == HS_OK && counters.pairs == 0);
+    s.options.cutoff = -1.0;
+    CHECK(find_rows(NULL) == HS_ERR_CUTOFF);
+    s.options.cutoff = 1.0;
+    s.systems.selection = &numbered;
+    CHECK(find_rows(NULL) == HS_ERR_ARGUMENT);
+    s.systems.selection = NULL;
+    s.systems.reach = &reach;
+    CHECK(find_rows(NULL) == HS_ERR_ARGUMENT);
+    s.systems.reach = NULL;
+    s.options.kernel = "none";
+    CHECK(find_rows(NULL) == HS_ERR_KERNEL);
+}
+
+/* What each thread has done is done by the call. */
+static void
+work_of_all_threads_is_added_up(void)
+{
+    hs_counters one, two;
+    make_scene();
+    s.options.counters = &one;
+    CHECK(find_rows(NULL) == HS_OK);
+    s.options.counters = &two;
+    s.options.threads = 2;
+    CHECK(find_rows(NULL) == HS_OK);
+    CHECK(one.candidates > 0 && one.candidates == two.candidates && one.pairs == two.pairs);
+    CHECK(one.groups > 0 && one.groups == two.groups && one.ambiguous == two.ambiguous);
+    CHECK(one.bytes[HS_FOR_POINTS] > 0 && two.bytes[HS_FOR_POINTS] >= one.bytes[HS_FOR_POINTS]);
+    CHECK(one.bytes_peak > 0 && two.bytes_peak > 0);
+}
+
+static double limit_of_all;
+
+static double
+find_limit(void *context)
+{
+    ++*(int *)context;
+    return limit_of_all;
+}
+
+/* The machine is asked once for all threads, which share what it has. */
+static void
+threads_share_the_limit(void)
+{
+    int n_asked = 0;
+    make_scene();
+    s.options.threads = 2;
+    s.options.find_limit = find_limit;
+    s.options.find_context = &n_asked;
+    limit_of_all = 1e9;
+    CHECK(find_rows(NULL) == HS_OK && n_asked == 1);
+    limit_of_all = 100.0;
+    CHECK(find_rows(NULL) == HS_ERR_MEMORY && n_asked == 2);
+}
+
+/* More threads than systems, and systems that are a range of their own. */
+static void
+few_large_systems(void)
+{
+    const int64_t ends[] = {0, N / 2, N}, of_queries[] = {0, 1, 2};
+    hs_pairs     *one, *many;
+    make_scene();
+    s.options.cutoff = 0.1;
+    s.queries.n = 2;
+    s.systems = (hs_systems){.n = 2, .first = ends, .first_query = of_queries};
+    CHECK(hs_systems_neighbors(&s.points, NULL, &s.systems, &s.options, &one, NULL) == HS_OK);
+    s.options.threads = 4;
+    CHECK(hs_systems_neighbors(&s.points, NULL, &s.systems, &s.options, &many, NULL) == HS_OK);
+    CHECK(hs_pairs_length(one) > N && hs_pairs_length(one) == hs_pairs_length(many));
+    CHECK(memcmp(hs_pairs_array(one, HS_WANT_J), hs_pairs_array(many, HS_WANT_J),
+                 (size_t)hs_pairs_length(one) * 8) == 0);
+    hs_pairs_free(one);
+    hs_pairs_free(many);
+    CHECK(find_rows(&s.queries) == HS_OK);
+}
+
+void
+test_systems_each(void)
+{
+    RUN(polls_tell_how_far_it_is);
+    RUN(a_poll_may_stop_it);
+    RUN(memory_may_be_short);
+    RUN(failures_name_the_row_among_all);
+    RUN(rows_of_boxes_stay);
+    RUN(without_systems_all_else_is_checked);
+    RUN(work_of_all_threads_is_added_up);
+    RUN(threads_share_the_limit);
+    RUN(few_large_systems);
+}
