@@ -88,8 +88,12 @@ def trajectory_pairs(
     box, periodic : optional
         As in `pairs`, for all frames that bring none: a frame (points, None) has this box too.
         `periodic` holds for the boxes of frames as well, but for objects that have their own.
-    quantities, inclusive, sort, index_dtype, kernel, threads, memory_limit
+    quantities, inclusive, sort, index_dtype, kernel, memory_limit
         As in `pairs`, for each frame.
+    threads : int, optional
+        As in `pairs`, for each frame. With ``skin=None`` and a number above 1, so many frames of
+        1000 points or more are searched at a time, by one thread each: then as many are read ahead,
+        and copied.
     progress : callable, optional
         Called once for each frame, as ``progress(fraction)``, before its pairs are handed out: the
         part of the frames that has been dealt with, up to 1. It needs frames that have a length. An
@@ -116,9 +120,9 @@ def trajectory_pairs(
 
     Notes
     -----
-    Nothing is read ahead, and no frame is kept but the last one: frames of any number take the
-    memory of one. Where a reader hands out the same object in each frame, as MDAnalysis does, that
-    is as good as any.
+    Nothing is read ahead, but for `threads`, and no frame is kept but the last one: frames of any
+    number take the memory of one. Where a reader hands out the same object in each frame, as
+    MDAnalysis does, that is as good as any.
 
     Examples
     --------
@@ -150,11 +154,13 @@ def trajectory_pairs(
         if n_frames is None:
             raise TypeError(f"progress needs frames that have a length, got {kind_of(frames)}")
 
+    is_shared = skin is None and threads is not None and threads > 1
+
     def search(points: Any, own: Any, repeats: Any) -> Arrays:
         return pairs(
             points, kept.cutoff, box=own, periodic=repeats, quantities=quantities,
             inclusive=inclusive, sort=sort, index_dtype=index_dtype, kernel=kernel,
-            threads=threads, memory_limit=memory_limit,
+            threads=1 if is_shared else threads, memory_limit=memory_limit,
         )  # fmt: skip
 
     def follow(points: Any, own: Any, repeats: Any) -> Arrays:
@@ -167,16 +173,18 @@ def trajectory_pairs(
         return (search if is_small else follow)(points, own, repeats)
 
     find = search if skin is None else choose if isinstance(skin, str) else follow
-    return _each(iterator, n_frames, find, box, periodic, progress)
+    if is_shared:
+        from halfshell._functions.frames_ahead import search_ahead  # here: others do without
+
+        assert threads is not None
+        found = search_ahead(iterator, search, box, periodic, threads)
+    else:
+        found = _each(iterator, find, box, periodic)
+    return found if progress is None else _told(found, n_frames or 1, progress)
 
 
 def _each(
-    frames: Iterator[Any],
-    n_frames: int | None,
-    find: Callable[[Any, Any, Any], Arrays],
-    box: Any,
-    periodic: Any,
-    progress: Callable[[float], object] | None,
+    frames: Iterator[Any], find: Callable[[Any, Any, Any], Arrays], box: Any, periodic: Any
 ) -> Generator[Any, None, None]:
     for number, frame in enumerate(frames):
         try:
@@ -184,7 +192,15 @@ def _each(
         except Exception as error:
             of_frame(error, number)
             raise
-        if progress is not None and n_frames:
-            progress(min((number + 1) / n_frames, 1.0))
         yield found
         del found  # its memory is for the next frame, if it is nowhere else
+
+
+def _told(
+    results: Iterator[Any], n_frames: int, progress: Callable[[float], object]
+) -> Generator[Any, None, None]:
+    """The same, each after `progress` has been told."""
+    for number, found in enumerate(results):
+        progress(min((number + 1) / n_frames, 1.0))
+        yield found
+        del found

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectories: each frame has the pairs of a search of its own, whatever comes before it."""
 
+import threading
 from types import SimpleNamespace
 
 import ase
@@ -313,3 +314,72 @@ def test_a_result_that_does_not_fit():
     with pytest.raises(MemoryError) as caught:
         next(hs.trajectory_pairs(walk(1, 3000), 5.0, memory_limit=1e5))
     assert caught.value.__notes__ == ["in frame 0 of trajectory_pairs"]
+
+
+def large(n_frames=9, n=1500, seed=3):
+    """Frames that are worth a thread, and some that are not."""
+    rng = np.random.default_rng(seed)
+    sizes = [n if k % 4 else 60 for k in range(n_frames)]
+    return [rng.uniform(0.0, 9.0, (size, 3)) for size in sizes]
+
+
+@pytest.mark.parametrize("threads", [2, 3, 8])
+@pytest.mark.parametrize("box", [None, 9.0, SKEWED + 6.0 * np.eye(3)], ids=["open", "cube", "skew"])
+def test_frames_are_shared_out_among_threads(threads, box):
+    frames = large()
+    expected = [fresh(points, box=box) for points in frames]
+    how = {"skin": None, "box": box, "threads": threads}
+    check(follow(frames, **how), expected)
+    unsorted = hs.trajectory_pairs(frames, 1.3, quantities=LETTERS, **how)
+    check(unsorted, [hs.pairs(x, 1.3, quantities=LETTERS, box=box) for x in frames])
+    done = []
+    for k, _ in enumerate(follow(frames, progress=done.append, **how)):
+        assert len(done) == k + 1
+    assert done == [(k + 1) / 9 for k in range(9)]
+
+
+def test_a_reader_may_hand_out_the_same_array_to_threads():
+    frames = large()[1:4]
+    expected = [fresh(points, box=9.0) for points in frames]
+
+    def reader():
+        buffer = np.empty_like(frames[0])
+        for points in frames:
+            buffer[:] = points
+            yield buffer
+            buffer[:] = np.nan
+
+    check(follow(reader(), skin=None, threads=2, box=9.0), expected)
+    atoms = [ase.Atoms(positions=x, cell=[9.0] * 3, pbc=[True, False, True]) for x in frames]
+    check(follow(atoms, skin=None, threads=2), [fresh(one) for one in atoms])
+    own = [(x, [9.0 + k] * 3) for k, x in enumerate(frames)]
+    check(follow(own, skin=None, threads=2), [fresh(x, box=box) for x, box in own])
+
+
+@pytest.mark.parametrize("bad", [1, 4, 6])
+def test_frames_before_a_wrong_one_come_first(bad):
+    frames = large()
+    for wrong in (np.nan, "a box of another shape"):
+        given = list(frames)
+        if isinstance(wrong, float):
+            given[bad] = given[bad].copy()
+            given[bad][7, 1] = wrong
+        else:
+            given[bad] = (given[bad], np.eye(2))
+        found = follow(given, skin=None, threads=3)
+        for points in frames[:bad]:
+            check([next(found)], [fresh(points)])
+        with pytest.raises(ValueError) as refused:
+            next(found)
+        assert refused.value.__notes__ == [f"in frame {bad} of trajectory_pairs"]
+        assert list(found) == []
+
+
+def test_threads_end_with_the_iteration():
+    before = set(threading.enumerate())
+    found = follow(large(), skin=None, threads=2)
+    next(found)
+    next(found)
+    found.close()
+    assert set(threading.enumerate()) == before
+    assert list(follow([], skin=None, threads=2)) == []
