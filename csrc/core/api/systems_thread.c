@@ -304,9 +304,6 @@ open_worker(void *context, void *place)
     hs_search_begin(&me->call, &me->search);
     me->search.kept_forms = me->forms;
     me->committer.options = &me->call.options;
-    if (job->systems->box != NULL) {
-        me->box = *job->systems->box;
-    }
     if (job->output != NULL) {
         me->committer.pairs = &me->backlog.pairs;
         hs_backlog_init(job->output, &me->committer, &me->backlog);

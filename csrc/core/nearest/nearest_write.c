@@ -55,6 +55,7 @@ hs_nearest_write_nothing(const hs_nearest *near, int64_t row, int64_t from)
     double          *distance = hs_output_column(rows, HS_WANT_DISTANCE);
     double          *vector = hs_output_column(rows, HS_WANT_VECTOR);
     int32_t         *shift = hs_output_column(rows, HS_WANT_SHIFT);
+    HS_ASSERT((row + 1) * near->k <= rows->n_pairs);
     for (int64_t at = row * near->k + from; at < (row + 1) * near->k; at++) {
         put_number(j, rows->index_bytes, at, -1);
         if (distance != NULL) {
