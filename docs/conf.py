@@ -41,11 +41,13 @@ numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
 
-def leave_out_signature(app, what, name, *_):
-    """Return no signature for classes that users do not call, but get."""
+def leave_out_signature(app, what, name, _obj, _options, signature, returned):
+    """Return no signature for classes that users do not call, but get; else what users may give."""
     results = Path(app.srcdir, "reference", "results.md").read_text(encoding="utf-8")
     is_result = f"autoclass:: {name.rpartition('.')[2]}\n" in results
-    return ("", None) if what == "class" and is_result else None
+    if what == "class" and is_result:
+        return "", None
+    return signature and re.sub(r", \*\*unknown\b[^,)]*", "", signature), returned
 
 
 def link_public_names(_app, _what, _name, _obj, _options, lines):

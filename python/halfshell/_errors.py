@@ -57,3 +57,15 @@ class StaleError(RuntimeError):
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
+
+
+def shorten(error: BaseException) -> None:
+    """Drop the frames of an error in which input was looked at, before it is raised again.
+
+    Where it was raised by this package: what a user's own code raises keeps them.
+    """
+    last = error.__traceback__
+    while last is not None and last.tb_next is not None:
+        last = last.tb_next
+    if last is None or str(last.tb_frame.f_globals.get("__name__")).startswith("halfshell."):
+        error.__traceback__ = None

@@ -19,6 +19,7 @@ from halfshell._convert.scene import (
     brings_its_box,
     vectors_of,
 )
+from halfshell._errors import shorten
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -157,22 +158,26 @@ def as_systems(
 
     directed: the result has a direction, so that rules may have one.
     """
-    array, vectors, bits, boxes = _scene(points, box, periodic)
-    numbers = as_numbers(batch, array.shape[0])
-    asking, of_queries = _as_queries(queries, query_batch, array)
-    n, q = len(array), None if asking is None else len(asking)
-    sets = Sets(points, queries, n, q, array.shape[1])
-    one, cutoffs, reach = _as_limits(cutoff, given, sets, directed)
-    if boxes is not None and cutoffs is not None and len(boxes) != len(cutoffs):
-        raise ValueError(
-            "box and cutoff must be given for the same number of systems, got "
-            f"{len(boxes)} and {len(cutoffs)}"
-        )
-    if chosen is not None and not chosen.is_nothing:
-        from halfshell._convert.selection import with_selection  # here: others do without
+    try:
+        array, vectors, bits, boxes = _scene(points, box, periodic)
+        numbers = as_numbers(batch, array.shape[0])
+        asking, of_queries = _as_queries(queries, query_batch, array)
+        n, q = len(array), None if asking is None else len(asking)
+        sets = Sets(points, queries, n, q, array.shape[1])
+        one, cutoffs, reach = _as_limits(cutoff, given, sets, directed)
+        if boxes is not None and cutoffs is not None and len(boxes) != len(cutoffs):
+            raise ValueError(
+                "box and cutoff must be given for the same number of systems, got "
+                f"{len(boxes)} and {len(cutoffs)}"
+            )
+        if chosen is not None and not chosen.is_nothing:
+            from halfshell._convert.selection import with_selection  # here: others do without
 
-        reach = with_selection(reach, chosen, n, q, precision)
-    return (array, one, vectors, bits), (numbers, cutoffs, boxes, of_queries), reach, asking
+            reach = with_selection(reach, chosen, n, q, precision)
+        return (array, one, vectors, bits), (numbers, cutoffs, boxes, of_queries), reach, asking
+    except Exception as error:
+        shorten(error)
+        raise
 
 
 def check_no_batch(query_batch: Any) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
+from halfshell._unknown import nearest_word
 
 # The default of `algorithm`: what is this string itself needs no conversion.
 AUTO = "auto"
@@ -96,7 +97,9 @@ def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:
     if value not in choices:
         few = len(choices) <= 2
         words = " or ".join(map(repr, choices)) if few else f"one of {' '.join(choices)}"
-        raise ValueError(f"{name} must be {words}, got {shown(value)}")
+        meant = nearest_word(value, choices)
+        hint = f": did you mean {meant!r}?" if meant else ""
+        raise ValueError(f"{name} must be {words}, got {shown(value)}{hint}")
     return value
 
 

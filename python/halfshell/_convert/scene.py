@@ -9,6 +9,7 @@ import numpy as np
 
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
+from halfshell._errors import shorten
 
 if TYPE_CHECKING:
     from halfshell._convert.types import FloatArray, PointArray
@@ -128,7 +129,11 @@ def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
         counts[:0] = shape
 
     if box is not None:
-        as_real_array(vectors_of(box), "box", "be lengths or vectors", check_box)
+        try:
+            as_real_array(vectors_of(box), "box", "be lengths or vectors", check_box)
+        except Exception as error:
+            shorten(error)
+            raise
     if len(counts) == 1 and not is_a(periodic, (str, bytes)):
         axes = as_array(periodic, "periodic").shape
         counts[:0] = axes if len(axes) == 1 and 1 <= axes[0] <= MAX_DIM else ()
@@ -182,20 +187,24 @@ def as_scene(
     An object with ``positions``, ``cell`` and ``pbc`` brings its own box, so giving one is an
     error. Groups of MDAnalysis may bring none, and do not say which axes repeat.
     """
-    if brings_its_box(points):
-        group = _group(points, "points")
-        if group is not None and (group[1] is None or box is None):
-            array = as_points(group[0], ndim=ndim)
-            own = box if group[1] is None else group[1]
-            return array, *as_own_box(own, periodic, array.shape[1])
-        if box is not None or periodic is not None:
-            given = "box" if box is not None else "periodic"
-            raise ValueError(
-                f"{given} comes from the {kind_of(points)} object itself that points are"
-            )
-        return _own_scene(points, ndim=ndim)
-    array = as_points(points, ndim=ndim)
-    return array, *as_own_box(box, periodic, array.shape[1])
+    try:
+        if brings_its_box(points):
+            group = _group(points, "points")
+            if group is not None and (group[1] is None or box is None):
+                array = as_points(group[0], ndim=ndim)
+                own = box if group[1] is None else group[1]
+                return array, *as_own_box(own, periodic, array.shape[1])
+            if box is not None or periodic is not None:
+                given = "box" if box is not None else "periodic"
+                raise ValueError(
+                    f"{given} comes from the {kind_of(points)} object itself that points are"
+                )
+            return _own_scene(points, ndim=ndim)
+        array = as_points(points, ndim=ndim)
+        return array, *as_own_box(box, periodic, array.shape[1])
+    except Exception as error:
+        shorten(error)
+        raise
 
 
 def as_queries(
@@ -245,9 +254,13 @@ def as_sets(
     queries: Any, points: Any, box: Any, periodic: Any
 ) -> tuple[PointArray | None, PointArray, FloatArray | None, int]:
     """As `as_two_sets`, where there may be no queries."""
-    if queries is None:
-        return None, *as_scene(points, box, periodic)
-    return as_two_sets(queries, points, box, periodic)
+    try:
+        if queries is None:
+            return None, *as_scene(points, box, periodic)
+        return as_two_sets(queries, points, box, periodic)
+    except Exception as error:
+        shorten(error)
+        raise
 
 
 def _same_box(one: OwnBox, other: OwnBox) -> bool:

@@ -14,6 +14,7 @@ from halfshell._convert.given import Chosen, Given, Sets
 from halfshell._convert.lengths import as_cutoff, refuse_none
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_sets
+from halfshell._errors import shorten
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -43,9 +44,13 @@ def as_search(
     queries: Any = None,
 ) -> tuple[Search, PointArray | None]:
     """The first ten arguments of the core, and the queries or None."""
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
-    return (array, as_cutoff(cutoff), vectors, bits, *rest), asking
+    try:
+        asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+        rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
+        return (array, as_cutoff(cutoff), vectors, bits, *rest), asking
+    except Exception as error:
+        shorten(error)
+        raise
 
 
 def as_search_of_each(
@@ -64,23 +69,27 @@ def as_search_of_each(
     directed: the result has a direction, so that the rule may have one. chosen: which pairs count;
     the selection then comes with the reach.
     """
-    asking, array, vectors, bits = as_sets(queries, points, box, periodic)
-    reach = None
-    if given.is_nothing and not is_a(cutoff, Mapping):
-        refuse_none(cutoff)
-        largest = as_cutoff(cutoff)
-    else:
-        from halfshell._convert.reach import as_reach  # here: plain searches do without
+    try:
+        asking, array, vectors, bits = as_sets(queries, points, box, periodic)
+        reach = None
+        if given.is_nothing and not is_a(cutoff, Mapping):
+            refuse_none(cutoff)
+            largest = as_cutoff(cutoff)
+        else:
+            from halfshell._convert.reach import as_reach  # here: plain searches do without
 
-        n_queries = None if asking is None else len(asking)
-        sets = Sets(points, queries, len(array), n_queries, array.shape[1])
-        largest, reach = as_reach(cutoff, given, sets, directed)
-    if chosen is not None and not chosen.is_nothing:
-        from halfshell._convert.selection import with_selection  # here, as above
+            n_queries = None if asking is None else len(asking)
+            sets = Sets(points, queries, len(array), n_queries, array.shape[1])
+            largest, reach = as_reach(cutoff, given, sets, directed)
+        if chosen is not None and not chosen.is_nothing:
+            from halfshell._convert.selection import with_selection  # here, as above
 
-        n_asking = None if asking is None else len(asking)
-        reach = with_selection(reach, chosen, len(array), n_asking, rest[1])
-    return (array, largest, vectors, bits, *rest), asking, reach
+            n_asking = None if asking is None else len(asking)
+            reach = with_selection(reach, chosen, len(array), n_asking, rest[1])
+        return (array, largest, vectors, bits, *rest), asking, reach
+    except Exception as error:
+        shorten(error)
+        raise
 
 
 def as_rest(

@@ -13,6 +13,7 @@ from halfshell._convert.arrays import as_array, one_each
 from halfshell._convert.foreign import is_a, kind_of, whole_number
 from halfshell._convert.lengths import as_number
 from halfshell._convert.listed import as_point_numbers
+from halfshell._errors import shorten
 
 if TYPE_CHECKING:
     from halfshell._convert.given import Chosen
@@ -27,7 +28,11 @@ def with_selection(
     """The reach, and what is chosen among n points, or among these for each of q queries."""
     if chosen.is_nothing:
         return None if reach is None else reach
-    selection = _as_selection(chosen, n, q)
+    try:
+        selection = _as_selection(chosen, n, q)
+    except Exception as error:
+        shorten(error)
+        raise
     if selection[-1] > 0.0 and is_a(precision, str) and precision == "single":
         raise ValueError("min_distance does not go with precision 'single'")
     return (reach, selection)  # type: ignore[return-value]

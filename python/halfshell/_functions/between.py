@@ -14,9 +14,10 @@ from halfshell._convert.options import AUTO, RAISE, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._objects.box import Box
+from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
-    from typing import Literal, Unpack
+    from typing import Literal, Never, Unpack
 
     import numpy.typing as npt
 
@@ -110,6 +111,7 @@ def pairs_between(
     min_distance: float | None = None,
     batch: npt.ArrayLike | None = None,
     query_batch: npt.ArrayLike | None = None,
+    **unknown: Never,
 ) -> Arrays | tuple[Any, ...]:
     """Find every pair of a query and a point within a cutoff.
 
@@ -194,6 +196,8 @@ def pairs_between(
     >>> i.tolist(), j.tolist()
     ([0, 0, 1, 1, 1], [0, 1, 0, 1, 2])
     """
+    if unknown:
+        refuse_unknown(pairs_between, unknown)
     if type(box) is Box:
         box = box.vectors
     room = None

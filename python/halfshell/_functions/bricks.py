@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from halfshell._convert.options import as_count
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import BoxLike, FloatArray, Number, PeriodicLike, PointsLike
 from halfshell._objects.brick import Brick, Bricks
+from halfshell._unknown import refuse_unknown
 
 _Numbers = npt.NDArray[np.int64]
 
@@ -30,6 +31,7 @@ def bricks(
     *,
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
+    **unknown: Never,
 ) -> Bricks:
     """Divide points into bricks for other threads or machines; their pairs are always exact.
 
@@ -88,6 +90,8 @@ def bricks(
     >>> hs.count_pairs(points, 0.1, box=[1.0, 1.0, 1.0])
     2099
     """
+    if unknown:
+        refuse_unknown(bricks, unknown)
     array, vectors, bits = as_scene(points, box, periodic)
     largest, n_bricks = as_cutoff(cutoff), as_count(n, "n")
     _core.count_pairs(array, 0.0 if math.isfinite(largest) and largest >= 0.0 else largest,

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Never
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,6 +23,7 @@ from halfshell._convert.types import (
     Rule,
 )
 from halfshell._objects.clusters import Clusters
+from halfshell._unknown import refuse_unknown
 
 
 def clusters(
@@ -42,6 +45,7 @@ def clusters(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    **unknown: Never,
 ) -> Clusters:
     """Find which points hang together: connected components, or the clusters of DBSCAN.
 
@@ -116,6 +120,8 @@ def clusters(
     >>> hs.clusters([[0.0], [0.5], [1.0], [2.0], [9.0]], 1.0, min_points=3).labels.tolist()
     [0, 0, 0, 0, -1]
     """
+    if unknown:
+        refuse_unknown(clusters, unknown)
     least = as_count(min_points, "min_points")
     with_winding = as_flag(winding, "winding")
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)

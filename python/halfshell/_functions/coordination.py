@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any, Never, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from halfshell._convert.types import (
 )
 from halfshell._functions.neighbors import rows_alone
 from halfshell._objects.box import Box
+from halfshell._unknown import refuse_unknown
 
 
 def coordination(
@@ -58,6 +59,7 @@ def coordination(
     min_distance: float | None = None,
     batch: npt.ArrayLike | None = None,
     query_batch: npt.ArrayLike | None = None,
+    **unknown: Never,
 ) -> npt.NDArray[np.int64]:
     """Count the neighbours of each point, or of each query, without listing them.
 
@@ -120,6 +122,8 @@ def coordination(
     >>> hs.coordination([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 2.0, types=names).tolist()
     [[1, 0], [1, 1], [1, 0]]
     """
+    if unknown:
+        refuse_unknown(coordination, unknown)
     if type(box) is Box:
         box = box.vectors
     if types is not None or by_type is not None:

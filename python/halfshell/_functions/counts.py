@@ -14,10 +14,11 @@ from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.options import AUTO
 from halfshell._convert.search import as_rest, as_search_of_each, count_within
 from halfshell._objects.box import Box
+from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import Unpack
+    from typing import Never, Unpack
 
     import numpy as np
     import numpy.typing as npt
@@ -106,6 +107,7 @@ def count_pairs(
     query_exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
     min_distance: float | None = None,
+    **unknown: Never,
 ) -> int | npt.NDArray[np.int64]:
     """Count the pairs of points within one or several cutoffs.
 
@@ -167,6 +169,8 @@ def count_pairs(
     >>> hs.count_pairs(points, None, radii=[0.5, 1.0, 1.0])
     2
     """
+    if unknown:
+        refuse_unknown(count_pairs, unknown)
     if type(box) is Box:
         box = box.vectors
     if batch is None and (

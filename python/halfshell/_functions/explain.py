@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from halfshell._convert.types import (
     Rule,
 )
 from halfshell._functions.parts import parts_of
+from halfshell._unknown import refuse_unknown
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,7 @@ def explain(
     threads: int | None = None,
     memory_limit: float | None = None,
     measure: bool = False,
+    **unknown: Never,
 ) -> Explanation:
     """Say how `pairs` would search a scene, and what it leaves out.
 
@@ -170,6 +172,8 @@ def explain(
     >>> plan.algorithm, plan.shape, plan.measured["pairs"]
     ('all-pairs', (1, 1), 1)
     """
+    if unknown:
+        refuse_unknown(explain, unknown)
     rest = as_rest(inclusive, precision, kernel, memory_limit, None, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
     search, _, reach = as_search_of_each(points, cutoff, box, periodic, rest, given)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Never
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,6 +15,7 @@ from halfshell._convert.marks import as_marks, binned
 from halfshell._convert.search import as_rest, as_search
 from halfshell._convert.selection import with_selection
 from halfshell._convert.types import Algorithm, BoxLike, PeriodicLike, PointsLike
+from halfshell._unknown import refuse_unknown
 
 
 def pair_histogram(
@@ -37,6 +40,7 @@ def pair_histogram(
     exclude_within: int | None = None,
     batch: npt.ArrayLike | None = None,
     query_batch: npt.ArrayLike | None = None,
+    **unknown: Never,
 ) -> npt.NDArray[np.int64] | npt.NDArray[np.float64]:
     """Count pairs in bins of distance, always exact, without storing them.
 
@@ -120,6 +124,8 @@ def pair_histogram(
     >>> hs.pair_histogram(points, [0.0, 1.5, 3.0], weights=[1.0, -1.0, 0.5]).tolist()
     [-1.0, 0.0]
     """
+    if unknown:
+        refuse_unknown(pair_histogram, unknown)
     chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
     if batch is not None:
         scene, own, selection, asking = as_systems(

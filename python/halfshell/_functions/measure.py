@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, Never, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from halfshell._convert.foreign import kind_of
 from halfshell._convert.listed import as_listed
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import ArrayLike, Arrays, BoxLike, PeriodicLike, PointsLike
+from halfshell._unknown import refuse_unknown
 
 _LETTERS = "dDS"
 
@@ -69,6 +70,7 @@ def measure(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
+    **unknown: Never,
 ) -> Arrays:
     """Measure given pairs, in the nearest image or in a given one; always exact.
 
@@ -135,6 +137,8 @@ def measure(
     >>> hs.measure(points, [0], [1], [[0, 0]], box=[1.0, 1.0], quantities="d").tolist()
     [0.8]
     """
+    if unknown:
+        refuse_unknown(measure, unknown)
     if not isinstance(quantities, str):
         raise TypeError(f"quantities must be a string, got {kind_of(quantities)}")
     if not quantities or not set(quantities) <= set(_LETTERS) or (

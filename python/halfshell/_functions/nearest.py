@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, Never, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from halfshell._convert.nearest import as_k, as_max_distance, check_max_distance
 from halfshell._convert.options import as_index_bytes
 from halfshell._convert.scene import as_sets
 from halfshell._convert.types import Arrays, BoxLike, Number, PeriodicLike, PointsLike
+from halfshell._unknown import refuse_unknown
 
 
 class _NearestOptions(TypedDict, total=False):
@@ -67,6 +68,7 @@ def nearest(
     memory_limit: float | None = None,
     batch: npt.ArrayLike | None = None,
     query_batch: npt.ArrayLike | None = None,
+    **unknown: Never,
 ) -> Arrays:
     """Find the k nearest points of each point or query, in an order that is always exact.
 
@@ -161,6 +163,8 @@ def nearest(
     >>> j.tolist(), d.tolist(), S.tolist()
     ([[0, 2]], [[0.5, 0.5]], [[[1, 0], [0, 0]]])
     """
+    if unknown:
+        refuse_unknown(nearest, unknown)
     k, own = as_k(k), None
     if batch is None:
         check_no_batch(query_batch)

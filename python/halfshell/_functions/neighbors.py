@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,7 @@ from halfshell._convert.types import (
 from halfshell._objects.box import Box
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.origin import Origin, shifts_of_search
+from halfshell._unknown import refuse_unknown
 
 
 def neighbors(
@@ -63,6 +64,7 @@ def neighbors(
     min_distance: float | None = None,
     batch: npt.ArrayLike | None = None,
     query_batch: npt.ArrayLike | None = None,
+    **unknown: Never,
 ) -> NeighborTable:
     """Find all neighbours of each point, or of each query, as a table of rows.
 
@@ -167,6 +169,8 @@ def neighbors(
     >>> [row.tolist() for row in hs.neighbors(points, None, radii=[0.5, 1.5, 3.0], rule="gather")]
     [[], [0], [0, 1]]
     """
+    if unknown:
+        refuse_unknown(neighbors, unknown)
     if type(box) is Box:
         box = box.vectors
     found: Any = points  # these five as the core has them

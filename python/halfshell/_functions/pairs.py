@@ -15,10 +15,11 @@ from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.shells import as_shells
 from halfshell._objects.box import Box
+from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Literal, Unpack
+    from typing import Literal, Never, Unpack
 
     import numpy.typing as npt
 
@@ -104,6 +105,7 @@ def pairs(
     exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
     min_distance: float | None = None,
+    **unknown: Never,
 ) -> Arrays | tuple[Any, ...]:
     """Find every pair of points within a cutoff, each once.
 
@@ -352,8 +354,9 @@ def pairs(
     >>> i.tolist(), j.tolist()
     ([0, 2], [1, 3])
     """
-    if type(box) is Box:
-        box = box.vectors
+    if unknown:
+        refuse_unknown(pairs, unknown)
+    box = box.vectors if type(box) is Box else box
     room = None
     if capacity is not None or on_overflow is not RAISE:
         room = as_room(capacity, on_overflow, out)
@@ -383,9 +386,8 @@ def pairs(
         other = "batch" if batch is not None else "capacity" if shells is None else "the letter k"
         raise ValueError(f"touching does not go with {other}")
     if batch is None:
-        search, _, reach = as_search_of_each(
-            points, cutoff, box, periodic, rest, given, chosen=chosen
-        )
+        every = points, cutoff, box, periodic, rest, given
+        search, _, reach = as_search_of_each(*every, chosen=chosen)
         if touching is None:
             return _core.pairs(*(*search, *wanted, reach, algorithm, shells, room))
         from halfshell._convert.touching import pairs_touching  # here: others do without

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ from halfshell._functions.ideal_gas import (
     shell_shares,
 )
 from halfshell._objects.radial_distribution import RadialDistribution
+from halfshell._unknown import refuse_unknown
 
 _COLUMNS = 12  # of a result without types, and what makes them
 
@@ -56,6 +57,7 @@ def rdf(
     exclude_within: int | None = None,
     batch: npt.ArrayLike | None = None,
     query_batch: npt.ArrayLike | None = None,
+    **unknown: Never,
 ) -> RadialDistribution:
     """Compute the radial distribution function g(r) of a periodic box; counts are always exact.
 
@@ -145,6 +147,8 @@ def rdf(
     >>> partial.n_r.round().tolist()  # oxygens within 0.1, 0.2, 0.3 and 0.4 of a silicon
     [6.0, 50.0, 170.0, 402.0]
     """
+    if unknown:
+        refuse_unknown(rdf, unknown)
     edges = _edges(r_max, bins)
     chosen = Chosen(groups, exclude, exclude_within, None, query_groups, query_exclude)
     if batch is not None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, Unpack, cast, overload
+from typing import Any, Literal, Never, Unpack, cast, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from halfshell._convert.types import (
     ReachOptions,
     Rule,
 )
+from halfshell._unknown import refuse_unknown
 
 
 class _StreamOptions(ReachOptions, total=False):
@@ -79,6 +80,7 @@ def iter_pairs(
     exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
     min_distance: float | None = None,
+    **unknown: Never,
 ) -> PairBlocks[Any]:
     """Iterate over all pairs of points within a cutoff, in blocks of bounded size.
 
@@ -148,6 +150,8 @@ def iter_pairs(
     >>> int(histogram.sum()) == hs.count_pairs(points, 0.1, box=[1.0] * 3)
     True
     """
+    if unknown:
+        refuse_unknown(iter_pairs, unknown)
     most = most_pairs(max_pairs)
     rest = as_rest(inclusive, precision, kernel, memory_limit, progress, threads)
     given = Given(radii, None, rule, types, None, supports, None, extent)
@@ -186,6 +190,7 @@ def for_each_pair(
     exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
     min_distance: float | None = None,
+    **unknown: Never,
 ) -> int:
     """Call a function for each pair of points within a cutoff, storing none of them.
 
@@ -266,6 +271,8 @@ def for_each_pair(
     >>> sorted(bonds)
     [(0, 1, (1.0,), 1.0), (1, 2, (1.5,), 2.25)]
     """
+    if unknown:
+        refuse_unknown(for_each_pair, unknown)
     from halfshell._convert.callbacks import target_of  # here: iter_pairs does without
 
     target = target_of(callback, user_data)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, Never, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,10 @@ from halfshell._convert.foreign import kind_of
 from halfshell._convert.frames import as_frame, frames_of, of_frame
 from halfshell._convert.options import as_flag, as_index_bytes, check_letters
 from halfshell._convert.types import Arrays, BoxLike, Letter, Number, PeriodicLike, PointsLike
+from halfshell._errors import shorten
 from halfshell._functions.pairs import pairs
 from halfshell._objects.verlet_list import VerletList
+from halfshell._unknown import refuse_unknown
 
 # Below them a search takes no longer than to look at a list, as docs/verlet.md has measured.
 _FEW_POINTS = 1000
@@ -68,6 +70,7 @@ def trajectory_pairs(
     threads: int | None = None,
     memory_limit: float | None = None,
     progress: Callable[[float], object] | None = None,
+    **unknown: Never,
 ) -> Generator[Any, None, None]:
     """Find the pairs of each frame of a trajectory, one frame after the other; always exact.
 
@@ -141,6 +144,8 @@ def trajectory_pairs(
     >>> [pairs.tolist() for pairs in found]
     [[[0, 1], [0, 2]], [[1, 2]]]
     """
+    if unknown:
+        refuse_unknown(trajectory_pairs, unknown)
     check_letters(quantities)
     sort, index_dtype = as_flag(sort, "sort"), np.dtype(f"i{as_index_bytes(index_dtype)}")
     kept = VerletList(
@@ -191,6 +196,7 @@ def _each(
             found = find(*as_frame(frame, box, periodic))
         except Exception as error:
             of_frame(error, number)
+            shorten(error)
             raise
         yield found
         del found  # its memory is for the next frame, if it is nowhere else

@@ -13,7 +13,7 @@ import halfshell as hs
 
 #: What `import halfshell` may load of its own.
 OWN = {
-    "_core", "_errors",
+    "_core", "_errors", "_unknown",
     "_convert", "_convert.arrays", "_convert.batch", "_convert.foreign", "_convert.given",
     "_convert.lengths", "_convert.memory", "_convert.options", "_convert.scene", "_convert.search",
     "_convert.shells",

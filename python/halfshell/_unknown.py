@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a call with a keyword that there is none of is answered: the one that is meant, if any."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Never
+
+#: What other libraries call them.
+_MEANT = {
+    "periodic": ["pbc", "pbcs", "is_periodic", "periodicity"],
+    "box": [
+        "cell", "cells", "boxsize", "box_size", "boxlength", "lattice", "dimensions", "unitcell",
+        "unit_cell", "box_vectors", "supercell",
+    ],
+    "cutoff": [
+        "r", "rc", "r_c", "rcut", "r_cut", "rmax", "r_max", "radius", "max_cutoff", "max_distance",
+        "distance_upper_bound", "cut_off",
+    ],
+    "r_max": ["range", "rmax", "cutoff"],
+    "max_distance": ["cutoff", "r_max", "radius", "distance_upper_bound"],
+    "min_distance": ["min_cutoff", "r_min", "rmin", "minimum_distance"],
+    "bins": ["nbins", "n_bins", "num_bins"],
+    "k": ["n_neighbors", "num_neighbors", "n_nearest"],
+    "threads": ["workers", "n_jobs", "num_threads", "nthreads", "n_threads"],
+    "queries": ["x", "y", "query", "query_points", "reference", "configuration"],
+    "points": ["positions", "coordinates", "coords", "xyz", "atoms", "data"],
+    "quantities": ["return_distance", "return_distances", "quantity", "output"],
+    "sort": ["sorted", "sort_results", "sort_pairs"],
+    "types": ["species", "symbols", "elements", "numbers"],
+    "index_dtype": ["dtype", "index_type", "output_type"],
+    "min_points": ["min_samples"],
+    "batch": ["batch_index", "system_index"],
+}  # fmt: skip
+
+
+def refuse_unknown(function: Callable[..., Any], names: Iterable[str]) -> Never:
+    """TypeError for the first of these keywords, with what it seems to mean."""
+    import inspect  # here, as it takes some milliseconds
+
+    name = next(iter(names))
+    known = [
+        parameter.name for parameter in inspect.signature(function).parameters.values()
+        if parameter.kind is not inspect.Parameter.VAR_KEYWORD and parameter.name != "self"
+    ]  # fmt: skip
+    meant = _meant(name, known)
+    hint = f": did you mean {meant}=?" if meant else ""
+    raise TypeError(
+        f"{function.__qualname__}() got an unexpected keyword argument {name!r}{hint}"
+    )
+
+
+def _meant(name: str, known: list[str]) -> str | None:
+    """One of the known names, by what other libraries call it, or by its spelling."""
+    for one, others in _MEANT.items():
+        if one in known and name.lower() in others:
+            return one
+    return nearest_word(name, known)
+
+
+def nearest_word(word: str, known: Iterable[str]) -> str | None:
+    """The one that is spelled most like a word, if any is."""
+    import difflib  # here, as above
+
+    found = difflib.get_close_matches(word, list(known), 1, 0.6)
+    return found[0] if found else None
