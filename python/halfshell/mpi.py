@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,7 +134,7 @@ def _divided(given: list[_Given]) -> list[brick_tasks.Part]:
                 f"{points.shape[1]} columns of {points.dtype} on rank 0 and "
                 f"{array.shape[1]} of {array.dtype} on rank {rank}"
             )
-        if one.cutoff != first.cutoff:
+        if one.cutoff != first.cutoff and not math.isnan(first.cutoff):
             raise ValueError(
                 f"cutoff must be the same on all ranks, got {first.cutoff} on rank 0 and "
                 f"{one.cutoff} on rank {rank}"

@@ -40,7 +40,7 @@ def of_columns(frame: Any, dtype: np.dtype[Any]) -> Array:
 
 def gathered(chunks: Sequence[Any], ndim: int, dtype: np.dtype[Any]) -> Array:
     """All points in one array, if every chunk is what the whole was said to be."""
-    arrays = [np.asarray(chunk) for chunk in chunks]
+    arrays = [np.asanyarray(chunk) for chunk in chunks]
     for place, array in enumerate(arrays):
         if array.ndim != 2 or array.shape[1] != ndim:
             raise ValueError(
@@ -52,6 +52,9 @@ def gathered(chunks: Sequence[Any], ndim: int, dtype: np.dtype[Any]) -> Array:
                 f"points must be of {dtype} in every chunk, as the whole says; chunk {place} is of "
                 f"{array.dtype}"
             )
+    if any(isinstance(array, np.ma.MaskedArray) for array in arrays):
+        join: Any = np.ma.concatenate
+        return as_real_array(join(arrays), "points")  # which refuses what is masked
     return np.concatenate(arrays) if arrays else np.empty((0, ndim), dtype)
 
 

@@ -59,3 +59,11 @@ def test_chunks_are_what_the_whole_says():
         bad = np.array([[0.0, 1.0, 2.0], [3.0, np.nan, 4.0]])
         tasks.divided([np.zeros((4, 3)), bad], 3, np.dtype(float), 1.0, 2, {})
     assert tasks.gathered([], 2, np.dtype(np.float32)).shape == (0, 2)
+
+
+def test_masked_points_are_refused_by_their_place():
+    whole = np.ma.masked_array(np.ones((3, 2)))
+    assert same([tasks.gathered([np.zeros((1, 2)), whole], 2, np.dtype(float))[1:]], [whole.data])
+    hidden = np.ma.masked_array(np.ones((3, 2)), [[False, False], [False, True], [False, False]])
+    with pytest.raises(ValueError, match="masked"):
+        tasks.gathered([np.zeros((4, 2)), hidden], 2, np.dtype(float))

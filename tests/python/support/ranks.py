@@ -44,7 +44,7 @@ def refusals():
         ((spoilt if last else points, 1.0), {}, ValueError, f"points[{5 * SIZE - 3}, 1]"),
         ((["a"] if last else points, 1.0), {}, TypeError, f"rank {SIZE - 1}: points"),
         ((points, -1.0), {}, ValueError, "cutoff"),
-        ((points, np.nan), {}, ValueError, "cutoff"),
+        ((points, np.nan), {}, ValueError, "got nan"),
         ((points, "1" if last else 1.0), {}, TypeError, f"rank {SIZE - 1}: cutoff"),
         ((points, 1.0), {"box": [1.0, 0.0, 1.0]}, ValueError, "vector 1 of box is zero"),
         ((points, 1.0), {"periodic": last}, ValueError, "periodic needs a box"),
