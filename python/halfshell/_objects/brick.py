@@ -102,8 +102,10 @@ class Brick:
         check_letters(quantities)
         members = self.members
         letters = quantities if "i" in quantities else "i" + quantities
+        # All pairs of the members are found sooner than those of half of them.
+        some = None if 2 * len(self.owned) >= len(members) else self._places(members)
         found: Any = hs.pairs(
-            self._of_members(points, members), self.cutoff, touching=self._places(members),
+            self._of_members(points, members), self.cutoff, touching=some,
             quantities=letters, sort=True,
             **self._options(inclusive, kernel, threads, memory_limit),
         )  # fmt: skip

@@ -15,7 +15,8 @@ import halfshell as hs
 from checkout import ROOT
 
 MODULES = ["halfshell", *(m.name for m in pkgutil.walk_packages(hs.__path__, "halfshell."))]
-MODULES = [m for m in MODULES if m not in ("halfshell.torch", "halfshell.jax")]  # frameworks/
+ELSEWHERE = ["torch", "jax", "dask", "_functions.dask_scene"]  # frameworks/ and distributed/
+MODULES = [m for m in MODULES if m not in [f"halfshell.{name}" for name in ELSEWHERE]]
 OWNERS = {
     "halfshell.compat.ase": "ase",
     "halfshell.compat.matscipy": "ase",

@@ -18,6 +18,7 @@ FOLDERS = {
     "process": "memory, threads, signals, the environment",
     "compat": "stand-ins for other libraries",
     "frameworks": "tensors of PyTorch and JAX",
+    "distributed": "Dask and MPI",
     "scenes": "the scenes and structures of the package",
     "binding": "the boundary to C",
     "report": "`halfshell report`",

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What Dask and MPI do with bricks, without either: together the parts say what one search says."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from brick_scenes import LETTERS, in_order, same, scenes, serial
+from halfshell._functions import brick_tasks as tasks
+
+OPTIONS = {"inclusive": True, "kernel": None, "threads": 1, "memory_limit": None}
+
+
+def parts_of(points, cutoff, options, n):
+    array = np.asarray(points)
+    chunks = np.array_split(array, 3)
+    parts = tasks.divided(chunks, array.shape[1], array.dtype, cutoff, n, options)
+    return pickle.loads(pickle.dumps(parts))
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 50])
+@pytest.mark.parametrize("name", scenes())
+def test_parts_are_one_search(name, n):
+    points, cutoff, scene = scenes()[name]
+    parts = parts_of(points, cutoff, scene, n)
+    found = [tasks.pairs_of(part, LETTERS, OPTIONS) for part in parts]
+    columns = [np.concatenate(column) for column in zip(*(one[0][1:] for one in found))]
+    expected = serial(points, cutoff, scene)
+    assert same(in_order(columns), expected)
+    cuts = [tasks.cut(groups, part, n) for groups, part in zip(found, parts)]
+    ranges = [tasks.merged([one[k] for one in cuts])[0][1:] for k in range(n)]
+    assert same([np.concatenate(column) for column in zip(*ranges)], expected)
+    cutoffs = np.array([0.0, cutoff / 2.0, cutoff])
+    doubled = [tasks.counts_of(part, cutoffs, scene, OPTIONS) for part in parts]
+    assert tasks.half_sum(doubled).tolist() == hs.count_pairs(points, cutoffs, **scene).tolist()
+    edges = np.array([0.0, cutoff / 3.0, cutoff])
+    rest = {key: value for key, value in OPTIONS.items() if key != "inclusive"}
+    binned = [tasks.histogram_of(part, edges, scene, rest) for part in parts]
+    assert tasks.half_sum(binned).tolist() == hs.pair_histogram(points, edges, **scene).tolist()
+    counts = [tasks.coordination_of(part, scene, OPTIONS) for part in parts]
+    assert same([tasks.merged(counts)[0][1]], [hs.coordination(points, cutoff, **scene)])
+    rows = [tasks.neighbors_of(part, "jdDS", OPTIONS) for part in parts]
+    table = tasks.table_of(rows, "jdDS", parts[0])
+    whole = hs.neighbors(points, cutoff, quantities="jdDS", **scene)
+    names = ("offsets", "indices", "distances", "vectors", "shifts")
+    assert same([getattr(table, key) for key in names], [getattr(whole, key) for key in names])
+    assert tasks.bricks_of(parts).overhead == hs.bricks(points, cutoff, n, **scene).overhead
+
+
+def test_chunks_are_what_the_whole_says():
+    chunks = [np.zeros((2, 3)), np.zeros((2, 2))]
+    with pytest.raises(ValueError, match=r"3 columns in every chunk; chunk 1 has shape \(2, 2\)"):
+        tasks.gathered(chunks, 3, np.dtype(float))
+    with pytest.raises(TypeError, match=r"float64 in every chunk.*chunk 1 is of int64"):
+        tasks.gathered([np.zeros((2, 3)), np.ones((2, 3), np.int64)], 3, np.dtype(float))
+    with pytest.raises(ValueError, match=r"points\[5, 1\]"):  # of all
+        bad = np.array([[0.0, 1.0, 2.0], [3.0, np.nan, 4.0]])
+        tasks.divided([np.zeros((4, 3)), bad], 3, np.dtype(float), 1.0, 2, {})
+    assert tasks.gathered([], 2, np.dtype(np.float32)).shape == (0, 2)
+
+
+def test_masked_points_are_refused_by_their_place():
+    whole = np.ma.masked_array(np.ones((3, 2)))
+    assert same([tasks.gathered([np.zeros((1, 2)), whole], 2, np.dtype(float))[1:]], [whole.data])
+    hidden = np.ma.masked_array(np.ones((3, 2)), [[False, False], [False, True], [False, False]])
+    with pytest.raises(ValueError, match="masked"):
+        tasks.gathered([np.zeros((4, 2)), hidden], 2, np.dtype(float))

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`halfshell.dask`: for any chunks and workers the answer is that of one search."""
+
+import contextlib
+import doctest
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import halfshell as hs
+from brick_scenes import LETTERS, in_order, same, scenes, serial
+from checkout import ROOT
+
+dask = pytest.importorskip("dask", reason="dask is not installed")
+da = pytest.importorskip("dask.array", reason="dask.array is not installed")
+distributed = pytest.importorskip("distributed", reason="distributed is not installed")
+hd = pytest.importorskip("halfshell.dask", reason="dask is not installed")
+
+CHUNKS = {"one": -1, "some": 100, "uneven": "uneven"}
+
+
+def collection(points, chunks):
+    if chunks == "uneven":
+        first = len(points) // 5
+        chunks = ((first, 0, len(points) - first), points.shape[1])
+    return da.from_array(points, chunks=chunks)
+
+
+def check_all(points, cutoff, scene, chunks, n=None, **how):
+    """All functions against one search, by bytes."""
+    given, how = collection(points, chunks), {"n": n, **scene}
+    edges, cutoffs = [0.0, cutoff / 2.0, cutoff], [cutoff / 2.0, cutoff]
+    rows = hd.neighbors(given, cutoff, quantities="jdS", sort=True, **how)
+    found = dask.compute(
+        hd.pairs(given, cutoff, quantities=LETTERS, **how),
+        hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **how),
+        hd.coordination(given, cutoff, **how),
+        hd.count_pairs(given, cutoff, **how), hd.count_pairs(given, cutoffs, **how),
+        hd.pair_histogram(given, edges, **how),
+        (rows.points, rows.counts, *rows.columns),
+    )  # fmt: skip
+    table, parts = dask.compute(rows.table, hd.bricks(given, cutoff, **how))
+    expected = serial(points, cutoff, scene)
+    assert same(in_order(found[0]), expected) and same(found[1], expected)
+    counts = hs.coordination(points, cutoff, **scene)
+    assert same([found[2]], [counts])
+    assert found[3].dtype == np.int64 and found[3].shape == () and found[3] == len(expected[0])
+    assert same([found[4]], [hs.count_pairs(points, cutoffs, **scene)])
+    assert same([found[5]], [hs.pair_histogram(points, edges, **scene)])
+    whole = hs.neighbors(points, cutoff, quantities="jdS", **scene)
+    columns = (whole.indices, whole.distances, whole.shifts)
+    assert same(found[6], (np.arange(len(points)), counts, *columns))
+    assert same((table.indices, table.distances, table.shifts), columns)
+    assert same([table.offsets], [whole.offsets])
+    n_bricks = given.numblocks[0] if n is None else n
+    assert parts.sizes == hs.bricks(points, cutoff, n_bricks, **scene).sizes
+
+
+@pytest.mark.parametrize("chunks", CHUNKS)
+@pytest.mark.parametrize("name", scenes())
+def test_it_is_one_search(name, chunks):
+    with dask.config.set(scheduler="threads", num_workers=2):
+        check_all(*scenes()[name], CHUNKS[chunks], n=5 if chunks == "one" else None)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_threads(workers):
+    with dask.config.set(scheduler="threads", num_workers=workers):
+        check_all(*scenes()["skewed"], 60, n=7)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_processes(workers):
+    with dask.config.set(scheduler="processes", num_workers=workers):
+        check_all(*scenes()["mixed"], 60)
+
+
+@contextlib.contextmanager
+def cluster(workers, **options):
+    options = {"threads_per_worker": 1, "dashboard_address": None, "processes": False, **options}
+    with (
+        distributed.LocalCluster(n_workers=workers, **options) as made,
+        distributed.Client(made) as client,
+    ):
+        yield client
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_a_cluster(workers):
+    with cluster(workers):
+        check_all(*scenes()["mixed"], 50)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_what_is_spilled_to_disk_is_read_again(tmp_path):
+    limits = {"target": 1e-9, "spill": 1e-9, "pause": False, "terminate": False}
+    limits = {f"distributed.worker.memory.{name}": value for name, value in limits.items()}
+    points, cutoff, scene = scenes()["skewed"]
+    with (
+        dask.config.set(limits),
+        cluster(2, memory_limit="1GiB", local_directory=str(tmp_path)) as client,
+    ):
+        found = hd.pairs(collection(points, 60), cutoff, quantities=LETTERS, sort=True, **scene)
+        kept = client.persist(list(found))
+        answer = client.gather(client.compute(kept))
+        on_disk = [len(worker.data.disk) for worker in client.cluster.workers.values()]
+        assert sum(on_disk) > 0
+        assert same(answer, serial(points, cutoff, scene))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_that_dies_is_survived():
+    points, cutoff, scene = scenes()["skewed"]
+    with cluster(2, processes=True) as client:
+        found = hd.pairs(collection(points, 60), cutoff, quantities=LETTERS, sort=True, **scene)
+        kept = client.persist(list(found))
+        distributed.wait(kept)
+        pids = client.run(os.getpid)
+        holding = client.has_what()
+        victim = max(pids, key=lambda address: len(holding[address]))
+        assert holding[victim]
+        os.kill(pids[victim], signal.SIGKILL)
+        assert same(client.gather(client.compute(kept)), serial(points, cutoff, scene))
+        assert pids[victim] not in client.run(os.getpid).values()
+
+
+def test_from_disk_and_of_unknown_length(tmp_path):
+    points, cutoff, scene = scenes()["mixed"]
+    paths = [tmp_path / f"{k}.npy" for k in range(3)]
+    for path, some in zip(paths, np.array_split(points, 3), strict=True):
+        np.save(path, some)
+    loads = [dask.delayed(np.load)(path) for path in paths]
+    chunks = [da.from_delayed(load, (np.nan, 3), float) for load in loads]
+    given = da.concatenate(chunks, allow_unknown_chunksizes=True)
+    expected = serial(points, cutoff, scene)
+    found = hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **scene)
+    assert same(dask.compute(*found), expected)
+    of_each = hd.coordination(given, cutoff, **scene)
+    assert same([of_each.compute()], [hs.coordination(points, cutoff, **scene)])
+
+
+def test_columns_in_chunks():
+    points, cutoff, scene = scenes()["mixed"]
+    given = da.from_array(points, chunks=(70, 2))
+    assert hd.count_pairs(given, cutoff, **scene).compute() == hs.count_pairs(
+        points, cutoff, **scene
+    )
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_dataframes():
+    dd = pytest.importorskip("dask.dataframe", reason="dask.dataframe is not installed")
+    pd = pytest.importorskip("pandas", reason="pandas is not installed")
+    points, cutoff, scene = scenes()["mixed"]
+    for kind in (np.float64, np.float32):
+        frame = pd.DataFrame(points.astype(kind), columns=list("xyz"))
+        given = dd.from_pandas(frame, npartitions=3)
+        found = hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **scene)
+        assert same(dask.compute(*found), serial(points.astype(kind), cutoff, scene))
+    mixed = pd.DataFrame({"x": np.arange(6), "y": np.linspace(0.0, 1.0, 6)})
+    given = dd.from_pandas(mixed, npartitions=2)
+    assert hd.count_pairs(given, 1.5).compute() == hs.count_pairs(mixed.to_numpy(), 1.5)
+    names = pd.DataFrame({"x": [0.0, 1.0], "name": ["a", "b"]})
+    with pytest.raises(TypeError, match="column 'name' of points"):
+        hd.count_pairs(dd.from_pandas(names, npartitions=1), 1.0)
+    with pytest.raises(TypeError, match="column 'z' of points"):
+        hd.count_pairs(dd.from_pandas(pd.DataFrame({"z": [1j]}), npartitions=1), 1.0)
+    with pytest.raises(ValueError, match="a column for each axis"):
+        hd.count_pairs(dd.from_pandas(mixed, npartitions=1)["x"], 1.0)
+    big = dd.from_pandas(pd.DataFrame({"x": [0, 2**53 + 1], "y": [0.0, 1.0]}), npartitions=1)
+    with pytest.raises(ValueError, match="column 'x' of points"):
+        hd.count_pairs(big, 1.0).compute()
+
+
+def test_equal_calls_share_their_tasks():
+    given = collection(np.zeros((10, 2)), 5)
+    first, second = hd.count_pairs(given, 1.0), hd.count_pairs(given, 1.0)
+    assert first.name == second.name
+
+
+def test_numbers_of_one_letter_and_of_strict_cutoffs():
+    points, cutoff, scene = scenes()["on the cuts"]
+    given = collection(points, 10)
+    for inclusive in (False, True):
+        how = {"inclusive": inclusive, **scene}
+        found = hd.pairs(given, cutoff, quantities="P", sort=True, kernel="scalar", **how)
+        assert same([found.compute()], [hs.pairs(points, cutoff, quantities="P", sort=True, **how)])
+        assert hd.count_pairs(given, cutoff, **how).compute() == len(found.compute())
+
+
+def test_bad_coordinates_are_named_among_all_points():
+    points = np.zeros((30, 3))
+    points[17, 2] = np.nan
+    for call in (hd.pairs, hd.count_pairs, hd.coordination):
+        with pytest.raises(ValueError, match=r"points\[17, 2\]"):
+            dask.compute(call(collection(points, 10), 1.0))
+
+
+@pytest.mark.parametrize(
+    ("shape", "change", "kind", "words"),
+    [
+        ((4, 3), {"cutoff": -1.0}, ValueError, "cutoff"),
+        ((4, 3), {"cutoff": np.inf}, ValueError, "cutoff"),
+        ((4, 3), {"cutoff": "1"}, TypeError, "cutoff"),
+        ((4, 3), {"box": [1.0, 0.0, 1.0]}, ValueError, "box"),
+        ((4, 3), {"box": [1.0, 1.0]}, ValueError, "box"),
+        ((4, 3), {"periodic": True}, ValueError, "periodic needs a box"),
+        ((4, 3), {"n": 0}, ValueError, "n must be 1"),
+        ((4, 3), {"kernel": "none"}, ValueError, "kernel"),
+        ((4, 3), {"threads": 0}, ValueError, "threads"),
+        ((4, 3), {"quantities": "x"}, ValueError, "quantities"),
+        ((4, 3), {"sort": 1.5}, TypeError, "sort"),
+        ((4,), {}, ValueError, "shape"),
+        ((4, 0), {}, ValueError, "columns"),
+        ((4, 9), {}, ValueError, "columns"),
+    ],
+)
+def test_bad_arguments_are_refused_at_once(shape, change, kind, words):
+    with pytest.raises(kind, match=words):
+        hd.pairs(da.zeros(shape), **{"cutoff": 1.0, **change})
+
+
+def test_bad_collections_are_refused_at_once():
+    with pytest.raises(TypeError, match=r"dask array or dataframe, got .*from_array"):
+        hd.count_pairs(np.zeros((3, 3)), 1.0)
+    with pytest.raises(TypeError, match="real numbers, got complex128"):
+        hd.count_pairs(da.zeros((3, 3), dtype=complex), 1.0)
+    unknown = da.from_delayed(dask.delayed(np.zeros)((3, 3)), (3, np.nan), float)
+    with pytest.raises(ValueError, match="known number of columns"):
+        hd.count_pairs(unknown, 1.0)
+    with pytest.raises(ValueError, match="j d D S"):
+        hd.neighbors(da.zeros((3, 3)), 1.0, quantities="ij")
+
+
+def test_chunks_that_are_not_what_was_said():
+    chunks = [np.zeros((3, 3)), np.zeros((3, 2))]
+    blocks = [da.from_delayed(dask.delayed(chunk), (3, 3), float) for chunk in chunks]
+    with pytest.raises(ValueError, match=r"chunk 1 has shape \(3, 2\)"):
+        hd.count_pairs(da.concatenate(blocks), 1.0).compute()
+
+
+def test_examples_run():
+    result = doctest.testmod(hd)
+    assert result.attempted > 10 and result.failed == 0
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", (ROOT / "docs/dask.md").read_text(), re.DOTALL):
+        exec(compile(code, "dask.md", "exec"), names)
+    assert names["n_pairs"] == names["histogram"].sum()
+
+
+def test_without_the_package_one_line_names_the_extra():
+    script = "import sys; sys.modules['dask'] = None\nimport halfshell.dask"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("ImportError: halfshell.dask needs dask[array]: pip install")
+    assert "halfshell[distributed]" in last
+    script = "import sys, halfshell; sys.exit('dask' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script]).returncode == 0
