@@ -2,6 +2,7 @@
 /* levels.c: one pass finds the level of each point, a counting sort puts the levels in order. */
 #include "levels.h"
 
+#include "../base/starts.h"
 #include "../scene/points.h"
 
 #include <math.h>
@@ -238,9 +239,7 @@ arrange(const division *by, division_set *from, int32_t n_levels, hs_level_set *
     for (int64_t i = 0; i < to->n; i++) {
         next[by->count[from->size[i]] + 1]++;
     }
-    for (int32_t l = 0; l < n_levels; l++) {
-        next[l + 1] += next[l];
-    }
+    hs_starts_of_lengths(next, (int64_t)n_levels + 1);
     while (go_on(by, to->n, &part, &status)) {
         for (int64_t i = part.first; i < part.end; i++) {
             const int64_t at = next[by->count[from->size[i]]]++;
@@ -251,10 +250,7 @@ arrange(const division *by, division_set *from, int32_t n_levels, hs_level_set *
             }
         }
     }
-    for (int32_t l = n_levels; l > 0; l--) {
-        next[l] = next[l - 1];
-    }
-    next[0] = 0;
+    hs_starts_of_ends(next, (int64_t)n_levels + 1);
     to->supports = from->read;
     from->read.numbers = NULL;
     return status;
