@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* os_thread.h: the few functions of threads and atomic numbers that the core needs, on POSIX and
- * on Windows. */
+/* os_thread.h: the few functions of threads, and of numbers that several of them change, that the
+ * core needs, on POSIX and on Windows. */
 #ifndef HS_OS_THREAD_H
 #define HS_OS_THREAD_H
 
@@ -129,8 +129,8 @@ hs_signals_restore(const hs_signals *saved)
 
 #endif
 
-/* Numbers that several threads change, each function in one step. But for the first one, all threads
- * see all of these steps in the same order. */
+/* Numbers that several threads change, each function in one step. All threads see the steps of the
+ * last four functions in one order. */
 #if defined(_MSC_VER) && !defined(__clang__)
 
 /* Returns *counter and adds 1 to it; orders nothing else. */

@@ -3,6 +3,7 @@
  * brings their radii into the order of the cells. */
 #include "level_search.h"
 
+#include "../base/rule.h"
 #include "../search/choice.h"
 #include "../search/search_open.h"
 #include "support_width.h"
@@ -159,10 +160,10 @@ set_supports(const hs_levels *levels, const hs_level_step *step, double bound,
     const hs_search      *search = &open->search;
     const hs_scene       *scene = &search->scene;
     hs_supports          *supports = &open->supports;
-    const hs_support_set *of_points = levels->rule != HS_RULE_GATHER ? &levels->points.supports
-                                                                     : NULL;
+    const hs_support_set *of_points = hs_rule_needs_other(levels->rule) ? &levels->points.supports
+                                                                        : NULL;
     const hs_support_set *of_asking =
-        levels->rule != HS_RULE_SCATTER ? &hs_levels_asking(levels)->supports : NULL;
+        hs_rule_needs_asking(levels->rule) ? &hs_levels_asking(levels)->supports : NULL;
     const int exponent = scene->extreme ? 0 : -scene->scale.exponent;
     *supports = (hs_supports){.rule = levels->rule, .is_bounded = bound <= step->cutoff};
     hs_support_metric_init(scene->ndim, levels->extent, scene->metric.inclusive, exponent,
@@ -189,9 +190,9 @@ set_limits(const hs_levels *levels, const hs_level_step *step, double bound, hs_
     const hs_scene     *scene = &search->scene;
     const hs_level_set *asking = hs_levels_asking(levels);
     const double       *of_points =
-        levels->rule != HS_RULE_GATHER ? radii_of(&levels->points, step->points) : NULL;
-    const double *of_asking = levels->rule != HS_RULE_SCATTER ? radii_of(asking, step->asking)
-                                                              : NULL;
+        hs_rule_needs_other(levels->rule) ? radii_of(&levels->points, step->points) : NULL;
+    const double *of_asking = hs_rule_needs_asking(levels->rule) ? radii_of(asking, step->asking)
+                                                                 : NULL;
     const double  near_bound = hs_scale_apply(scene->scale, bound);
     open->limits = (hs_limits){.rule = levels->rule,
                                .factor = levels->factor,
