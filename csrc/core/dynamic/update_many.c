@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* update_many.c: many points at once. All cells get room for what comes into them, as if it were all
- * new; then each point is put where it belongs. */
+/* update_many.c: many points at once. First each cell gets room for all that comes into it, as if
+ * all were new; then each point is put where it belongs. */
 #include "update.h"
 
 #include <stdlib.h>
