@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell import _core
-from halfshell._objects.node_list import reach_of
+from halfshell._objects.node_supports import reach_of
 from halfshell._objects.pair_table import Columns, PairTable
 
 if TYPE_CHECKING:
