@@ -46,8 +46,20 @@ typedef struct hs_dynamic_options {
 /* Three dimensions, open space, HS_STORE_HASH, cells of width 1, inclusive, cells of 1 GB. */
 hs_dynamic_options hs_dynamic_options_default(void);
 
-/* HS_ERR_ARGUMENT, HS_ERR_BOX_*, HS_ERR_MEMORY; HS_ERR_CUTOFF for cell_size (failure->column 0) or
- * max_radius (1) out of range, or a box (2). *list is NULL on failure. */
+/* failure->column of HS_ERR_CUTOFF: which length is out of range. */
+typedef enum hs_length_column {
+    HS_LENGTH_CELL_SIZE,
+    HS_LENGTH_MAX_RADIUS,
+    HS_LENGTH_BOX /* an entry of a periodic box vector */
+} hs_length_column;
+
+/* failure->column of HS_ERR_KEY, for many points at once. */
+typedef enum hs_key_column {
+    HS_KEY_REPEATED, /* it came before */
+    HS_KEY_ABSENT    /* it is not there */
+} hs_key_column;
+
+/* HS_ERR_ARGUMENT, HS_ERR_BOX_*, HS_ERR_MEMORY, HS_ERR_CUTOFF. *list is NULL on failure. */
 hs_status hs_dynamic_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *failure);
 void      hs_dynamic_free(hs_dynamic *list); /* NULL-safe */
 
@@ -71,8 +83,8 @@ hs_status hs_dynamic_move(hs_dynamic *list, hs_key key, const double *position,
 bool hs_dynamic_remove(hs_dynamic *list, hs_key key);
 
 /* Many at once, all or none. ids: n; tags: n, or NULL: all 0. HS_ERR_KEY: failure->row is that of a
- * key that came before, or for hs_dynamic_move_many (failure->column 1) is not there. removed: n,
- * or NULL. */
+ * key that came before (HS_KEY_REPEATED), or for hs_dynamic_move_many is not there (HS_KEY_ABSENT).
+ * removed: n, or NULL. */
 hs_status hs_dynamic_insert_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,
                                  const hs_points *positions, hs_failure *failure);
 hs_status hs_dynamic_move_many(hs_dynamic *list, const int64_t *ids, const int32_t *tags,

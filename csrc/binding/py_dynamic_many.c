@@ -34,7 +34,7 @@ raise_many(const py_dynamic *self, hs_status status, const hs_failure *failure, 
     const long long id = ids[failure->row];
     PyObject *key = self->tagged ? Py_BuildValue("(iL)", tags != NULL ? tags[failure->row] : 0, id)
                                  : PyLong_FromLongLong(id);
-    if (key != NULL && failure->column == 1) {
+    if (key != NULL && failure->column == HS_KEY_ABSENT) {
         PyErr_SetObject(PyExc_KeyError, key);
     } else if (key != NULL) {
         PyErr_Format(PyExc_ValueError, "keys must differ, but keys[%lld] = %R came before",

@@ -11,10 +11,12 @@ static PyObject *
 raise_new(hs_status status, const hs_failure *failure)
 {
     static const char *const must[] = {
-        "cell_size must be from 2**-300 to 2**300",
-        "max_radius must be from 2**-300 to 2**300, and span at most 2**20 images of the box",
-        "entries of periodic box vectors must be 0 or from 2**-300 to 2**300 in size"};
-    if (status == HS_ERR_CUTOFF && failure->column >= 0 && failure->column < 3) {
+        [HS_LENGTH_CELL_SIZE] = "cell_size must be from 2**-300 to 2**300",
+        [HS_LENGTH_MAX_RADIUS] =
+            "max_radius must be from 2**-300 to 2**300, and span at most 2**20 images of the box",
+        [HS_LENGTH_BOX] =
+            "entries of periodic box vectors must be 0 or from 2**-300 to 2**300 in size"};
+    if (status == HS_ERR_CUTOFF && failure->column >= 0 && failure->column <= HS_LENGTH_BOX) {
         PyObject *value = PyFloat_FromDouble(failure->value);
         if (value != NULL) {
             PyErr_Format(PyExc_ValueError, "%s, got %R", must[failure->column], value);

@@ -27,6 +27,7 @@
 #define HS_KERNEL_H
 
 #include "../core/base/base.h"
+#include "../core/base/rule.h"
 #include "../core/exact/filter.h"
 #include "../core/exact/support.h"
 #include "../halfshell.h"

@@ -39,7 +39,7 @@ set_support(const hs_support_scan *supports, int32_t t, const int ndim, vector_s
 {
     const float         none[HS_SUPPORT_ENTRIES + 1] = {0.0f};
     const int           n = hs_support_entries(ndim);
-    const float        *numbers = supports->rule != HS_RULE_SCATTER
+    const float        *numbers = hs_rule_needs_asking(supports->rule)
                                       ? supports->of_point + (int64_t)t * hs_support_numbers(ndim)
                                       : none;
     const hs_thresholds thresholds = hs_support_thresholds(supports->form, numbers[n]);
@@ -168,13 +168,13 @@ HS_ALWAYS_INLINE lanes_near
 meet_supports(const hs_support_scan *supports, const vector_scan *v, const floats *along, int32_t c,
               const int ndim)
 {
-    if (supports->rule == HS_RULE_SCATTER) {
+    if (!hs_rule_needs_asking(supports->rule)) {
         return meet_candidates(supports, along, c, ndim);
     }
     const floats s = square_within(v->support, along, ndim);
     const mask   near = not_greater(s, v->support_out);
     const mask   maybe = and_not_less(near, s, v->support_in);
-    if (supports->rule == HS_RULE_GATHER) {
+    if (!hs_rule_needs_other(supports->rule)) {
         return (lanes_near){near, maybe};
     }
     const lanes_near other = meet_candidates(supports, along, c, ndim);

@@ -21,7 +21,7 @@ HS_ALWAYS_INLINE scalar_own
 own_support(const hs_support_scan *supports, const bool has_supports, int32_t t, const int ndim)
 {
     scalar_own own = {NULL, {0.0f, 0.0f}};
-    if (has_supports && supports->rule != HS_RULE_SCATTER) {
+    if (has_supports && hs_rule_needs_asking(supports->rule)) {
         own.numbers = supports->of_point + (int64_t)t * hs_support_numbers(ndim);
         own.thresholds =
             hs_support_thresholds(supports->form, own.numbers[hs_support_entries(ndim)]);
@@ -68,10 +68,10 @@ meet_supports(const hs_scan *scan, const float *centre, const scalar_own *own, i
         s = k == 0 ? along[k] * along[k] : s + along[k] * along[k];
     }
     const int32_t near = !(s > scan->direct.out), sure = s < scan->direct.in;
-    if (supports->rule != HS_RULE_SCATTER) {
+    if (hs_rule_needs_asking(supports->rule)) {
         one = meet_support(own->numbers, 1, own->thresholds, along, ndim);
     }
-    if (supports->rule != HS_RULE_GATHER) {
+    if (hs_rule_needs_other(supports->rule)) {
         other = meet_candidate(supports, along, c, ndim);
     }
     return supports->rule == HS_RULE_MIN

@@ -69,14 +69,14 @@ check_keys(const hs_dynamic *list, const int64_t *ids, const int32_t *tags, int6
     const int64_t repeated = hs_repeated_key(ids, tags, n);
     if (repeated != -1) {
         failure->row = repeated >= 0 ? repeated : -1;
-        failure->column = repeated >= 0 ? 0 : -1;
+        failure->column = repeated >= 0 ? HS_KEY_REPEATED : -1;
         return repeated >= 0 ? HS_ERR_KEY : HS_ERR_MEMORY;
     }
     for (int64_t i = 0; must_be_there && i < n; i++) {
         const hs_key key = {ids[i], tags != NULL ? tags[i] : 0};
         if (hs_key_map_find(&list->map, &list->entries, key) == HS_NO_PLACE) {
             failure->row = i;
-            failure->column = 1;
+            failure->column = HS_KEY_ABSENT;
             return HS_ERR_KEY;
         }
     }

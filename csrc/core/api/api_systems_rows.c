@@ -5,6 +5,7 @@
 
 #include "request.h"
 #include "systems_check.h"
+#include "../base/starts.h"
 
 /* Where what is found goes besides the pairs. */
 typedef struct rows_job {
@@ -80,16 +81,6 @@ number_asking(const hs_system_sets *sets)
     return sets->queries != NULL ? sets->queries->n : sets->points->n;
 }
 
-/* Offsets of rows from their lengths. */
-static void
-add_up(int64_t *offsets, int64_t n)
-{
-    offsets[0] = 0;
-    for (int64_t i = 0; i < n; i++) {
-        offsets[i + 1] += offsets[i];
-    }
-}
-
 /* The largest distance of nearest points, which may be infinite. */
 static hs_status
 check_radius(const hs_system_sets *sets, const hs_options *options, hs_failure *failure)
@@ -127,7 +118,8 @@ find_rows(const hs_system_sets *sets, hs_system_fn search, int64_t k, const hs_o
         status = hs_systems_do_each(&each, &rows->call, failure);
     }
     if (status == HS_OK && k == 0) {
-        add_up(job.offsets, number_asking(sets));
+        job.offsets[0] = 0;
+        hs_starts_of_lengths(job.offsets, number_asking(sets) + 1);
     }
     status = hs_pairs_conclude(&rows->output, status, failure);
     return hs_pairs_finish(rows, status, rows->output.n_pairs, result);

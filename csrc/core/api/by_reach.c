@@ -2,6 +2,7 @@
 /* by_reach.c: arguments, the division into levels, and one search after the other. */
 #include "by_reach.h"
 
+#include "../base/rule.h"
 #include "../exact/support.h"
 #include "../search/choice.h"
 
@@ -43,7 +44,8 @@ hs_by_reach_check(const hs_request *request, hs_failure *failure)
 {
     const hs_sets  *sets = &request->sets;
     const hs_reach *reach = request->reach;
-    const bool      asks = reach->rule != HS_RULE_SCATTER, meets = reach->rule != HS_RULE_GATHER;
+    const bool      asks = hs_rule_needs_asking(reach->rule);
+    const bool      meets = hs_rule_needs_other(reach->rule);
     const double    cutoff = request->options->cutoff;
     const double   *own = reach->has_supports ? reach->supports : reach->radii;
     const double   *of_queries = reach->has_supports ? reach->query_supports : reach->query_radii;
@@ -51,7 +53,7 @@ hs_by_reach_check(const hs_request *request, hs_failure *failure)
         (reach->n_types > 0 && reach->cutoffs == NULL) ||
         (reach->has_supports &&
          (reach->n_types > 0 || sets->points->ndim > HS_SUPPORT_DIM || !takes_one(reach->rule))) ||
-        (!sets->is_full && !(asks && meets) && reach->n_types == 0)) {
+        (!sets->is_full && hs_rule_is_directed(reach->rule) && reach->n_types == 0)) {
         return HS_ERR_ARGUMENT;
     }
     if (!(cutoff >= 0.0) || (reach->n_types > 0 && !isfinite(cutoff))) {
@@ -76,9 +78,9 @@ static hs_reach
 needed_of(const hs_request *request)
 {
     hs_reach reach = *request->reach;
-    if (request->sets.queries != NULL && reach.rule == HS_RULE_GATHER) {
+    if (request->sets.queries != NULL && !hs_rule_needs_other(reach.rule)) {
         reach.radii = reach.supports = NULL;
-    } else if (reach.rule == HS_RULE_SCATTER) {
+    } else if (!hs_rule_needs_asking(reach.rule)) {
         reach.query_radii = reach.query_supports = NULL;
     }
     return reach;

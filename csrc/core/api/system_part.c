@@ -2,6 +2,8 @@
 /* system_part.c: arrays of a system begin where those of the systems before it end. */
 #include "system_part.h"
 
+#include "../base/starts.h"
+
 #include <string.h>
 
 hs_points
@@ -118,9 +120,7 @@ hs_excluded_parts_open(const hs_system_sets *sets, hs_account *account, hs_exclu
         const int64_t s = system_of_pair(sets, selection->excluded + 2 * e);
         parts->first[s + 2] += s >= 0; /* of pairs of two systems none is added */
     }
-    for (int64_t s = 0; s < n; s++) {
-        parts->first[s + 2] += parts->first[s + 1];
-    }
+    hs_starts_of_lengths(parts->first + 1, n + 1);
     for (int64_t e = 0; e < selection->n_excluded; e++) {
         const int64_t *pair = selection->excluded + 2 * e;
         const int64_t  s = system_of_pair(sets, pair);

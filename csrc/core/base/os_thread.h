@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* os_thread.h: the few functions of threads that the core needs, on POSIX and on Windows. */
+/* os_thread.h: the few functions of threads, and of numbers that several of them change, that the
+ * core needs, on POSIX and on Windows. */
 #ifndef HS_OS_THREAD_H
 #define HS_OS_THREAD_H
 
@@ -128,15 +129,78 @@ hs_signals_restore(const hs_signals *saved)
 
 #endif
 
-/* Returns *counter and adds 1 to it, as one step. */
+/* Numbers that several threads change, each function in one step. All threads see the steps of the
+ * last four functions in one order. */
+#if defined(_MSC_VER) && !defined(__clang__)
+
+/* Returns *counter and adds 1 to it; orders nothing else. */
 HS_ALWAYS_INLINE int64_t
 hs_fetch_increment(volatile int64_t *counter)
 {
-#if defined(_MSC_VER) && !defined(__clang__)
     return InterlockedIncrement64(counter) - 1;
-#else
-    return __atomic_fetch_add(counter, 1, __ATOMIC_RELAXED);
-#endif
 }
+
+HS_ALWAYS_INLINE int64_t
+hs_atomic_load(volatile int64_t *x)
+{
+    return InterlockedCompareExchange64(x, 0, 0);
+}
+
+HS_ALWAYS_INLINE void
+hs_atomic_store(volatile int64_t *x, int64_t value)
+{
+    (void)InterlockedExchange64(x, value);
+}
+
+/* Returns what *x was. */
+HS_ALWAYS_INLINE int64_t
+hs_atomic_add(volatile int64_t *x, int64_t more)
+{
+    return InterlockedExchangeAdd64(x, more);
+}
+
+/* Whether *x was `old`, and is `value` now. */
+HS_ALWAYS_INLINE bool
+hs_atomic_swap_if(volatile int64_t *x, int64_t old, int64_t value)
+{
+    return InterlockedCompareExchange64(x, value, old) == old;
+}
+
+#else
+
+/* Returns *counter and adds 1 to it; orders nothing else. */
+HS_ALWAYS_INLINE int64_t
+hs_fetch_increment(volatile int64_t *counter)
+{
+    return __atomic_fetch_add(counter, 1, __ATOMIC_RELAXED);
+}
+
+HS_ALWAYS_INLINE int64_t
+hs_atomic_load(volatile int64_t *x)
+{
+    return __atomic_load_n(x, __ATOMIC_SEQ_CST);
+}
+
+HS_ALWAYS_INLINE void
+hs_atomic_store(volatile int64_t *x, int64_t value)
+{
+    __atomic_store_n(x, value, __ATOMIC_SEQ_CST);
+}
+
+/* Returns what *x was. */
+HS_ALWAYS_INLINE int64_t
+hs_atomic_add(volatile int64_t *x, int64_t more)
+{
+    return __atomic_fetch_add(x, more, __ATOMIC_SEQ_CST);
+}
+
+/* Whether *x was `old`, and is `value` now. */
+HS_ALWAYS_INLINE bool
+hs_atomic_swap_if(volatile int64_t *x, int64_t old, int64_t value)
+{
+    return __atomic_compare_exchange_n(x, &old, value, false, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
+}
+
+#endif
 
 #endif

@@ -135,9 +135,7 @@ put(worker *me, int64_t n, int64_t *length)
         me->next[map->list[me->common[e]] + 1]++;
     }
     memcpy(length, me->next + 1, (size_t)map->n_lists * sizeof *length);
-    for (int32_t l = 0; l < map->n_lists; l++) {
-        me->next[l + 1] += me->next[l];
-    }
+    hs_starts_of_lengths(me->next, (int64_t)map->n_lists + 1);
     for (int64_t e = 0; e < n; e++) {
         to[me->next[map->list[me->common[e]]]++] = map->node[me->common[e]];
     }

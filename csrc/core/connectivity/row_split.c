@@ -4,6 +4,7 @@
 #include "row_split.h"
 
 #include "half_list.h"
+#include "../base/starts.h"
 
 #include <string.h>
 
@@ -43,21 +44,17 @@ static void
 distribute(const hs_node_map *map, const hs_rows_view *from, int64_t p, const target *to)
 {
     int64_t      *offsets = to->offsets;
-    const int64_t base = offsets[0];
-    for (int32_t l = 0; l < map->n_lists; l++) {
-        offsets[l + 1] = 0;
-    }
+    const int64_t base = offsets[0], n = (int64_t)map->n_lists + 1;
+    memset(offsets + 1, 0, (size_t)map->n_lists * sizeof *offsets);
     for (int64_t e = from->first[p]; e < from->end[p]; e++) {
         offsets[map->list[from->index[e]] + 1]++;
     }
-    for (int32_t l = 0; l < map->n_lists; l++) {
-        offsets[l + 1] += offsets[l];
-    }
+    hs_starts_of_lengths(offsets, n);
     for (int64_t e = from->first[p]; e < from->end[p]; e++) {
         const int32_t q = from->index[e];
         put(to, offsets[map->list[q]]++, map->node[q], from, e);
     }
-    memmove(offsets + 1, offsets, (size_t)map->n_lists * sizeof *offsets);
+    hs_starts_of_ends(offsets, n);
     offsets[0] = base;
 }
 

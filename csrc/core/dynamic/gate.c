@@ -15,50 +15,6 @@
 #define CURRENT_PROCESS() ((int64_t)getpid())
 #endif
 
-#if defined(_MSC_VER) && !defined(__clang__)
-static int64_t
-load(volatile int64_t *x)
-{
-    return InterlockedCompareExchange64(x, 0, 0);
-}
-static int64_t
-add(volatile int64_t *x, int64_t more)
-{
-    return InterlockedExchangeAdd64(x, more);
-}
-static void
-store(volatile int64_t *x, int64_t value)
-{
-    (void)InterlockedExchange64(x, value);
-}
-static bool
-swap_if(volatile int64_t *x, int64_t old, int64_t value)
-{
-    return InterlockedCompareExchange64(x, value, old) == old;
-}
-#else
-HS_ALWAYS_INLINE int64_t
-load(volatile int64_t *x)
-{
-    return __atomic_load_n(x, __ATOMIC_SEQ_CST);
-}
-HS_ALWAYS_INLINE int64_t
-add(volatile int64_t *x, int64_t more)
-{
-    return __atomic_fetch_add(x, more, __ATOMIC_SEQ_CST);
-}
-HS_ALWAYS_INLINE void
-store(volatile int64_t *x, int64_t value)
-{
-    __atomic_store_n(x, value, __ATOMIC_SEQ_CST);
-}
-HS_ALWAYS_INLINE bool
-swap_if(volatile int64_t *x, int64_t old, int64_t value)
-{
-    return __atomic_compare_exchange_n(x, &old, value, false, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
-}
-#endif
-
 typedef struct hs_queue {
     hs_mutex     mutex;
     hs_condition changed;
@@ -89,14 +45,14 @@ hs_gate_destroy(hs_gate *gate)
 static bool
 try_read(hs_gate *gate)
 {
-    const int64_t state = load(&gate->state);
-    return state >= 0 && swap_if(&gate->state, state, state + 1);
+    const int64_t state = hs_atomic_load(&gate->state);
+    return state >= 0 && hs_atomic_swap_if(&gate->state, state, state + 1);
 }
 
 static bool
 try_write(hs_gate *gate)
 {
-    return swap_if(&gate->state, 0, -1);
+    return hs_atomic_swap_if(&gate->state, 0, -1);
 }
 
 /* Where threads of a parent were inside when this process was forked off, they never leave. */
@@ -118,18 +74,18 @@ wait_for(hs_gate *gate, bool (*try_enter)(hs_gate *))
 {
     forget_the_parent(gate);
     hs_mutex_lock(&gate->queue->mutex);
-    (void)add(&gate->waiting, 1);
+    (void)hs_atomic_add(&gate->waiting, 1);
     while (!try_enter(gate)) {
         hs_condition_wait_briefly(&gate->queue->changed, &gate->queue->mutex);
     }
-    (void)add(&gate->waiting, -1);
+    (void)hs_atomic_add(&gate->waiting, -1);
     hs_mutex_unlock(&gate->queue->mutex);
 }
 
 static void
 wake(hs_gate *gate)
 {
-    if (load(&gate->waiting) > 0) {
+    if (hs_atomic_load(&gate->waiting) > 0) {
         hs_mutex_lock(&gate->queue->mutex);
         hs_condition_wake(&gate->queue->changed);
         hs_mutex_unlock(&gate->queue->mutex);
@@ -147,7 +103,7 @@ hs_gate_read(hs_gate *gate)
 void
 hs_gate_read_end(hs_gate *gate)
 {
-    if (add(&gate->state, -1) == 1) {
+    if (hs_atomic_add(&gate->state, -1) == 1) {
         wake(gate);
     }
 }
@@ -163,6 +119,6 @@ hs_gate_write(hs_gate *gate)
 void
 hs_gate_write_end(hs_gate *gate)
 {
-    store(&gate->state, 0);
+    hs_atomic_store(&gate->state, 0);
     wake(gate);
 }

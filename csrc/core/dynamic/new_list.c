@@ -18,7 +18,7 @@ is_length(double x)
 }
 
 static hs_status
-refuse_length(hs_failure *failure, int column, double value)
+refuse_length(hs_failure *failure, hs_length_column column, double value)
 {
     failure->column = column;
     failure->value = value;
@@ -38,7 +38,7 @@ check_box(const hs_box *box, int ndim, hs_failure *failure)
     for (int l = 0; status == HS_OK && l < ndim; l++) {
         for (int k = 0; box->periodic[l] && k < ndim; k++) {
             if (box->rows[l][k] != 0.0 && !is_length(fabs(box->rows[l][k]))) {
-                return refuse_length(failure, 2, box->rows[l][k]);
+                return refuse_length(failure, HS_LENGTH_BOX, box->rows[l][k]);
             }
         }
     }
@@ -54,10 +54,10 @@ hs_list_check(const hs_dynamic_options *options, hs_failure *failure)
         return HS_ERR_ARGUMENT;
     }
     if (!is_length(options->cell_size)) {
-        return refuse_length(failure, 0, options->cell_size);
+        return refuse_length(failure, HS_LENGTH_CELL_SIZE, options->cell_size);
     }
     if (radius != 0.0 && !is_length(radius)) {
-        return refuse_length(failure, 1, radius);
+        return refuse_length(failure, HS_LENGTH_MAX_RADIUS, radius);
     }
     return check_box(options->box, options->ndim, failure);
 }
@@ -108,7 +108,7 @@ hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *fa
     hs_lattice_init(options->box, options->ndim, hs_scale_of(0), &made->lattice);
     hs_status status = hs_skew_is_left(&made->lattice) ? HS_ERR_BOX_SKEWED : HS_OK;
     if (status == HS_OK && !(count_images(&made->lattice, made->max_radius) <= MOST_IMAGES)) {
-        status = refuse_length(failure, 1, made->max_radius);
+        status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
     }
     if (status == HS_OK) {
         measure_box(made);

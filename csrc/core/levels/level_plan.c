@@ -5,6 +5,7 @@
  */
 #include "level_plan.h"
 
+#include "../base/rule.h"
 #include "../search/limits.h"
 
 #include <math.h>
@@ -248,8 +249,7 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, double bound,
                    hs_algorithm algorithm, hs_level_plan *plan)
 {
     const int64_t n = levels->n, most = levels->cutoffs != NULL ? 2 * n : MOST_STEPS;
-    const bool    is_directed = levels->cutoffs == NULL &&
-                             (levels->rule == HS_RULE_GATHER || levels->rule == HS_RULE_SCATTER);
+    const bool    is_directed = levels->cutoffs == NULL && hs_rule_is_directed(levels->rule);
     *plan = (hs_level_plan){
         .is_half = !levels->has_queries && !is_directed, .bound = bound, .algorithm = algorithm};
     plan->steps = hs_alloc(account, HS_FOR_CELLS, n * most, sizeof *plan->steps);

@@ -6,18 +6,12 @@
 #ifndef HS_LEVEL_SEARCH_H
 #define HS_LEVEL_SEARCH_H
 
-#include "../search/limits.h"
-#include "../search/supports.h"
-
-#include "level_plan.h"
+#include "level_limits.h"
 
 /* An open step; it must not move. */
 typedef struct hs_level_search {
-    hs_search   search;
-    hs_limits   limits;
-    hs_supports supports;              /* those of limits, if it has any */
-    void       *of_asking, *of_points; /* owned: the radii of limits, the types, or the supports */
-    void       *table;                 /* owned: that of limits */
+    hs_search       search;
+    hs_level_limits own; /* where the step has any */
 } hs_level_search;
 
 /*

@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "../base/rule.h"
 #include "../exact/support_along.h"
 
 /* Of the points of some levels, which have supports. Ends where it is enough. */
@@ -36,10 +37,11 @@ hs_support_step_width(const void *context, const double *normal, double enough, 
     const hs_rule          rule = of->levels->rule;
     hs_status              status = HS_OK;
     double                 asking = 0.0, points = 0.0;
-    if (rule != HS_RULE_SCATTER) {
+    if (hs_rule_needs_asking(rule)) {
         status = width_of(of, set, step->asking, normal, enough, &asking);
     }
-    if (status == HS_OK && rule != HS_RULE_GATHER && !(rule == HS_RULE_MAX && asking >= enough)) {
+    if (status == HS_OK && hs_rule_needs_other(rule) &&
+        !(rule == HS_RULE_MAX && asking >= enough)) {
         status = width_of(of, &of->levels->points, step->points, normal, enough, &points);
     }
     *width = rule == HS_RULE_MIN ? hs_smaller(asking, points) : hs_larger(asking, points);

@@ -1,106 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* choice.c: rows of partners are made by transposing them twice, which leaves them ascending. */
+/* choice.c: what the caller selects is checked; points, box and labels are kept where they are
+ * needed. */
 #include "choice.h"
 
 #include <math.h>
 #include <string.h>
-
-/* Numbers in rows: those of row r are number[first[r]] to number[first[r + 1]]. */
-typedef struct row_list {
-    int64_t *first;
-    int32_t *number;
-} row_list;
-
-/* Room for rows of so many numbers, all of them empty. */
-static bool
-open_rows(hs_account *account, int64_t n_rows, int64_t n_numbers, row_list *rows)
-{
-    rows->first = hs_alloc(account, HS_FOR_CANDIDATES, n_rows + 2, sizeof *rows->first);
-    rows->number = hs_alloc(account, HS_FOR_CANDIDATES, n_numbers, sizeof *rows->number);
-    if (rows->first == NULL || rows->number == NULL) {
-        return false;
-    }
-    memset(rows->first, 0, (size_t)(n_rows + 2) * sizeof *rows->first);
-    return true;
-}
-
-static void
-free_rows(hs_account *account, row_list *rows)
-{
-    hs_free(account, rows->first);
-    hs_free(account, rows->number);
-    *rows = (row_list){NULL, NULL};
-}
-
-/* Turns lengths, which are at first[r + 2], into where row r is to be filled: first[r + 1]. Once
- * each row is full, that is where the next one begins. */
-static void
-add_up(int64_t n_rows, int64_t *first)
-{
-    for (int64_t r = 0; r < n_rows; r++) {
-        first[r + 2] += first[r + 1];
-    }
-}
-
-/* One of both points of an excluded pair: the asking one, or the other. */
-HS_ALWAYS_INLINE int64_t
-number_in(const hs_selection *selection, int64_t pair, int which)
-{
-    return selection->excluded[2 * pair + which];
-}
-
-/* Pairs by their second point: each way round, but for those with queries. */
-static void
-fill_by_second(const hs_selection *selection, int n_ways, int64_t n_rows, row_list *rows)
-{
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        for (int way = 0; way < n_ways; way++) {
-            rows->first[number_in(selection, e, 1 - way) + 2]++;
-        }
-    }
-    add_up(n_rows, rows->first);
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        for (int way = 0; way < n_ways; way++) {
-            const int64_t at = rows->first[number_in(selection, e, 1 - way) + 1]++;
-            rows->number[at] = (int32_t)number_in(selection, e, way);
-        }
-    }
-}
-
-static void
-transpose(const row_list *from, int64_t n_from, int64_t n_to, row_list *to)
-{
-    for (int64_t p = 0; p < from->first[n_from]; p++) {
-        to->first[from->number[p] + 2]++;
-    }
-    add_up(n_to, to->first);
-    for (int64_t r = 0; r < n_from; r++) {
-        for (int64_t p = from->first[r]; p < from->first[r + 1]; p++) {
-            to->number[to->first[from->number[p] + 1]++] = (int32_t)r;
-        }
-    }
-}
-
-static hs_status
-open_partners(const hs_selection *selection, const hs_sets *sets, hs_call *call, hs_choice *choice)
-{
-    const int64_t n_points = sets->points->n;
-    const int64_t n_asking = choice->has_queries ? sets->queries->n : n_points;
-    hs_account   *account = &call->account;
-    const int     n_ways = choice->has_queries ? 1 : 2;
-    const int64_t n_numbers = selection->n_excluded * n_ways;
-    row_list      by_second = {NULL, NULL}, rows = {NULL, NULL};
-    const bool    is_open = open_rows(account, n_asking, n_numbers, &rows) &&
-                         open_rows(account, n_points, n_numbers, &by_second);
-    if (is_open) {
-        fill_by_second(selection, n_ways, n_points, &by_second);
-        transpose(&by_second, n_points, n_asking, &rows);
-    }
-    free_rows(account, &by_second);
-    choice->first = rows.first;
-    choice->partner = rows.number;
-    return is_open ? HS_OK : HS_ERR_MEMORY;
-}
 
 hs_status
 hs_choice_set_box(const hs_box *box, int ndim, hs_choice *choice)
@@ -223,28 +127,14 @@ is_sound(const hs_selection *selection, const hs_sets *sets, const hs_options *o
            has_both(selection->labels, selection->query_labels, sets, are_points);
 }
 
-static hs_status
-check_excluded(const hs_selection *selection, int64_t n_asking, int64_t n_points,
-               hs_failure *failure)
-{
-    for (int64_t e = 0; e < selection->n_excluded; e++) {
-        const int64_t i = number_in(selection, e, 0), j = number_in(selection, e, 1);
-        if (i < 0 || i >= n_asking || j < 0 || j >= n_points) {
-            failure->row = e;
-            return HS_ERR_ARGUMENT;
-        }
-    }
-    return HS_OK;
-}
-
 hs_status
 hs_selection_check(const hs_selection *selection, const hs_sets *sets, const hs_options *options,
                    hs_failure *failure)
 {
     const bool has_queries = sets->queries != NULL && selection->query_numbers == NULL;
     return is_sound(selection, sets, options)
-               ? check_excluded(selection, has_queries ? sets->queries->n : sets->points->n,
-                                sets->points->n, failure)
+               ? hs_partners_check(selection, has_queries ? sets->queries->n : sets->points->n,
+                                   sets->points->n, failure)
                : HS_ERR_ARGUMENT;
 }
 
@@ -255,9 +145,8 @@ hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call
     if (selection == NULL) {
         return HS_OK;
     }
-    hs_status status = hs_selection_check(selection, sets, &call->options, failure);
-    if (status != HS_OK) {
-        return status;
+    if (!is_sound(selection, sets, &call->options)) {
+        return HS_ERR_ARGUMENT;
     }
     const bool has_queries = sets->queries != NULL && selection->query_numbers == NULL;
     hs_choice *choice = hs_alloc(&call->account, HS_FOR_CANDIDATES, 1, sizeof *choice);
@@ -276,7 +165,12 @@ hs_choice_open(const hs_selection *selection, const hs_sets *sets, hs_call *call
         .shortest = INFINITY,
     };
     call->choice = choice;
-    status = selection->n_excluded > 0 ? open_partners(selection, sets, call, choice) : HS_OK;
+    hs_status status = HS_OK;
+    if (selection->n_excluded > 0) {
+        status = hs_partners_open(selection, has_queries ? sets->queries->n : sets->points->n,
+                                  sets->points->n, has_queries, &call->account, &choice->partners,
+                                  failure);
+    }
     if (status != HS_OK) {
         hs_choice_close(call);
     }
@@ -294,8 +188,7 @@ hs_choice_close(hs_call *call)
     hs_cloud_free(account, &choice->asking_cloud);
     hs_cloud_free(account, &choice->cloud);
     hs_free(account, choice->copies);
-    hs_free(account, choice->first);
-    hs_free(account, choice->partner);
+    hs_partners_free(account, &choice->partners);
     hs_free(account, choice);
     call->choice = NULL;
 }

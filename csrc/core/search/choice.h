@@ -11,6 +11,7 @@
 #include "../box/near_image.h"
 #include "../scene/scene.h"
 #include "../threads/call.h"
+#include "partners.h"
 
 #include <math.h>
 
@@ -25,8 +26,7 @@ typedef struct hs_choice {
     bool           has_queries;  /* asking points are no points themselves */
     /* Owned. */
     int64_t     *copies;   /* of the labels, where the caller's do not last; or NULL */
-    int64_t     *first;    /* of the partners of each asking point, one more than these; or NULL */
-    int32_t     *partner;  /* points whose pairs are excluded; ascending for each asking point */
+    hs_partners  partners; /* points whose pairs are excluded */
     double       shortest; /* no vector of the lattice is shorter; infinity in open space */
     hs_cloud     asking_cloud, cloud; /* as given; empty where the shortest is far enough */
     hs_image_box images;
@@ -52,7 +52,7 @@ void hs_choice_close(hs_call *call);
 HS_ALWAYS_INLINE bool
 hs_choice_excludes(const hs_choice *choice)
 {
-    return choice->label != NULL || choice->first != NULL;
+    return choice->label != NULL || choice->partners.first != NULL;
 }
 
 /* The box of a choice that excludes pairs, in place of one before: HS_OK or HS_ERR_BOX_SKEWED. */

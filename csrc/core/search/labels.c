@@ -52,11 +52,12 @@ hs_labels_find(const hs_choice *choice, int32_t point, hs_asking *asking, hs_lab
         *test = choice->within == 0 ? HS_OF_EQUAL_LABEL : HS_OF_NEAR_LABEL;
         return true;
     }
-    if (choice->first == NULL) {
+    const hs_partners *partners = &choice->partners;
+    if (partners->first == NULL) {
         return false;
     }
-    asking->partner = choice->partner + choice->first[point];
-    asking->n_partners = choice->first[point + 1] - choice->first[point];
+    asking->partner = partners->number + partners->first[point];
+    asking->n_partners = partners->first[point + 1] - partners->first[point];
     for (int64_t p = 0; p < asking->n_partners && asking->bits != UINT64_MAX; p++) {
         asking->bits |= UINT64_C(1) << (asking->partner[p] & 63);
     }

@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "../base/rule.h"
 #include "limits.h"
 
 /* Supports of other sizes, over their extent, leave no room for float32: nothing is sure of them.
@@ -104,10 +105,10 @@ supports_of(const hs_scanner *scanner, int32_t e)
     const int          n_entries = hs_support_entries(scanner->search->scene.ndim);
     const int32_t      sj = scanner->block.number[trace->place[e]];
     two_supports       of = {NULL, NULL, n_entries};
-    if (supports->rule != HS_RULE_SCATTER) {
+    if (hs_rule_needs_asking(supports->rule)) {
         of.asking = support_of(&supports->of_asking, trace->si[e], n_entries);
     }
-    if (supports->rule != HS_RULE_GATHER) {
+    if (hs_rule_needs_other(supports->rule)) {
         of.point = support_of(&supports->of_points, sj, n_entries);
     }
     return of;

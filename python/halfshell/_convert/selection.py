@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _Labels = npt.NDArray[np.int64]
 
+_QUERY_NUMBERS = 4  # which field of a selection these are
+
 
 def with_selection(
     reach: Any, chosen: Chosen, n: int, q: int | None, precision: Any = "exact"
@@ -49,7 +51,7 @@ def for_points(reach: Any, by: Reach | None, numbers: _Labels) -> Reach | None:
     if reach is None or len(reach) != 2:
         return by
     fields = list(reach[1])
-    fields[4] = numbers
+    fields[_QUERY_NUMBERS] = numbers
     return (by, tuple(fields))  # type: ignore[return-value]
 
 
@@ -138,7 +140,7 @@ def _as_within(value: Any, has_labels: bool) -> int:
     if within is None:
         raise TypeError(f"exclude_within must be a whole number, got {kind_of(value)}")
     if not has_labels:
-        raise ValueError("exclude_within goes with labels in exclude, one a point")
+        raise ValueError("exclude_within goes with labels in exclude, one for each point")
     if not 0 <= within < 2**63:
         raise ValueError(f"exclude_within must be from 0 on and below 2**63, got {within}")
     return within

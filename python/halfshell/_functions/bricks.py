@@ -44,7 +44,7 @@ def bricks(
         than a brick, and than the box: then bricks need many other points, which `Bricks.overhead`
         says beforehand.
     n : int
-        How many bricks, 1 or more. They own as many points each as possible, but for one; with
+        How many bricks, 1 or more. The numbers of points that they own differ by at most 1; with
         more bricks than points some own none.
     box, periodic
         As in `pairs`.
@@ -94,6 +94,7 @@ def bricks(
         refuse_unknown(bricks, unknown)
     array, vectors, bits = as_scene(points, box, periodic)
     largest, n_bricks = as_cutoff(cutoff), as_count(n, "n")
+    # Refuses what a search would refuse, at the price of a search with the cutoff 0.
     _core.count_pairs(array, 0.0 if math.isfinite(largest) and largest >= 0.0 else largest,
                       vectors, bits, False, "exact", None, None, None, 1, None, "auto")  # fmt: skip
     n_points, ndim = array.shape

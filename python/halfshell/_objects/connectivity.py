@@ -14,9 +14,10 @@ from halfshell._convert.options import as_choice, as_flag, as_list
 from halfshell._convert.scene import as_box_alone, as_own_box
 from halfshell._objects import node_check, node_cuts, node_patch
 from halfshell._objects.node_links import How, Links, search
-from halfshell._objects.node_list import NodeList, as_extent
+from halfshell._objects.node_list import NodeList
 from halfshell._objects.node_plot import NodePictures
 from halfshell._objects.node_removal import removed
+from halfshell._objects.node_supports import as_extent
 from halfshell._objects.nodes import as_morton_box, morton_number, nodes_of
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.options import as_choice, as_flag, check_letters
+from halfshell._convert.starts import starts_of
 from halfshell._objects import table_forms
 from halfshell._objects.graph import Graph, check_complete, turned
 from halfshell._objects.table_plot import TablePictures
@@ -115,10 +116,8 @@ class NeighborTable(TablePictures):
         [[], [2], [1]]
         """
         keep = table_forms.as_mask(mask, self.n_entries)
-        before = np.concatenate(([0], np.cumsum(keep, dtype=np.int64)))
-        return self._with(
-            before[self.offsets], keep, self._is_complete and bool(keep.all()), self._is_in_order
-        )
+        complete = self._is_complete and bool(keep.all())
+        return self._with(starts_of(keep)[self.offsets], keep, complete, self._is_in_order)
 
     def sort(self, by: Literal["distance"] = "distance") -> NeighborTable:
         """Put the entries of each row in another order.

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell import _core
-from halfshell._objects.node_list import reach_of
+from halfshell._convert.starts import starts_of
+from halfshell._objects.node_supports import reach_of
 from halfshell._objects.pair_table import Columns, PairTable
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Gathered:
     def keep(self, mask: npt.NDArray[np.bool_]) -> Gathered:
         if mask.all():
             return self
-        before = np.concatenate(([0], np.cumsum(mask, dtype=np.int64)))
+        before = starts_of(mask)
         return Gathered(before[self.offsets], self.indices[mask])
 
 
@@ -350,7 +351,7 @@ def _is_forward(shifts: Ints) -> npt.NDArray[np.bool_]:
 def row_starts(links: Links) -> npt.NDArray[np.int64]:
     """How many nodes of the lists before each one have rows, and at last of all."""
     counts = links.nodes.counts if links.how.ghost_rows else links.nodes.internal
-    return np.concatenate(([0], np.cumsum(counts))).astype(np.int64)
+    return starts_of(counts)
 
 
 def are_listed(links: Links, half: Half) -> npt.NDArray[np.bool_]:

@@ -3,31 +3,22 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from halfshell import _core, _show
-from halfshell._convert.arrays import as_array, as_real_array, in_order
+from halfshell._convert.arrays import as_array, in_order
 from halfshell._convert.foreign import kind_of
-from halfshell._convert.lengths import as_positive, check_lengths
 from halfshell._convert.options import as_whole
-from halfshell._convert.rules import reach_by_radii, reach_by_supports
 from halfshell._convert.scene import as_points
-from halfshell._convert.supports import MOST_AXES, as_matrices
+from halfshell._objects.node_planes import are_parallel, as_plane, touched_by
+from halfshell._objects.node_supports import as_extent, as_supports, reach_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from halfshell._convert.types import ArrayLike, FloatArray, Reach
-
-#: Between these the product with an extent is known to the last bit.
-_LEAST_SUPPORT, _LARGEST_SUPPORT = 2.0**-500, 2.0**500
-#: Extents that the core takes.
-_LEAST_EXTENT, _LARGEST_EXTENT = 2.0**-64, 2.0**64
-#: Roundings of a distance from a plane, and of a support in its units, relative to their terms.
-_PLANE_ERROR = 64 * 2.0**-53
+    from halfshell._convert.types import ArrayLike, FloatArray
 
 
 class NodeList:
@@ -103,7 +94,7 @@ class NodeList:
         self.is_anywhere = n == 0 and np.ndim(cast("Any", positions)) == 1
         self.positions = _locked(in_order(points, np.float64))
         _refuse_infinite(self.positions)
-        self.H = _locked(_as_supports(H, n, self.positions.shape[1]))
+        self.H = _locked(as_supports(H, n, self.positions.shape[1]))
         self.n_ghost = _as_ghosts(n_ghost, n)
         self.ids = None if ids is None else _locked(_as_ids(ids, n))
 
@@ -176,11 +167,11 @@ class NodeList:
         """
         d = self.positions.shape[1]
         factor = as_extent(extent)
-        point, normal = _as_plane(enter, "enter", d)
-        other, other_normal = _as_plane(exit, "exit", d)
-        if not _are_parallel(normal, other_normal):
+        point, normal = as_plane(enter, "enter", d)
+        other, other_normal = as_plane(exit, "exit", d)
+        if not are_parallel(normal, other_normal):
             raise ValueError("enter and exit must be parallel planes")
-        near = np.flatnonzero(self._touches(point, normal, factor))
+        near = np.flatnonzero(touched_by(self.positions, self.H, factor, point, normal))
         images = self.positions[near] + (other - point)
         _refuse_infinite(images)
         found = _core.pairs_between(
@@ -188,30 +179,6 @@ class NodeList:
             None, images, reach_of("max", self.H, factor, self.H[near]), "auto",
         )  # fmt: skip
         return near, np.unique(found)
-
-    def _touches(self, point: FloatArray, normal: FloatArray, extent: float) -> npt.NDArray[Any]:
-        """Whether each support touches a plane: in floats where these can tell."""
-        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-            terms = (self.positions - point) * normal
-            height = np.abs(terms.sum(axis=1))
-            size = np.abs(terms).sum(axis=1)
-            reach, error = _reach_along(normal, self.H, extent)
-            margin = _PLANE_ERROR * (size + reach) + error
-            within = height < reach - margin
-            unsure = ~(within | (height > reach + margin)) | ~np.isfinite(margin)
-            unsure |= (size < 2.0**-900) | (reach < 2.0**-900)
-        for k in np.flatnonzero(unsure):
-            within[k] = _touches_exactly(self.positions[k], point, normal, self.H[k], extent)
-        found: npt.NDArray[Any] = within
-        return found
-
-
-def as_extent(value: Any) -> float:
-    """How many times supports count."""
-    extent = as_positive(value, "extent")
-    if not _LEAST_EXTENT <= extent <= _LARGEST_EXTENT:
-        raise ValueError(f"extent must be from 2**-64 to 2**64, got {extent}")
-    return extent
 
 
 def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -225,49 +192,6 @@ def _refuse_infinite(points: FloatArray) -> None:
     if not np.isfinite(points).all():
         i, k = np.argwhere(~np.isfinite(points))[0]
         raise ValueError(f"positions must be finite, got positions[{i}, {k}] = {points[i, k]}")
-
-
-def reach_of(
-    rule: str, supports: FloatArray, extent: float, of_queries: FloatArray | None = None
-) -> Reach:
-    """What the core takes for a reach by such supports."""
-    if supports.ndim == 1:
-        return reach_by_radii(rule, supports, of_queries, extent)
-    return reach_by_supports(rule, supports, of_queries, extent)
-
-
-def _as_supports(values: Any, n: int, d: int) -> FloatArray:
-    def check(shape: tuple[int, ...]) -> None:
-        if shape not in ((n,), (n, d, d)):
-            raise ValueError(
-                f"H must have shape ({n},) or ({n}, {d}, {d}), one h or matrix for each node, got "
-                f"{shape}"
-            )
-
-    given = as_real_array(values, "H", check_shape=check)
-    if given.ndim == 3:
-        if d > MOST_AXES:
-            raise ValueError(f"H can be matrices in 1 to {MOST_AXES} dimensions, got {d}")
-        matrices = as_matrices(given, "H", "node", n, d)
-        _refuse_indefinite(matrices)
-        return matrices
-    supports = in_order(given, np.float64)
-    check_lengths(supports, "H")
-    wrong = (supports > _LARGEST_SUPPORT) | ((supports > 0.0) & (supports < _LEAST_SUPPORT))
-    for k in np.flatnonzero(wrong):
-        raise ValueError(f"H must be 0 or from 2**-500 to 2**500, got H[{k}] = {supports[k]}")
-    return supports
-
-
-def _refuse_indefinite(matrices: FloatArray) -> None:
-    """ValueError for a matrix that is surely not positive definite; the core decides the rest."""
-    try:
-        np.linalg.cholesky(matrices)
-    except np.linalg.LinAlgError:
-        for k in np.flatnonzero(np.linalg.eigvalsh(matrices)[:, 0] <= 0.0):
-            raise ValueError(
-                f"H must be positive definite, got H[{k}] = {matrices[k].tolist()}"
-            ) from None
 
 
 def _as_ghosts(value: Any, n: int) -> int:
@@ -288,69 +212,3 @@ def _as_ids(values: Any, n: int) -> npt.NDArray[np.int64]:
     if array.dtype == np.uint64 and (array > np.iinfo(np.int64).max).any():
         raise OverflowError("ids must be less than 2**63")
     return np.ascontiguousarray(array, np.int64)
-
-
-def _as_plane(values: Any, name: str, d: int) -> tuple[FloatArray, FloatArray]:
-    """A point and a normal."""
-    if not isinstance(values, (tuple, list)) or len(values) != 2:
-        raise ValueError(f"{name} must be a point and a normal")
-
-    def check(shape: tuple[int, ...]) -> None:
-        if shape != (d,):
-            raise ValueError(f"{name} must have a point and a normal of shape ({d},), got {shape}")
-
-    point, normal = (
-        in_order(as_real_array(one, name, check_shape=check), np.float64) for one in values
-    )
-    if not (np.isfinite(point).all() and np.isfinite(normal).all() and normal.any()):
-        raise ValueError(f"{name} must be finite, and its normal must not be zero")
-    return point, normal
-
-
-def _are_parallel(normal: FloatArray, other: FloatArray) -> bool:
-    a, b = ([Fraction(float(x)) for x in one] for one in (normal, other))
-    return all(a[k] * b[m] == a[m] * b[k] for k in range(len(a)) for m in range(k))
-
-
-def _touches_exactly(
-    x: FloatArray, point: FloatArray, normal: FloatArray, h: Any, extent: float
-) -> bool:
-    n = [Fraction(float(one)) for one in normal]
-    height = sum(
-        (
-            a * (Fraction(float(b)) - Fraction(float(c)))
-            for a, b, c in zip(n, x, point, strict=True)
-        ),
-        Fraction(0),
-    )
-    if np.ndim(h) == 0:
-        n = [Fraction(float(h)) * a for a in n]
-    else:
-        n = _solved([[Fraction(float(a)) for a in row] for row in h], n)
-    return height * height <= Fraction(extent) ** 2 * sum((a * a for a in n), Fraction(0))
-
-
-def _reach_along(
-    normal: FloatArray, supports: FloatArray, extent: float
-) -> tuple[FloatArray, FloatArray]:
-    """How far each support reaches along a normal, times its length, and a bound of the error."""
-    if supports.ndim == 1:
-        return extent * supports * np.sqrt((normal * normal).sum()), np.zeros(len(supports))
-    spread = np.linalg.cond(supports)
-    columns = np.broadcast_to(normal, (len(supports), len(normal)))[:, :, None]
-    reach = extent * np.linalg.norm(np.linalg.solve(supports, columns)[:, :, 0], axis=1)
-    return reach, np.where(spread < 2.0**30, 2.0**-40 * spread, np.inf) * reach
-
-
-def _solved(matrix: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:
-    """The solution of a system that has one, by elimination."""
-    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
-    d = len(rows)
-    for k in range(d):
-        pivot = next(m for m in range(k, d) if rows[m][k] != 0)
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [value / rows[k][k] for value in rows[k]]
-        for m in range(d):
-            if m != k:
-                rows[m] = [a - rows[m][k] * b for a, b in zip(rows[m], rows[k], strict=True)]
-    return [row[d] for row in rows]

@@ -9,6 +9,7 @@ import numpy as np
 
 from halfshell._convert.arrays import as_array
 from halfshell._convert.options import as_list
+from halfshell._convert.starts import starts_of
 from halfshell._objects.node_links import (
     Gathered,
     Half,
@@ -178,7 +179,7 @@ def _shrunk(
     ghosts = np.array([
         mask[len(mask) - n :].sum() for mask, n in zip(kept, old.ghosts, strict=True)
     ], np.int64)  # fmt: skip
-    first = np.concatenate(([0], np.cumsum(counts)))
+    first = starts_of(counts)
     number = np.concatenate([
         np.where(one >= 0, one + start, -1) for one, start in zip(new, first, strict=False)
     ] or [np.empty(0, np.int64)])  # fmt: skip

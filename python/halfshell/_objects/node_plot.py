@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from halfshell._convert.starts import starts_of
 from halfshell._extras import needs
 from halfshell._objects.node_sets import NodeSets
 
@@ -78,7 +79,7 @@ def html_of(links: Links) -> str:
     nodes = links.nodes
     lengths = np.diff(links.offsets)
     rows = nodes.counts if links.how.ghost_rows else nodes.internal
-    ends = np.concatenate(([0], np.cumsum(rows))) * nodes.n_lists
+    ends = starts_of(rows) * nodes.n_lists
     entries = [int(lengths[a:b].sum()) for a, b in pairwise(ends)]
     cells = "".join(
         f"<tr><td>{escape(name)}</td><td>{n}</td><td>{ghosts}</td><td>{mean:.1f}</td></tr>"

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from halfshell import _core, _show
 from halfshell._convert.arrays import as_real_array, in_order
+from halfshell._convert.starts import starts_of
 from halfshell._objects.node_links import stored
 from halfshell._objects.node_rows import NodeRows
 
@@ -154,8 +155,8 @@ class NodeSets(NodeRows):
         internal = ~nodes.is_ghost(owners)
         counts = np.diff(starts)
         wanted = np.repeat(internal, counts)
-        offsets = np.concatenate(([0], np.cumsum(counts[internal])))
-        return GlobalNeighbors(ids[owners[internal]], offsets.astype(np.int64), others[wanted])
+        offsets = starts_of(counts[internal])
+        return GlobalNeighbors(ids[owners[internal]], offsets, others[wanted])
 
     def _two_nodes(self, *four: Any) -> tuple[tuple[int, int], tuple[int, int]]:
         if self._links.shifts is not None:

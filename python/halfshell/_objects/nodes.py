@@ -13,6 +13,7 @@ import numpy as np
 
 from halfshell import _core
 from halfshell._convert.arrays import as_real_array, in_order
+from halfshell._convert.starts import starts_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +47,7 @@ class Nodes:
         self.names = names
         self.counts = counts
         self.ghosts = ghosts
-        self.first = np.concatenate(([0], np.cumsum(counts))).astype(np.int64)
+        self.first = starts_of(counts)
         self.ids = ids
         self.number = number
         self._rank: npt.NDArray[np.int32] | None = None
@@ -144,7 +145,7 @@ def nodes_of(lists: Sequence[NodeList]) -> tuple[Nodes, FloatArray, FloatArray]:
         raise OverflowError(f"fewer than 2**31 nodes can be searched, got {counts.sum()}")
     ids = None
     if any(one.ids is not None for one in lists):
-        first = np.concatenate(([0], np.cumsum(counts)))
+        first = starts_of(counts)
         ids = np.concatenate([
             np.arange(start, start + one.n_nodes) if one.ids is None else one.ids
             for start, one in zip(first, lists, strict=False)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.memory import gigabytes
+from halfshell._convert.starts import starts_of
 
 Columns = tuple[npt.NDArray[Any], ...]
 Radii = npt.NDArray[np.float64]
@@ -67,8 +68,8 @@ def _joined(parts: list[Columns], order: npt.NDArray[np.intp]) -> Columns:
     counts = np.concatenate([np.diff(part[0]) for part in parts])
     lengths = np.empty(len(order), np.int64)
     lengths[order] = counts
-    offsets = np.concatenate(([0], np.cumsum(lengths)))
-    starts = offsets[:-1][order] - np.concatenate(([0], np.cumsum(counts)[:-1]))
+    offsets = starts_of(lengths)
+    starts = offsets[:-1][order] - starts_of(counts)[:-1]
     to = np.arange(int(offsets[-1])) + np.repeat(starts, counts)
     joined = [offsets]
     for columns in list(zip(*parts))[1:]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import is_a
+from halfshell._convert.starts import starts_of
 
 __all__ = ["as_rows", "entries_of", "row_sums"]
 
@@ -58,7 +59,7 @@ def _refused(kind: str) -> TypeError:
 def entries_of(offsets: Array, rows: Positions) -> tuple[Array, Positions]:
     """Offsets of these rows alone, and the entries that are in them."""
     counts = offsets[rows + 1] - offsets[rows]
-    ends = np.concatenate(([0], np.cumsum(counts)))
+    ends = starts_of(counts)
     return ends, np.repeat(offsets[rows] - ends[:-1], counts) + np.arange(ends[-1])
 
 

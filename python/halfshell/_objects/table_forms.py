@@ -15,6 +15,7 @@ from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import kind_of, shown, whole_number
 from halfshell._convert.lengths import as_number
 from halfshell._convert.memory import refuse_unavailable
+from halfshell._convert.starts import starts_of
 from halfshell._errors import CapacityError
 from halfshell._extras import needs
 
@@ -139,7 +140,7 @@ def sparse_array(
             "them: duplicates='min' keeps the nearest"
         )
     nearest = np.minimum.reduceat(distances, np.flatnonzero(is_first))
-    before = np.concatenate(([0], np.cumsum(is_first, dtype=np.int64)))
+    before = starts_of(is_first)
     return sparse.csr_array((nearest, indices[is_first], before[offsets]), shape=shape)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.options import as_index_bytes, check_letters
+from halfshell._convert.starts import starts_of
 from halfshell._objects.alone import Alone
 from halfshell._objects.neighbor_table import NeighborTable
 from halfshell._objects.table_rows import read_only
@@ -104,6 +105,5 @@ def _both_directions(columns: dict[str, _Array], quantities: str, n: int) -> tup
         back = column[::-1]
         opposite = back if letter == "d" else 0 - back  # of 0.0 it is 0.0
         found[letter] = np.concatenate((opposite, column))
-    offsets = np.zeros(n + 1, np.int64)
-    offsets[1:] = np.cumsum(np.bincount(rows, minlength=n))
+    offsets = starts_of(np.bincount(rows, minlength=n))
     return read_only(offsets), *(read_only(found[letter][order]) for letter in quantities)

@@ -167,6 +167,7 @@ def triplet_list(
     >>> ij.tolist(), ik.tolist()
     ([0, 1], [1, 0])
     """
+    from halfshell._convert.starts import starts_of
     from halfshell._objects.table_triplets import triplets
 
     starts = np.asarray(first_neighbours).astype(np.int64)
@@ -175,7 +176,7 @@ def triplet_list(
     else:
         near = np.asarray(abs_dr_p) < cutoff
         kept = np.flatnonzero(near)
-        ij, ik = triplets(np.concatenate(([0], np.cumsum(near)))[starts], True)
+        ij, ik = triplets(starts_of(near)[starts], True)
         ij, ik = kept[ij], kept[ik]
     if i_p is None or j_p is None:
         return ij.astype(np.int32), ik.astype(np.int32)

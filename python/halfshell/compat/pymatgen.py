@@ -44,7 +44,7 @@ def find_points_in_spheres(
     lattice : array_like of float, shape (3, 3)
         Lattice vectors as rows.
     tol : float, default 1e-8
-        Added to the square of the radius, unless that is below `min_r`.
+        Added to the square of the radius, unless the radius is below `min_r`.
     min_r : float, default 1.0
         Spheres with a smaller radius are closed, and have no tolerance.
 

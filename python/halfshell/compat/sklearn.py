@@ -35,10 +35,10 @@ _MOST_FEATURES = 8
 
 
 class _Graphs:
-    """What both transformers share; their owner's methods come behind it."""
+    """What both transformers share; ``super()`` is the transformer of scikit-learn."""
 
     def _fit(self: Any, X: Any, y: Any = None) -> Any:
-        """Without a tree, where none is used."""
+        """Fit, without building a tree where no method here would use it."""
         algorithm = self.algorithm
         if self._goes_by_distance() and algorithm in ("auto", "kd_tree", "ball_tree"):
             shape: tuple[int, ...] = tuple(getattr(X, "shape", ()))
@@ -54,7 +54,7 @@ class _Graphs:
         return of_points and self.metric_params is None
 
     def _samples(self: Any, X: Any) -> tuple[Any, Any] | None:
-        """Samples that were fitted and those that ask, or None where this is not for us."""
+        """Samples that were fitted and those that ask, or None where scikit-learn is to search."""
         check_is_fitted(self)
         own = self._fit_X
         usual = self._goes_by_distance() and not sparse.issparse(own) and not sparse.issparse(X)

@@ -19,11 +19,11 @@ bad_options_are_refused(void)
     for (int b = 0; b < 6; b++) {
         options.cell_size = bad[b];
         CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF && list == NULL);
-        CHECK(failure.column == 0);
+        CHECK(failure.column == HS_LENGTH_CELL_SIZE);
         options.cell_size = 1.0;
         options.max_radius = bad[b];
         CHECK((hs_dynamic_new(&options, &list, &failure) == HS_OK) == (b == 0));
-        CHECK(b == 0 || failure.column == 1);
+        CHECK(b == 0 || failure.column == HS_LENGTH_MAX_RADIUS);
         hs_dynamic_free(list);
         list = NULL;
         options.max_radius = 0.0;
@@ -38,10 +38,12 @@ bad_options_are_refused(void)
     options.ndim = 3;
     options.box = &box;
     box.rows[0][0] = 1e-100;
-    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF && failure.column == 2);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF &&
+          failure.column == HS_LENGTH_BOX);
     box.rows[0][0] = 1e-5;
     options.max_radius = 1e3;
-    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF && failure.column == 1);
+    CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_CUTOFF &&
+          failure.column == HS_LENGTH_MAX_RADIUS);
     memset(box.rows[0], 0, sizeof box.rows[0]);
     CHECK(hs_dynamic_new(&options, &list, &failure) == HS_ERR_BOX_DEPENDENT);
 }

@@ -242,12 +242,12 @@ extreme_radii_stay_as_they_are(void)
         hs_level_search open;
         hs_failure      failure;
         CHECK(open_step(&made, s, &open, &failure) == HS_OK);
-        const hs_radii *radii = &open.limits.of_points;
+        const hs_radii *radii = &open.own.limits.of_points;
         for (int64_t si = 0;
              open.search.scene.extreme && open.search.limits != NULL && si < open.search.bins.n;
              si++, kept++) {
             CHECK(radii->exact[si] == points.radii[open.search.bins.order[si]]);
-            CHECK(open.limits.bound == HUGE_VAL && radii->near[si] <= 0x1p100f);
+            CHECK(open.own.limits.bound == HUGE_VAL && radii->near[si] <= 0x1p100f);
         }
         hs_level_close(&open);
     }
@@ -262,8 +262,8 @@ extreme_radii_stay_as_they_are(void)
     make_plan(&by_type, false, HUGE_VAL, NULL, &made);
     CHECK(made.plan.n == 1 && made.plan.steps[0].by_table);
     CHECK(open_step(&made, 0, &open, &failure) == HS_OK && open.search.scene.extreme);
-    CHECK(memcmp(open.limits.table.exact, ends, sizeof ends) == 0);
-    CHECK(open.limits.table.near[3] == -1.0f && open.limits.table.near[0] <= 0x1p100f);
+    CHECK(memcmp(open.own.limits.table.exact, ends, sizeof ends) == 0);
+    CHECK(open.own.limits.table.near[3] == -1.0f && open.own.limits.table.near[0] <= 0x1p100f);
     hs_level_close(&open);
     free_plan(&made);
 }

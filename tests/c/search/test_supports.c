@@ -159,7 +159,7 @@ count_with(const question *ask, hs_stages *stages)
     plan.is_half = plan.is_half && !ask->is_ordered;
     for (int64_t s = 0; s < plan.n; s++) {
         CHECK(hs_level_open(&levels, &plan, s, NULL, false, &call, &open, &failure) == HS_OK);
-        CHECK(open.search.limits != NULL && open.search.limits->supports == &open.supports);
+        CHECK(open.search.limits != NULL && open.search.limits->supports == &open.own.supports);
         n += count_step(ask, &open.search, stages);
         hs_level_close(&open);
     }

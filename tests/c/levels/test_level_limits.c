@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_level_supports.c: points with supports are divided by how far these reach, and a step of
+/* test_level_limits.c: points with supports are divided by how far these reach, and a step of
  * theirs as an open search has the supports of both sides, as far as its rule looks at them. */
 #include "../../../csrc/core/base/outcome.h"
 #include "../../../csrc/core/levels/level_search.h"
 #include "../support/poll_checks.h"
 #include "../support/reach_sets.h"
 
-void test_level_supports(void);
+void test_level_limits(void);
 
 enum { ENTRIES = REACH_POINTS * 9 };
 
@@ -200,10 +200,10 @@ step_is_right(planned *made, int64_t s, bool is_bounded)
     }
     const hs_search   *search = &open.search;
     const hs_scene    *scene = &search->scene;
-    const hs_supports *supports = &open.supports;
+    const hs_supports *supports = &open.own.supports;
     const bool         both = !search->has_queries;
-    bool               right = made->plan.steps[s].has_limits && search->limits == &open.limits &&
-                 open.limits.supports == supports && open.limits.rule == rule;
+    bool right = made->plan.steps[s].has_limits && search->limits == &open.own.limits &&
+                 open.own.limits.supports == supports && open.own.limits.rule == rule;
     right = right && supports->rule == rule && supports->is_bounded == is_bounded;
     right = right && supports->metric.limit.cutoff == 0.75;
     right = right && supports->metric.exponent == (scene->extreme ? 0 : -scene->scale.exponent);
@@ -253,7 +253,7 @@ extreme_points_are_not_scaled(void)
         hs_failure      failure;
         CHECK(hs_level_open(&made.levels, &made.plan, s, NULL, false, &made.call, &open,
                             &failure) == HS_OK);
-        CHECK(!open.search.scene.extreme || open.supports.metric.exponent == 0);
+        CHECK(!open.search.scene.extreme || open.own.supports.metric.exponent == 0);
         extreme += open.search.scene.extreme;
         hs_level_close(&open);
     }
@@ -315,7 +315,7 @@ nothing_leaks_when_memory_is_short(void)
 }
 
 void
-test_level_supports(void)
+test_level_limits(void)
 {
     RUN(points_are_divided_by_how_far_supports_reach);
     RUN(the_first_wrong_support_is_named);
