@@ -313,6 +313,9 @@ what_has_no_meaning_is_refused(void)
     make_scene(6);
     CHECK(hs_systems_nearest(&s.points, NULL, &s.systems, 0, &s.options, &rows, NULL) ==
           HS_ERR_ARGUMENT);
+    CHECK(hs_systems_nearest(&s.points, NULL, &s.systems, 1, &s.options, &rows, NULL) == HS_OK);
+    CHECK(hs_pairs_length(rows) == s.points.n);
+    hs_pairs_free(rows);
     s.options.cutoff = -1.0;
     CHECK(hs_systems_nearest(&s.points, NULL, &s.systems, 2, &s.options, &rows, &failure) ==
           HS_ERR_CUTOFF);

@@ -148,8 +148,11 @@ joined_ranges_are_those_of_both(void)
         CHECK(scene.cloud.upper[k] == 5.0 + k && asking.cloud.upper[k] == 5.0 + k);
     }
     CHECK(scene.cloud.largest == 8.0 && asking.cloud.largest == 8.0);
+    scene.x_largest[2] = -1.0; /* is of no axis */
+    asking.x_largest[2] = 3.0;
     hs_scene_join_wrapped(&scene, &asking);
     CHECK(scene.is_asked && scene.x_largest[0] == 7.0 && scene.x_largest[1] == 8.0);
+    CHECK(scene.x_largest[2] == -1.0);
     CHECK(scene.lower[0] == -7.0 && scene.upper[1] == 6.0);
 }
 
