@@ -155,7 +155,7 @@ def _halved(places: FloatArray, widths: FloatArray, n: int) -> list[_Numbers]:
         if len(numbers) > 1:
             own = places[numbers]
             axis = int(np.argmax(np.ptp(own, axis=0) * widths))
-            numbers = numbers[np.argsort(own[:, axis], kind="stable")]
+            numbers = numbers[np.argpartition(own[:, axis], cut)]  # a sort takes far longer
         open_sets += [(numbers[cut:], n_parts - first), (numbers[:cut], first)]
     return parts
 
