@@ -160,6 +160,10 @@ def _add_pairs(commands: Any) -> None:
         help="columns of OUT, any of i j d D S P; default: ijdS, or ijd without a box",
     )
     command.add_argument("--sort", action="store_true", help="OUT ascending by (i, j, S)")
+    command.add_argument(
+        "--max-output", type=_size, metavar="SIZE",
+        help="write at most so much, such as 500MB or 4GB; default: 1GB"
+    )
     command.add_argument("--plot", metavar="PNG", help="draw g(r): .png, .pdf or .svg")
     command.add_argument(
         "--precision",
@@ -278,6 +282,19 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
     return int(text)
+
+
+def _size(text: str) -> float:
+    """Bytes, of a number with kB, MB, GB or TB behind it, or with none."""
+    number = text.strip().upper().removesuffix("B")
+    power = "KMGT".find(number[-1:]) + 1 if number[-1:] else 0
+    try:
+        value = float(number[:-1] if power else number) * 1000.0**power
+    except ValueError:
+        value = 0.0
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 500MB or 4GB")
+    return value
 
 
 def _sample(text: str) -> int:

@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 
 from halfshell._cli.files import InputError, replacing
 
-__all__ = ["open_output", "write_columns", "write_csv"]
+__all__ = ["check_size", "open_output", "write_columns", "write_csv"]
+
+# About how many characters a number has in text, with what separates it from the next.
+_DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT = 19, 3
 
 
 def open_output(
@@ -36,6 +39,32 @@ def open_output(
     if source is not None and os.path.exists(target) and os.path.samefile(target, source):
         raise InputError(f"{target}: is the input; it is not overwritten")
     return stack.enter_context(replacing(target))
+
+
+def check_size(
+    target: str, letters: str, n_pairs: int, n_points: int, ndim: int, most: float
+) -> None:
+    """InputError for an output that would be larger than `most` bytes, told beforehand."""
+    in_text = not target.lower().endswith(".npz")
+    number = (len(str(n_points)) + 1, _DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT) if in_text else (8, 8, 4)
+    of_each = {
+        "i": number[0], "j": number[0], "P": 2 * number[0], "d": number[1],
+        "D": ndim * number[1], "S": ndim * number[2],
+    }  # fmt: skip
+    size = n_pairs * sum(of_each[letter] for letter in letters)
+    if size > most:
+        raise InputError(
+            f"{target}: would have {n_pairs:,} pairs in about {_readable(size)}, more than "
+            f"--max-output {_readable(most)}: raise it, or choose fewer --quantities"
+        )
+
+
+def _readable(size: float) -> str:
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} TB"
 
 
 def write_columns(

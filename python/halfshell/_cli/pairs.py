@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell import _core
 from halfshell._cli.files import InputError, Scene, one_line
-from halfshell._cli.output import open_output, write_columns
+from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,
     load_scene,
@@ -33,6 +33,7 @@ from halfshell._terminal import printable
 __all__ = ["run"]
 
 BAR_AFTER = 0.5  # seconds without a progress bar
+MOST_BYTES = 1e9  # of an output, unless --max-output says otherwise
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,19 @@ def run(args: Namespace) -> int:
     letters += "" if "d" in letters else "d"
     if args.plot and cutoff == 0:
         raise InputError("--plot needs a cutoff above 0")
+    for name, given in (
+        ("--quantities", args.quantities), ("--sort", args.sort), ("--max-output", args.max_output)
+    ):  # fmt: skip
+        if given and not args.output:
+            raise InputError(f"{name} is about what -o writes: give -o as well")
 
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)
         plot = open_output(args.plot, args.file, stack, (".png", ".pdf", ".svg"))
         if plot:
             require_matplotlib()
+        if output:
+            _check_size(scene, cutoff, wanted, args)
         start = time.perf_counter()
         columns = _search(scene, cutoff, letters, args)
         seconds = time.perf_counter() - start
@@ -114,18 +122,32 @@ def run(args: Namespace) -> int:
 # The search --------------------------------------------------------------------------------
 
 
-def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[str, NDArray[Any]]:
-    """Find the pairs; return one array for each letter."""
-    options: dict[str, Any] = {
+def _options(scene: Scene, args: Namespace) -> dict[str, Any]:
+    """What counting and finding share."""
+    return {
         "box": scene.box,
         "periodic": scene.periodic if scene.box is not None else None,
-        "quantities": letters,
         "inclusive": not args.strict,
-        "sort": args.sort,
         "precision": args.precision,
         "kernel": args.kernel,
         "threads": args.threads,
     }
+
+
+def _check_size(scene: Scene, cutoff: float, letters: str, args: Namespace) -> None:
+    """Refuse an output that is too large, for what counting takes."""
+    n, ndim = scene.points.shape
+    try:
+        n_pairs = hs.count_pairs(scene.points, cutoff, **_options(scene, args))
+    except (ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise InputError(f"{scene.source}: {one_line(error)}") from None
+    most = MOST_BYTES if args.max_output is None else args.max_output
+    check_size(args.output, letters, n_pairs, n, ndim, most)
+
+
+def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[str, NDArray[Any]]:
+    """Find the pairs; return one array for each letter."""
+    options = {**_options(scene, args), "quantities": letters, "sort": args.sort}
     try:
         with _progress_bar(args.progress and not args.json) as advance:
             found = hs.pairs(scene.points, cutoff, progress=advance, **options)

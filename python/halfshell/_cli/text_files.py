@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,6 +44,9 @@ def read_points(file: str) -> NDArray[np.float64]:
             if len(row) < len(values):
                 word = words[values.index(None)]
                 raise BadLine(f"line {number}: {word!r} is not a number")
+            for value in row:
+                if not math.isfinite(value):
+                    raise BadLine(f"line {number}: {value} is not a finite number")
             if rows and len(row) != len(rows[0]):
                 raise BadLine(f"line {number}: has {len(row)} numbers, lines before {len(rows[0])}")
             rows.append(row)

@@ -156,7 +156,7 @@ def test_forms_of_text(told, tmp_path, content, rows):
         ("0 0 0\n\n1 2\n", "line 3: has 2 numbers, lines before 3"),
         ("x y\nz w\n1 2\n", "line 2: 'z' is not a number"),
         ("0 y z\n", "line 1: 'y' is not a number"),
-        ("0 nan 1\n", "point 0, coordinate 1 is nan"),
+        ("0 nan 1\n", "line 1: nan is not a finite number"),
         ("# nothing\n", "holds no points"),
     ],
 )
@@ -207,3 +207,37 @@ def test_options_that_cannot_be(run, args):
     status, out, err = run(*args)
     assert (status, out) == (2, "") and err.startswith("halfshell: error: ")
     assert err.count("\n") == 1
+
+
+def test_large_outputs_are_told_beforehand(run, tmp_path):
+    points = tmp_path / "points.npy"
+    np.save(points, np.random.default_rng(0).random((400, 3)))
+    for name in ("all.npz", "all.csv"):
+        output = tmp_path / name
+        status, out, err = run(
+            "pairs", points, "--cutoff", "2", "-o", output, "--quantities", "ijdD",
+            "--max-output", "1MB",
+        )  # fmt: skip
+        assert status != 0 and not output.exists() and not out
+        assert "would have 79,800 pairs in about " in err and "--max-output 1 MB" in err
+        if name.endswith("npz"):
+            assert f"{79_800 * 48 / 1e6:.3g} MB" in err
+        assert run("pairs", points, "--cutoff", "2", "-o", output, "--max-output", "9MB")[0] == 0
+        assert output.stat().st_size > 1_000_000
+    for wrong in ("0", "many", "-3GB", "1XB", "inf", ""):
+        status, _, err = run("pairs", points, "--cutoff", "1", "-o", "x.csv", f"--max-output={wrong}")
+        assert status == 2 and "is not a size such as 500MB or 4GB" in err
+
+
+@pytest.mark.parametrize("option", [["--sort"], ["--quantities", "ij"], ["--max-output", "1kB"]])
+def test_options_that_would_be_ignored_are_errors(run, option):
+    status, _, err = run("pairs", "--cutoff", "1.7", *option)
+    assert status != 0 and f"{option[0]} is about what -o writes: give -o as well" in err
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "-Infinity"])
+def test_numbers_that_are_not_finite_are_named_by_their_line(run, tmp_path, word):
+    text = tmp_path / "points.txt"
+    text.write_text(f"# three points\n0 0 0\n1 {word} 0\n0 0 1\n")
+    status, _, err = run("pairs", text, "--cutoff", "1")
+    assert status != 0 and "line 3: " in err and "is not a finite number" in err
