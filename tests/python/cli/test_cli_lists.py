@@ -225,7 +225,8 @@ def test_large_outputs_are_told_beforehand(run, tmp_path):
         assert run("pairs", points, "--cutoff", "2", "-o", output, "--max-output", "9MB")[0] == 0
         assert output.stat().st_size > 1_000_000
     for wrong in ("0", "many", "-3GB", "1XB", "inf", ""):
-        status, _, err = run("pairs", points, "--cutoff", "1", "-o", "x.csv", f"--max-output={wrong}")
+        limit = f"--max-output={wrong}"
+        status, _, err = run("pairs", points, "--cutoff", "1", "-o", "x.csv", limit)
         assert status == 2 and "is not a size such as 500MB or 4GB" in err
 
 
