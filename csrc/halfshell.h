@@ -607,6 +607,7 @@ typedef struct hs_systems {
     const hs_reach     *reach;       /* of all points; the cutoffs are further limits; or NULL */
     const hs_selection *selection;   /* of all points; or NULL */
     const int64_t      *first_query; /* as first, of queries, where there are any; or NULL */
+    const uint8_t      *periodic;    /* n, in place of box->periodic: bit l for row l; or NULL */
 } hs_systems;
 
 /*

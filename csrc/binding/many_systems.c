@@ -209,35 +209,68 @@ take_numbers(PyObject *object, int64_t n, const char *name, numbered *set)
     return true;
 }
 
+/* Boxes fit the points and the call's box; else an exception is set. */
+static bool
+boxes_fit(PyObject *boxes, const hs_py_call *call)
+{
+    const npy_intp *shape = PyArray_DIMS((PyArrayObject *)boxes);
+    if (call->among.box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1]) {
+        PyErr_SetString(PyExc_ValueError, "boxes do not fit points, box and cutoffs");
+        return false;
+    }
+    return true;
+}
+
+/* Bits of the axes that repeat, or None. */
+static bool
+take_bits(PyObject *object, const hs_py_call *call, hs_systems *systems)
+{
+    if (object == Py_None) {
+        return true;
+    }
+    if (!hs_is_array(object, NPY_UINT8, 1) || call->among.box == NULL) {
+        PyErr_SetString(PyExc_TypeError, "axes that repeat must be uint8, beside a box");
+        return false;
+    }
+    systems->periodic = PyArray_DATA((PyArrayObject *)object);
+    return true;
+}
+
 /* What systems have of their own; returns how many there are, MOST_NUMBER where all share it, or -1
  * with an exception set. */
 static int64_t
-take_own(PyObject *cutoffs, PyObject *boxes, const hs_py_call *call, hs_systems *systems)
+take_own(PyObject *const *given, const hs_py_call *call, hs_systems *systems)
 {
-    const int64_t n_cutoffs = length_of(cutoffs, 1, MOST_NUMBER, &systems->cutoffs);
-    const int64_t n_boxes = length_of(boxes, 3, MOST_NUMBER, &systems->rows);
-    if (n_cutoffs < 0 || n_boxes < 0) {
+    PyObject     *bits = given[4];
+    const int64_t n_cutoffs = length_of(given[1], 1, MOST_NUMBER, &systems->cutoffs);
+    const int64_t n_boxes = length_of(given[2], 3, MOST_NUMBER, &systems->rows);
+    if (n_cutoffs < 0 || n_boxes < 0 || (systems->rows != NULL && !boxes_fit(given[2], call)) ||
+        !take_bits(bits, call, systems)) {
         return -1;
     }
-    if (systems->rows != NULL) {
-        const npy_intp *shape = PyArray_DIMS((PyArrayObject *)boxes);
-        if (systems->box == NULL || shape[1] != call->points.ndim || shape[2] != shape[1] ||
-            (systems->cutoffs != NULL && n_cutoffs != n_boxes)) {
+    const int64_t lengths[] = {n_cutoffs, n_boxes,
+                               systems->periodic != NULL ? PyArray_DIM((PyArrayObject *)bits, 0)
+                                                         : MOST_NUMBER};
+    int64_t       n = MOST_NUMBER;
+    for (int k = 0; k < 3; k++) {
+        if (lengths[k] != MOST_NUMBER && n != MOST_NUMBER && lengths[k] != n) {
             PyErr_SetString(PyExc_ValueError, "boxes do not fit points, box and cutoffs");
             return -1;
         }
+        n = lengths[k] < n ? lengths[k] : n;
     }
-    return n_boxes < n_cutoffs ? n_boxes : n_cutoffs;
+    return n;
 }
 
 bool
 hs_batch_take(PyObject *const *given, const hs_py_call *call, hs_batch *batch)
 {
-    static const char *const names[] = {"batch", "cutoff", "box", "query_batch"};
+    static const char *const names[HS_BATCH_PARTS] = {"batch", "cutoff", "box", "query_batch",
+                                                      "periodic"};
     hs_systems              *systems = &batch->systems;
     numbered                 points, queries = {.name = "query_batch"};
     *batch = (hs_batch){.is_given = true};
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < HS_BATCH_PARTS; k++) {
         if (given[k] != Py_None && !hs_py_call_is_apart(call, given[k], names[k])) {
             return false;
         }
@@ -250,7 +283,7 @@ hs_batch_take(PyObject *const *given, const hs_py_call *call, hs_batch *batch)
     systems->box = call->among.box;
     systems->reach = call->among.reach;
     systems->selection = call->among.selection;
-    const int64_t n_systems = take_own(given[1], given[2], call, systems);
+    const int64_t n_systems = take_own(given, call, systems);
     if (n_systems < 0 || !find_systems(&points, &queries, n_systems, batch)) {
         hs_batch_free(batch);
         return false;
@@ -267,9 +300,9 @@ hs_batch_take_optional(const hs_py_call *call, hs_batch *batch)
     if (call->batch == NULL) {
         return true;
     }
-    if (!PyTuple_CheckExact(call->batch) || PyTuple_GET_SIZE(call->batch) != 4 ||
+    if (!PyTuple_CheckExact(call->batch) || PyTuple_GET_SIZE(call->batch) != HS_BATCH_PARTS ||
         call->among.cells != NULL) {
-        PyErr_SetString(PyExc_TypeError, "a batch of points must be a tuple of four");
+        PyErr_SetString(PyExc_TypeError, "a batch of points must be a tuple of five");
         return false;
     }
     return hs_batch_take(&PyTuple_GET_ITEM(call->batch, 0), call, batch);

@@ -20,10 +20,13 @@ typedef struct hs_batch {
     int64_t    n_numbers;   /* systems, those without points counted */
 } hs_batch;
 
+enum { HS_BATCH_PARTS = 5 };
+
 /*
- * The batch of a call, if it has one: four objects, batch, int64 (n,); cutoffs, None or float64
+ * The batch of a call, if it has one: five objects, batch, int64 (n,); cutoffs, None or float64
  * (s,); boxes, None or float64 (s, d, d), for which the call's box has the axes that repeat; the
- * batch of queries, int64 (q,), or None where there are none. False with an exception set, and
+ * batch of queries, int64 (q,), or None where there are none; bits of the axes that repeat in each
+ * system, uint8 (s,), or None where they are those of the call. False with an exception set, and
  * nothing to free.
  */
 bool hs_batch_take(PyObject *const *given, const hs_py_call *call, hs_batch *batch);

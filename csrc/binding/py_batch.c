@@ -12,7 +12,7 @@ hs_py_batch_pairs(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_pairs  *pairs = NULL;
     hs_batch   batch;
     (void)module;
-    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaaahgc", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "batch_pairs", "qsboaaaaahgc", arguments, n_arguments) ||
         !hs_batch_take(arguments + HS_CALL_ARGUMENTS + 4, &call, &batch)) {
         return NULL;
     }
@@ -43,7 +43,7 @@ hs_py_batch_count(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arg
     hs_py_call call;
     hs_batch   batch;
     (void)module;
-    if (!hs_py_call_take(&call, "batch_count", "aaaahg", arguments, n_arguments) ||
+    if (!hs_py_call_take(&call, "batch_count", "aaaaahg", arguments, n_arguments) ||
         !hs_batch_take(arguments + HS_CALL_ARGUMENTS, &call, &batch)) {
         return NULL;
     }

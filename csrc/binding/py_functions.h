@@ -59,10 +59,10 @@ PyObject *hs_py_stream_type(PyObject *module);
 hs_py_search hs_py_for_each_pair;
 
 /* py_batch.c. The arguments of py_call.h (where each system has a box of its own, any one of that
- * shape), quantities, sort, index_bytes, out; batch, cutoffs or None, boxes or None; reach and
+ * shape), quantities, sort, index_bytes, out; the parts of many_systems.h; reach and
  * algorithm, as all that find pairs. */
 hs_py_search hs_py_batch_pairs;
-/* The arguments of py_call.h, batch, cutoffs, boxes. */
+/* The arguments of py_call.h, the parts of many_systems.h. */
 hs_py_search hs_py_batch_count;
 
 /* py_connectivity.c. The arguments of py_call.h, of which points and resources count, then i, j,

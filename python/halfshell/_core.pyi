@@ -27,11 +27,12 @@ _Reach = tuple[
 ] | None  # fmt: skip
 # Functions that return arrays go on with quantities, sort, index_bytes, out.
 _Result = tuple[str, bool, int, Any]
-# Many systems: batch, cutoffs, boxes, and the batch of queries, all but the first of which may be
-# None. Functions that take them as one tuple have it at their very end.
+# Many systems: batch, cutoffs, boxes, the batch of queries, and bits of the axes that repeat; all
+# but the first may be None. Functions that take them as one tuple have it at their very end.
 _Batch = tuple[
-    npt.NDArray[np.int64], _Floats | None, _Floats | None, npt.NDArray[np.int64] | None
-]
+    npt.NDArray[np.int64], _Floats | None, _Floats | None, npt.NDArray[np.int64] | None,
+    npt.NDArray[np.uint8] | None,
+]  # fmt: skip
 # Functions that find pairs may have a capacity at their very end, negative where the number of
 # pairs is returned as well.
 _Room = tuple[int | None, ...]

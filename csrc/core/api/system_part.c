@@ -20,15 +20,19 @@ hs_points_of_system(const hs_points *all, const int64_t *first, int64_t s)
 const hs_box *
 hs_box_of_system(const hs_systems *systems, int ndim, int64_t s, hs_box *own_box)
 {
-    if (systems->box == NULL || systems->rows == NULL) {
+    if (systems->box == NULL || !hs_systems_have_boxes(systems)) {
         return systems->box;
     }
-    const double *rows = systems->rows + s * ndim * ndim;
+    const double *rows = systems->rows;
+    *own_box = *systems->box;
     for (int l = 0; l < ndim; l++) {
-        own_box->periodic[l] = systems->box->periodic[l];
-        memcpy(own_box->rows[l], rows + l * ndim, (size_t)ndim * sizeof(double));
+        if (rows != NULL) {
+            memcpy(own_box->rows[l], rows + (s * ndim + l) * ndim, (size_t)ndim * sizeof(double));
+        }
+        if (systems->periodic != NULL) {
+            own_box->periodic[l] = systems->periodic[s] >> l & 1;
+        }
     }
-    own_box->ndim = ndim;
     return own_box;
 }
 

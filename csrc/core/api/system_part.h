@@ -38,6 +38,13 @@ typedef struct hs_system_part {
 /* Points first[s] to first[s + 1] of all. */
 hs_points hs_points_of_system(const hs_points *all, const int64_t *first, int64_t s);
 
+/* Whether each system has something of a box of its own. */
+HS_ALWAYS_INLINE bool
+hs_systems_have_boxes(const hs_systems *systems)
+{
+    return systems->rows != NULL || systems->periodic != NULL;
+}
+
 /* The box of system s of points in so many dimensions: that of all, or own_box, which is set. */
 const hs_box *hs_box_of_system(const hs_systems *systems, int ndim, int64_t s, hs_box *own_box);
 

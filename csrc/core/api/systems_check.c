@@ -34,9 +34,9 @@ hs_systems_check(const hs_system_sets *sets, const hs_call *total, hs_failure *f
     if (status != HS_OK) {
         return status;
     }
-    return total->kernel == NULL   ? HS_ERR_KERNEL
-           : systems->rows == NULL ? hs_box_check(box, failure)
-                                   : HS_OK;
+    return total->kernel == NULL            ? HS_ERR_KERNEL
+           : hs_systems_have_boxes(systems) ? HS_OK
+                                            : hs_box_check(box, failure);
 }
 
 hs_status

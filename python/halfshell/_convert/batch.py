@@ -87,6 +87,38 @@ def _scene(
     return points, box, bits, None
 
 
+def _as_repeats(periodic: Any) -> npt.NDArray[Any] | None:
+    """What is given for each system, (s, d), or None for what holds for all of them."""
+    if periodic is None or is_a(periodic, (bool, str, bytes)):
+        return None
+    array = as_array(periodic, "periodic")
+    return array if array.ndim == 2 else None
+
+
+def _as_axes(
+    repeats: npt.NDArray[Any], ndim: int, has_box: bool, own: FloatArray | None
+) -> npt.NDArray[np.uint8]:
+    """Bits of the axes that repeat in each system. own: something else that each has, or None."""
+    if not has_box:
+        raise ValueError("periodic needs a box: give box, or leave periodic out")
+    if repeats.shape[1] != ndim:
+        raise ValueError(
+            f"periodic must be a bool, {ndim} bools, or these for each system, (s, {ndim}), "
+            f"got shape {repeats.shape}"
+        )
+    if repeats.dtype.kind != "b" and not (
+        repeats.dtype.kind in "iu" and bool(((repeats == 0) | (repeats == 1)).all())
+    ):
+        raise TypeError(f"periodic must hold bools, got dtype {repeats.dtype}")
+    if own is not None and len(own) != len(repeats):
+        raise ValueError(
+            "periodic and box or cutoff must be given for the same number of systems, got "
+            f"{len(repeats)} and {len(own)}"
+        )
+    bits: npt.NDArray[np.uint8] = (repeats != 0) @ (1 << np.arange(ndim)).astype(np.uint8)
+    return np.ascontiguousarray(bits.astype(np.uint8))
+
+
 def _as_cutoffs(value: Any) -> tuple[float, FloatArray | None]:
     """One cutoff, or one a system."""
     if is_a(value, float):
@@ -159,7 +191,8 @@ def as_systems(
     directed: the result has a direction, so that rules may have one.
     """
     try:
-        array, vectors, bits, boxes = _scene(points, box, periodic)
+        repeats = _as_repeats(periodic)
+        array, vectors, bits, boxes = _scene(points, box, periodic if repeats is None else None)
         numbers = as_numbers(batch, array.shape[0])
         asking, of_queries = _as_queries(queries, query_batch, array)
         n, q = len(array), None if asking is None else len(asking)
@@ -170,11 +203,16 @@ def as_systems(
                 "box and cutoff must be given for the same number of systems, got "
                 f"{len(boxes)} and {len(cutoffs)}"
             )
+        axes = None
+        if repeats is not None:
+            of_each = cutoffs if boxes is None else boxes
+            axes = _as_axes(repeats, array.shape[1], vectors is not None, of_each)
         if chosen is not None and not chosen.is_nothing:
             from halfshell._convert.selection import with_selection  # here: others do without
 
             reach = with_selection(reach, chosen, n, q, precision)
-        return (array, one, vectors, bits), (numbers, cutoffs, boxes, of_queries), reach, asking
+        own = (numbers, cutoffs, boxes, of_queries, axes)
+        return (array, one, vectors, bits), own, reach, asking
     except Exception as error:
         shorten(error)
         raise
@@ -194,8 +232,8 @@ def refuse_indices(indices: Any) -> None:
 
 def refuse_many(own: Systems) -> None:
     """MemoryError before results of more systems than memory holds; the core checks all else."""
-    numbers, cutoffs, boxes, _ = own
-    if cutoffs is not None or boxes is not None or len(numbers) == 0:
+    numbers, cutoffs, boxes, _, axes = own
+    if not (cutoffs is None and boxes is None and axes is None) or len(numbers) == 0:
         return
     last = int(numbers[-1])
     if _MANY_SYSTEMS < last < 2**62 and bool((numbers[1:] >= numbers[:-1]).all()):

@@ -92,8 +92,8 @@ def as_named_marks(
 
 def number_of(systems: Systems) -> int:
     """How many there are: those with a box or cutoff, or up to the largest number."""
-    numbers, cutoffs, boxes, of_queries = systems
-    for own in (cutoffs, boxes):
+    numbers, cutoffs, boxes, of_queries, axes = systems
+    for own in (cutoffs, boxes, axes):
         if own is not None:
             return len(own)
     last = [int(one[-1]) for one in (numbers, of_queries) if one is not None and len(one)]

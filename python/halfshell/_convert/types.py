@@ -43,10 +43,11 @@ Selection = tuple[_Labels, _Labels, _Labels, _Labels, _Labels, int, _Labels, flo
 
 # What the core takes from `inclusive` to `threads`.
 # What each system of a batch has of its own: numbers, one a point; cutoffs and boxes, one a
-# system; numbers of the queries, where there are any.
+# system; numbers of the queries, where there are any; bits of the axes that repeat, one a system.
 Systems = tuple[
-    npt.NDArray[np.int64], FloatArray | None, FloatArray | None, npt.NDArray[np.int64] | None
-]
+    npt.NDArray[np.int64], FloatArray | None, FloatArray | None, npt.NDArray[np.int64] | None,
+    npt.NDArray[np.uint8] | None,
+]  # fmt: skip
 
 Rest = tuple[bool, Precision, str | None, float | None, Progress, int | None]
 

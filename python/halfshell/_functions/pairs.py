@@ -204,9 +204,9 @@ def pairs(
     batch : array_like of int, shape (n,), optional
         Many systems in one call: the system of each point, ascending from 0 or above; numbers may
         be left out. Points pair within their system only, and the result is that of one call for
-        each system, in ascending order, with i and j numbering all points. `periodic` and all
-        else hold for every system, but `box` may have shape (s, d, d), one a system, and `cutoff`
-        shape (s,); then every number in `batch` is less than s. A `box` with two axes is one box
+        each system, in ascending order, with i and j numbering all points. All else
+        holds for every system, but `box` may have shape (s, d, d), one a system, `periodic` (s, d),
+        `cutoff` (s,); then every number in `batch` is less than s. A `box` with two axes is one box
         for all: give edge lengths of each system as the diagonals of (s, d, d). Threads share the
         systems out. With `radii`, `types` or `supports`, one for each point of all systems,
         `cutoff` is a further limit, of all or one a system, or the table or dict of all.

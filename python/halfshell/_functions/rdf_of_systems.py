@@ -32,7 +32,9 @@ def rdf_of_systems(
         points, 0.0, box, periodic, batch, Given(), chosen, "exact", queries, query_batch
     )
     array, _, vectors, bits = scene
-    numbers, _, boxes, of_queries = own
+    numbers, _, boxes, of_queries, axes = own
+    if axes is not None:  # one that does not repeat along all axes is refused
+        bits = next((int(one) for one in axes if one != bits), bits)
     shell_shares(vectors, bits, edges)  # also where there are no systems
     marks, names = as_named_marks(len(array), asking, types, query_types)
     refuse_types(marks, len(edges) - 1)

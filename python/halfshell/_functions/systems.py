@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Given
@@ -20,7 +22,6 @@ from halfshell._objects.origin import Origin, copied
 from halfshell._objects.origin_of_systems import OriginOfSystems
 
 if TYPE_CHECKING:
-    import numpy as np
     import numpy.typing as npt
 
     from halfshell._convert.batch import Scene
@@ -50,7 +51,10 @@ def rows_of_systems(
                 *(origin.queries, kept[0], AUTO, kept[1]),
             )[1]
 
-        numbers, _, boxes, of_queries = kept[1]
+        numbers, _, boxes, of_queries, axes = kept[1]
+        if axes is not None and vectors is not None:
+            rows = np.broadcast_to(vectors, (len(axes), *vectors.shape)) if boxes is None else boxes
+            boxes = rows * (axes[:, None] >> np.arange(vectors.shape[0]) & 1)[:, :, None]
         if boxes is None:
             origin = Origin(points, asking, vectors, bits, find)
         else:

@@ -62,6 +62,7 @@ compare(const batch *made, hs_options options, bool has_box, int threads)
                                 made->cutoffs,
                                 NULL,
                                 NULL,
+                                NULL,
                                 NULL};
     hs_pairs        *pairs = NULL;
     hs_failure       failure;
@@ -129,8 +130,8 @@ failures_name_system_and_point(void)
     int64_t      counts[N_SYSTEMS];
     make_batch(5, &made);
     const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS,    made.first, &made.box, made.rows,
-                                made.cutoffs, NULL,       NULL,      NULL};
+    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs,
+                                NULL,      NULL,       NULL,      NULL};
     const double     saved = made.rows[9 * 17 + 4];
     made.rows[9 * 17 + 4] = INFINITY;
     CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_BOX_FINITE);
@@ -182,7 +183,7 @@ polls_are_counted(void)
     for (int s = 0; s <= N; s++)
         first[s] = s * POINTS;
     const hs_points  points = {x, N * POINTS, 1, HS_FLOAT64, sizeof(double), sizeof(double)};
-    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     for (int threads = 1; threads <= 4; threads++) {
         for (int trial = 0; trial < 4; trial++) {
             hs_counters counters;
@@ -216,8 +217,8 @@ a_shortage_is_told_in_pairs_and_bytes(void)
     hs_failure   failure;
     make_batch(3, &made);
     const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS,    made.first, &made.box, made.rows,
-                                made.cutoffs, NULL,       NULL,      NULL};
+    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs,
+                                NULL,      NULL,       NULL,      NULL};
     for (int kind = 0; kind < 4; kind++) {
         hs_options options = hs_options_default();
         hs_pairs  *pairs = NULL;
@@ -246,8 +247,8 @@ nothing_is_lost_when_memory_is_short(void)
     const int64_t before = hs_test_live_blocks();
     make_batch(9, &made);
     const hs_points  points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    const hs_systems systems = {N_SYSTEMS,    made.first, &made.box, made.rows,
-                                made.cutoffs, NULL,       NULL,      NULL};
+    const hs_systems systems = {N_SYSTEMS, made.first, &made.box, made.rows, made.cutoffs,
+                                NULL,      NULL,       NULL,      NULL};
     for (int kind = 0; kind < 4; kind++) {
         int64_t expected = -1;
         bool    ended = false;
@@ -284,7 +285,7 @@ bad_arguments_are_refused(void)
     int64_t      counts[N_SYSTEMS];
     make_batch(4, &made);
     hs_points           points = points_of(&made, 0, made.first[N_SYSTEMS]);
-    hs_systems          systems = {N_SYSTEMS, made.first, NULL, NULL, NULL, NULL, NULL, NULL};
+    hs_systems          systems = {N_SYSTEMS, made.first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     static const double bad[] = {NAN, INFINITY, -1.0};
     for (int b = 0; b < 3; b++) {
         options.cutoff = bad[b];
@@ -345,7 +346,8 @@ results_go_to_the_callers_arrays(void)
     options.find_context = &n_asked;
     for (int threads = 1; threads <= 4; threads += 3) {
         for (int n = 3; n <= N_SYSTEMS; n += N_SYSTEMS - 3) {
-            const hs_systems systems = {n, made.first, &made.box, NULL, NULL, NULL, NULL, NULL};
+            const hs_systems systems = {n,    made.first, &made.box, NULL, NULL,
+                                        NULL, NULL,       NULL,      NULL};
             const hs_points  some = points_of(&made, 0, made.first[n]);
             hs_pairs        *own = NULL, *into = NULL;
             options.threads = threads;
@@ -390,7 +392,7 @@ far_points_are_named_among_all(void)
     const int64_t first[] = {0, 2, 4};
     hs_box        box = {.ndim = 2, .periodic = {true, true}, .rows = {{8.0, 0.0}, {0x1p40, 8.0}}};
     const hs_points  points = {x, 4, 2, HS_FLOAT64, 16, 8};
-    const hs_systems systems = {2, first, &box, NULL, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {2, first, &box, NULL, NULL, NULL, NULL, NULL, NULL};
     hs_options       options = hs_options_default();
     hs_pairs        *pairs = NULL;
     hs_failure       failure;
@@ -439,7 +441,7 @@ progress_goes_on_over_all_systems(void)
     for (int s = 0; s <= N; s++)
         first[s] = s * POINTS;
     for (int threads = 1; threads <= 2; threads++) {
-        const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL};
+        const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
         hs_options       options = hs_options_default();
         hs_pairs        *pairs;
         double           told = 0.0;
@@ -461,7 +463,7 @@ cells_of_one_system_are_not_those_of_the_next(void)
     static double    x[(CROWD + FEW) * 3];
     const int64_t    first[] = {0, CROWD, CROWD + FEW};
     const hs_points  points = {x, CROWD + FEW, 3, HS_FLOAT64, 24, 8};
-    const hs_systems systems = {2, first, NULL, NULL, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {2, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     harness_random   random = {23};
     hs_options       options = hs_options_default();
     hs_pairs        *pairs, *alone;

@@ -39,6 +39,14 @@ each_system_has_its_box(void)
         CHECK(own_box.rows[0][0] == 1.0 + 4 * s && own_box.rows[0][1] == 2.0 + 4 * s);
         CHECK(own_box.rows[1][0] == 3.0 + 4 * s && own_box.rows[1][1] == 4.0 + 4 * s);
     }
+    const uint8_t bits[] = {2, 1}; /* which axes repeat may be of each as well, or that alone */
+    systems.periodic = bits;
+    CHECK(hs_box_of_system(&systems, 2, 0, &own_box) == &own_box);
+    CHECK(!own_box.periodic[0] && own_box.periodic[1] && own_box.rows[1][1] == 4.0);
+    systems.rows = NULL;
+    CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == &own_box && own_box.ndim == 2);
+    CHECK(own_box.periodic[0] && !own_box.periodic[1]);
+    CHECK(own_box.rows[0][0] == 9.0 && own_box.rows[1][1] == 9.0);
     systems.box = NULL;
     CHECK(hs_box_of_system(&systems, 2, 1, &own_box) == NULL);
     CHECK(hs_cutoff_of_system(&systems, 1, 0.5) == 0.5);

@@ -30,7 +30,7 @@ small_systems_are_polled_between_now_and_then(void)
     const hs_points points = {many, N, 1, HS_FLOAT64, 8, 8};
     for (int s = 0; s <= N; s++)
         first[s] = s;
-    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     hs_options       options = hs_options_default();
     polls            noted = {0, 0.0};
     options.cutoff = 1.0;
@@ -55,7 +55,7 @@ work_of_all_threads_is_added_up(void)
         first[s] = s * POINTS;
     for (int e = 0; e < N * POINTS; e++)
         many[e] = random_unit(&random);
-    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL};
+    const hs_systems systems = {N, first, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     hs_options       options = hs_options_default();
     options.cutoff = 0.125;
     options.threads = 1;

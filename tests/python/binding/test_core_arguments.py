@@ -26,8 +26,8 @@ def count(points, box=None, periodic=0):
 def batch(name, numbers, cutoffs=None, boxes=None, box=None, periodic=0):
     shared = (POINTS, 1.5, box, periodic, True, "exact", None, None, None, None)
     if name == "batch_pairs":
-        return _core.batch_pairs(*shared, "ij", False, 8, None, numbers, cutoffs, boxes, None)
-    return _core.batch_count(*shared, numbers, cutoffs, boxes, None)
+        return _core.batch_pairs(*shared, "ij", False, 8, None, numbers, cutoffs, boxes, None, None)
+    return _core.batch_count(*shared, numbers, cutoffs, boxes, None, None)
 
 
 @pytest.mark.parametrize("points", NO_ARRAYS, ids=lambda value: type(value).__name__)
