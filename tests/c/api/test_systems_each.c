@@ -90,7 +90,10 @@ a_poll_may_stop_it(void)
             s.options.threads = threads;
             s.options.poll = stop_after;
             s.options.poll_context = &left;
-            CHECK(find_rows(NULL) == HS_ERR_INTERRUPTED);
+            const hs_status status = find_rows(NULL);
+            /* Another thread may have all systems before the caller's has asked so often. */
+            CHECK(status == (left < 0 ? HS_ERR_INTERRUPTED : HS_OK));
+            CHECK(threads > 1 || left < 0);
         }
     }
 }
