@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which pairs count: groups, excluded pairs, a least distance, against fractions in every box."""
+"""Which pairs count: groups, excluded pairs, a least distance, against integers in every box."""
 
 import itertools
 import random
@@ -10,24 +10,21 @@ import pytest
 
 import halfshell as hs
 
-# ---- the rule, in fractions ------------------------------------------------------------------
+# ---- the rule, in integers -------------------------------------------------------------------
 
 
-def square(p, q, S, box):
-    along = [b - a for a, b in zip(p, q, strict=True)]
-    for times, row in zip(S, box, strict=True):
-        if times:
-            along = [x + times * y for x, y in zip(along, row, strict=True)]
-    return sum(x * x for x in along)
+def unit_of(*arrays):
+    """A power of two that makes all of these floats integers."""
+    each = itertools.chain.from_iterable(np.ravel(array).tolist() for array in arrays)
+    return max((x.as_integer_ratio()[1] for x in each), default=1)
 
 
-def fractions_of(array):
-    return [[Fraction(float(x)) for x in row] for row in array]
+def integers_of(array, unit):
+    return [[int(Fraction(x) * unit) for x in row] for row in array.tolist()]
 
 
-def least_image(p, q, box, images):
-    """Of images that are equally near the first one: they ascend."""
-    return min(images, key=lambda S: square(p, q, S, box))
+def square(p, q, step):
+    return sum((b - a + c) ** 2 for a, b, c in zip(p, q, step, strict=True))
 
 
 class Rule:
@@ -37,18 +34,21 @@ class Rule:
         points, cutoff, options = scene
         self.own = of_queries is None
         self.chosen = chosen
-        self.points = fractions_of(points)
-        self.asking = self.points if self.own else fractions_of(of_queries["queries"])
         self.of_asking = chosen if self.own else of_queries
         ndim = points.shape[1]
-        box = options.get("box")
         periodic = options.get("periodic", [False] * ndim)
-        self.box = fractions_of(np.zeros((ndim, ndim)) if box is None else box)
-        self.images = list(
-            itertools.product(*[range(-5, 6) if axis else (0,) for axis in periodic])
-        )
-        self.largest = Fraction(float(cutoff)) ** 2
-        self.least = Fraction(float(chosen["min_distance"] or 0)) ** 2
+        asking = points if self.own else of_queries["queries"]
+        box = options.get("box", np.zeros((ndim, ndim)))
+        limits = np.array([[cutoff, chosen["min_distance"] or 0.0]])
+        unit = unit_of(points, asking, box, limits)
+        self.points, self.asking = integers_of(points, unit), integers_of(asking, unit)
+        self.images = {  # each with its displacement
+            S: [sum(s * x for s, x in zip(S, column, strict=True)) for column in columns]
+            for columns in [integers_of(box.T, unit)]
+            for S in itertools.product(*[range(-5, 6) if axis else (0,) for axis in periodic])
+        }
+        ((largest, least),) = integers_of(limits, unit)
+        self.largest, self.least = largest**2, least**2
         self.inclusive = options["inclusive"]
 
     def is_excluded(self, i, j):
@@ -64,8 +64,12 @@ class Rule:
     def nearest(self, i, j):
         p, q = self.asking[i], self.points[j]
         if self.own and j < i:
-            return tuple(-s for s in least_image(q, p, self.box, self.images))
-        return least_image(p, q, self.box, self.images)
+            return tuple(-s for s in self.least_image(q, p))
+        return self.least_image(p, q)
+
+    def least_image(self, p, q):
+        """Of images that are equally near the first one: they ascend."""
+        return min(self.images, key=lambda S: square(p, q, self.images[S]))
 
     def row(self, i, j):
         groups = self.chosen["groups"]
@@ -73,13 +77,14 @@ class Rule:
             label = (groups if self.own else self.of_asking["query_groups"])[i]
             if label != groups[j]:
                 return
-        excluded = self.is_excluded(i, j) and not (self.own and i == j)
-        for S in self.images:
+        is_excluded = self.is_excluded(i, j) and not (self.own and i == j)
+        excluded = self.nearest(i, j) if is_excluded else None
+        for S, step in self.images.items():
             if self.own and i == j and not any(S):
                 continue
-            size = square(self.asking[i], self.points[j], S, self.box)
+            size = square(self.asking[i], self.points[j], step)
             near = size < self.largest or (self.inclusive and size == self.largest)
-            if near and size >= self.least and not (excluded and S == self.nearest(i, j)):
+            if near and size >= self.least and S != excluded:
                 yield (i, j, S)
 
     def entries(self):

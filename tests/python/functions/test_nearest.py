@@ -3,7 +3,6 @@
 
 import itertools
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -20,17 +19,22 @@ from oracles import (
     random_box,
     remembered,
     same_arrays,
+    whole,
 )
 
 
-def rational(rows):
-    return [[Fraction(x) for x in row] for row in np.asarray(rows, np.float64).tolist()]
+def whole_rows(rows):
+    return [[whole(x) for x in row] for row in np.asarray(rows, np.float64).tolist()]
 
 
 def within(point, owner, points, rows, axes, radius):
-    """All (square, j, S) of one query up to a radius, the images found through dual vectors."""
-    exact, box = rational(points), rational(rows)
-    query = [Fraction(x) for x in np.asarray(point, np.float64).tolist()]
+    """All (square, j, S) of one query up to a radius, the images found through dual vectors.
+
+    Squares are of lengths in units of the smallest float above 0.
+    """
+    exact, box = whole_rows(points), whole_rows(rows)
+    point = np.asarray(point, np.float64)
+    (query,), limit = whole_rows(point[None]), whole(radius) ** 2
     ndim = len(query)
     used = rows[axes]
     size = np.abs(used).max(initial=0.0) or 1.0
@@ -38,7 +42,8 @@ def within(point, owner, points, rows, axes, radius):
     lengths = np.array([math.hypot(*row) for row in dual])
     found = []
     for j, target in enumerate(exact):
-        along = dual @ np.array([float(a - b) for a, b in zip(target, query)])
+        apart = [a - b for a, b in zip(target, query)]
+        along = dual @ np.array([a / (1 << 1074) for a in apart])
         reach = radius * lengths * (1 + 1e-6) + 1e-6
         ranges = [
             range(math.ceil(-a - r), math.floor(-a + r) + 1) for a, r in zip(along, reach)
@@ -49,12 +54,9 @@ def within(point, owner, points, rows, axes, radius):
                 S[axis] = value
             if j == owner and not any(S):
                 continue
-            D = [
-                target[c] - query[c] + sum(S[axis] * box[axis][c] for axis in axes)
-                for c in range(ndim)
-            ]
+            D = [a + sum(S[axis] * box[axis][c] for axis in axes) for c, a in enumerate(apart)]
             square = sum(x * x for x in D)
-            if not len(axes) or square <= Fraction(radius) ** 2:
+            if not len(axes) or square <= limit:
                 found.append((square, j, tuple(S)))
     return found
 
@@ -76,7 +78,7 @@ def expected_rows(points, k, queries=None, box=None, periodic=None, max_distance
                 break
             radius = min(1.5 * radius, max(max_distance, radius))
         found = found if n > 0 else []
-        limit = None if math.isinf(max_distance) else Fraction(max_distance) ** 2
+        limit = None if math.isinf(max_distance) else whole(max_distance) ** 2
         result.append(sorted(x for x in found if limit is None or x[0] <= limit)[:k])
     return result
 
@@ -98,9 +100,8 @@ def check(points, k, **how):
         m = len(row)
         assert list(zip(j[i, :m].tolist(), map(tuple, S[i, :m].tolist()))) == [r[1:] for r in row]
         for e, (square, *_) in enumerate(row):
-            ulp = Fraction(float(np.spacing(d[i, e])))
-            assert max(Fraction(d[i, e]) - ulp, 0) ** 2 <= square
-            assert square <= (Fraction(d[i, e]) + ulp) ** 2
+            ulp, length = whole(np.spacing(d[i, e])), whole(d[i, e])
+            assert max(length - ulp, 0) ** 2 <= square <= (length + ulp) ** 2
         assert (np.diff(d[i, :m]) >= 0).all() and (d[i, :m] <= oracle["max_distance"]).all()
         assert (j[i, m:] == -1).all() and (d[i, m:] == np.inf).all()
         assert np.isnan(D[i, m:]).all() and (S[i, m:] == 0).all()
@@ -110,14 +111,14 @@ def check(points, k, **how):
 
 def check_vectors(points, i, j, D, S, d, how):
     asking = how.get("queries")
-    points = rational(points)
-    origin = points[i] if asking is None else rational(asking)[i]
-    rows = rational(full_box(how.get("box"), how.get("periodic"), len(origin))[0])
+    points = whole_rows(points)
+    origin = points[i] if asking is None else whole_rows(asking)[i]
+    rows = whole_rows(full_box(how.get("box"), how.get("periodic"), len(origin))[0])
     for e, other in enumerate(j.tolist()):
         for c in range(len(origin)):
             true = points[other][c] - origin[c]
             true += sum(int(S[e, r]) * rows[r][c] for r in range(len(rows)))
-            assert abs(Fraction(D[e, c]) - true) <= Fraction(float(np.spacing(d[e])))
+            assert abs(whole(D[e, c]) - true) <= whole(np.spacing(d[e]))
 
 
 # ---- against rational arithmetic -----------------------------------------------------------

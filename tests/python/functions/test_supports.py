@@ -49,11 +49,14 @@ def brute(
     )
     limit = (Fraction(extent) * unit * of_entries) ** 2
     ball = None if cutoff is None else (Fraction(cutoff) * unit) ** 2
-    every = [h for h in (H, of_asking) if h is not None]
+    every = np.concatenate([h for h in (H, of_asking) if h is not None])
     shifts = [(0,) * d]
     if box is not None:
-        wide = most_images(np.concatenate(every), extent, np.asarray(box, float), periodic)
+        wide = most_images(every, extent, np.asarray(box, float), periodic)
         shifts = list(itertools.product(*(range(-m, m + 1) for m in wide)))
+    steps = np.array(shifts) @ edges
+    size = max(np.abs(table).max(initial=0.0) for table in (x, asking, steps))
+    longest = 1.01 * extent / np.linalg.eigvalsh(every)[:, 0].min(initial=math.inf) + 1e-9 * size
 
     def below(square, most):
         return square <= most if inclusive else square < most
@@ -63,7 +66,9 @@ def brute(
         for j, r in enumerate(X):
             if not directed and j < i:
                 continue
-            for S in shifts:
+            apart = x[j].astype(float) - asking[i] + steps
+            for k in np.flatnonzero((np.abs(apart) <= longest).all(axis=1)).tolist():
+                S = shifts[k]
                 if q is None and i == j:
                     first = next((s for s in S if s), 0)
                     if first == 0 or (not directed and first < 0):

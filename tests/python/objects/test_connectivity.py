@@ -352,14 +352,12 @@ def test_a_skewed_box_with_nodes_outside(tensors, ghosts):
     for i, (a, node) in enumerate(labels):
         row = [[] for _ in lists]
         for j, (b, other) in enumerate(labels):
-            for s in np.ndindex(11, 11):
-                S = np.array(s) - 5 + home[i] - home[j]
+            shifts = np.array(list(np.ndindex(11, 11))) - 5 + home[i] - home[j]
+            images = x[j] + shifts @ box
+            reached = gather_rows(x[i : i + 1], images, h[i : i + 1], 1.5)[0]
+            reaching = gather_rows(images, x[i : i + 1], h[[j] * len(images)], 1.5)[:, 0]
+            for S in shifts[reached | reaching]:
                 if i == j and not S.any():
-                    continue
-                y = x[j] + S @ box
-                reaches = [gather_rows(p[None], q[None], h[k][None], 1.5)[0, 0]
-                           for p, q, k in ((x[i], y, i), (y, x[i], j))]
-                if not any(reaches):
                     continue
                 row[b].append((other, *S))
                 if (i < j or (i == j and tuple(S) > (0, 0))) and (

@@ -4,6 +4,7 @@
 import threading
 
 import numpy as np
+import pytest
 
 import halfshell as hs
 from oracles import random_scene, same_arrays
@@ -108,12 +109,14 @@ def test_searches_in_threads_overlap(rng):
     assert during >= 5
 
 
+@pytest.mark.slow
 def test_points_that_change_during_the_search_never_crash():
     # Any answer is allowed, or an exception; the process must survive and work afterwards.
     survived, changed = run(
         """
 import json, threading, time
 import numpy as np
+import pytest
 import halfshell as hs
 
 rng = np.random.default_rng(1)
@@ -166,6 +169,7 @@ def test_points_that_are_freed_during_the_search_are_kept_alive():
         """
 import gc, json, threading
 import numpy as np
+import pytest
 import halfshell as hs
 
 def work():

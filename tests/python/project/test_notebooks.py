@@ -13,6 +13,7 @@ pytest.importorskip("matplotlib")
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebooks_run(path):
     notebook = nbformat.read(path, as_version=4)

@@ -67,6 +67,7 @@ def test_an_unknown_kernel_is_refused_before_any_scene(monkeypatch, capsys, tmp_
         hs.report(["slab"], methods=["exact"], size="small")
 
 
+@pytest.mark.slow
 def test_libraries_are_all_or_none():
     options = {"scenes": ["near-ties"], "methods": ["exact"], "size": "small"}
     (alone,) = hs.report(peers="none", **options)

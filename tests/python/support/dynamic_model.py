@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A dict of keys and positions that answers as a DynamicCellList must, in rational arithmetic."""
+"""A dict of keys and positions that answers as a DynamicCellList must, in whole numbers."""
 
 import itertools
-from fractions import Fraction
 
 import numpy as np
+
+from oracles import whole
 
 
 class Model:
@@ -16,21 +17,22 @@ class Model:
         rows = np.diag(rows) if rows.ndim == 1 else rows
         repeats = np.broadcast_to(True if periodic is None else periodic, dim)
         self.axes = [axis for axis in range(len(rows)) if repeats[axis]]
-        self.rows = [[Fraction(x) for x in rows[axis]] for axis in self.axes]
-        self.images = list(itertools.product(range(-reach, reach + 1), repeat=len(self.axes)))
+        rows = [[whole(x) for x in rows[axis]] for axis in self.axes]
+        self.images = {}  # how far each is from the points themselves
+        for image in itertools.product(range(-reach, reach + 1), repeat=len(self.axes)):
+            steps = (sum(s * row[k] for s, row in zip(image, rows)) for k in range(dim))
+            self.images[image] = list(steps)
 
     def insert(self, key, position):
-        self.points[key] = [Fraction(float(x)) for x in position]
+        self.points[key] = [whole(x) for x in position]
 
     def within(self, position, radius):
         """The set of (key, S)."""
-        centre, square = [Fraction(float(x)) for x in position], Fraction(float(radius)) ** 2
+        centre, square = [whole(x) for x in position], whole(radius) ** 2
         found = set()
         for (key, point), image in itertools.product(self.points.items(), self.images):
-            distance = sum(
-                (p - c + sum(s * row[k] for s, row in zip(image, self.rows))) ** 2
-                for k, (p, c) in enumerate(zip(point, centre))
-            )
+            steps = self.images[image]
+            distance = sum((p - c + step) ** 2 for p, c, step in zip(point, centre, steps))
             if distance < square or (self.inclusive and distance == square):
                 shift = [0] * self.dim
                 for axis, s in zip(self.axes, image):
@@ -73,4 +75,4 @@ def check_points(cells, model):
     assert sorted(cells) == sorted(model.points)
     for key, point in model.points.items():
         assert key in cells
-        assert cells.position(key).tolist() == [float(x) for x in point]
+        assert cells.position(key).tolist() == [x / (1 << 1074) for x in point]

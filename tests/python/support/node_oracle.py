@@ -11,6 +11,7 @@ from fractions import Fraction
 import numpy as np
 
 import halfshell as hs
+from oracles import whole
 
 
 def _is_within(p, q, h, extent):
@@ -54,7 +55,7 @@ def gather_matrix(x, h, extent):
 
 
 def foot_is_between(x, p, q):
-    x, p, q = ([Fraction(float(a)) for a in one] for one in (x, p, q))
+    """Of points in whole numbers."""
     along = sum((a - b) * (c - b) for a, b, c in zip(x, p, q, strict=True))
     return 0 <= along <= sum((c - b) ** 2 for b, c in zip(p, q, strict=True))
 
@@ -68,6 +69,7 @@ class Expected:
         points = [one.positions.reshape(-1, d) for one in lists]
         self.x = np.concatenate(points) if points else np.empty((0, d))
         supports = [one.H for one in lists if one.n_nodes]
+        self.whole = [[whole(a) for a in row] for row in self.x.tolist()]
         self.h = np.concatenate(supports) if supports else np.empty(0)
         self.labels = [(k, i) for k, one in enumerate(lists) for i in range(one.n_nodes)]
         self.ghost = [
@@ -116,7 +118,7 @@ class Expected:
         a, b = self.number(pair[1], pair[0]), self.number(pair[3], pair[2])
         common = [
             k for k in np.flatnonzero(self.near[a] & self.near[b])
-            if foot_is_between(self.x[k], self.x[a], self.x[b])
+            if foot_is_between(self.whole[k], self.whole[a], self.whole[b])
         ]  # fmt: skip
         return self.split([*common, a, b])
 

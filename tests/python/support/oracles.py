@@ -197,6 +197,12 @@ def within_exactly(points, cutoff, i, j, S=None, box=None, inclusive=True):
     return inside.astype(bool)
 
 
+def whole(x):
+    """A float as an integer, in units of the smallest float above 0."""
+    numerator, denominator = float(x).as_integer_ratio()
+    return numerator << (1075 - denominator.bit_length())
+
+
 def as_integers(*arrays):
     """Multiply float64 arrays by one power of two so that all entries are Python integers."""
     split = []
