@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Searches of dask arrays and dataframes, in any number of processes, with one search's answer.
 
-All is lazy: nothing is read or searched before ``compute``. Points are gathered once, to be divided
-by `halfshell.bricks`; each brick is then a task of its own.
+All is lazy: nothing is read or searched before ``compute``. Bricks are cut by a sample of each
+chunk; each chunk gives its points to the bricks that own or need them; each brick is then a task.
 """
 
 from __future__ import annotations
@@ -57,6 +57,9 @@ def bricks(
 ) -> Collection:
     """Divide points as all functions of this module do; the result tells what that costs.
 
+    Bricks are as those of `halfshell.bricks`, but own about as many points each, not exactly: they
+    are cut by a sample of the points.
+
     Parameters
     ----------
     points, cutoff, n, box, periodic
@@ -65,7 +68,7 @@ def bricks(
     Returns
     -------
     Delayed
-        The `Bricks` that `halfshell.bricks` returns for all points.
+        `halfshell.Bricks` of all points.
 
     Raises
     ------
@@ -80,7 +83,9 @@ def bricks(
     Bricks(2 of 8 points, overhead 1.25)
     """
     scene = divided(points, as_cutoff(cutoff), n, box, periodic)
-    return dask.delayed(brick_tasks.bricks_of, pure=True)(scene.whole)
+    return dask.delayed(brick_tasks.bricks_of, pure=True)(
+        scene.each(brick_tasks.brick_of), scene.division
+    )
 
 
 def pairs(
@@ -202,7 +207,7 @@ def neighbors(
     scene = divided(points, as_cutoff(cutoff), n, box, periodic, kernel=kernel)
     options = options_of(inclusive, kernel, threads, memory_limit)
     found = scene.each(brick_tasks.neighbors_of, quantities, options)
-    table = dask.delayed(brick_tasks.table_of, pure=True)(found, quantities, scene.parts[0])
+    table = dask.delayed(brick_tasks.table_of, pure=True)(found, quantities, scene.division)
     if as_flag(sort, "sort"):
         found = scene.in_ranges(found)
     rows, counts = (joined(found, 0, place, (math.nan,), np.int64) for place in (0, 1))

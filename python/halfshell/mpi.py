@@ -13,7 +13,16 @@ from halfshell._convert.foreign import kind_of
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.scene import as_own_box, as_points
 from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike
-from halfshell._functions import brick_tasks
+from halfshell._functions.brick_plan import (
+    Division,
+    Piece,
+    Summary,
+    divide,
+    joined,
+    split,
+    summary,
+)
+from halfshell._functions.counts import count_pairs
 from halfshell._objects.brick import Brick
 
 __all__ = ["Exchanged", "exchange"]
@@ -35,9 +44,11 @@ class Exchanged(NamedTuple):
 
 
 class _Given(NamedTuple):
-    """What one rank brings, or why it can bring nothing."""
+    """What one rank says of its points, or why it has none."""
 
-    points: npt.NDArray[Any] | None
+    ndim: int
+    dtype: str
+    summary: Summary | None
     cutoff: float
     box: bytes | None
     periodic: int
@@ -67,8 +78,9 @@ def exchange(
     Returns
     -------
     Exchanged
-        This rank's brick and the coordinates of its members. ``brick.pairs(points)`` of all
-        ranks together is `halfshell.pairs` of all points, byte for byte.
+        This rank's brick, which owns about as many points as the others, and the coordinates of
+        its members. ``brick.pairs(points)`` of all ranks together is `halfshell.pairs` of all
+        points, byte for byte.
 
     Raises
     ------
@@ -79,7 +91,8 @@ def exchange(
 
     Notes
     -----
-    Rank 0 gathers all coordinates and divides them; it must hold them, with some copies.
+    No rank holds all coordinates: bricks are cut by a sample of each rank's points, and every rank
+    sends its points to those whose bricks own or need them.
 
     Examples
     --------
@@ -91,48 +104,59 @@ def exchange(
     >>> i, j = brick.pairs(held)                                         # doctest: +SKIP
     >>> n = MPI.COMM_WORLD.allreduce(len(i))                             # doctest: +SKIP
     """
-    if not all(hasattr(comm, name) for name in ("gather", "bcast", "scatter")):
+    if not all(hasattr(comm, name) for name in ("gather", "bcast", "allgather", "alltoall")):
         raise TypeError(
             f"comm must be a communicator of mpi4py (the extra halfshell[mpi]), got {kind_of(comm)}"
         )
-    gathered = comm.gather(_given(points, cutoff, box, periodic))
-    parts: list[brick_tasks.Part] | None = None
-    error: Exception | None = None
+    array, given = _given(points, cutoff, box, periodic)
+    gathered = comm.gather(given)
+    answer: Division | Exception | None = None
     if gathered is not None:
         try:
-            parts = _divided(gathered)
+            answer = _divided(gathered)
         except Exception as found:
-            error = _plain(found, "")
-    error = comm.bcast(error)
-    if error is not None:
-        raise error
-    part = comm.scatter(parts)
-    return Exchanged(part.brick, part.points)
+            answer = _plain(found, "")
+    answer = comm.bcast(answer)
+    if isinstance(answer, Exception):
+        raise answer
+    division: Any = answer
+    pieces: list[Piece] = []
+    error = None
+    try:
+        pieces = split(array, division, comm.Get_rank())
+    except Exception as found:  # the others must not wait for these pieces
+        error = _plain(found, "")
+    for rank, one in enumerate(comm.allgather(error)):
+        if one is not None:
+            raise _plain(one, f"rank {rank}: ")
+    return Exchanged(*joined(comm.alltoall(pieces), division))
 
 
-def _given(points: Any, cutoff: Any, box: Any, periodic: Any) -> _Given:
+def _given(
+    points: Any, cutoff: Any, box: Any, periodic: Any
+) -> tuple[npt.NDArray[Any], _Given]:
     """Arguments of this rank, with what is wrong with them, so that no other waits in vain."""
     try:
         array = as_points(points)
-        vectors, bits = as_own_box(box, periodic, array.shape[1])
+        ndim, dtype = array.shape[1], array.dtype.name
+        vectors, bits = as_own_box(box, periodic, ndim)
         shown = None if vectors is None else np.ascontiguousarray(vectors, np.float64).tobytes()
-        return _Given(np.ascontiguousarray(array), as_cutoff(cutoff), shown, bits, None)
+        return array, _Given(ndim, dtype, summary(array), as_cutoff(cutoff), shown, bits, None)
     except Exception as error:
-        return _Given(None, 0.0, None, 0, _plain(error, ""))
+        return np.empty((0, 1)), _Given(0, "", None, 0.0, None, 0, _plain(error, ""))
 
 
-def _divided(given: list[_Given]) -> list[brick_tasks.Part]:
+def _divided(given: list[_Given]) -> Division:
     for rank, one in enumerate(given):
         if one.error is not None:
             raise _plain(one.error, f"rank {rank}: ")
-    arrays = [one.points for one in given if one.points is not None]
-    first, points = given[0], arrays[0]
-    for rank, (one, array) in enumerate(zip(given, arrays, strict=True)):
-        if array.shape[1] != points.shape[1] or array.dtype != points.dtype:
+    first = given[0]
+    for rank, one in enumerate(given):
+        if (one.ndim, one.dtype) != (first.ndim, first.dtype):
             raise ValueError(
                 "points must be of one width and type on all ranks, got "
-                f"{points.shape[1]} columns of {points.dtype} on rank 0 and "
-                f"{array.shape[1]} of {array.dtype} on rank {rank}"
+                f"{first.ndim} columns of {first.dtype} on rank 0 and "
+                f"{one.ndim} of {one.dtype} on rank {rank}"
             )
         if one.cutoff != first.cutoff and not math.isnan(first.cutoff):
             raise ValueError(
@@ -146,14 +170,14 @@ def _divided(given: list[_Given]) -> list[brick_tasks.Part]:
                 raise ValueError(
                     f"{name} must be the same on all ranks; rank {rank} has another than rank 0"
                 )
-    scene: dict[str, Any] = {}
+    ndim, vectors, flags = first.ndim, None, None
     if first.box is not None:
-        ndim = points.shape[1]
-        scene["box"] = np.frombuffer(first.box).reshape(ndim, ndim)
-        scene["periodic"] = [bool(first.periodic >> k & 1) for k in range(ndim)]
-    return brick_tasks.divided(
-        arrays, points.shape[1], points.dtype, first.cutoff, len(given), scene
-    )
+        vectors = np.frombuffer(first.box).reshape(ndim, ndim)
+        flags = [bool(first.periodic >> k & 1) for k in range(ndim)]
+    # Refuses what a search would refuse.
+    count_pairs(np.empty((0, ndim)), first.cutoff, box=vectors, periodic=flags)
+    summaries = [one.summary for one in given if one.summary is not None]
+    return divide(summaries, first.cutoff, len(given), vectors, tuple(flags or [False] * ndim))
 
 
 def _plain(error: Exception, whose: str) -> Exception:

@@ -7,14 +7,23 @@ is a tuple of arrays of one length, of which the first holds numbers of points, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.arrays import as_real_array
-from halfshell._functions.bricks import bricks
+from halfshell._functions.brick_plan import (
+    Division,
+    Piece,
+    Summary,
+    joined,
+    renumbered,
+    split,
+    summary,
+)
 from halfshell._objects.brick import Brick, Bricks
 from halfshell._objects.neighbor_table import NeighborTable
 
@@ -38,51 +47,64 @@ def of_columns(frame: Any, dtype: np.dtype[Any]) -> Array:
     return array
 
 
-def gathered(chunks: Sequence[Any], ndim: int, dtype: np.dtype[Any]) -> Array:
-    """All points in one array, if every chunk is what the whole was said to be."""
-    arrays = [np.asanyarray(chunk) for chunk in chunks]
-    for place, array in enumerate(arrays):
-        if array.ndim != 2 or array.shape[1] != ndim:
-            raise ValueError(
-                f"points must have {ndim} columns in every chunk; chunk {place} has shape "
-                f"{array.shape}"
-            )
-        if array.dtype != dtype:
-            raise TypeError(
-                f"points must be of {dtype} in every chunk, as the whole says; chunk {place} is of "
-                f"{array.dtype}"
-            )
-    if any(isinstance(array, np.ma.MaskedArray) for array in arrays):
-        join: Any = np.ma.concatenate
-        return as_real_array(join(arrays), "points")  # which refuses what is masked
-    return np.concatenate(arrays) if arrays else np.empty((0, ndim), dtype)
+def of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Array:
+    """The coordinates of a chunk, if it is what the whole was said to be."""
+    array = np.asanyarray(chunk)
+    if array.ndim != 2 or array.shape[1] != ndim:
+        raise ValueError(
+            f"points must have {ndim} columns in every chunk; chunk {place} has shape {array.shape}"
+        )
+    if array.dtype != dtype:
+        raise TypeError(
+            f"points must be of {dtype} in every chunk, as the whole says; chunk {place} is of "
+            f"{array.dtype}"
+        )
+    return as_real_array(array, "points")
 
 
-def divided(
-    chunks: Sequence[Any], ndim: int, dtype: np.dtype[Any], cutoff: float, n: int, scene: Any
-) -> list[Part]:
-    """Bricks of all points, each with the coordinates of its members."""
-    points = gathered(chunks, ndim, dtype)
-    made = bricks(points, cutoff, n, **scene)
-    return [Part(brick, points[brick.members]) for brick in made]
+def summary_of(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Summary:
+    """What a division must know of a chunk; what is wrong with its coordinates is a part of it."""
+    try:
+        return summary(of_chunk(chunk, ndim, dtype, place))
+    except (ValueError, OverflowError) as error:
+        return Summary(len(chunk), 0.0, np.empty((0, ndim)), 1.0, error)
 
 
-def bricks_of(parts: Sequence[Part]) -> Bricks:
-    """The bricks alone."""
-    return Bricks([part.brick for part in parts], parts[0].brick.n_points)
+def pieces_of(
+    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, division: Division
+) -> list[Piece]:
+    """What a chunk gives to each brick."""
+    return split(of_chunk(chunk, ndim, dtype, place), division, place)
+
+
+def part_of(pieces: Sequence[Piece], division: Division) -> Part:
+    """A brick of what all chunks give to it."""
+    return Part(*joined(pieces, division))
+
+
+def brick_of(part: Part) -> Brick:
+    return part.brick
+
+
+def bricks_of(made: Sequence[Brick], division: Division) -> Bricks:
+    """All bricks."""
+    return Bricks(made, division.n_points)
 
 
 def pairs_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Group, ...]:
     """One group: i, and a column for each letter."""
-    found = part.brick.pairs(part.points, quantities="i" + quantities.replace("i", ""), **options)
+    letters = "i" + quantities.replace("i", "")
+    with _numbered(points=part.brick.members):
+        found = part.brick.pairs(part.points, quantities=letters, **options)
     arrays = list(found) if isinstance(found, tuple) else [found]
-    columns = dict(zip("i" + quantities.replace("i", ""), arrays, strict=True))
+    columns = dict(zip(letters, arrays, strict=True))
     return ((arrays[0], *(columns[letter] for letter in quantities)),)
 
 
 def neighbors_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Group, ...]:
     """Two groups: points and how many neighbours they have; point and columns of each neighbour."""
-    table = part.brick.neighbors(part.points, quantities=quantities, **options)
+    with _numbered(points=part.brick.members):
+        table = part.brick.neighbors(part.points, quantities=quantities, **options)
     names = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
     owned, counts = part.brick.owned, np.asarray(table.counts, np.int64)
     columns = [getattr(table, names[letter]) for letter in quantities]
@@ -93,28 +115,31 @@ def coordination_of(part: Part, scene: Any, options: dict[str, Any]) -> tuple[Gr
     """One group: points, and how many neighbours they have."""
     import halfshell as hs
 
-    of_all = hs.coordination(part.points, part.brick.cutoff, **scene, **options)
-    return ((part.brick.owned, of_all[_owned(part)]),)
+    with _numbered(points=part.brick.members):
+        of_all = hs.coordination(part.points, part.brick.cutoff, **scene, **options)
+    return ((part.brick.owned, of_all[part.brick.is_owned]),)
 
 
 def counts_of(part: Part, cutoff: Any, scene: Any, options: dict[str, Any]) -> Any:
     """Twice the pairs of owned points, and once those with needed ones, which two bricks count."""
     import halfshell as hs
 
-    owned = _owned(part)
-    inner, outer = part.points[owned], part.points[~owned]
-    own = hs.count_pairs(inner, cutoff, **scene, **options)
-    return 2 * own + hs.count_pairs(outer, cutoff, queries=inner, **scene, **options)
+    inner, outer = _inner_and_outer(part)
+    with _numbered(points=part.brick.owned):
+        own = hs.count_pairs(inner, cutoff, **scene, **options)
+    with _numbered(points=part.brick.needed, queries=part.brick.owned):
+        return 2 * own + hs.count_pairs(outer, cutoff, queries=inner, **scene, **options)
 
 
 def histogram_of(part: Part, edges: Any, scene: Any, options: dict[str, Any]) -> Any:
     """As `counts_of`, in each bin."""
     import halfshell as hs
 
-    owned = _owned(part)
-    inner, outer = part.points[owned], part.points[~owned]
-    own = hs.pair_histogram(inner, edges, **scene, **options)
-    return 2 * own + hs.pair_histogram(outer, edges, queries=inner, **scene, **options)
+    inner, outer = _inner_and_outer(part)
+    with _numbered(points=part.brick.owned):
+        own = hs.pair_histogram(inner, edges, **scene, **options)
+    with _numbered(points=part.brick.needed, queries=part.brick.owned):
+        return 2 * own + hs.pair_histogram(outer, edges, queries=inner, **scene, **options)
 
 
 def half_sum(doubled: Sequence[Any]) -> Any:
@@ -122,9 +147,9 @@ def half_sum(doubled: Sequence[Any]) -> Any:
     return sum(doubled, start=np.int64(0)) // 2
 
 
-def cut(groups: Sequence[Group], part: Part, n: int) -> list[list[Group]]:
+def cut(groups: Sequence[Group], division: Division, n: int) -> list[list[Group]]:
     """What belongs to each of n ranges of points, of equal length but for one."""
-    n_points = part.brick.n_points
+    n_points = division.n_points
     limits = np.array([n_points * k // n for k in range(n + 1)], np.int64)
     places = [np.searchsorted(group[0], limits) for group in groups]
     return [
@@ -149,15 +174,25 @@ def merged(cuts: Sequence[Sequence[Group]]) -> list[Group]:
     return whole
 
 
-def table_of(found: Sequence[Sequence[Group]], quantities: str, part: Part) -> NeighborTable:
+def table_of(
+    found: Sequence[Sequence[Group]], quantities: str, division: Division
+) -> NeighborTable:
     """The rows of all points, ascending, from what `neighbors_of` returns for each brick."""
     (_, counts), (_, *columns) = merged(found)
     offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)))
-    return NeighborTable((offsets, *columns), quantities, part.brick.n_points, False)
+    return NeighborTable((offsets, *columns), quantities, division.n_points, False)
 
 
-def _owned(part: Part) -> npt.NDArray[np.bool_]:
-    members = part.brick.members
-    flags = np.zeros(len(members), bool)
-    flags[np.searchsorted(members, part.brick.owned)] = True
-    return flags
+@contextmanager
+def _numbered(**numbers: Numbers) -> Iterator[None]:
+    """Errors name points by their numbers among all points."""
+    try:
+        yield
+    except (ValueError, OverflowError) as error:
+        raise renumbered(error, **numbers) from None
+
+
+def _inner_and_outer(part: Part) -> tuple[Array, Array]:
+    """Coordinates of the points that a brick owns, and of those that it needs."""
+    is_owned = part.brick.is_owned
+    return part.points[is_owned], part.points[~is_owned]

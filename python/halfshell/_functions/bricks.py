@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Never
+from collections.abc import Iterable, Iterator
+from typing import Never
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +15,11 @@ from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.options import as_count
 from halfshell._convert.scene import as_scene
 from halfshell._convert.types import BoxLike, FloatArray, Number, PeriodicLike, PointsLike
+from halfshell._functions.brick_places import Axes, axes_of, within
 from halfshell._objects.brick import Brick, Bricks
 from halfshell._unknown import refuse_unknown
 
 _Numbers = npt.NDArray[np.int64]
-
-# Places are products of some terms with matrices that were inverted in float64: relative to their
-# terms they are known to this, which is far more than they lose.
-_ROUNDING = 2.0**-30
 
 
 def bricks(
@@ -99,102 +97,42 @@ def bricks(
                       vectors, bits, False, "exact", None, None, None, 1, None, "auto")  # fmt: skip
     n_points, ndim = array.shape
     flags = tuple(bool(bits >> k & 1) for k in range(ndim))
-    places, reach, widths = _places(array.astype(np.float64), vectors, flags, largest)
-    parts = _halved(places, widths, n_bricks)
-    order = np.argsort(places[:, 0], kind="stable") if n_points else np.empty(0, np.int64)
-    lines = places[order, 0] if n_points else np.empty(0)
+    largest_of_all = max(array.max(initial=0.0), -array.min(initial=0.0))
+    axes = axes_of(vectors, flags, largest, float(largest_of_all))
+    places = axes.places(array)
+    every, is_owned = np.arange(n_points), np.zeros(n_points, bool)
     made = []
-    for part in parts:
-        owned = np.sort(part)
-        needed = _near(places, order, lines, owned, flags, reach)
-        made.append(Brick(owned, needed, n_points, largest, (vectors, flags)))
+    for owned, members in _halved(places, axes, every, every, n_bricks):
+        is_owned[owned] = True
+        made.append(Brick(members, is_owned[members], n_points, largest, (vectors, flags)))
+        is_owned[owned] = False
     return Bricks(made, n_points)
 
 
-def _places(
-    points: FloatArray, vectors: FloatArray | None, flags: tuple[bool, ...], cutoff: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where points are along each axis, how far a pair can be apart there, and the axes' lengths.
-
-    Along axes that repeat, places are from 0 to 1; others have the length of the coordinates.
-    """
-    ndim = points.shape[1]
-    rows = np.eye(ndim)
-    repeating = [k for k in range(ndim) if flags[k]]
-    if vectors is not None and repeating:
-        given = np.asarray(vectors, np.float64)[repeating]
-        scale = np.abs(given).max(axis=1, keepdims=True)
-        others = np.linalg.svd(given / scale)[2][len(repeating) :]  # at right angles to all of them
-        rows[repeating] = given
-        rows[[k for k in range(ndim) if not flags[k]]] = others
-    with np.errstate(all="ignore"):
-        dual = np.linalg.inv(rows).T
-        places = points @ dual.T
-        lengths = np.linalg.norm(dual, axis=1)
-        terms = np.abs(points).max(initial=0.0) * np.abs(dual).sum(axis=1) + 1.0
-        reach = cutoff * lengths * (1.0 + _ROUNDING) + terms * _ROUNDING
-    for k in repeating:
-        places[:, k] -= np.floor(places[:, k])
-    # Where numbers are too large for this, all points are needed.
-    unknown = ~np.isfinite(places).all(axis=0) | ~np.isfinite(reach)
-    places[:, unknown], reach[unknown] = 0.0, np.inf
-    return places, reach, 1.0 / np.where(lengths > 0.0, lengths, 1.0)
-
-
-def _halved(places: FloatArray, widths: FloatArray, n: int) -> list[_Numbers]:
-    """Numbers of points in n parts: each set of parts is cut across its longest side."""
-    parts: list[_Numbers] = []
-    open_sets: list[tuple[_Numbers, int]] = [(np.arange(len(places)), n)]
-    while open_sets:
-        numbers, n_parts = open_sets.pop()
-        if n_parts == 1:
-            parts.append(numbers)
-            continue
-        first = n_parts // 2
-        cut = len(numbers) * first // n_parts
-        if len(numbers) > 1:
-            own = places[numbers]
-            axis = int(np.argmax(np.ptp(own, axis=0) * widths))
-            numbers = numbers[np.argpartition(own[:, axis], cut)]  # a sort takes far longer
-        open_sets += [(numbers[cut:], n_parts - first), (numbers[:cut], first)]
-    return parts
+def _halved(
+    places: FloatArray, axes: Axes, owned: _Numbers, near: _Numbers, n: int
+) -> Iterator[tuple[_Numbers, _Numbers]]:
+    """Owned points in n parts, cut across their longest side, each with all that it may need."""
+    if n == 1:
+        yield owned, _near(places, axes, owned, near, range(len(places)))
+        return
+    first = n // 2
+    cut, axis = len(owned) * first // n, 0
+    if len(owned) > 1:
+        axis = int(np.argmax([np.ptp(line[owned]) for line in places] * axes.widths))
+        owned = owned[np.argpartition(places[axis][owned], cut)]  # a sort takes far longer
+    for part, n_parts in ((owned[:cut], first), (owned[cut:], n - first)):
+        yield from _halved(places, axes, part, _near(places, axes, part, near, [axis]), n_parts)
 
 
 def _near(
-    places: FloatArray, order: _Numbers, lines: FloatArray, owned: _Numbers,
-    flags: tuple[bool, ...], reach: FloatArray,
-) -> _Numbers:  # fmt: skip
-    """Other points whose places are within reach of the range of the owned ones, ascending."""
+    places: FloatArray, axes: Axes, owned: _Numbers, numbers: _Numbers, along: Iterable[int]
+) -> _Numbers:
+    """Of these points, those within reach of the range of the owned ones, along some axes."""
     if len(owned) == 0:
-        return np.empty(0, np.int64)
-    low = places[owned].min(axis=0) - reach
-    high = places[owned].max(axis=0) + reach
-    found = order[_slices(lines, float(low[0]), float(high[0]), flags[0])]
-    for k in range(1, places.shape[1]):
-        found = found[_within(places[found, k], low[k], high[k], flags[k])]
-    return np.sort(np.setdiff1d(found, owned, assume_unique=True))
-
-
-def _slices(lines: FloatArray, low: float, high: float, repeats: bool) -> Any:
-    """Positions of ascending places within a range, which may go on from the other side."""
-    if not repeats:
-        return slice(np.searchsorted(lines, low), np.searchsorted(lines, high, side="right"))
-    if not high - low < 1.0:
-        return slice(None)
-    turns = math.floor(low)
-    low, high = low - turns, high - turns
-    inside = np.arange(np.searchsorted(lines, low), np.searchsorted(lines, high, side="right"))
-    behind = np.searchsorted(lines, high - 1.0, side="right") if high >= 1.0 else 0
-    return np.concatenate((np.arange(behind), inside))
-
-
-def _within(
-    places: FloatArray, low: float, high: float, repeats: bool
-) -> npt.NDArray[np.bool_]:
-    if not repeats:
-        return (places >= low) & (places <= high)
-    if not high - low < 1.0:
-        return np.ones(len(places), bool)
-    turned = places - low
-    found: npt.NDArray[np.bool_] = turned - np.floor(turned) <= high - low
-    return found
+        return owned
+    for axis in along:
+        own, reach = places[axis][owned], float(axes.reach[axis])
+        low, high = float(own.min()) - reach, float(own.max()) + reach
+        numbers = numbers[within(places[axis][numbers], low, high, axes.flags[axis])]
+    return numbers

@@ -14,6 +14,7 @@ from halfshell._convert.options import as_count
 from halfshell._convert.scene import MAX_DIM, as_own_box
 from halfshell._extras import needs
 from halfshell._functions import brick_tasks
+from halfshell._functions.brick_plan import divide
 from halfshell._functions.counts import count_pairs
 
 try:
@@ -36,7 +37,7 @@ class Scene(NamedTuple):
     """Parts of a division that is to come, and what is known of the points before."""
 
     parts: Sequence[Any]  # each a delayed `Part`
-    whole: Any  # all of them
+    division: Any  # a delayed `Division`
     n_points: float  # NaN if not known
     ndim: int
     box: dict[str, Any]
@@ -50,7 +51,7 @@ class Scene(NamedTuple):
         """What parts found, in as many ranges of ascending points."""
         n = len(self.parts)
         do = dask.delayed(brick_tasks.cut, pure=True)
-        cuts = [do(groups, part, n) for groups, part in zip(found, self.parts, strict=True)]
+        cuts = [do(groups, self.division, n) for groups in found]
         merged = dask.delayed(brick_tasks.merged, pure=True)
         return [merged([one[k] for one in cuts]) for k in range(n)]
 
@@ -66,10 +67,14 @@ def divided(
     if vectors is not None:
         scene["periodic"] = [bool(bits >> k & 1) for k in range(ndim)]
     count_pairs(np.empty((0, ndim)), cutoff, kernel=kernel, **scene)
-    whole = dask.delayed(brick_tasks.divided, pure=True)(
-        chunks, ndim, dtype, cutoff, n_bricks, scene
-    )
-    return Scene([whole[k] for k in range(n_bricks)], whole, n_points, ndim, scene)
+    flags = tuple(scene["periodic"] or [False] * ndim)
+    tasks = (brick_tasks.summary_of, divide, brick_tasks.pieces_of, brick_tasks.part_of)
+    summary_of, divide_by, pieces_of, part_of = (dask.delayed(one, pure=True) for one in tasks)
+    each = [(chunk, ndim, dtype, place) for place, chunk in enumerate(chunks)]
+    division = divide_by([summary_of(*one) for one in each], cutoff, n_bricks, vectors, flags)
+    pieces = [pieces_of(*one, division) for one in each]
+    parts = [part_of([piece[k] for piece in pieces], division) for k in range(n_bricks)]
+    return Scene(parts, division, n_points, ndim, scene)
 
 
 def options_of(

@@ -57,19 +57,25 @@ class Brick:
 
     def __init__(
         self,
-        owned: Numbers,
-        needed: Numbers,
+        members: Numbers,
+        is_owned: npt.NDArray[np.bool_],
         n_points: int,
         cutoff: float,
         scene: tuple[FloatArray | None, tuple[bool, ...]],
     ) -> None:
-        self.owned, self.needed, self.n_points, self.cutoff = owned, needed, n_points, cutoff
+        self.members, self.n_points, self.cutoff = members, n_points, cutoff
+        self.is_owned = is_owned  # of each member
         self._box, self._periodic = scene
 
     @property
-    def members(self) -> Numbers:
-        """The points of this brick and those that it needs, ascending."""
-        return np.sort(np.concatenate((self.owned, self.needed)))
+    def owned(self) -> Numbers:
+        """Points of this brick, ascending."""
+        return self.members[self.is_owned]
+
+    @property
+    def needed(self) -> Numbers:
+        """Other points that may be within the cutoff of one of these, ascending."""
+        return self.members[~self.is_owned]
 
     def pairs(
         self,
@@ -100,17 +106,17 @@ class Brick:
         import halfshell as hs
 
         check_letters(quantities)
-        members = self.members
+        members, own = self.members, self._places()
         letters = quantities if "i" in quantities else "i" + quantities
         # All pairs of the members are found sooner than those of half of them.
-        some = None if 2 * len(self.owned) >= len(members) else self._places(members)
+        some = None if 2 * len(own) >= len(members) else own
         found: Any = hs.pairs(
-            self._of_members(points, members), self.cutoff, touching=some,
+            self._of_members(points), self.cutoff, touching=some,
             quantities=letters, sort=True,
             **self._options(inclusive, kernel, threads, memory_limit),
         )  # fmt: skip
         columns = dict(zip(letters, found if isinstance(found, tuple) else (found,), strict=True))
-        kept = self._is_owned(members)[columns["i"]]
+        kept = self.is_owned[columns["i"]]
         arrays = []
         for letter in quantities:
             array = columns[letter][kept]
@@ -135,9 +141,7 @@ class Brick:
         """
         import halfshell as hs
 
-        members, count = self.members, 0
-        own = self._of_members(points, members)
-        places = self._places(members)
+        own, places, count = self._of_members(points), self._places(), 0
         options = self._options(inclusive, kernel, threads, memory_limit)
         for first in range(0, len(places), _AT_A_TIME):
             some = places[first : first + _AT_A_TIME]
@@ -173,15 +177,14 @@ class Brick:
         """
         import halfshell as hs
 
-        members = self.members
         table = hs.neighbors(
-            self._of_members(points, members), self.cutoff, indices=self._places(members),
+            self._of_members(points), self.cutoff, indices=self._places(),
             quantities=quantities, **self._options(inclusive, kernel, threads, memory_limit),
         )  # fmt: skip
         columns = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
         arrays = [getattr(table, columns[letter]) for letter in quantities]
         if "j" in quantities:
-            arrays[quantities.index("j")] = members[table.indices]
+            arrays[quantities.index("j")] = self.members[table.indices]
         return NeighborTable((table.offsets, *arrays), quantities, self.n_points, False)
 
     def _options(
@@ -193,23 +196,18 @@ class Brick:
             "memory_limit": memory_limit,
         }  # fmt: skip
 
-    def _is_owned(self, members: Numbers) -> npt.NDArray[np.bool_]:
-        flags = np.zeros(len(members), bool)
-        flags[self._places(members)] = True
-        return flags
-
-    def _places(self, members: Numbers) -> Numbers:
+    def _places(self) -> Numbers:
         """Where the points of this brick are among the members."""
-        return np.searchsorted(members, self.owned).astype(np.int64)
+        return np.flatnonzero(self.is_owned)
 
-    def _of_members(self, points: Any, members: Numbers) -> Any:
-        array = np.asarray(points)
-        if array.ndim != 2 or len(array) not in (self.n_points, len(members)):
+    def _of_members(self, points: Any) -> Any:
+        array, n_members = np.asarray(points), len(self.members)
+        if array.ndim != 2 or len(array) not in (self.n_points, n_members):
             raise ValueError(
                 f"points must have shape (n, d) with n = {self.n_points}, all points, or "
-                f"{len(members)}, the members of the brick; got {array.shape}"
+                f"{n_members}, the members of the brick; got {array.shape}"
             )
-        return array[members] if len(array) == self.n_points else array
+        return array[self.members] if len(array) == self.n_points else array
 
 
 class Bricks(Sequence[Brick]):
@@ -236,12 +234,12 @@ class Bricks(Sequence[Brick]):
     @property
     def sizes(self) -> list[int]:
         """How many points each brick owns."""
-        return [len(brick.owned) for brick in self._made]
+        return [int(np.count_nonzero(brick.is_owned)) for brick in self._made]
 
     @property
     def overhead(self) -> float:
         """How many points all bricks hold together, for each point."""
-        held = sum(len(brick.owned) + len(brick.needed) for brick in self._made)
+        held = sum(len(brick.members) for brick in self._made)
         return held / self._n if self._n else 1.0
 
     def __len__(self) -> int:

@@ -8,7 +8,9 @@ import pytest
 
 import halfshell as hs
 from brick_scenes import LETTERS, in_order, same, scenes, serial
+from halfshell._convert.scene import as_own_box
 from halfshell._functions import brick_tasks as tasks
+from halfshell._functions.brick_plan import divide
 
 OPTIONS = {"inclusive": True, "kernel": None, "threads": 1, "memory_limit": None}
 
@@ -16,20 +18,27 @@ OPTIONS = {"inclusive": True, "kernel": None, "threads": 1, "memory_limit": None
 def parts_of(points, cutoff, options, n):
     array = np.asarray(points)
     chunks = np.array_split(array, 3)
-    parts = tasks.divided(chunks, array.shape[1], array.dtype, cutoff, n, options)
-    return pickle.loads(pickle.dumps(parts))
+    ndim = array.shape[1]
+    vectors, bits = as_own_box(options.get("box"), options.get("periodic"), ndim)
+    flags = tuple(bool(bits >> k & 1) for k in range(ndim))
+    each = [(chunk, ndim, array.dtype, k) for k, chunk in enumerate(chunks)]
+    summaries = [tasks.summary_of(*one) for one in each]
+    division = pickle.loads(pickle.dumps(divide(summaries, cutoff, n, vectors, flags)))
+    pieces = [tasks.pieces_of(*one, division) for one in each]
+    parts = [tasks.part_of([piece[k] for piece in pieces], division) for k in range(n)]
+    return pickle.loads(pickle.dumps(parts)), division
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 50])
 @pytest.mark.parametrize("name", scenes())
 def test_parts_are_one_search(name, n):
     points, cutoff, scene = scenes()[name]
-    parts = parts_of(points, cutoff, scene, n)
+    parts, division = parts_of(points, cutoff, scene, n)
     found = [tasks.pairs_of(part, LETTERS, OPTIONS) for part in parts]
     columns = [np.concatenate(column) for column in zip(*(one[0][1:] for one in found))]
     expected = serial(points, cutoff, scene)
     assert same(in_order(columns), expected)
-    cuts = [tasks.cut(groups, part, n) for groups, part in zip(found, parts)]
+    cuts = [tasks.cut(groups, division, n) for groups in found]
     ranges = [tasks.merged([one[k] for one in cuts])[0][1:] for k in range(n)]
     assert same([np.concatenate(column) for column in zip(*ranges)], expected)
     cutoffs = np.array([0.0, cutoff / 2.0, cutoff])
@@ -42,28 +51,31 @@ def test_parts_are_one_search(name, n):
     counts = [tasks.coordination_of(part, scene, OPTIONS) for part in parts]
     assert same([tasks.merged(counts)[0][1]], [hs.coordination(points, cutoff, **scene)])
     rows = [tasks.neighbors_of(part, "jdDS", OPTIONS) for part in parts]
-    table = tasks.table_of(rows, "jdDS", parts[0])
+    table = tasks.table_of(rows, "jdDS", division)
     whole = hs.neighbors(points, cutoff, quantities="jdDS", **scene)
     names = ("offsets", "indices", "distances", "vectors", "shifts")
     assert same([getattr(table, key) for key in names], [getattr(whole, key) for key in names])
-    assert tasks.bricks_of(parts).overhead == hs.bricks(points, cutoff, n, **scene).overhead
+    made = tasks.bricks_of([tasks.brick_of(part) for part in parts], division)
+    assert sum(made.sizes) == len(points) and len(made) == n
+    owned = np.concatenate([brick.owned for brick in made])
+    assert sorted(owned.tolist()) == list(range(len(points)))
 
 
 def test_chunks_are_what_the_whole_says():
     chunks = [np.zeros((2, 3)), np.zeros((2, 2))]
     with pytest.raises(ValueError, match=r"3 columns in every chunk; chunk 1 has shape \(2, 2\)"):
-        tasks.gathered(chunks, 3, np.dtype(float))
+        for place, chunk in enumerate(chunks):
+            tasks.of_chunk(chunk, 3, np.dtype(float), place)
     with pytest.raises(TypeError, match=r"float64 in every chunk.*chunk 1 is of int64"):
-        tasks.gathered([np.zeros((2, 3)), np.ones((2, 3), np.int64)], 3, np.dtype(float))
+        tasks.of_chunk(np.ones((2, 3), np.int64), 3, np.dtype(float), 1)
     with pytest.raises(ValueError, match=r"points\[5, 1\]"):  # of all
         bad = np.array([[0.0, 1.0, 2.0], [3.0, np.nan, 4.0]])
-        tasks.divided([np.zeros((4, 3)), bad], 3, np.dtype(float), 1.0, 2, {})
-    assert tasks.gathered([], 2, np.dtype(np.float32)).shape == (0, 2)
+        parts_of(np.concatenate((np.zeros((4, 3)), bad)), 1.0, {}, 2)
 
 
 def test_masked_points_are_refused_by_their_place():
     whole = np.ma.masked_array(np.ones((3, 2)))
-    assert same([tasks.gathered([np.zeros((1, 2)), whole], 2, np.dtype(float))[1:]], [whole.data])
+    assert same([tasks.of_chunk(whole, 2, np.dtype(float), 0)], [whole.data])
     hidden = np.ma.masked_array(np.ones((3, 2)), [[False, False], [False, True], [False, False]])
     with pytest.raises(ValueError, match="masked"):
-        tasks.gathered([np.zeros((4, 2)), hidden], 2, np.dtype(float))
+        tasks.of_chunk(hidden, 2, np.dtype(float), 0)

@@ -57,8 +57,8 @@ def check_all(points, cutoff, scene, chunks, n=None, **how):
     assert same(found[6], (np.arange(len(points)), counts, *columns))
     assert same((table.indices, table.distances, table.shifts), columns)
     assert same([table.offsets], [whole.offsets])
-    n_bricks = given.numblocks[0] if n is None else n
-    assert parts.sizes == hs.bricks(points, cutoff, n_bricks, **scene).sizes
+    assert len(parts) == (given.numblocks[0] if n is None else n)
+    assert sum(parts.sizes) == len(points)
 
 
 @pytest.mark.parametrize("chunks", CHUNKS)

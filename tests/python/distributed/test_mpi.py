@@ -14,6 +14,7 @@ import pytest
 import halfshell as hs
 from brick_scenes import LETTERS, in_order, same, scenes, serial
 from checkout import ROOT, SUPPORT
+from halfshell._functions.brick_plan import summary
 from halfshell.mpi import exchange
 
 
@@ -66,8 +67,14 @@ class Alone:
     def bcast(self, one):
         return one
 
-    def scatter(self, many):
-        return many[0]
+    def allgather(self, one):
+        return [one]
+
+    def alltoall(self, many):
+        return many
+
+    def Get_rank(self):
+        return 0
 
 
 class Others(Alone):
@@ -108,9 +115,9 @@ def test_one_rank(name):
         ({"cutoff": 2.0}, r"cutoff must be the same .*got 1.0 on rank 0 and 2.0 on rank 1"),
         ({"box": None}, "box must be the same on all ranks; rank 1 has another than rank 0"),
         ({"periodic": 1}, "periodic must be the same"),
-        ({"points": np.zeros((1, 2))}, "one width and type on all ranks, got 3 columns of float64"),
-        ({"points": np.zeros((1, 3), np.float32)}, "3 of float32 on rank 1"),
-        ({"points": np.full((2, 3), np.nan)}, r"points\[4, 0\]"),
+        ({"ndim": 2}, "one width and type on all ranks, got 3 columns of float64"),
+        ({"dtype": "float32"}, "3 of float32 on rank 1"),
+        ({"summary": summary(np.full((2, 3), np.nan))}, r"points\[4, 0\]"),
         ({"error": ValueError("no points")}, "rank 1: no points"),
     ],
 )
@@ -124,6 +131,15 @@ def test_each_rank_raises_what_rank_0_said():
         exchange(Beyond(MemoryError("all of it")), np.zeros((4, 3)), 1.0)
     with pytest.raises(RuntimeError, match=r"rank 1: .*what is that"):
         exchange(Others({"error": KeyError("what is that")}), np.zeros((4, 3)), 1.0)
+
+
+def test_a_rank_that_fails_last_is_heard_by_all():
+    class Failed(Alone):
+        def allgather(self, one):
+            return [one, MemoryError("no room")]
+
+    with pytest.raises(MemoryError, match="rank 1: no room"):
+        exchange(Failed(), np.zeros((4, 3)), 1.0)
 
 
 def test_what_is_no_communicator():

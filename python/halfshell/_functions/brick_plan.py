@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Division of points that are in pieces, none of which sees the others.
+
+Each piece is summed up; the summaries say where bricks are cut; each piece is then split into what
+it gives to every brick. Any cuts are right: a sample of the points only makes bricks of about equal
+size.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from halfshell._functions.brick_places import Axes, axes_of, within
+from halfshell._objects.brick import Brick
+
+Array = npt.NDArray[Any]
+Bits = npt.NDArray[np.bool_]
+Numbers = npt.NDArray[np.int64]
+
+_SAMPLE = 1 << 13  # points of each piece, at most, by which bricks are cut
+
+
+class Summary(NamedTuple):
+    """What a division must know of a piece."""
+
+    n_points: int
+    largest: float  # of the coordinates, without signs
+    sample: Array  # of shape (k, d)
+    weight: float  # how many points each of the sample stands for
+    error: Exception | None  # why the piece cannot be searched
+
+
+class Cut(NamedTuple):
+    """A range along an axis that is cut in two, and what its parts are: bricks or cuts."""
+
+    axis: int
+    low: float
+    at: float
+    high: float
+    below: Cut | int
+    above: Cut | int
+
+
+class Division(NamedTuple):
+    """Where bricks are cut, and where the numbers of each piece begin."""
+
+    cuts: Cut | int
+    n_bricks: int
+    axes: Axes
+    firsts: tuple[int, ...]
+    n_points: int
+    cutoff: float
+    scene: tuple[Any, tuple[bool, ...]]
+
+
+class Piece(NamedTuple):
+    """What one piece of the points gives to one brick, ascending by number."""
+
+    numbers: Numbers
+    points: Array
+    is_owned: Bits
+
+
+def summary(points: Array) -> Summary:
+    """Sum up a piece; points are named by their places in it."""
+    n_points = len(points)
+    step = 1 + n_points // _SAMPLE
+    largest = float(max(points.max(initial=0.0), -points.min(initial=0.0)))
+    error = None
+    if not np.isfinite(largest):
+        row, column = np.argwhere(~np.isfinite(points))[0].tolist()
+        value = points[row, column]
+        error = ValueError(f"points must be finite, got points[{row}, {column}] = {value}")
+    sample = points[::step].astype(np.float64)
+    return Summary(n_points, largest, sample, n_points / max(1, len(sample)), error)
+
+
+def divide(
+    summaries: Sequence[Summary], cutoff: float, n_bricks: int, vectors: Any,
+    flags: tuple[bool, ...],
+) -> Division:  # fmt: skip
+    """Where to cut; raises what is wrong with the first piece that has an error."""
+    ends = np.cumsum([0, *(one.n_points for one in summaries)], dtype=np.int64).tolist()
+    for one, first in zip(summaries, ends, strict=False):
+        if one.error is not None:
+            raise renumbered(one.error, points=range(first, first + one.n_points))
+    axes = axes_of(vectors, flags, cutoff, max((one.largest for one in summaries), default=0.0))
+    samples = [one.sample for one in summaries if len(one.sample)]
+    places = axes.places(np.concatenate(samples)) if samples else np.empty((len(flags), 0))
+    weights = np.repeat([one.weight for one in summaries], [len(one.sample) for one in summaries])
+    low = np.where(flags, 0.0, -np.inf)
+    high = np.where(flags, 1.0, np.inf)
+    bricks = iter(range(n_bricks))
+    cuts = _cut(places, weights, n_bricks, (low, high), axes.widths, bricks)
+    return Division(
+        cuts, n_bricks, axes, tuple(ends[:-1]), ends[-1], cutoff, (vectors, flags)
+    )
+
+
+def _cut(
+    places: Array, weights: Array, n_parts: int, region: tuple[Array, Array], widths: Array,
+    bricks: Iterator[int],
+) -> Cut | int:  # fmt: skip
+    """Cut a region across the longest side of its sample, so that both parts weigh their share."""
+    if n_parts == 1:
+        return next(bricks)
+    first, (low, high) = n_parts // 2, region
+    axis, at = 0, 0.0
+    if len(weights):
+        axis = int(np.argmax(np.ptp(places, axis=1) * widths))
+        order = np.argsort(places[axis], kind="stable")
+        sums = np.cumsum(weights[order])
+        above = int(np.searchsorted(sums, sums[-1] * first / n_parts, side="right"))
+        last, at = places[axis][order[[above - 1, above]]].tolist()
+        middle = 0.5 * last + 0.5 * at
+        at = middle if middle > last else at  # points at neither side of it need fewer others
+    is_below = places[axis] < at
+    ends, begins = high.copy(), low.copy()
+    ends[axis] = begins[axis] = at
+    return Cut(
+        axis, float(low[axis]), at, float(high[axis]),
+        _cut(places[:, is_below], weights[is_below], first, (low, ends), widths, bricks),
+        _cut(places[:, ~is_below], weights[~is_below], n_parts - first, (begins, high), widths,
+             bricks),
+    )  # fmt: skip
+
+
+def split(points: Array, division: Division, place: int) -> list[Piece]:
+    """What a piece gives to each brick: points of its region, and those within reach of it."""
+    axes = division.axes
+    places = axes.places(points)
+    pieces = []
+    first = division.firsts[place]
+    every = np.arange(len(points), dtype=np.int32)
+    for numbers, is_owned in _leaves(division.cuts, places, axes, every, None):
+        owned = np.ones(len(numbers), bool) if is_owned is None else is_owned
+        pieces.append(Piece(first + numbers.astype(np.int64), points[numbers], owned))
+    return pieces
+
+
+def _leaves(
+    cut: Cut | int, places: Array, axes: Axes, numbers: Any, is_inside: Bits | None
+) -> Iterator[tuple[Any, Bits | None]]:
+    """Of each brick, points within reach of its region, and which of them are inside."""
+    if isinstance(cut, int):
+        yield numbers, is_inside
+        return
+    own = places[cut.axis][numbers] if is_inside is not None else places[cut.axis]
+    reach, repeats = float(axes.reach[cut.axis]), axes.flags[cut.axis]
+    is_below = own < cut.at
+    for part, low, high, is_mine in (
+        (cut.below, cut.low, cut.at, is_below), (cut.above, cut.at, cut.high, ~is_below),
+    ):  # fmt: skip
+        near = within(own, low - reach, high + reach, repeats)
+        mine = is_mine if is_inside is None else is_mine & is_inside
+        yield from _leaves(part, places, axes, numbers[near], mine[near])
+
+
+def joined(pieces: Sequence[Piece], division: Division) -> tuple[Brick, Array]:
+    """A brick, and the coordinates of its members."""
+    numbers, points, is_owned = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    brick = Brick(numbers, is_owned, division.n_points, division.cutoff, division.scene)
+    return brick, points
+
+
+def renumbered(error: Exception, **numbers: Any) -> Exception:
+    """The same error with numbers among all points, by the name that it gives to some of them."""
+
+    def other(found: re.Match[str]) -> str:
+        return f"points[{numbers[found[1]][int(found[2])]}"
+
+    return type(error)(re.sub(rf"\b({'|'.join(numbers)})\[(\d+)", other, str(error)))
