@@ -139,7 +139,7 @@ def split(points: Array, division: Division, place: int) -> list[Piece]:
     every = np.arange(len(points), dtype=np.int32)
     for numbers, is_owned in _leaves(division.cuts, places, axes, every, None):
         owned = np.ones(len(numbers), bool) if is_owned is None else is_owned
-        pieces.append(Piece(first + numbers.astype(np.int64), points[numbers], owned))
+        pieces.append(Piece(first + numbers.astype(np.int64), points.take(numbers, axis=0), owned))
     return pieces
 
 
@@ -156,9 +156,9 @@ def _leaves(
     for part, low, high, is_mine in (
         (cut.below, cut.low, cut.at, is_below), (cut.above, cut.at, cut.high, ~is_below),
     ):  # fmt: skip
-        near = within(own, low - reach, high + reach, repeats)
+        near = np.flatnonzero(within(own, low - reach, high + reach, repeats))
         mine = is_mine if is_inside is None else is_mine & is_inside
-        yield from _leaves(part, places, axes, numbers[near], mine[near])
+        yield from _leaves(part, places, axes, numbers.take(near), mine.take(near))
 
 
 def joined(pieces: Sequence[Piece], division: Division) -> tuple[Brick, Array]:
