@@ -132,6 +132,55 @@ def test_a_worker_that_dies_is_survived():
         assert pids[victim] not in client.run(os.getpid).values()
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_that_dies_while_it_searches_is_survived(tmp_path):
+    """A task of the middle ends the process that runs it, the first time that it is run."""
+    points, cutoff, scene = scenes()["skewed"]
+
+    def once_deadly(chunk, place):
+        dead = tmp_path / "dead"
+        if place == 2 and not dead.exists():
+            dead.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return chunk
+
+    chunks = np.array_split(points, 4)
+    loads = [dask.delayed(once_deadly)(chunk, place) for place, chunk in enumerate(chunks)]
+    arrays = [da.from_delayed(one, (np.nan, 3), float) for one in loads]
+    given = da.concatenate(arrays, allow_unknown_chunksizes=True)
+    with cluster(2, processes=True):
+        found = hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **scene)
+        assert same(dask.compute(*found), serial(points, cutoff, scene))
+    assert (tmp_path / "dead").exists()
+
+
+def test_chunks_far_apart_and_chunks_of_nothing():
+    """Bricks that a sample cannot foresee: one chunk far from all others, many without points."""
+    rng = np.random.default_rng(5)
+    points = np.concatenate((rng.random((60, 2)), 1e6 + rng.random((3, 2)), np.full((50, 2), 0.5)))
+    chunks = ((0, 60, 0, 3, 50, 0), 2)
+    given = da.from_array(points, chunks=chunks)
+    for n in (1, 3, 40):
+        found = hd.pairs(given, 0.2, n=n, quantities=LETTERS, sort=True)
+        assert same(dask.compute(*found), serial(points, 0.2, {}))
+        assert hd.bricks(given, 0.2, n=n).compute().sizes != [0] * n
+
+
+def test_errors_of_a_search_name_points_among_all():
+    points = np.zeros((30, 2))
+    points[23, 0] = 1e300
+    box = [[1.0, 0.0], [0.25, 1.0]]
+    for call in (hd.pairs, hd.count_pairs, hd.coordination):
+        with pytest.raises(OverflowError, match=r"points\[23\] lies too many box vectors away"):
+            dask.compute(call(collection(points, 10), 0.5, box=box))
+    given = collection(points, 10)
+    with pytest.raises(OverflowError, match=r"points\[23\]"):
+        hd.pair_histogram(given, [0.0, 0.5], box=box).compute()
+    with pytest.raises(OverflowError, match=r"points\[23\]"):
+        dask.compute(hd.neighbors(given, 0.5, box=box).counts)
+
+
 def test_from_disk_and_of_unknown_length(tmp_path):
     points, cutoff, scene = scenes()["mixed"]
     paths = [tmp_path / f"{k}.npy" for k in range(3)]
@@ -153,6 +202,41 @@ def test_columns_in_chunks():
     assert hd.count_pairs(given, cutoff, **scene).compute() == hs.count_pairs(
         points, cutoff, **scene
     )
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_from_zarr_and_back(tmp_path):
+    pytest.importorskip("zarr", reason="zarr is not installed")
+    points, cutoff, scene = scenes()["mixed"]
+    expected = serial(points, cutoff, scene)
+    da.from_array(points, chunks=(70, 3)).to_zarr(str(tmp_path / "points.zarr"))
+    given = da.from_zarr(str(tmp_path / "points.zarr"))
+    assert given.numblocks == (4, 1)
+    with cluster(2):
+        found = hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **scene)
+        assert same(dask.compute(*found), expected)
+    first = found[0].compute_chunk_sizes().rechunk(100)
+    first.to_zarr(str(tmp_path / "i.zarr"))
+    assert same([da.from_zarr(str(tmp_path / "i.zarr")).compute()], [expected[0]])
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_from_parquet_and_back(tmp_path):
+    dd = pytest.importorskip("dask.dataframe", reason="dask.dataframe is not installed")
+    pd = pytest.importorskip("pandas", reason="pandas is not installed")
+    points, cutoff, scene = scenes()["mixed"]
+    expected = serial(points, cutoff, scene)
+    frame = pd.DataFrame(points, columns=list("xyz")).assign(mass=1.0)
+    dd.from_pandas(frame, npartitions=3).to_parquet(tmp_path / "points")
+    given = dd.read_parquet(tmp_path / "points")[["x", "y", "z"]]
+    found = hd.pairs(given, cutoff, quantities=LETTERS, sort=True, **scene)
+    assert same(dask.compute(*found), expected)
+    i, j = (column.compute_chunk_sizes() for column in found[:2])
+    dd.from_dask_array(da.stack((i, j), axis=1).rechunk({1: -1}), columns=["i", "j"]).to_parquet(
+        tmp_path / "pairs"
+    )
+    again = dd.read_parquet(tmp_path / "pairs").compute()
+    assert same([again["i"].to_numpy(), again["j"].to_numpy()], expected[:2])
 
 
 @pytest.mark.filterwarnings("ignore")
