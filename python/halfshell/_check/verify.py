@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check a list of pairs from any library: what it misses, what it invents, what it has twice."""
+"""Check a list of pairs from any library for missing, invented and repeated pairs."""
 
 from __future__ import annotations
 

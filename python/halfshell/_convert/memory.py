@@ -20,7 +20,7 @@ _SMALL = 1 << 26  # bytes; below them the system is not asked what is left
 def refuse_unavailable(needed: int, what: str) -> None:
     """MemoryError before results that would make the machine swap, or fit no address space."""
     if needed > _SMALL and needed > _core.available_memory():
-        raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than there is")
+        raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than is available")
 
 
 def gigabytes(n_bytes: int) -> str:

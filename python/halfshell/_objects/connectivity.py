@@ -51,7 +51,7 @@ class Connectivity(NodePictures):
         Whether ghosts have rows, and pairs with each other.
     overlap : bool, default False
         Whether to find nodes whose supports have a node in common; then ghosts have rows, too.
-        Not in a box that repeats.
+        Not in a periodic box.
     intersection : bool, default False
         Whether to find the nodes between the two of each pair; likewise.
     order : {"index", "morton"}, default "index"
@@ -81,7 +81,7 @@ class Connectivity(NodePictures):
         Their numbers in their lists, ascending; with "morton" by the Z curve. Read-only, as are
         all of these.
     shifts : ndarray of int32, shape (entries, d)
-        S of each entry, in a box that repeats; entries of one neighbour ascend by S.
+        S of each entry, in a periodic box; entries of one neighbour ascend by S.
     row_start : ndarray of int64, shape (n_lists + 1,)
         Nodes with rows before each list.
     overlap_offsets, overlap_indices : ndarray
@@ -97,8 +97,8 @@ class Connectivity(NodePictures):
     ------
     TypeError, ValueError, OverflowError, MemoryError
         As `pairs`; ValueError also if names repeat, lists differ in their dimensions, `exclude`
-        names a node that there is not, a node lies outside `morton_box`, or `overlap` or
-        `intersection` is wanted in a box that repeats.
+        names a node that does not exist, a node lies outside `morton_box`, or `overlap` or
+        `intersection` is wanted in a periodic box.
 
     See Also
     --------

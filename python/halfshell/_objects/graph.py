@@ -52,7 +52,7 @@ def check_complete(quantities: str) -> None:
     """Raise unless a table of these has what a graph needs."""
     if lacking := "".join(letter for letter in "jDS" if letter not in quantities):
         raise AttributeError(
-            "a graph needs indices, vectors and shifts: ask for them by quantities='jDS', got "
+            "a graph needs indices, vectors and shifts: request them with quantities='jDS', got "
             f"{quantities!r} without {lacking!r}"
         )
 

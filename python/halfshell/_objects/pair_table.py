@@ -57,7 +57,7 @@ class PairTable:
     i_node, i_list, j_node, j_list : ndarray of int32, shape (m,)
         The numbers of both nodes in their lists, and of their lists.
     shifts : ndarray of int32, shape (m, d)
-        S of each pair, in a box that repeats: D = x_j - x_i + S @ box.
+        S of each pair, in a periodic box: D = x_j - x_i + S @ box.
     coupling : ndarray of float64, shape (m,)
         A number for each pair, 1 at first. It takes no memory, and cannot be written to, until
         it is assigned to: ``pairs.coupling = 1.0``.
@@ -167,7 +167,7 @@ class PairTable:
     @property
     def shifts(self) -> Ints:
         if self._shifts is None:
-            raise AttributeError("these pairs have no shifts: there is no box that repeats")
+            raise AttributeError("these pairs have no shifts: there is no periodic box")
         return self._shifts
 
     @property
@@ -266,7 +266,7 @@ class PairTable:
     ) -> int:
         given = as_array(shift, "shift")
         if self._shifts is None:
-            raise ValueError("shift is for boxes that repeat: these pairs have none")
+            raise ValueError("shift is for periodic boxes: these pairs have none")
         shifts = self.shifts
         if given.dtype.kind not in "iu" or given.shape != shifts.shape[1:] or len(ranks[0]) != 1:
             raise ValueError(

@@ -136,7 +136,7 @@ class RadialDistribution:
             if is_a(one, (str, int, np.integer)) and not is_a(one, bool) and known == one:
                 return k
         among = ", ".join(map(repr, self.types[:20])) + (", ..." if len(self.types) > 20 else "")
-        raise KeyError(f"{shown(one)} is none of the types {among}")
+        raise KeyError(f"{shown(one)} is not one of the types {among}")
 
     def __add__(self, other: object) -> RadialDistribution:
         """The sum over the frames of both."""

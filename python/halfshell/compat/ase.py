@@ -176,7 +176,7 @@ def _reach(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
     """The cutoff of halfshell, and what each atom brings to it."""
     if isinstance(cutoff, Mapping):
         if numbers is None:
-            raise TypeError("numbers must be given where cutoff is a dict")
+            raise TypeError("numbers must be given if cutoff is a dict")
         kinds, types = np.unique(np.asarray(numbers), return_inverse=True)
         places = {kind: place for place, kind in enumerate(kinds.tolist())}
         table: dict[tuple[int, int], Any] = {}
