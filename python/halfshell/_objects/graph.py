@@ -14,12 +14,12 @@ __all__ = ["Graph", "check_complete", "turned"]
 
 
 class Graph(NamedTuple):
-    """What `NeighborTable.graph` returns.
+    """A graph, as `NeighborTable.graph` returns it.
 
     Attributes
     ----------
     edge_index : ndarray of the type of `indices`, shape (2, m)
-        Row 0 is the source, row 1 the target of each edge: the neighbour j and the point i in whose
+        Row 0 is the source of each edge, the neighbour j; row 1 is the target, the point i in whose
         row it is.
     shifts : ndarray of int32, shape (m, d)
         Box vectors to add, with ``vectors = points[edge_index[1]] - points[edge_index[0]] +

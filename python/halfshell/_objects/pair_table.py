@@ -49,8 +49,8 @@ class Columns(NamedTuple):
 class PairTable:
     """Every pair of nodes that are neighbours, each once.
 
-    Made by `Connectivity`, of which it is the attribute ``pairs``; it does not change but for
-    `coupling`, and the other arrays are read-only.
+    Made by `Connectivity`, as its attribute ``pairs``. Only `coupling` can be changed; all other
+    arrays are read-only.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class PairTable:
     the lower and the higher of the two. With ``order="morton"`` both go by the order of the nodes
     on the Z curve.
 
-    The arrays are made when one of them is first looked at, out of the rows.
+    The arrays are made from the rows when you first access one of them.
 
     ``pairs[k]`` is pair k as a tuple (i_node, i_list, j_node, j_list), and ``len(pairs)`` the
     number of pairs.
@@ -209,7 +209,7 @@ class PairTable:
         return table
 
     def index(self, pair: npt.ArrayLike, shift: npt.ArrayLike | None = None) -> Any:
-        """Where a pair is in the table, in whatever order its nodes are given.
+        """The position of a pair in the table, with its nodes in any order.
 
         Parameters
         ----------
@@ -227,12 +227,12 @@ class PairTable:
         KeyError
             If a pair is not in the table.
         TypeError, ValueError
-            If these are no pairs, a pair is there in several images and `shift` does not say
-            which, or `shift` is given where no box repeats.
+            If these are not pairs, a pair occurs in several images and `shift` does not tell
+            which, or `shift` is given without a periodic box.
 
         Notes
         -----
-        The first call makes an index of 8 bytes a pair; after that a pair takes a binary search.
+        The first call makes an index of 8 bytes per pair; then each pair takes a binary search.
 
         Examples
         --------
