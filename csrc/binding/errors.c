@@ -121,7 +121,7 @@ hs_format_limit(double bytes, char *text, size_t size)
 {
     char allowed[32];
     if (isinf(bytes)) {
-        snprintf(text, size, "the system has no more");
+        snprintf(text, size, "the system has no more memory");
     } else {
         snprintf(text, size, "%s are allowed", hs_format_bytes(bytes, allowed, sizeof allowed));
     }
@@ -148,11 +148,11 @@ raise_memory(const hs_failure *failure)
     hs_format_limit(failure->limit_bytes, limit, sizeof limit);
     if (isinf(failure->expected_bytes)) {
         snprintf(text, sizeof text,
-                 "the result would not fit: the cutoff spans more images of the box than any "
-                 "memory holds pairs; use a smaller cutoff");
+                 "the result would not fit: the cutoff spans more images of the box than there "
+                 "could be pairs in any memory; use a smaller cutoff");
     } else if (failure->search_bytes > 0.0 && hs_took_more(failure)) {
         snprintf(text, sizeof text,
-                 "the search would not fit: it needs more than the %s that are allowed, where "
+                 "the search would not fit: it needs more than the %s that are allowed; "
                  "%s and %s for the search itself were expected",
                  hs_format_bytes(failure->limit_bytes, bytes, sizeof bytes), pairs, search);
     } else if (failure->search_bytes > 0.0) {
@@ -161,7 +161,7 @@ raise_memory(const hs_failure *failure)
                  "but %s",
                  pairs, search, limit);
     } else if (failure->expected_pairs == 0.0) { /* nothing is known of what is lacking */
-        snprintf(text, sizeof text, "no memory for the search, its cells or its counts: %s", limit);
+        snprintf(text, sizeof text, "out of memory for the search, its cells or counts: %s", limit);
     } else {
         snprintf(text, sizeof text,
                  "the result would not fit: %s are expected, %s%s; "
@@ -323,7 +323,7 @@ raise_far(const hs_failure *failure)
                      (long long)failure->row, (long long)failure->column, number);
     } else if (number != NULL) {
         PyErr_SetString(PyExc_ValueError,
-                        "points lie so far from each other, or the box is so small beside that, "
+                        "points lie so far apart, or the box is so small in comparison, "
                         "that one cell holds everything, and all points are candidates: the "
                         "other methods and functions have no such limit");
     }

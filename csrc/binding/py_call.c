@@ -213,7 +213,7 @@ take_shells(PyObject *object, hs_options *options)
     if (object == NULL) {
         if (is_wanted) {
             PyErr_SetString(PyExc_ValueError,
-                            "the letter k in quantities goes with several cutoffs, got one");
+                            "the letter k in quantities needs several cutoffs, got one");
         }
         return !is_wanted;
     }

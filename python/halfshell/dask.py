@@ -34,11 +34,11 @@ class Neighbors(NamedTuple):
     points : dask Array of int64, shape (n,)
         The point of each row.
     counts : dask Array of int64, shape (n,)
-        How many neighbours it has.
+        Its number of neighbours.
     columns : dask Array, or tuple of them
-        What `quantities` names of each neighbour, row after row; of m neighbours in all.
+        The `quantities` of each neighbour, row after row; m neighbours in all.
     table : Delayed
-        All of them as the `NeighborTable` that `halfshell.neighbors` returns, in one process.
+        All rows as the `NeighborTable` that `halfshell.neighbors` returns, in one process.
     """
 
     points: Collection
@@ -55,7 +55,7 @@ def bricks(
     box: BoxLike | None = None,
     periodic: PeriodicLike | None = None,
 ) -> Collection:
-    """Divide points as all functions of this module do; the result tells what that costs.
+    """Divide points as the other functions of this module do, to find out what that costs.
 
     Bricks are as those of `halfshell.bricks`, but own about as many points each, not exactly: they
     are cut by a sample of the points.
@@ -108,11 +108,11 @@ def pairs(
     ----------
     points : dask Array or DataFrame of real numbers, shape (n_points, d)
         Coordinates, in chunks of any length, which need not be known; 1 <= d <= 8. Points are
-        numbered through all chunks.
+        numbered across all chunks.
     cutoff : float
         As in `halfshell.bricks`; in the unit of `points`.
     n : int, optional
-        How many bricks. Default: as many as `points` has chunks.
+        Number of bricks. Default: the number of chunks of `points`.
     box, periodic
         As in `halfshell.pairs`.
     quantities : str, default "ij"
@@ -120,9 +120,9 @@ def pairs(
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
     sort : bool, default False
-        Ascending by (i, j, S), as `halfshell.pairs` has it with ``sort=True``, byte for byte. Then
-        every brick's pairs are sent to as many tasks as there are bricks. Otherwise they are in
-        this order within each chunk, which is a brick.
+        Sort all pairs by (i, j, S), ascending, byte for byte as `halfshell.pairs` with
+        ``sort=True``. The pairs of every brick are then sent to as many tasks as there are bricks.
+        Otherwise they have this order within each chunk, which is a brick.
     kernel, memory_limit
         As in `halfshell.pairs`, for each brick.
     threads : int, default 1
@@ -136,9 +136,9 @@ def pairs(
     Raises
     ------
     TypeError, ValueError, OverflowError
-        At once, for arguments and for what the collection says of itself; when it is computed for
-        coordinates, named by their place among all points, and for chunks that are not what the
-        collection says.
+        At once, for arguments and the metadata of the collection; when the result is computed, for
+        coordinates, named by their position among all points, and for chunks that do not match the
+        metadata.
 
     Examples
     --------
@@ -180,12 +180,13 @@ def neighbors(
     quantities : str, default "j"
         Any of the letters ``j d D S``, as in `halfshell.neighbors`.
     sort : bool, default False
-        Rows ascending by point, with the bytes of `halfshell.neighbors`; otherwise brick by brick.
+        Rows in the order of the points, byte for byte as in `halfshell.neighbors`; otherwise brick
+        by brick.
 
     Returns
     -------
     Neighbors
-        Rows as dask arrays, with numbers among all points; `table` does not depend on `sort`.
+        Rows as dask arrays, with indices among all points; `table` does not depend on `sort`.
 
     Raises
     ------

@@ -31,7 +31,7 @@ Array = Any  # jax.Array, also for type checkers where JAX is not installed
 
 
 class NeighborList(NamedTuple):
-    """What `neighbor_list` returns: entries up to `needed`, and then what fills the capacity.
+    """The result of `neighbor_list`: entries up to `needed`, then padding up to the capacity.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ class NeighborList(NamedTuple):
     D : Array of the type of the positions, shape (capacity, d)
         ``positions[j] - positions[i] + S @ box``; 0 beyond the last entry.
     d : Array of the type of the positions, shape (capacity,)
-        Lengths of D; infinite beyond the last entry. Where d is 0 its gradient is.
+        Lengths of D; infinite beyond the last entry. Where d is 0, its gradient is 0.
     needed : Array of int32, shape ()
-        How many entries there are, whether or not they fit; 2**31 - 1 if there are more than that.
+        The true number of entries, whether or not they fit; 2**31 - 1 if there are more than that.
     overflow : Array of bool, shape ()
         Whether `needed` is above the capacity: then entries are missing.
 
@@ -85,39 +85,40 @@ def neighbor_list(
     Parameters
     ----------
     positions : Array of float32 or float64, shape (n, d)
-        Coordinates, any length unit, 1 <= d <= 8. What reaches the search is decided exactly; but
-        JAX makes float32 of all it is given unless ``jax_enable_x64`` is set.
+        Coordinates, any length unit, 1 <= d <= 8. The search is exact for the numbers that reach
+        it; but JAX converts its inputs to float32 unless ``jax_enable_x64`` is set.
     cutoff : float or Array, shape ()
-        Largest distance of a pair, in the unit of `positions`; finite, not negative. A number of
-        Python or NumPy stays float64, an array of JAX has its own type.
+        Largest distance of a pair, in the unit of `positions`; finite, not negative. A Python or
+        NumPy number stays float64, a JAX array keeps its own type.
     capacity : int
-        The length of the result. If there are more entries, those that come first are returned and
+        The length of the result. If there are more entries, the first ones are returned and
         `overflow` is set.
     box : float, array_like or Array, shape (d,) or (d, d), or Box, optional
-        As in `halfshell.pairs`. An array of JAX has its own type in the search and can be
-        differentiated by; others are searched as float64.
+        As in `halfshell.pairs`. A JAX array keeps its own type in the search, and derivatives with
+        respect to it exist; other values are searched as float64.
     periodic : bool or sequence of bool, shape (d,), optional
         Which box vectors repeat. Default: all with a box, none without.
     half : bool, default False
-        Each pair once, as `halfshell.pairs` has it; otherwise (i, j, S) and (j, i, -S).
+        Whether to list each pair once, as `halfshell.pairs` does, and not as (i, j, S) and
+        (j, i, -S).
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
 
     Returns
     -------
     NeighborList
-        i, j, S, D, d, the number of entries needed, and whether that is more than `capacity`.
+        i, j, S, D, d, the number of entries needed, and whether it exceeds `capacity`.
 
     Raises
     ------
     TypeError, ValueError
-        If `positions` or `capacity` are of the wrong type or shape. What `halfshell.pairs` refuses
-        in numbers is seen in the callback, and inside ``jax.jit`` raised by JAX, as its error.
+        If `positions` or `capacity` are of the wrong type or shape. Numbers that `halfshell.pairs`
+        refuses are found in the callback; inside ``jax.jit``, JAX raises this as its own error.
 
     Notes
     -----
     ``jax.vmap`` searches all systems in one callback. Under ``jax.jit`` the arrays go to the
-    host and back in each call, also from an accelerator.
+    host and back in each call, even from an accelerator.
 
     Examples
     --------

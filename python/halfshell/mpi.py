@@ -70,8 +70,8 @@ def exchange(
     comm : mpi4py.MPI.Comm
         The ranks, as many as there will be bricks.
     points : array_like of float, shape (n_rank, d)
-        Coordinates of this rank, of one type and with one d on all ranks; there may be none.
-        They are numbered through all ranks: those of rank 0 come first.
+        Coordinates of this rank, with the same dtype and d on all ranks; there may be none.
+        Points are numbered across all ranks: those of rank 0 come first.
     cutoff, box, periodic
         As in `halfshell.bricks`; the same on all ranks.
 
@@ -85,9 +85,9 @@ def exchange(
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `halfshell.bricks`, of one kind and with one message on every rank, whichever brought
-        what is wrong; coordinates are named by their place among all points. Also if ranks differ
-        in cutoff, box, periodicity, d or type.
+        As for `halfshell.bricks`, with the same type and message on every rank, whichever rank has
+        the error; coordinates are named by their position among all points. Also if ranks differ
+        in cutoff, box, periodicity, d or dtype.
 
     Notes
     -----

@@ -45,41 +45,42 @@ def neighbor_list(
     ----------
     positions : Tensor of float32 or float64, shape (n, d)
         Coordinates on the CPU, any length unit, 1 <= d <= 8. They are searched as they are,
-        without a copy where they are contiguous.
+        without a copy if they are contiguous.
     cutoff : float
         Largest distance of a pair, in the unit of `positions`; finite, not negative.
     box : float, array_like or Tensor, shape (d,), (d, d) or (s, d, d), or Box, optional
-        As in `halfshell.pairs`. d and D can be differentiated by a tensor.
+        As in `halfshell.pairs`. d and D can be differentiated with respect to a tensor.
     periodic : bool or sequence of bool, shape (d,), optional
         Which box vectors repeat. Default: all with a box, none without.
     quantities : str, default "ij"
         Any of the letters ``i j d D S P``: indices, distance, vector, shift, both indices.
     half : bool, default False
-        Each pair once, as `halfshell.pairs` has it; otherwise (i, j, S) and (j, i, -S).
+        Whether to list each pair once, as `halfshell.pairs` does, and not as (i, j, S) and
+        (j, i, -S).
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
     batch : Tensor of int, shape (n,), optional
-        The system of each point, ascending; points pair within their system only, and `box` may
-        have one matrix a system, (s, d, d).
+        The system of each point, ascending; only points of the same system pair. `box` may
+        have a matrix for each system, (s, d, d).
 
     Returns
     -------
     Tensor or tuple of Tensor
         One for each letter, in that order, ascending by (i, j, S); a bare tensor for one letter. i
         and j int64 (m,), P int64 (m, 2), S int32 (m, d); d (m,) and D (m, d) of the type of
-        `positions`, with ``D = positions[j] - positions[i] + S @ box``. Sums are made in float64.
-        The decision is exact for the coordinates given; d is rounded after it and may differ from
-        `cutoff` by rounding. The gradient of d is 0 where d is 0.
+        `positions`, with ``D = positions[j] - positions[i] + S @ box``, summed in float64.
+        The decision is exact for the given coordinates; d is rounded afterwards and may exceed
+        `cutoff` by a rounding error. The gradient of d is 0 where d is 0.
 
     Raises
     ------
     TypeError
-        If `positions` is no tensor, not on the CPU, not dense or of another type.
+        If `positions` is not a tensor, not on the CPU, not dense, or of another dtype.
     ValueError, OverflowError, MemoryError
         As `halfshell.pairs`.
     NotImplementedError
-        Under ``torch.vmap``, as systems differ in their number of pairs: use `batch`. From PyTorch
-        2.5 on; older ones raise an error of their own.
+        Under ``torch.vmap``, as systems differ in their number of pairs: use `batch`. PyTorch
+        before 2.5 raises its own error.
 
     Examples
     --------
@@ -127,10 +128,10 @@ def radius_graph(
     max_num_neighbors: int | None = None,
     flow: str = "source_to_target",
 ) -> Tensor:
-    """Connect all points that are less than `r` apart, as PyTorch Geometric's function does.
+    """Connect all points that are less than `r` apart, like PyTorch Geometric's function.
 
-    That one keeps 32 neighbours of a point unless it is told another number, and leaves out others
-    without a word; which ones depends on the order of the points. Here all of them are kept.
+    PyTorch Geometric keeps 32 neighbours of a point by default and silently drops the others; which
+    ones depends on the order of the points. Here all of them are kept.
 
     Parameters
     ----------
@@ -143,11 +144,11 @@ def radius_graph(
     loop : bool, default False
         Whether each point has an edge to itself.
     max_num_neighbors : int, optional
-        The most edges that a point may have, loops not counted. If one has more, that is an error:
-        none is left out. Default: any number.
+        Maximum number of edges of a point, not counting loops. If a point has more, this raises an
+        error; edges are never dropped. Default: any number.
     flow : {"source_to_target", "target_to_source"}, default "source_to_target"
-        Which row of the result holds the points whose neighbours the other row holds: the second
-        one, or the first.
+        The row of the result that holds the points, while the other holds their neighbours: the
+        second row for "source_to_target", the first for "target_to_source".
 
     Returns
     -------
@@ -157,7 +158,7 @@ def radius_graph(
     Raises
     ------
     CapacityError
-        If a point has more than `max_num_neighbors`; it carries ``needed``.
+        If a point has more than `max_num_neighbors`; its ``needed`` tells how many.
     TypeError, ValueError, OverflowError, MemoryError
         As `neighbor_list`.
 
@@ -185,7 +186,7 @@ def radius(
     batch_y: Tensor | None = None,
     max_num_neighbors: int | None = None,
 ) -> Tensor:
-    """Find all points of `x` that are less than `r` from each of `y`, as PyTorch Geometric's does.
+    """Find all points of `x` less than `r` from each point of `y`, like PyTorch Geometric's.
 
     Parameters
     ----------
@@ -196,12 +197,12 @@ def radius(
     batch_x, batch_y : Tensor of int, shape (n,) and (q,), optional
         The system of each point, ascending. A set without one is all of system 0.
     max_num_neighbors : int, optional
-        The most points that one of `y` may find, as in `radius_graph`. Default: any number.
+        Maximum number of points found for one of `y`, as in `radius_graph`. Default: any number.
 
     Returns
     -------
     Tensor of int64, shape (2, m)
-        Rows of `y` and, below them, of `x`; ascending by both.
+        Indices into `y` in row 0, into `x` in row 1; ascending by both.
 
     Raises
     ------

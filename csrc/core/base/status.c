@@ -24,7 +24,7 @@ hs_status_text(hs_status status)
     case HS_ERR_ROUNDING: return "too far from the box for precision=\"double\"";
     case HS_ERR_KERNEL: return "no such kernel on this CPU, or not compiled as it must be";
     case HS_ERR_FAR: return "queries, or points from each other, lie too far away for cells";
-    case HS_ERR_CAPACITY: return "the arrays that were given are too small";
+    case HS_ERR_CAPACITY: return "the given arrays are too small";
     case HS_ERR_EDGES: return "edges must be finite, not negative and ascending";
     case HS_ERR_TYPES: return "types must be from 0 on and below the number of types";
     case HS_ERR_WEIGHTS: return "weights must be finite";
@@ -33,7 +33,7 @@ hs_status_text(hs_status status)
     case HS_ERR_SUPPORTS: return "a support is not symmetric and positive definite";
     case HS_ERR_SUPPORT_REACH: return "a support reaches too far";
     case HS_ERR_EXTENT: return "the extent of supports is negative, NaN or infinite";
-    case HS_ERR_KEY: return "a key is not there, comes twice, or has no position";
+    case HS_ERR_KEY: return "a key is missing, repeated, or has no position";
     case HS_ERR_ARGUMENT: return "an argument is out of its range, or an array is missing";
     case HS_STATUS_END: break;
     }

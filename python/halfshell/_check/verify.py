@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check a list of pairs from any library: what it misses, what it invents, what it has twice."""
+"""Check a list of pairs from any library for missing, invented and repeated pairs."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ _CONFIRMED = 1000  # differences of each kind that are confirmed by rational ari
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What `verify` found; true when the list is right.
+    """The result of `verify`; true if the list is right.
 
     Attributes
     ----------
     n_expected, n_given : int
-        Pairs that there are, and rows that the list has.
+        Number of true pairs, and of rows in the list.
     missed, spurious, duplicate : ndarray of int64, shape (k, 2) or (k, 2 + d)
         Pairs as rows (i, j, \\*S), or (i, j) when no shifts were given: not in the list, in the
         list but beyond the cutoff, and listed more often than they should be (once for each
@@ -109,22 +109,22 @@ def verify(
         The pairs, in any order and orientation. Or, as `i` alone, a `NeighborTable`: its rows, with
         their shifts if it has any; without `queries` they must be a full list.
     S : array_like of int, shape (m, d), optional
-        Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, several images
-        of one pair of points are told apart by their number only.
+        Their shifts, with ``D = points[j] - points[i] + S @ box``. Without shifts, only the number
+        of images of each pair of points is checked.
     queries : array_like of float, shape (q, d), optional
-        The list is one of two sets, with i in `queries` and j in `points`, as from `pairs_between`
+        Check a list of two sets, with i in `queries` and j in `points`, as from `pairs_between`
         or from `neighbors` with queries.
     radii, query_radii, rule, types, query_types, supports, query_supports, extent
-        As in `neighbors`. A list for the rules "gather" or "scatter" has a direction, as one of two
-        sets has.
+        As in `neighbors`. A list for the rules "gather" or "scatter" has a direction, like a list
+        of two sets.
     full : bool, default False
-        Whether the list should have both (i, j, S) and (j, i, -S). Of arrays for one set of
-        points and a rule without direction; a table tells by itself.
+        Whether the list should have both (i, j, S) and (j, i, -S). Only for arrays, one set of
+        points and a rule without direction.
 
     Returns
     -------
     Verdict
-        True when right; otherwise says what is missed, spurious and duplicate.
+        True if the list is right; otherwise it has the missed, spurious and duplicate pairs.
 
     Raises
     ------
@@ -132,11 +132,11 @@ def verify(
         If `i`, `j` or `S` does not hold whole numbers, `inclusive` or `full` is not a bool, or a
         part of the scene is of the wrong kind.
     ValueError
-        If `i`, `j` and `S` do not fit each other or the points, a table is of other points, or of
-        queries and these are not given, `full` is given for two sets or a rule with a direction, or
-        the scene is refused by `pairs`.
+        If `i`, `j` and `S` do not fit each other or the points, a table belongs to other points, or
+        to queries that are not given, `full` is given for two sets or a rule with a direction, or
+        `pairs` would refuse the points or box.
     OverflowError, MemoryError
-        As `pairs`, for the right list.
+        As for `pairs`, for the right list.
 
     Examples
     --------

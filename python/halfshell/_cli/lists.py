@@ -103,7 +103,7 @@ def run_rdf(args: Namespace) -> int:
     def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
         del options["inclusive"]
         if scene.box is None or not all(scene.periodic):
-            raise InputError(f"{scene.source}: g(r) needs a box that repeats along every axis")
+            raise InputError(f"{scene.source}: g(r) needs a box that is periodic along every axis")
         result = hs.rdf(scene.points, cutoff, args.bins, **options)
         columns: Columns = {"r": result.r, "g": result.g, "counts": result.counts}
         highest = int(result.g.argmax())

@@ -110,7 +110,7 @@ def one_each(name: str, n: int) -> Callable[[tuple[int, ...]], None]:
     def check(shape: tuple[int, ...]) -> None:
         if shape != (n,):
             whom = "query" if name.startswith("query_") else "point"
-            raise ValueError(f"{name} must have shape ({n},), one a {whom}, got {shape}")
+            raise ValueError(f"{name} must have shape ({n},), one for each {whom}, got {shape}")
 
     return check
 

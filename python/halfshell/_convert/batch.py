@@ -40,7 +40,7 @@ def as_numbers(
     array = as_array(values, name, "hold integers")
     if array.shape != (n,):
         raise ValueError(
-            f"{name} must have shape ({n},), one number a {of_each}, got {array.shape}"
+            f"{name} must have shape ({n},), one number for each {of_each}, got {array.shape}"
         )
     if array.dtype.kind not in "iu" and n > 0:
         raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
@@ -53,7 +53,7 @@ def as_numbers(
 def _as_boxes(array: npt.NDArray[Any], ndim: int) -> FloatArray:
     if array.shape[1:] != (ndim, ndim):
         raise ValueError(
-            f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one a system "
+            f"box must have shape ({ndim},) or ({ndim}, {ndim}), or one for each system "
             f"(s, {ndim}, {ndim}), for points in {ndim} dimensions, got {array.shape}"
         )
     refuse_large(8 * array.size, array, "box")
@@ -63,7 +63,7 @@ def _as_boxes(array: npt.NDArray[Any], ndim: int) -> FloatArray:
 def _check_box(shape: tuple[int, ...]) -> None:
     if len(shape) == 2 and shape[0] != shape[1]:
         raise ValueError(
-            f"box must have shape (d,) or (d, d), or one a system (s, d, d), got {shape}"
+            f"box must have shape (d,) or (d, d), or one for each system (s, d, d), got {shape}"
         )
 
 
@@ -127,7 +127,7 @@ def _as_cutoffs(value: Any) -> tuple[float, FloatArray | None]:
     def check(shape: tuple[int, ...]) -> None:
         if len(shape) > 1:
             raise ValueError(
-                f"cutoff must be a number or, one a system, have shape (s,), got {shape}"
+                f"cutoff must be a number or have shape (s,), one for each system, got {shape}"
             )
 
     array = as_real_array(value, "cutoff", "be a number", check)
@@ -227,7 +227,7 @@ def check_no_batch(query_batch: Any) -> None:
 def refuse_indices(indices: Any) -> None:
     """ValueError for rows of some points, which are found in one system."""
     if indices is not None:
-        raise ValueError("indices does not go with batch")
+        raise ValueError("indices cannot be combined with batch")
 
 
 def refuse_many(own: Systems) -> None:

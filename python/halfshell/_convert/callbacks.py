@@ -152,7 +152,7 @@ def _ctypes_name(declared: Any) -> str:
 
 def _address_of_ctypes(callback: Any) -> int:
     if callback._flags_ & _PYTHON_CALLS:
-        raise TypeError("callback must not need Python's lock: use CFUNCTYPE, not PYFUNCTYPE")
+        raise TypeError("callback must not need the GIL: use CFUNCTYPE, not PYFUNCTYPE")
     if callback.argtypes is None:
         raise _refuse("none: set argtypes and restype of the ctypes function")
     types = [callback.restype, *callback.argtypes]

@@ -49,7 +49,7 @@ def as_cutoff(value: Any) -> float:
 def refuse_none(cutoff: Any) -> None:
     """TypeError for None, where nothing else says how far pairs reach but might have."""
     if cutoff is None:
-        raise TypeError("cutoff must be a number, got NoneType: None goes with radii or supports")
+        raise TypeError("cutoff must be a number, got NoneType: None needs radii or supports")
 
 
 def as_cutoffs(value: Any) -> float | FloatArray:

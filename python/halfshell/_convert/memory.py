@@ -20,7 +20,7 @@ _SMALL = 1 << 26  # bytes; below them the system is not asked what is left
 def refuse_unavailable(needed: int, what: str) -> None:
     """MemoryError before results that would make the machine swap, or fit no address space."""
     if needed > _SMALL and needed > _core.available_memory():
-        raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than there is")
+        raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than is available")
 
 
 def gigabytes(n_bytes: int) -> str:
@@ -62,7 +62,7 @@ class CacheInfo(NamedTuple):
 
 
 def cache_info() -> CacheInfo:
-    """Say how much memory of deleted results and finished calls is kept, and how much may be.
+    """Tell how much memory of deleted results and finished calls is kept, and how much may be.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def cache_info() -> CacheInfo:
 
     See Also
     --------
-    clear_cache : give back what is held now, and what is held at all.
+    clear_cache : release the memory that is kept now.
     set_cache_limit : how much may be kept.
 
     Examples
@@ -116,7 +116,7 @@ def set_cache_limit(limit: SupportsIndex) -> int:
     Parameters
     ----------
     limit : int
-        Bytes, not negative; 0 keeps nothing. What is held beyond it is given back at once. The
+        Bytes, not negative; 0 keeps nothing. Memory kept beyond it is released at once. The
         limit is 256 MB at first and holds for the whole process.
 
     Returns
@@ -134,7 +134,7 @@ def set_cache_limit(limit: SupportsIndex) -> int:
     See Also
     --------
     cache_info : how much is kept now, and the limit.
-    clear_cache : give back what is held now.
+    clear_cache : release the memory that is kept now.
 
     Examples
     --------

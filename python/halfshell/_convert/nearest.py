@@ -20,7 +20,7 @@ def as_k(k: Any) -> int:
     """How many are wanted: a whole number from 1 on."""
     number = as_count(k, "k")
     if number > _MOST:
-        raise MemoryError(f"k = {shown(number)} is more than any memory holds")
+        raise MemoryError(f"k = {shown(number)} is more than fits in any memory")
     return number
 
 
@@ -41,7 +41,8 @@ def check_max_distances(values: Any) -> Any:
         return as_max_distance(values)
     if array.ndim > 1:
         raise ValueError(
-            f"max_distance must be a number or, one a system, have shape (s,), got {array.shape}"
+            "max_distance must be a number or have shape (s,), one for each system, got "
+                f"{array.shape}"
         )
     for s in np.flatnonzero(~(array >= 0.0)):
         raise ValueError(

@@ -23,7 +23,7 @@ Array = npt.NDArray[Any]
 def check_alone(queries: Any) -> None:
     """ValueError where there are queries as well."""
     if queries is not None:
-        raise ValueError("indices are numbers of the points that ask: give no queries beside them")
+        raise ValueError("indices select rows of the points: do not give queries as well")
 
 
 def rows_of_points(
@@ -41,7 +41,7 @@ def rows_of_points(
     entries that a search for the same points as queries has.
     """
     if is_a(search[5], str) and search[5] == "single":
-        raise ValueError("indices does not go with precision 'single'")
+        raise ValueError("indices cannot be combined with precision 'single'")
     numbers = as_point_numbers(indices, "indices", len(points), "points")
     check_letters(quantities)
     letters = quantities if "j" in quantities else "j" + quantities

@@ -36,7 +36,7 @@ def with_selection(
         shorten(error)
         raise
     if selection[-1] > 0.0 and is_a(precision, str) and precision == "single":
-        raise ValueError("min_distance does not go with precision 'single'")
+        raise ValueError("min_distance cannot be combined with precision 'single'")
     return (reach, selection)  # type: ignore[return-value]
 
 
@@ -65,7 +65,7 @@ def _as_selection(chosen: Chosen, n: int, q: int | None) -> Selection:
             chosen.exclude, chosen.query_exclude, "exclude", n, q, may_be_names=named
         )
     elif chosen.query_exclude is not None:
-        raise ValueError("query_exclude goes with labels in exclude, not with pairs of numbers")
+        raise ValueError("query_exclude needs labels in exclude, not pairs of numbers")
     within = _as_within(chosen.exclude_within, labels is not None)
     least = _as_least(chosen.min_distance)
     return groups, asking_groups, labels, asking_labels, None, within, excluded, least
@@ -140,7 +140,7 @@ def _as_within(value: Any, has_labels: bool) -> int:
     if within is None:
         raise TypeError(f"exclude_within must be a whole number, got {kind_of(value)}")
     if not has_labels:
-        raise ValueError("exclude_within goes with labels in exclude, one for each point")
+        raise ValueError("exclude_within needs labels in exclude, one for each point")
     if not 0 <= within < 2**63:
         raise ValueError(f"exclude_within must be from 0 on and below 2**63, got {within}")
     return within

@@ -29,17 +29,17 @@ def as_shells(
         return cutoff, None
     if given is not None and not given.is_nothing:
         raise ValueError(
-            "the letter k in quantities goes with cutoffs alone, not with radii, types or supports"
+            "the letter k in quantities cannot be combined with radii, types or supports"
         )
     if batch is not None:
-        raise ValueError("the letter k in quantities does not go with batch")
+        raise ValueError("the letter k in quantities cannot be combined with batch")
     if is_a(precision, str) and precision != "exact":
         raise ValueError(
-            f"the letter k in quantities goes with precision 'exact', got {shown(precision)}"
+            f"the letter k in quantities needs precision 'exact', got {shown(precision)}"
         )
     if cutoff is None or is_a(cutoff, Mapping):
         raise TypeError(
-            "the letter k in quantities goes with several cutoffs, in an array of numbers, got "
+            "the letter k in quantities needs several cutoffs, in an array of numbers, got "
             f"{type(cutoff).__name__}"
         )
     array = as_real_array(cutoff, "cutoff", "hold numbers", _check_shape)
@@ -52,7 +52,7 @@ def as_shells(
 
 def _check_shape(shape: tuple[int, ...]) -> None:
     if shape == ():
-        raise ValueError("the letter k in quantities goes with several cutoffs, got one")
+        raise ValueError("the letter k in quantities needs several cutoffs, got one")
     if len(shape) != 1 or shape[0] == 0:
         raise ValueError(f"several cutoffs must have shape (k,), with one at least, got {shape}")
 
@@ -61,6 +61,6 @@ def _refuse_several(cutoff: Any) -> None:
     """TypeError for an array of cutoffs, which say nothing without the letter."""
     if is_a(cutoff, (list, tuple)) or (is_a(cutoff, np.ndarray) and cutoff.ndim == 1):
         raise TypeError(
-            "cutoff must be a number; several go with the letter k in quantities, got "
+            "cutoff must be a number; several need the letter k in quantities, got "
             f"{type(cutoff).__name__} of {len(cutoff)}"
         )

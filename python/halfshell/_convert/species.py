@@ -82,7 +82,7 @@ def _kinds(values: Any, name: str, owner: Any, owners: str, n: int) -> _Kinds:
         found = _elements_of(owner, owners)
         if found is None:
             raise TypeError(
-                f"{name} must be given where cutoff is a dict, unless {owners} are an object that "
+                f"{name} must be given if cutoff is a dict, unless {owners} are an object that "
                 "knows its elements, such as ase.Atoms"
             )
         kinds, name = found, f"elements of {owners}"
@@ -177,11 +177,11 @@ def _name(part: Any, where: str, kinds: list[_Kinds]) -> Any:
         if kinds[0].are_names:
             if symbol in _ATOMIC_NUMBERS or any((k.values == symbol).any() for k in kinds):
                 return symbol
-            raise ValueError(f"{where}: {shown(part)} is no element and no type of a point")
+            raise ValueError(f"{where}: {shown(part)} is neither an element nor a type of a point")
         if not kinds[0].are_elements:
             raise ValueError(f"{where} has names, and types are numbers")
         if symbol not in _ATOMIC_NUMBERS:
-            raise ValueError(f"{where}: {shown(part)} is no symbol of an element")
+            raise ValueError(f"{where}: {shown(part)} is not the symbol of an element")
         return _ATOMIC_NUMBERS[symbol]
     number = whole_number(part, "cutoff")
     if number is None or isinstance(number, bool):

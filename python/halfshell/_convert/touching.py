@@ -47,7 +47,7 @@ def pairs_touching(
     quantities, sort, index_bytes, out = wanted
     check_letters(quantities)
     if is_a(search[5], str) and search[5] == "single":
-        raise ValueError("touching does not go with precision 'single'")
+        raise ValueError("touching cannot be combined with precision 'single'")
     numbers = as_touching(touching, len(points))
     if out is not None:  # its types and shapes, before anything is searched for
         _core.pairs(

@@ -119,7 +119,7 @@ def pairs_between(
     ----------
     queries : array_like of float, shape (q, d)
         Coordinates of queries, in the unit of `points` and with as many columns. They may lie
-        anywhere, also far from all points or outside the box. float32 beside float64 is fine:
+        anywhere, even far from all points or outside the box. You may mix float32 and float64:
         each number is used as it is.
     points : array_like of float, shape (n, d)
         Coordinates of the points to find, as in `pairs`. An object such as ``ase.Atoms`` brings
@@ -127,18 +127,18 @@ def pairs_between(
     cutoff, box, periodic, inclusive, index_dtype, out, precision, algorithm, kernel
         As in `pairs`.
     capacity, on_overflow, threads, memory_limit
-        As in `pairs`; behind the last pair i is the number of queries, j that of points.
+        As in `pairs`; in the padding, i is the number of queries and j the number of points.
     radii, query_radii : array_like of float, shape (n,) and (q,), optional
-        A radius for each point and for each query, as in `pairs`. Both, but for rules that go by
-        one of them alone.
+        A radius for each point and for each query, as in `pairs`. Give both, unless `rule` uses
+        only one of them.
     rule : {"sum", "mean", "max", "min", "gather", "scatter"}, optional
-        As in `pairs`, or "gather": within the radius of the query, or "scatter": within that of
-        the point. Then `query_radii` or `radii` are given alone.
+        As in `pairs`; or "gather", within the radius of the query, for which only `query_radii`
+        are given; or "scatter", within the radius of the point, with only `radii`.
     types, query_types : array_like of int or str, shape (n,) and (q,), optional
         Types of points and queries, as in `pairs`; both are numbers, or both are names.
     supports, query_supports : array_like of float, shape (n, d, d) and (q, d, d), optional
-        A support for each point and for each query, as in `pairs`; given as `radii` are, with the
-        rules "max", "min", "gather" and "scatter".
+        A support for each point and for each query, as in `pairs`; one or both, like `radii`, with
+        the rules "max", "min", "gather" and "scatter".
     extent : float, optional
         How far supports reach, as in `pairs`.
     quantities : str, default "ij"
@@ -146,12 +146,12 @@ def pairs_between(
     groups, exclude, exclude_within, min_distance
         As in `pairs`.
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, beside those of the points. Pairs of numbers in `exclude` are
-        of a query and a point.
+        Labels of the queries, in addition to those of the points. Each pair of numbers in
+        `exclude` is a query and a point.
     batch : array_like of int, shape (n,), optional
         Many systems in one call, as in `pairs`: the system of each point, ascending. Neighbours are
-        of the same system, and the result is that of one call for each system, in ascending order,
-        with numbers among all queries and points.
+        in the same system. The result is that of one call for each system, in ascending order, but
+        indices number the queries and points of all systems.
     query_batch : array_like of int, shape (q,), optional
         The system of each query, ascending; with `batch` and `queries`, and only then.
 
@@ -162,19 +162,19 @@ def pairs_between(
         shapes are those of `pairs`: i is the number of a query, j that of a point, and in real
         arithmetic ``D = points[j] - queries[i] + S @ box``. Ascending (i, j, S).
 
-        Nothing is left out: a query that lies on a point is its neighbour at distance 0, also
-        where one array is given for both, and each image of a point within the cutoff is a pair.
+        Nothing is left out: a query that coincides with a point is its neighbour at distance 0,
+        even if you pass one array as both, and each image of a point within the cutoff is a pair.
 
     Raises
     ------
     TypeError, ValueError, CapacityError, OverflowError, MemoryError
-        As `pairs`, which see; ValueError also if `queries` have another number of columns than
-        `points`, or a box that is not theirs.
+        As for `pairs`. ValueError also if `queries` and `points` differ in their number of columns
+        or in their box.
 
     See Also
     --------
-    neighbors : the same as a table, a row for each query.
-    count_pairs : how many there are.
+    neighbors : the same pairs as a table, with a row for each query.
+    count_pairs : the number of these pairs.
 
     Examples
     --------

@@ -39,10 +39,10 @@ def bricks(
         Coordinates, as in `pairs`.
     cutoff : float
         Largest distance of a pair, in the unit of `points`; finite, not negative. It may be larger
-        than a brick, and than the box: then bricks need many other points, which `Bricks.overhead`
-        says beforehand.
+        than a brick, and than the box: bricks then need many other points, as `Bricks.overhead`
+        tells beforehand.
     n : int
-        How many bricks, 1 or more. The numbers of points that they own differ by at most 1; with
+        Number of bricks, 1 or more. The numbers of points that they own differ by at most 1; with
         more bricks than points some own none.
     box, periodic
         As in `pairs`.
@@ -65,10 +65,10 @@ def bricks(
     Notes
     -----
     Points are halved again and again across their longest side [1]_, so that bricks follow the
-    points, clusters too, and not the volume. What a brick needs is found by the range of its
-    points along each box vector, widened by the cutoff and by what rounding may do. Each brick is
-    searched with the whole box and the points as they are given: its decisions and its shifts are
-    those of one search of everything.
+    points, even in clusters, and not the volume. The points that a brick needs are found from the
+    range of its points along each box vector, widened by the cutoff and a bound on rounding. Each
+    brick is searched with the whole box and the points as given: its decisions and shifts are
+    those of a single search of all points.
 
     References
     ----------

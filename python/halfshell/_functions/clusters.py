@@ -47,53 +47,53 @@ def clusters(
     memory_limit: float | None = None,
     **unknown: Never,
 ) -> Clusters:
-    """Find which points hang together: connected components, or the clusters of DBSCAN.
+    """Group points into connected components, or into the clusters of DBSCAN.
 
     Parameters
     ----------
     points, cutoff, radii, rule, types, supports, extent, box, periodic
         As in `pairs`, whose pairs are the edges of the graph.
     min_points : int, default 1
-        Points that must lie within the cutoff of a core point, itself included; images count one
-        by one. Core points that are a pair are in one cluster. Any other point is in the cluster
-        of a core point within its cutoff: the first such cluster, if there are several; or in
-        none. With 1 all points are core points, and clusters are connected components.
+        Number of points that must lie within the cutoff of a core point, itself included; each
+        image counts. Two core points that form a pair are in the same cluster. Any other point is
+        in the cluster of a core point within its cutoff (the first cluster, if there are several),
+        or in none. With 1, all points are core points and clusters are connected components.
     winding : bool, default False
-        Whether to find out along which box vectors each cluster winds.
+        Whether to find the box vectors along which each cluster winds.
     inclusive, precision, algorithm, kernel, threads
-        As in `pairs`. Threads sort the points and count; pairs are joined by one.
+        As in `pairs`. Several threads sort the points and count; one joins the pairs.
     memory_limit : float, optional
-        Bytes that the search may take, with what it notes for each point: 4 bytes, or with
-        `winding` in a periodic box 5 + 4 d.
+        Bytes that the search may take, including its notes for each point: 4 bytes, or 5 + 4 d
+        with `winding` in a periodic box.
 
     Returns
     -------
     Clusters
         `labels` (n,), `sizes` (c,), `core` (n,) and `winding` (c, d) or None. Clusters are
-        numbered by their lowest core points. Nothing depends on kernel, threads or the order in
-        which pairs are found.
+        numbered in the order of their lowest core points. Nothing depends on kernel, threads or
+        the order in which pairs are found.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`; MemoryError only if the search itself would not fit. ValueError if `min_points`
-        is less than 1.
+        As for `pairs`; MemoryError only if the search itself would not fit. ValueError if
+        `min_points` is less than 1.
 
     See Also
     --------
-    coordination : how many points are near each one.
-    for_each_pair : hand each pair to a function.
+    coordination : the number of neighbours of each point.
+    for_each_pair : pass each pair to a function.
 
     Notes
     -----
-    A cluster winds along a box vector if, from some core point of it, a way from core point to
-    core point leads to an image of that point which is shifted along this box vector; it may be
-    shifted along others as well. In a simulation such a cluster percolates. The shifts of pairs
-    are added up along the ways, so that it does not matter whether points are wrapped. [2]_
+    A cluster winds along a box vector if a path of pairs from one of its core points, over other
+    core points, leads to an image of that point shifted along this box vector; it may be
+    shifted along others as well. In a simulation such a cluster percolates. The shifts of the
+    pairs are added along the path, so it does not matter whether points are wrapped. [2]_
 
-    Components are found by disjoint sets with path halving [3]_, while pairs are found; no pair is
-    stored. With `min_points` above 1 the pairs are looked for up to three times: to count, to join
-    and to find clusters for points that are no core points. Labels are those of
+    Components are found with disjoint sets and path halving [3]_ during the search; no pair is
+    stored. With `min_points` above 1 there are up to three searches: to count, to join,
+    and to find clusters for points that are not core points. Labels are those of
     ``sklearn.cluster.DBSCAN(eps=cutoff, min_samples=min_points)``, whose distances are rounded.
 
     References

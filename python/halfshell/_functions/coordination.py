@@ -70,8 +70,8 @@ def coordination(
     types : array_like of int or str, shape (n,), optional
         The type of each point, a number from 0 on or a name, such as ``atoms.symbols`` of ASE.
     by_type : bool, optional
-        Count neighbours of each type by themselves. Default: where `types` are given with one
-        cutoff for all; with a cutoff for each pair of types these only say how far pairs reach.
+        Count the neighbours of each type separately. Default: True if `types` are given with one
+        cutoff for all, False with a cutoff for each pair of types.
     supports, query_supports, extent
         As in `neighbors`.
     box, periodic, inclusive, precision, algorithm, kernel, threads
@@ -79,28 +79,28 @@ def coordination(
     memory_limit : float, optional
         Bytes that the search may take.
     indices : array_like of int, shape (r,), optional
-        Only these points, as in `neighbors`; their neighbours are listed one by one for this.
+        Count only for these points, as in `neighbors`; internally their neighbours are listed.
     groups, exclude, exclude_within, min_distance
         As in `pairs`.
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, beside those of the points. With queries the pairs of
-        numbers in `exclude` are of a query and a point.
+        Labels of the queries, in addition to those of the points. With queries, each pair of
+        numbers in `exclude` is a query and a point.
     batch, query_batch
         As in `neighbors`.
 
     Returns
     -------
     ndarray of int64, shape (n,), (q,) or (r,)
-        Length of each row of the full list; images count one by one. The sum is twice
-        `count_pairs`, or with `queries` just that; but for rules with a direction.
+        Length of each row of the full list; each image counts. The sum is twice
+        `count_pairs`, or equal to it with `queries`, except for rules with a direction.
 
         By type the shape is (n, t), (q, t) or (r, t): column k counts the neighbours of type k, or
-        those with name k of ``np.unique(types)``. A row adds up to what is returned otherwise.
+        those with name k of ``np.unique(types)``. The sum of a row is the count without types.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `neighbors`; MemoryError only if the search itself or the counts would not fit.
+        As for `neighbors`; MemoryError only if the search itself or the counts would not fit.
         ValueError also if `by_type` is set without `types`, or `query_types` are given with one
         cutoff for all.
 
@@ -116,7 +116,7 @@ def coordination(
     >>> hs.coordination([[0.0], [1.0], [3.0]], None, radii=[1.0, 0.5, 1.0], rule="max").tolist()
     [1, 1, 0]
 
-    How many neighbours of each element:
+    The number of neighbours of each element:
 
     >>> names = ["Si", "O", "O"]  # columns: O, Si
     >>> hs.coordination([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]], 2.0, types=names).tolist()

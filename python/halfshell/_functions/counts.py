@@ -116,10 +116,10 @@ def count_pairs(
     points, box, periodic, inclusive, precision, algorithm, kernel, threads
         As in `pairs`.
     cutoff : float, array_like of float, shape (k,) or (t, t), dict or None
-        One cutoff, or several in ascending order, for which there is one search up to the largest
-        (k searches where `precision` is not "exact", or with `radii` or `supports`). With `batch`:
-        one for all systems, or one for each. With `radii` or `supports`, None is no further limit;
-        with `types` a table or a dict, as in `pairs`.
+        One cutoff, or several in ascending order, all counted by one search up to the largest
+        (k searches if `precision` is not "exact", or with `radii` or `supports`). With `batch`,
+        one for all systems, or one for each. With `radii` or `supports`, a further limit, or None;
+        with `types`, a table or a dict, as in `pairs`.
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries: count pairs of a query and a point instead, as `pairs_between`
         finds them.
@@ -132,22 +132,22 @@ def count_pairs(
     groups, exclude, exclude_within, min_distance
         As in `pairs`.
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, beside those of the points. With queries the pairs of
-        numbers in `exclude` are of a query and a point.
+        Labels of the queries, in addition to those of the points. With queries, each pair of
+        numbers in `exclude` is a query and a point.
 
     Returns
     -------
     int or ndarray of int64, shape (k,)
-        The number of pairs of the half list, or of `queries` and `points`, for each cutoff; with
-        `batch`, for each system: those that `box` or `cutoff` is given for, or up to the largest
+        The number of pairs in the half list, or of a query and a point, for each cutoff. With
+        `batch`, for each system: those for which `box` or `cutoff` is given, or up to the largest
         number in `batch`.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs` and `pairs_between`; ValueError also if several cutoffs are not ascending, or
-        for `queries` with `batch`. MemoryError only if the search itself would not fit: no pair
-        is stored.
+        As for `pairs` and `pairs_between`; ValueError also if several cutoffs are not ascending,
+        or if `queries` are given with `batch`. MemoryError only if the search itself would not
+        fit: no pair is stored.
 
     See Also
     --------

@@ -35,12 +35,12 @@ class Explanation:
     Attributes
     ----------
     algorithm : {"all-pairs", "grid", "hash", "hierarchy"}
-        One cell, a grid of cells, or a grid of which only the occupied cells are stored; with
-        radii, types or supports several searches, as a rule, and then cells and images are those
+        One cell, a grid of cells, a grid of which only the occupied cells are stored, or several
+        searches, as usual with radii, types or supports; cells and images are then those
         of the search with the largest reach.
-        The one that was asked for, or what "auto" takes.
+        As given, or as chosen by "auto".
     reason : str
-        Why.
+        Why this algorithm is used.
     n, ndim : int
         Number of points and dimensions.
     shape : tuple of int
@@ -50,18 +50,18 @@ class Explanation:
     cell_sizes : tuple of float
         Their extents, in the unit of the points.
     images : tuple of int
-        How many periods a pair can be apart along each grid axis; 0 where none are needed.
+        How many periods a pair can be apart along each grid axis; 0 if no images are needed.
     expected_pairs : float
-        From the pairs of up to 1024 points. Where these have more than can be counted in some
-        milliseconds, at least what the density says.
+        Estimated from the pairs of up to 1024 points. If these have more than can be counted in a
+        few milliseconds, at least the number that the density suggests.
     expected_bytes : float
-        What these pairs take in the returned arrays.
+        Size of these pairs in the returned arrays.
     kernel : str
         The kernel that is used.
     threads : int
-        How many threads share the search.
+        Number of threads that share the search.
     leaves_out : tuple of str
-        What this scene does not need and does not pay for.
+        Steps that this scene does not need and does not pay for.
     measured : dict
         With ``measure=True``, counts made by the search itself: ``bytes`` by purpose,
         ``bytes_peak``, ``groups``, ``candidates``, ``pairs``, ``ambiguous``, ``by_float64``,
@@ -142,7 +142,7 @@ def explain(
     measure: bool = False,
     **unknown: Never,
 ) -> Explanation:
-    """Say how `pairs` would search a scene, and what it leaves out.
+    """Explain how `pairs` would search a scene, and which steps it leaves out.
 
     Parameters
     ----------
@@ -153,8 +153,8 @@ def explain(
     index_dtype, precision, algorithm, kernel, threads, memory_limit
         As in `pairs`.
     measure : bool, default False
-        Run the search too, and report its own counters: bytes allocated by purpose, candidates
-        tested, and how many decisions each stage took.
+        Also run the search, and report its counters: bytes allocated by purpose, candidates
+        tested, and the number of decisions made by each stage.
 
     Returns
     -------

@@ -58,60 +58,61 @@ def pair_histogram(
     types : array_like of int or str, shape (n,), optional
         The type of each point, a number from 0 on or a name: one histogram for each pair of types.
     query_types : array_like of int or str, shape (q,), optional
-        The types of the queries: given if both `types` and `queries` are.
+        The types of the queries; needed with both `types` and `queries`.
     weights : array_like of float, shape (n,), optional
         Add up the product of the weights of both points instead of counting; finite.
     query_weights : array_like of float, shape (q,), optional
-        The weights of the queries. Where only one set has weights, those of the other are 1.
+        The weights of the queries. If only one set has weights, those of the other are 1.
     memory_limit : float, optional
         Bytes that the search and the counts of each thread may take.
     groups, exclude, exclude_within
         As in `pairs`.
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, beside those of the points. With queries the pairs of
-        numbers in `exclude` are of a query and a point.
+        Labels of the queries, in addition to those of the points. With queries, each pair of
+        numbers in `exclude` is a query and a point.
     batch : array_like of int, shape (n,), optional
-        Many systems in one call, as in `pairs`: the system of each point, ascending. Pairs are of
-        one system, and the result has an axis for the systems before all others: those that `box`
-        is given for, or up to the largest number.
+        Many systems in one call, as in `pairs`: the system of each point, ascending. Only points
+        of the same system pair. The first axis of the result is then the system: those for which
+        `box` is given, or up to the largest number.
     query_batch : array_like of int, shape (q,), optional
         The system of each query, ascending; with `batch` and `queries`, and only then.
 
     Returns
     -------
     ndarray of int64, or with weights float64
-        Shape (bins,), or (t, t, bins) with types, t being one more than the largest of them. Types
-        that are names have an entry each, in ascending order, that of ``np.unique``.
+        Shape (bins,), or (t, t, bins) with types, where t is one more than the largest type. If
+        types are names, each has an entry, in the ascending order of ``np.unique``.
 
-        Bins are half-open and the last one is closed, as in ``numpy.histogram``: bin k counts
-        ``edges[k] <= d < edges[k + 1]``, each pair decided exactly for the real numbers that all
-        inputs are. A bin between two equal edges is empty, unless it is the last one.
+        Bins are half-open except the last, which is closed, as in ``numpy.histogram``: bin k counts
+        ``edges[k] <= d < edges[k + 1]``, with each pair decided exactly for the real values of all
+        inputs. A bin between two equal edges is empty, unless it is the last one.
 
         Without queries each pair counts once (half list). Entry [a, b] then counts the pairs of a
-        point of type a with one of type b, whichever comes first: [b, a] is the same, so the
-        pairs of all types are the sum over ``a <= b``. With queries [a, b] counts queries of type
+        point of type a with one of type b, whichever comes first: [b, a] is the same, and the
+        number of all pairs is the sum over ``a <= b``. With queries [a, b] counts queries of type
         a with points of type b.
 
-        Weighted sums are exact until they are rounded once: they are the float64 nearest to the
-        real sum of the real products.
+        Weighted sums are exact and rounded once: they are the float64 nearest to the real sum of
+        the real products.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs` and `pairs_between`; ValueError also if edges are fewer than two, negative, not
-        finite or not ascending, if a type is negative, a weight not finite, or their number is
-        not that of the points, and for types of one set only or marks of queries without queries.
+        As for `pairs` and `pairs_between`; ValueError also if there are fewer than two edges, or
+        edges are negative, not finite or not ascending; if a type is negative or a weight not
+        finite, or there is not one for each point; if only one set has types; or if the types,
+        weights or labels of queries are given without queries.
 
     See Also
     --------
     count_pairs : cumulative counts.
-    rdf : the histogram over that of an ideal gas.
+    rdf : the histogram divided by that of an ideal gas.
 
     Notes
     -----
     Bins are found from float32 squares with a proven error bound; only pairs too close to an edge
-    to tell are decided again, by the stages of `pairs`. So neither the kernel nor the number of
-    threads changes the result. Memory: the bins, for each thread.
+    to tell are decided again, as in `pairs`. So neither the kernel nor the number of threads
+    changes the result. The memory needed is that of the bins, once for each thread.
 
     Examples
     --------

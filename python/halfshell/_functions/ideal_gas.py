@@ -58,7 +58,7 @@ def shell_shares(
     """
     if vectors is None or bits != (1 << len(vectors)) - 1:
         raise ValueError(
-            "rdf needs a box that repeats along every axis, for the density of the points; "
+            "rdf needs a box that is periodic along every axis, for the density of the points; "
             "pair_histogram counts without one"
         )
     power = -int(np.frexp(np.abs(vectors).max())[1])

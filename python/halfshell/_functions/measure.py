@@ -72,19 +72,19 @@ def measure(
     memory_limit: float | None = None,
     **unknown: Never,
 ) -> Arrays:
-    """Measure given pairs, in the nearest image or in a given one; always exact.
+    """Measure given pairs, in the nearest image or in given images; always exact.
 
     Parameters
     ----------
     points, box, periodic, kernel, threads
         As in `pairs`.
     i, j : array_like of int, shape (m,)
-        Numbers of the points of each pair, in any order, as often as wanted; they may be equal.
+        Point numbers of each pair, in any order; pairs may repeat, and i may equal j.
     S : array_like of int, shape (m, d), optional
-        The image of j that is meant, 0 along axes that do not repeat. Default: the one nearest to
-        i; of several that are equally near, the one with the lexicographically least S. Both are
-        decided for the real numbers that the inputs are. The nearest image of a point to itself is
-        the point, S = 0.
+        The image of j, 0 along axes that are not periodic. Default: the image nearest to
+        i; of several equally near, the one with the lexicographically least S. This is decided
+        exactly for the real values of the inputs. The nearest image of a point to itself is the
+        point, S = 0.
     quantities : str, default "dDS"
         Any of the letters ``d D S``, each at most once: distance, vector, shift. Only these are
         computed.
@@ -103,14 +103,14 @@ def measure(
     Raises
     ------
     TypeError
-        If `i`, `j` or `S` does not hold whole numbers, or an argument of another wrong kind.
+        If `i`, `j` or `S` does not hold whole numbers, or another argument is of the wrong kind.
     ValueError
         If `i`, `j` and `S` do not fit each other or the points, `S` is not 0 along an axis that
-        does not repeat, a letter is none of ``d D S``, or the scene is refused by `pairs`; or if
-        the box is so skewed, or so long and thin without being aligned with the coordinate axes,
-        that float64 does not tell which images are near.
+        is not periodic, a letter is not one of ``d D S``, or `pairs` would refuse the points or
+        box; or if the box is so skewed, or so long and thin without being aligned with the
+        coordinate axes, that float64 cannot tell which images are near.
     OverflowError
-        If a point is more than 2**51 box vectors away and `S` is not given, an S that is asked for
+        If a point is more than 2**51 box vectors away and `S` is not given, an S to return
         does not fit int32, or a vector does not fit float64.
     MemoryError
         If the result would not fit `memory_limit`.
@@ -122,10 +122,11 @@ def measure(
 
     Notes
     -----
-    For edges that stay, such as bonds, and for lists that other programs made. For pairs that
-    `pairs` found, with their S, d and D are those that it returns. The nearest image is found in a
-    short basis of the box: along coordinate axes each axis by itself, else among all images within
-    the distance of one that is near; those that rounding cannot tell apart are compared exactly.
+    Use it for fixed edges, such as bonds, and for lists from other programs. For pairs found by
+    `pairs`, with their S, d and D are the same as there. The nearest image is found in a
+    short basis of the box: axis by axis if it is aligned with the coordinate axes, otherwise among
+    all images within the distance of a near one. Images that rounding cannot tell apart are
+    compared exactly.
 
     Examples
     --------

@@ -77,23 +77,23 @@ def nearest(
     points, box, periodic, index_dtype, kernel, threads
         As in `pairs`.
     k : int
-        How many; 1 or more. In a periodic box each image of a point counts for itself, so that k
-        may be larger than n.
+        Number of neighbours, 1 or more. In a periodic box each image of a point counts separately,
+        so k may be larger than n.
     queries : array_like of float, shape (q, d), optional
-        Coordinates of queries, in the unit of `points`; they may lie anywhere, also outside the
-        box. A query on a point has it as a neighbour at distance 0. Default: the points, each
-        left out of its own row where S = 0; its images are not.
+        Coordinates of queries, in the unit of `points`; they may lie anywhere, even outside the
+        box. A query that coincides with a point has it as a neighbour at distance 0. Default: the
+        points themselves; a point is left out of its own row, but its images are not.
     max_distance : float, default infinity
-        Largest distance that counts, this one included; not negative.
+        Largest distance of a neighbour, inclusive; not negative.
     quantities : str, default "jd"
-        Any of the letters ``j d D S``, each at most once: number of the point, distance, vector,
+        Any of the letters ``j d D S``, each at most once: index of the point, distance, vector,
         shift. Only these are computed.
     memory_limit : float, optional
         Bytes that search and result may take. Default: what the machine and its control group
         have available.
     batch : array_like of int, shape (n,), optional
-        Many systems in one call, as in `pairs`: the system of each point, ascending. The nearest
-        are of the same system, with numbers among all points; `max_distance` may have shape (s,).
+        Many systems in one call, as in `pairs`: the system of each point, ascending. Neighbours
+        are in the same system; j numbers the points of all. `max_distance` may have shape (s,).
     query_batch : array_like of int, shape (q,), optional
         The system of each query, ascending; with `batch` and `queries`, and only then.
 
@@ -105,24 +105,23 @@ def nearest(
         (q, k); ``D`` float64 (q, k, d); ``S`` int32 (q, k, d). In real arithmetic
         ``D = points[j] - queries[i] + S @ box``.
 
-        Rows ascend by the exact distance of the real numbers that the inputs are, and at equal
-        distances by (j, S). Where fewer than k points are there, or within `max_distance`, the
+        Rows ascend by exact distance, and at equal distances by (j, S). If there are fewer than k
+        points, or fewer within `max_distance`, the
         rest of the row is j = -1, d = infinity, D = NaN and S = 0. d is within 1 ulp, ascends along
         the row and is never above `max_distance`; each component of D is within 1 ulp of d.
 
     Raises
     ------
     TypeError
-        If `k` is not an integer, or an argument of another wrong kind, as in `pairs`.
+        If `k` is not an integer, or another argument is of the wrong kind, as for `pairs`.
     ValueError
-        If `k` is less than 1, `max_distance` is negative or NaN, `queries` are not of the dimension
-        of the points, or a letter is none of ``j d D S``; otherwise as `pairs`.
+        If `k` is less than 1, `max_distance` is negative or NaN, `queries` do not have the
+        dimension of the points, or a letter is not one of ``j d D S``; otherwise as for `pairs`.
     OverflowError
-        As `pairs`.
+        As for `pairs`.
     MemoryError
-        If the result would not fit `memory_limit`; or if a query is so far away from points that
-        repeat, well beyond 10**8 periods, that more of their images are about as near than memory
-        holds.
+        If the result would not fit `memory_limit`; or if a query is so far from periodic points,
+        well beyond 10**8 periods, that the images at nearly equal distances do not fit in memory.
 
     See Also
     --------
@@ -131,13 +130,13 @@ def nearest(
     Notes
     -----
     Points are sorted into cells that each hold a few of them, whatever their density. A group of
-    neighbouring queries looks at the cells within a radius guessed from the local density;
-    float32 with a proven error bound sorts out what is far, float64 puts the rest in order, and
-    what is too close to tell is compared in double-word arithmetic and at last in integers. A
+    neighbouring queries looks at the cells within a radius guessed from the local density.
+    float32 with a proven error bound discards distant points, float64 sorts the rest, and
+    distances too close to tell apart are compared in double-word arithmetic, then in integers. A
     query that found too few is searched again with a radius that surely suffices. So the time
-    follows n and k, also where points crowd in clusters.
+    depends on n and k, even for strongly clustered points.
 
-    If you come from SciPy: missing neighbours have j = -1 here, not n, and each point's own row
+    If you come from SciPy: missing neighbours have j = -1 here, not n, and the row of a point
     does not begin with the point itself.
 
     Examples
@@ -149,7 +148,7 @@ def nearest(
     >>> j.tolist(), d.tolist()
     ([[1, 2], [0, 2], [1, 0]], [[1.0, 3.0], [1.0, 2.0], [2.0, 3.0]])
 
-    Rows that lack neighbours, masked:
+    Rows with missing neighbours, masked:
 
     >>> j, d = hs.nearest(points, 2, max_distance=1.5)
     >>> j.tolist()

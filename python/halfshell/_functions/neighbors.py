@@ -74,7 +74,7 @@ def neighbors(
         Coordinates, as in `pairs`; an object such as ``ase.Atoms`` brings its own box.
     cutoff : float, array_like of float, shape (t, t), dict or None
         Largest distance of a neighbour, in the unit of `points`; finite, not negative. With `radii`
-        or `supports` a further limit, or None; with `types` one for each pair of types, as in
+        or `supports`, a further limit, or None; with `types`, one for each pair of types, as in
         `pairs`.
     queries : array_like of float, shape (q, d), optional
         Coordinates of queries, in the unit of `points`; they may lie anywhere. The table then has
@@ -83,10 +83,10 @@ def neighbors(
     radii : array_like of float, shape (n,), optional
         A radius for each point, as in `pairs`.
     query_radii : array_like of float, shape (q,), optional
-        A radius for each query, beside `radii`; alone if the rule is "gather".
+        A radius for each query, in addition to `radii`; for "gather", without `radii`.
     rule : {"sum", "mean", "max", "min", "gather", "scatter"}, optional
-        As in `pairs`, or with a direction: "gather", row i holds all within the radius of i, or
-        "scatter", those within whose radius i is.
+        As in `pairs`, or with a direction: with "gather", row i holds the points within the radius
+        of i; with "scatter", the points whose radius reaches i.
     types, query_types : array_like of int or str, shape (n,) and (q,), optional
         As in `pairs_between`.
     supports, query_supports : array_like of float, shape (n, d, d) and (q, d, d), optional
@@ -99,18 +99,18 @@ def neighbors(
     box, periodic, inclusive, index_dtype, precision, algorithm, kernel, threads, memory_limit
         As in `pairs`.
     indices : array_like of int, shape (r,), optional
-        Only the rows of these points, in this order: row k is that of point ``indices[k]``, as the
-        whole table has it, found at a cost after their number. Not beside `queries` or precision
-        "single".
+        Return only the rows of these points, in this order: row k belongs to point ``indices[k]``
+        and is the same as in the whole table. The cost depends on their number. Not with `queries`
+        or precision "single".
     groups, exclude, exclude_within, min_distance
         As in `pairs`.
     query_groups, query_exclude : array_like of int or str, shape (q,), optional
-        Labels of the queries, beside those of the points. With queries the pairs of
-        numbers in `exclude` are of a query and a point.
+        Labels of the queries, in addition to those of the points. With queries, each pair of
+        numbers in `exclude` is a query and a point.
     batch : array_like of int, shape (n,), optional
         Many systems in one call, as in `pairs`: the system of each point, ascending. Neighbours are
-        of the same system, and the result is that of one call for each system, in ascending order,
-        with numbers among all points. Not with `indices`.
+        in the same system. The result is that of one call for each system, in ascending order, but
+        indices number the points of all systems. Not with `indices`.
     query_batch : array_like of int, shape (q,), optional
         The system of each query, ascending; with `batch` and `queries`, and only then.
 
@@ -118,17 +118,17 @@ def neighbors(
     -------
     NeighborTable
         Row i holds the neighbours j of point i, ascending by (j, S), with
-        ``D = points[j] - points[i] + S @ box`` in real arithmetic. This is the full list: with
-        (i, j, S) there is (j, i, -S), with the same d and the opposite D. Without `queries` a
-        point is no neighbour of itself, though its images within the cutoff are; with them
-        nothing is left out. With the rules "gather" and "scatter" there may be (i, j, S) without
-        (j, i, -S); ``reverse()`` and ``to_pairs(half=True)`` of such a table are refused.
+        ``D = points[j] - points[i] + S @ box`` in real arithmetic. This is a full list: it has
+        both (i, j, S) and (j, i, -S), with the same d and the opposite D. Without `queries` a
+        point is not a neighbour of itself, but its images within the cutoff are. With queries
+        nothing is left out. With the rules "gather" and "scatter" (i, j, S) may occur without
+        (j, i, -S), and ``reverse()`` and ``to_pairs(half=True)`` of the table raise an error.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`, which see; ValueError also if `queries` have another number of columns than
-        `points`, or a box that is not theirs, or without the radii or types that they need.
+        As for `pairs`. ValueError also if `queries` and `points` differ in their number of columns
+        or in their box, or if the queries lack the radii or types that they need.
 
     See Also
     --------
@@ -138,8 +138,8 @@ def neighbors(
 
     Notes
     -----
-    The scene is searched twice, once to count and once to write each row to its place, so that
-    nothing is held beside the result. The number of threads changes nothing in the table.
+    The points are searched twice, once to count and once to write each row in place, so that
+    nothing is stored besides the result. The table is the same for any number of threads.
 
     Examples
     --------
@@ -159,12 +159,12 @@ def neighbors(
     >>> [row.tolist() for row in hs.neighbors(points, 1.5, queries=[[2.0, 0.0], [9.0, 9.0]])]
     [[1, 2], []]
 
-    Rows of some of the points, which are no neighbours of themselves:
+    Rows of some of the points, which are not neighbours of themselves:
 
     >>> [row.tolist() for row in hs.neighbors(points, 2.0, indices=[2, 1])]
     [[1], [0, 2]]
 
-    Each point looks as far as its own radius:
+    The neighbours of each point within its own radius:
 
     >>> [row.tolist() for row in hs.neighbors(points, None, radii=[0.5, 1.5, 3.0], rule="gather")]
     [[], [0], [0, 1]]
@@ -240,7 +240,7 @@ def rows_alone(
     reach: Reach | None,
     algorithm: str,
 ) -> NeighborTable:
-    """The table of some points; sorting it exactly asks for what the search had found."""
+    """The table of some points; sorting it exactly needs what the search found."""
     from halfshell._convert.own_rows import check_alone, rows_of_points  # here: others do without
     from halfshell._convert.touching import asked_by
 

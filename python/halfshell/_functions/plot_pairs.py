@@ -48,17 +48,17 @@ def plot_pairs(
     S : array_like of int, shape (m, d), optional
         The shift of each pair. Default: that of the nearest image, as `measure` finds it.
     types : array_like of int or str, shape (n,), optional
-        A colour, and an entry of the legend, for each.
+        The type of each point; each type has a colour and an entry in the legend.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; for points in three dimensions with ``projection="3d"``. Default: axes of a
-        new figure.
+        Axes to draw on; for points in three dimensions with ``projection="3d"``. Default: axes of
+        a new figure.
     unit : str, optional
         The unit of the points, for the labels of the axes: "Å".
 
     Returns
     -------
     matplotlib.axes.Axes
-        What has been drawn on.
+        The axes drawn on.
 
     Raises
     ------
@@ -70,8 +70,8 @@ def plot_pairs(
 
     Notes
     -----
-    Points are drawn where they are given. A line goes from point i to the image of j that it is
-    paired with: those to an image (S is not 0) are dotted, and end where no point is drawn.
+    Points are drawn where they are. A line goes from point i to the image of j that belongs to the
+    pair. Lines to an image with S other than 0 are dotted, and end where no point is drawn.
 
     Examples
     --------

@@ -66,29 +66,29 @@ def rdf(
     points, kernel, threads, memory_limit
         As in `pair_histogram`.
     r_max : float
-        The largest distance, in the unit of `points`; finite, greater than 0. It may pass half
-        the box, and the box: all images are counted.
+        The largest distance, in the unit of `points`; finite, greater than 0. It may exceed half
+        the box, and the whole box: all images are counted.
     bins : int, default 100
         Bins of equal width from 0 to `r_max`.
     queries : array_like of float, shape (q, d), optional
-        g(r) of the points around these instead. A query that lies on a point finds it at distance
-        0, in the first bin.
+        Compute g(r) of the points around these instead. A query that coincides with a point finds
+        it at distance 0, in the first bin.
     types : array_like of int or str, shape (n,), optional
-        The type of each point, a number from 0 on or a name, such as ``atoms.symbols`` of ASE: g(r)
-        for each pair of types. Names count in ascending order.
+        The type of each point, a number from 0 on or a name, such as ``atoms.symbols`` in ASE, to
+        compute g(r) for each pair of types. Names are in ascending order.
     query_types : array_like of int or str, shape (q,), optional
-        The types of the queries: given if both `types` and `queries` are. [a, b] is then g(r) of
+        The types of the queries; needed with both `types` and `queries`. [a, b] is then g(r) of
         points of type b around queries of type a.
     box : float, array_like of float, shape (d,) or (d, d), or Box
-        As in `pairs`. It must repeat along every axis, for a density is needed.
+        As in `pairs`. It must be periodic along every axis, as g(r) needs a density.
     periodic : bool or sequence of bool, shape (d,), optional
         As in `pairs`; all True, which is the default.
     groups, query_groups, exclude, query_exclude, exclude_within
-        Which pairs count, as in `pair_histogram`: with molecules in `exclude` g(r) is that between
-        molecules, with `groups` that within them. It is over the same ideal gas, of all pairs.
+        Which pairs count, as in `pair_histogram`: with molecules as `exclude`, g(r) is between
+        molecules; as `groups`, within them. Both are relative to the same ideal gas, of all pairs.
     batch : array_like of int, shape (n,), optional
-        Many systems in one call, as in `pair_histogram`; each that has points counts as a frame,
-        and the result is that of all of them.
+        Many systems in one call, as in `pair_histogram`; each system with points counts as a
+        frame, and the result is their average.
     query_batch : array_like of int, shape (q,), optional
         The system of each query, ascending; with `batch` and `queries`, and only then.
 
@@ -96,30 +96,30 @@ def rdf(
     -------
     RadialDistribution
         An object with ``r``, ``g``, ``counts``, ``edges``, the coordination numbers ``n_r``,
-        ``types`` and ``plot()``. Results of several frames add up: ``sum(rdf(x, 5.0, box=box) for x
-        in frames)``.
+        ``types`` and ``plot()``. To average over frames, add their results:
+        ``sum(rdf(x, 5.0, box=box) for x in frames)``.
 
-        g is the mean number of neighbours in a shell over what the density of all points, n / V,
-        would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two different types it
-        is ``counts / (n_a * n_b / V * shell)``, for queries ``counts / (q * n / V * shell)``, with
-        types ``counts / (q_a * n_b / V * shell)``. Without counts it is 0, also where n_a or n_b
-        is 0. A shell is the length, area, volume, ... between
-        two spheres, in any number of dimensions.
+        g is the mean number of neighbours in a shell divided by the number that the density n / V
+        of all points would put there: ``2 counts / (n * n / V * shell)``. For [a, b] with two
+        different types it is ``counts / (n_a * n_b / V * shell)``, for queries
+        ``counts / (q * n / V * shell)``, with types ``counts / (q_a * n_b / V * shell)``. It is 0
+        where counts are 0, even if n_a or n_b is 0. A shell is the length, area, volume, ...
+        between two spheres, in any number of dimensions.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pair_histogram`; ValueError also if there is no box or an axis does not repeat, or if
+        As for `pair_histogram`; ValueError also without a box, if an axis is not periodic, or if
         `r_max` or `bins` is not positive.
 
     See Also
     --------
-    pair_histogram : counts only, in bins of any width, in any box and in none.
+    pair_histogram : counts only, in bins of any width, in any box or in open space.
 
     Notes
     -----
-    n points at random have n (n - 1) / 2 pairs in their box, not n**2 / 2, so below half the box
-    their g is (n - 1) / n on average; with all images up to large r it tends to 1.
+    n random points have n (n - 1) / 2 pairs in their box, not n**2 / 2, so below half the box
+    their g is (n - 1) / n on average; for large r, where all images count, it tends to 1.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def rdf(
     >>> int(result.counts.sum()) == hs.count_pairs(points, 0.4, box=[1.0, 1.0, 1.0])
     True
 
-    By the names of the types, over ten frames:
+    By type name, averaged over ten frames:
 
     >>> names = np.where(np.arange(2000) < 500, "Si", "O")
     >>> frames = np.random.default_rng(1).random((10, 2000, 3))

@@ -24,9 +24,9 @@ def report(
     size: str = "quick",
     patience: float | None = None,
 ) -> list[ReportRow]:
-    """Measure error against run time: this library and others, on scenes that are hard.
+    """Measure error against run time, of this library and others, on hard scenes.
 
-    The truth that every list is held against calls nothing of this library's compiled core:
+    Every list is compared with a truth that does not use this library's compiled core:
     SciPy's k-d tree over explicit images with a proven margin, and integers inside the margin.
 
     Parameters
@@ -39,10 +39,10 @@ def report(
         rounded to float32 first), "verlet" and "stale" (on scenes that move: a `VerletList`,
         and lists that are rebuilt by the clock, too late on purpose). Default: all.
     peers : sequence of str, "all" or "none", default "none"
-        Other libraries to run beside ours, each in a process of its own: any of "vesin",
+        Other libraries to compare with, each in a separate process: any of "vesin",
         "cKDTree", "neighborlist-rs", "matscipy-neighbours", "matscipy", "MDAnalysis", "freud",
-        "pymatgen", "ase", "NumPy" (all pairs in float64, where points have supports). None is
-        "all". One that is not installed gets rows that say so.
+        "pymatgen", "ase", "NumPy" (all pairs in float64, if points have supports). None is
+        "all". For a library that is not installed, the rows say so.
     size : {"quick", "full", "small"}, default "quick"
         Size of the scenes, as in `halfshell.scenes.load`, and care in timing.
     patience : float, optional
@@ -53,10 +53,10 @@ def report(
     -------
     list of ReportRow
         One for each method on each scene, in this order. A row is a frozen dataclass: what
-        was asked (``scene``, ``method``, ...), ``status`` ("ok", or why there are no figures),
+        was measured (``scene``, ``method``, ...), ``status`` ("ok", or why there are no figures),
         ``seconds``, ``missed``, ``spurious``, ``duplicate``, errors of d and D in units in the
         last place (ulp) and relative, errors of Lennard-Jones energy and forces, energy drift.
-        Its docstring tells all fields; what was not measured is None.
+        Its docstring lists all fields; what was not measured is None.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def report(
         If a name is not known, or `patience` is not positive, or HALFSHELL_KERNEL names no kernel
         of this CPU.
     TypeError
-        If names are no sequence of strings, or `patience` is no number.
+        If names are not a sequence of strings, or `patience` is not a number.
     ImportError
         If SciPy is not installed.
 

@@ -87,57 +87,57 @@ def iter_pairs(
     Parameters
     ----------
     points, cutoff, radii, rule, types, supports, extent, box, periodic
-        As in `pairs`. They are checked and copied when `iter_pairs` is called: what happens to
-        them afterwards changes nothing.
+        As in `pairs`. They are checked and copied when `iter_pairs` is called; later changes to
+        them have no effect.
     quantities, inclusive, index_dtype, precision, algorithm, kernel
         As in `pairs`.
     max_pairs : int, default 2**20
-        Pairs in each block but the last, which has what is left; at least 1. Blocks of fewer than
-        65 536 pairs are cut from larger ones.
+        Number of pairs in each block except the last, which may have fewer; at least 1. Blocks of
+        fewer than 65 536 pairs are cut from larger ones.
     threads : int, optional
-        As in `pairs`. Threads work while a block is being made and end before it is returned.
+        As in `pairs`. Threads run while a block is being made and end before it is returned.
     memory_limit : float, optional
-        Bytes that the search and what it holds ready may take, not counting blocks that were
+        Bytes that the search and its buffers may take, not counting blocks already
         returned. Default: what the machine and its control group have available.
     progress : callable, optional
-        Called now and then, at least once for each time that pairs are looked for, as
-        ``progress(fraction)``: the part of the points that has been dealt with, from 0 to 1. It
+        Called now and then, at least once each time the iterator searches for more pairs, as
+        ``progress(fraction)``, with the fraction of the points that are done, from 0 to 1. It
         never falls, for any number of threads, and is 1 once all pairs have been found; without
-        points it is not called. An exception ends the call, and the iterator can go on.
+        points it is not called. An exception ends the call; the iterator can continue afterwards.
     groups, exclude, exclude_within, min_distance
         As in `pairs`.
 
     Returns
     -------
     iterator of ndarray or tuple of ndarray
-        Each block is what `pairs` returns, new arrays that are the caller's. One after the other
-        they are the result of `pairs` with ``sort=False``, in the same order, for any `max_pairs`
-        and any number of threads. Without pairs there is no block. ``close()`` gives back all
-        memory early; so does forgetting the iterator.
+        Each block is what `pairs` returns, in new arrays. Concatenated, the blocks are the result
+        of `pairs` with ``sort=False``, in the same order, for any `max_pairs`
+        and any number of threads. Without pairs there is no block. ``close()``, or deleting the
+        iterator, releases all memory early.
 
     Raises
     ------
     TypeError, ValueError, OverflowError
-        As `pairs`, by the call itself; also TypeError or ValueError if `max_pairs` is no whole
-        number from 1 on or `progress` cannot be called. OverflowError for a shift that does not
-        fit int32 comes with the block it would be in. ValueError if two threads ask one iterator
-        at a time, or `progress` asks it.
+        As for `pairs`, by the call itself; also TypeError or ValueError if `max_pairs` is not a
+        whole number from 1 on or `progress` cannot be called. OverflowError for a shift that does
+        not fit int32 is raised at its block. ValueError if two threads, or `progress`, advance the
+        iterator while it is running.
     MemoryError
         If the search, or a block, would not fit `memory_limit`.
 
     See Also
     --------
     pairs : all pairs at once.
-    for_each_pair : hand each pair to a compiled function.
+    for_each_pair : pass each pair to a compiled function.
 
     Notes
     -----
-    The iterator holds the points in cells, one block, and what was found beyond it: at most about
-    256 kB for each thread and the pairs of 64 points with 4096 candidates. A block that was
-    returned belongs to the caller; drop it before asking for the next one where memory is tight.
+    The iterator holds the points in cells, one block, and pairs found beyond it: at most about
+    256 kB for each thread and the pairs of 64 points with 4096 candidates. A returned block
+    belongs to the caller; if memory is tight, delete it before you take the next one.
 
-    Ctrl-C works between blocks and within them, in at most some milliseconds; the iterator can be
-    asked again afterwards and goes on where it was.
+    Ctrl-C works between and within blocks, and takes a few milliseconds at most; the iterator
+    then continues where it was.
 
     Examples
     --------
@@ -201,43 +201,43 @@ def for_each_pair(
     inclusive, precision, algorithm, kernel
         As in `pairs`.
     callback : scipy.LowLevelCallable, numba cfunc, ctypes or cffi function pointer, or callable
-        What to call. A compiled function has the C signature ::
+        The function to call. A compiled function has the C signature ::
 
             int f(int64_t i, int64_t j, const int32_t *S, const double *D, double d2, void *user)
 
-        where ``S`` and ``D`` have d entries and are valid during the call only, and anything but
-        0 ends the search. It is called without Python's lock; it must return, and may itself
-        search. Its types are checked as far as `callback` tells them. Any other callable is
+        where ``S`` and ``D`` have d entries and are valid during the call only. Any return value
+        but 0 ends the search. The function runs without the GIL; it must return, and may itself
+        search. Its types are checked as far as `callback` reveals them. Any other callable is
         called as ``callback(i, j, S, D, d2)`` with ints, a tuple of d ints, a tuple of d floats
         and a float; a true result ends the search, an exception ends it and is raised here.
     user_data : optional
         The pointer ``user``: a ctypes or cffi pointer, an address as int, or an array or another
-        contiguous buffer, whose memory is passed as it is. None: NULL, or what a
-        `LowLevelCallable` brings. Not for Python callables.
+        contiguous buffer, whose memory is passed directly. None: NULL, or the pointer of a
+        `LowLevelCallable`. Not for Python callables.
     threads : int, optional
         As in `pairs`. Without `thread_safe` they only sort the points.
     memory_limit : float, optional
         Bytes that the search may take.
     thread_safe : bool, default False
-        Declares that several threads may call the function at once. Then the order of the pairs
-        is unspecified, and what it writes to must be atomic or guarded.
+        Whether several threads may call the function at once. Then the order of the pairs
+        is unspecified, and its writes to shared memory must be atomic or locked.
     groups, exclude, exclude_within, min_distance
         As in `pairs`.
 
     Returns
     -------
     int
-        The number of pairs that the function was called for, the one that ended the search
-        included.
+        The number of pairs for which the function was called, including the one that ended the
+        search.
 
     Raises
     ------
     TypeError
         If `callback` is none of these or has another signature, which the message shows;
-        otherwise as `pairs`.
+        otherwise as for `pairs`.
     ValueError, OverflowError
-        As `pairs`; OverflowError also if a shift does not fit int32. ValueError if a pointer is
-        NULL.
+        As for `pairs`; OverflowError also if a shift does not fit int32. ValueError if a pointer
+        is NULL.
     MemoryError
         If the search itself would not fit.
     Exception
@@ -251,15 +251,15 @@ def for_each_pair(
 
     Notes
     -----
-    Each pair comes once, with ``i < j`` or the orientation that `pairs` says, in the order of
-    `pairs` with ``sort=False``. S is zero where the box does not repeat. D is that of `pairs`,
+    Each pair comes once, with ``i < j`` or oriented as in `pairs`, in the order of
+    `pairs` with ``sort=False``. S is zero along axes that are not periodic. D is that of `pairs`,
     and ``d2`` is ``d * d``, rounded once, of its d: sqrt(d2) gives d back, unless d * d overflows
-    or is subnormal. With `inclusive` d2 <= cutoff * cutoff as float64 rounds it, and so with
-    radii of their reach.
+    or is subnormal. With `inclusive`, d2 <= cutoff * cutoff as float64 rounds it; with radii, the
+    same holds for the cutoff of each pair.
 
     The function runs with round-to-nearest and without flushing of subnormal numbers. Ctrl-C is
-    looked for between calls, once for some ten thousand pairs. When a function ends the search on
-    threads, the others may still visit pairs of a few hundred points each.
+    checked between calls, about once in ten thousand pairs. If the function ends the search in
+    one thread, the others may still visit pairs of a few hundred points each.
 
     Examples
     --------

@@ -80,52 +80,52 @@ def trajectory_pairs(
         The frames, each of them points as in `pairs`, or a tuple of two, (points, box), or an
         object that brings its box: ``ase.Atoms``, a ``Timestep`` of MDAnalysis, an
         ``mdtraj.Trajectory`` of one frame. An array of shape (f, n, d) has f frames, and so do
-        ``universe.trajectory`` and an ``mdtraj.Trajectory``. A generator is asked for one frame at
+        ``universe.trajectory`` and an ``mdtraj.Trajectory``. A generator is read one frame at
         a time. Frames may differ in their number of points and in their box.
     cutoff : float
         Largest distance of a pair, in the unit of the points; finite, not negative.
     skin : float, "auto" or None, default "auto"
-        As in `VerletList`, which keeps a list from frame to frame; "auto" does so where that is
-        quicker, and arrays of fewer than 1000 points are searched. None: each frame is searched by
-        itself, for frames that have little to do with each other.
+        As in `VerletList`, which keeps a list from frame to frame; "auto" does so if that is
+        faster, and always searches fewer than 1000 points. None: each frame is searched
+        separately, for frames that have little in common.
     box, periodic : optional
-        As in `pairs`, for all frames that bring none: a frame (points, None) has this box too.
-        `periodic` holds for the boxes of frames as well, but for objects that have their own.
+        As in `pairs`, for all frames without a box, including a frame (points, None).
+        `periodic` also holds for the boxes of frames, except objects with their own.
     quantities, inclusive, sort, index_dtype, kernel, memory_limit
         As in `pairs`, for each frame.
     threads : int, optional
-        As in `pairs`, for each frame. With ``skin=None`` and a number above 1, so many frames of
-        1000 points or more are searched at a time, by one thread each: then as many are read ahead,
+        As in `pairs`, for each frame. With ``skin=None`` and a number above 1, this many frames of
+        1000 points or more are searched at a time, by one thread each; as many are then read ahead
         and copied.
     progress : callable, optional
-        Called once for each frame, as ``progress(fraction)``, before its pairs are handed out: the
-        part of the frames that has been dealt with, up to 1. It needs frames that have a length. An
+        Called once for each frame, as ``progress(fraction)``, before its pairs are returned, with
+        the fraction of the frames done, up to 1. The frames must have a length. An
         exception ends the iteration.
 
     Returns
     -------
     generator of ndarray or tuple of ndarray
-        For each frame what `pairs` returns for it, new arrays that are the caller's: the same pairs
-        and the same bits of d, D and S. Their order is that of `VerletList`, or with `sort`, or
-        where each frame is searched, that of `pairs`.
+        For each frame what `pairs` returns, in new arrays: the same pairs
+        and the same bits of d, D and S. Their order is that of `VerletList`; with `sort`, or
+        if each frame is searched, that of `pairs`.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `VerletList`, for all arguments but the frames, by the call itself. As `pairs`, for a
-        frame, when its pairs are asked for; a note says which frame it is, and the iteration is
-        over. ValueError also if a frame brings its box, and `box` is given.
+        For all arguments but the frames, as for `VerletList`, by the call itself. For a frame, as
+        for `pairs`, when the iteration reaches it; a note names the frame, and the iteration
+        ends. ValueError also if a frame brings its box and `box` is given.
 
     See Also
     --------
-    VerletList : the same with the steps in your hands.
+    VerletList : the same, with control over each step.
     pairs : one frame.
 
     Notes
     -----
-    Nothing is read ahead, but for `threads`, and no frame is kept but the last one: frames of any
-    number take the memory of one. Where a reader hands out the same object in each frame, as
-    MDAnalysis does, that is as good as any.
+    Except with `threads`, nothing is read ahead, and only the last frame is kept: any number of
+    frames takes the memory of one. A reader may return the same object in each frame, as
+    MDAnalysis does.
 
     Examples
     --------

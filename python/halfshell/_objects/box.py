@@ -34,7 +34,7 @@ class Box:
     ----------
     vectors : array_like of float, shape (d, d) or (d,), or Box
         Box vectors as rows, or edge lengths along the coordinate axes, in the unit of the points;
-        1 <= d <= 8. Six bare numbers are refused, for they may be meant as lengths and angles: use
+        1 <= d <= 8. Six bare numbers are refused, as they may be lengths and angles: use
         `from_dimensions`, or `orthorhombic` for six lengths. Any orientation and handedness;
         the vectors must be linearly independent, which is decided exactly.
 
@@ -53,7 +53,7 @@ class Box:
 
     Notes
     -----
-    A box does not change. Boxes with equal vectors are equal, and may be keys of a dict.
+    A box is immutable. Boxes with equal vectors are equal, and may be keys of a dict.
 
     Examples
     --------
@@ -206,7 +206,7 @@ class Box:
 
     @classmethod
     def from_dimensions(cls, dimensions: ArrayLike) -> Box:
-        """Crystallographic cell of six numbers, as ASE's `cellpar` and MDAnalysis's `dimensions`.
+        """Crystallographic cell from six numbers, like ASE's `cellpar`, MDAnalysis's `dimensions`.
 
         Parameters
         ----------
@@ -223,7 +223,7 @@ class Box:
         TypeError
             If the entries are not real numbers, or are long doubles.
         ValueError
-            If there are not six of them, or as `from_lengths_angles`: MDAnalysis has zeros where
+            If there are not six of them, or as for `from_lengths_angles`; MDAnalysis has zeros if
             there is no box.
 
         Examples
@@ -252,7 +252,7 @@ class Box:
 
     @property
     def perpendicular_heights(self) -> npt.NDArray[np.float64]:
-        """Distances between opposite faces, shape (d,): what a cutoff is compared with."""
+        """Distances between opposite faces, shape (d,), to compare with a cutoff."""
         return self._heights
 
     def wrap(

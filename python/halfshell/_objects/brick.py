@@ -22,11 +22,11 @@ _AT_A_TIME = 1 << 14  # points whose pairs are counted
 
 
 class Brick:
-    """Points that one worker answers for, and those that it needs besides.
+    """The points of one worker, and the other points that it needs.
 
     Made by `bricks`. It can be pickled, and holds no coordinates. Methods take the coordinates of
-    all points, or of `members` alone, and give numbers among all points: what one search of all
-    points says of this brick, decision for decision.
+    all points, or of `members` alone, and return indices among all points: exactly what a single
+    search of all points finds for this brick.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Brick:
         Returns
         -------
         ndarray or tuple of ndarray
-            As `pairs` returns them, ascending by (i, j, S), with numbers among all points.
+            As from `pairs`, ascending by (i, j, S), with indices among all points.
         """
         import halfshell as hs
 
@@ -137,7 +137,7 @@ class Brick:
         Parameters
         ----------
         points, inclusive, kernel, threads, memory_limit
-            As in `Brick.pairs`. Memory follows the pairs of some thousand points.
+            As in `Brick.pairs`. Memory is that of the pairs of a few thousand points.
         """
         import halfshell as hs
 
@@ -173,7 +173,7 @@ class Brick:
         Returns
         -------
         NeighborTable
-            Row k is that of point ``owned[k]``, with numbers among all points.
+            Row k belongs to point ``owned[k]``, with indices among all points.
         """
         import halfshell as hs
 

@@ -43,7 +43,7 @@ class Candidates(NamedTuple):
 
 
 class CellList(CellPairs, CellRows, CellCounts):
-    """Points sorted into cells once, to be asked many times.
+    """Points sorted into cells once, for many searches.
 
     Parameters
     ----------
@@ -51,20 +51,20 @@ class CellList(CellPairs, CellRows, CellCounts):
         Coordinates, as in `pairs`; they are copied. An object such as ``ase.Atoms`` brings its own
         box.
     cutoff : float
-        The largest cutoff that the cells are made for. Smaller ones are served by the same cells;
-        larger ones are answered as well, by cells that are made for that call.
+        The largest cutoff that the cells are made for. They serve smaller ones too; a call with a
+        larger cutoff makes cells of its own.
     box, periodic, precision
         As in `pairs`.
     cell_size : float, optional
-        The least width of a cell, in the unit of the points; finite, greater than 0. Each axis is
-        cut into as many equal cells as that allows. It changes the layout and how long calls take,
-        but no answer (except with `precision` "single", which goes by cells); a cell may well be
-        narrower than the cutoff. Cells are wider where there would be more than 2 n + 64 of them,
-        or more than some thousand rows of cells within the cutoff, and a few millionths wider where
-        `cell_size` is the cutoff or a whole part of it. Default: what is quick for this cutoff and
-        this number of points.
+        The minimum width of a cell, in the unit of the points; finite, greater than 0. Each axis
+        is cut into as many equal cells as that allows. It changes the layout and the run time, but
+        no answer (except with `precision` "single", which depends on the cells); a cell may be
+        narrower than the cutoff. Cells are wider if there would be more than 2 n + 64 of them,
+        or more than a few thousand rows of cells within the cutoff, and a few millionths wider if
+        `cell_size` is the cutoff divided by a whole number. Default: a width that is fast for this
+        cutoff and this number of points.
     threads : int, optional
-        Threads that sort the points; and those that later calls use unless they say otherwise.
+        Threads that sort the points; also the default of later calls.
     memory_limit : float, optional
         Bytes that the cells may take; later calls have limits of their own. As in `pairs`.
 
@@ -75,39 +75,39 @@ class CellList(CellPairs, CellRows, CellCounts):
     shape : tuple of int, length d
         Cells along each axis, occupied or not.
     cell_sizes : tuple of float, length d
-        Extent of a cell, across its faces, in the unit of the points. Infinity where points are so
-        far from each other, or the box is so small beside that, that no float64 cells tell them
-        apart: there is one cell with everything then. All answers but `candidates` are as ever;
-        each call sorts the points anew.
+        Distance between opposite faces of a cell, in the unit of the points. Infinity if points
+        are so far apart, or the box is so small in comparison, that float64 cells cannot separate
+        them: then one cell holds everything, and each call sorts the points anew. All answers
+        except `candidates` stay the same.
     cell_start : ndarray of int32, shape (cells + 1,)
         Cell c holds the points ``order[cell_start[c]:cell_start[c + 1]]``.
     order : ndarray of int32, shape (n,)
         The points in cell order: a permutation, ascending in each cell.
     cell_ids : ndarray of int64, shape (cells, d), or None
-        None where each cell has an id: ids then run along the first axis fastest. For points in
-        clusters far apart only occupied cells are stored, and these are their indices along the
+        None if every cell has an id: ids then run fastest along the first axis. For clusters of
+        points far apart only occupied cells are stored, and these are their indices along the
         axes.
 
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`, which see.
+        As for `pairs`.
 
     See Also
     --------
-    pairs, neighbors, pairs_between, count_pairs : the same without keeping the cells.
+    pairs, neighbors, pairs_between, count_pairs : the same searches without keeping the cells.
 
     Notes
     -----
-    A cell list does not change, and any number of threads may ask it at once. It holds the points
-    once as they were given, as float64, and once in cell order; tables with distances that it
-    makes refer to the former and keep the list alive.
+    A cell list is immutable, and any number of threads may search it at once. It holds the points
+    once as given, as float64, and once in cell order; its tables with distances refer to the
+    former and keep the list alive.
 
     Cells are found by a counting sort in O(n + cells), and there are at most 2 n + 64 of them,
     however large the volume (Hockney and Eastwood, Computer Simulation Using Particles, 1981,
-    section 8-4). Answers are those of the functions of the same names, decided exactly; only the
-    order of `pairs` without ``sort=True``, `iter_pairs` and `for_each_pair`, which is the same for
-    the three, may differ from theirs, since cells that are kept are cut a little differently.
+    section 8-4). Answers are those of the functions of the same names, decided exactly. Only the
+    order of pairs from `pairs` without ``sort=True``, `iter_pairs` and `for_each_pair` (the same
+    for all three) may differ from that of the functions, since kept cells have other boundaries.
 
     Examples
     --------
@@ -195,18 +195,18 @@ class CellList(CellPairs, CellRows, CellCounts):
         return cast("npt.NDArray[np.int64] | None", self._layout["cell_ids"])
 
     def cell_of(self, points: PointsLike) -> npt.NDArray[np.int64]:
-        """Find the cell that each of some points would be in.
+        """Find the cell that each given point would be in.
 
         Parameters
         ----------
         points : array_like of float, shape (m, d)
-            They need not be those of the list. They are wrapped into the box; those beyond an open
-            face count as on it.
+            Any points, not just those of the list. They are wrapped into the box; points beyond an
+            open face count as on it.
 
         Returns
         -------
         ndarray of int64, shape (m,)
-            Cell ids; -1 where only occupied cells have one and this cell holds no point.
+            Cell ids; -1 if only occupied cells have an id and this cell is empty.
 
         Examples
         --------
@@ -238,8 +238,8 @@ class CellList(CellPairs, CellRows, CellCounts):
         Raises
         ------
         ValueError
-            If a query is much further away than the points and the box reach, or if there is but
-            one cell with everything (`cell_sizes` is infinite).
+            If a query is far outside the points and the box, or if a single cell holds everything
+            (`cell_sizes` is infinite).
 
         Examples
         --------
@@ -260,7 +260,7 @@ class CellList(CellPairs, CellRows, CellCounts):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; for points in three dimensions with ``projection="3d"``. Default: axes
+            Axes to draw on; for points in three dimensions with ``projection="3d"``. Default: axes
             of a new figure.
         unit : str, optional
             The unit of the points, for the labels of the axes: "Å".
@@ -268,7 +268,7 @@ class CellList(CellPairs, CellRows, CellCounts):
         Returns
         -------
         matplotlib.axes.Axes
-            What has been drawn on.
+            The axes drawn on.
 
         Raises
         ------

@@ -52,12 +52,12 @@ class CellPairs(KeptCells):
         threads : int, optional
             As in `halfshell.pairs`. Default: that of the list.
         touching : array_like of int, shape (k,), optional
-            As in `halfshell.pairs`: the time follows their number alone.
+            As in `halfshell.pairs`; the time depends on their number alone.
 
         Returns
         -------
         ndarray or tuple of ndarray
-            As `halfshell.pairs`.
+            As from `halfshell.pairs`.
 
         Examples
         --------
@@ -75,7 +75,7 @@ class CellPairs(KeptCells):
             return _core.pairs(*(*search, *wanted, None, AUTO, shells, room))
         if shells is not None or room is not None:
             other = "the letter k" if shells is not None else "capacity"
-            raise ValueError(f"touching does not go with {other}")
+            raise ValueError(f"touching cannot be combined with {other}")
         check_apart(out, touching=touching)
         from halfshell._convert.touching import pairs_touching  # here: others do without
 
@@ -109,8 +109,8 @@ class CellPairs(KeptCells):
         Returns
         -------
         iterator of ndarray or tuple of ndarray
-            Joined, the blocks are what `pairs` returns, in the same order. They come from the
-            cells of the list, which live as long as the iterator.
+            Concatenated, the blocks are what `pairs` returns, in the same order. The iterator keeps
+            the cells of the list alive.
 
         Examples
         --------
@@ -154,7 +154,7 @@ class CellPairs(KeptCells):
         Returns
         -------
         int
-            Pairs that it was called for.
+            The number of pairs for which it was called.
 
         Examples
         --------

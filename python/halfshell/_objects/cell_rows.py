@@ -94,8 +94,8 @@ class CellRows(KeptCells):
         queries : array_like of float, shape (q, d)
             Coordinates of queries, in the unit of the points; they may lie anywhere.
         radius : float or array_like of float, shape (q,), optional
-            One for all queries, or one for each. Default: the cutoff of the list. Up to that the
-            kept cells answer; larger radii cost a search of their own.
+            One for all queries, or one for each. Default: the cutoff of the list, up to which the
+            kept cells are used; larger radii take a separate search.
         quantities, inclusive, index_dtype, kernel, memory_limit
             As in `halfshell.neighbors`.
         threads : int, optional
@@ -104,7 +104,7 @@ class CellRows(KeptCells):
         Returns
         -------
         NeighborTable
-            A row for each query, ascending by (j, S). A point at the place of a query is its
+            A row for each query, ascending by (j, S). A point that coincides with a query is its
             neighbour at distance 0.
 
         Examples
@@ -144,25 +144,25 @@ class CellRows(KeptCells):
     ) -> Arrays:
         """Find the k nearest points, as `halfshell.nearest` does; always exact.
 
-        The first call makes a tree of the points, which is kept; later calls, with any `k` and
-        any queries, spare that. The cutoff and the precision of the list play no part.
+        The first call builds a tree of the points; later calls, with any `k` and any queries,
+        reuse it. The cutoff and the precision of the list have no effect.
 
         Parameters
         ----------
         k : int
-            How many; 1 or more.
+            Number of neighbours, 1 or more.
         queries : array_like of float, shape (q, d), optional
             Coordinates of queries. Default: the points of the list, each left out of its own row.
         max_distance, quantities, index_dtype, kernel, memory_limit
-            As in `halfshell.nearest`. The tree that is kept does not count for `memory_limit`
-            together with the rest, but must fit it by itself.
+            As in `halfshell.nearest`. The tree must fit `memory_limit` by itself, but does not
+            count towards it otherwise.
         threads : int, optional
             As in `halfshell.nearest`. Default: that of the list.
 
         Returns
         -------
         ndarray or tuple of ndarray
-            As `halfshell.nearest`: rows of k entries, in exact order, ties by (j, S).
+            As from `halfshell.nearest`: rows of k entries, in exact order, ties by (j, S).
 
         Examples
         --------

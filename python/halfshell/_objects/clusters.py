@@ -14,7 +14,7 @@ __all__ = ["Clusters"]
 
 
 class Clusters(NamedTuple):
-    """Which points belong together: what `clusters` returns.
+    """The clusters of points that `clusters` returns.
 
     Attributes
     ----------
@@ -22,11 +22,11 @@ class Clusters(NamedTuple):
         The cluster of each point, from 0 on, in the order of their lowest core points; -1 for
         points that belong to none.
     sizes : ndarray of int64, shape (c,)
-        Points of each cluster.
+        Number of points in each cluster.
     core : ndarray of bool, shape (n,)
         Which points have `min_points` points within their cutoff, themselves included.
     winding : ndarray of bool, shape (c, d), or None
-        Whether each cluster winds along each box vector; None if that was not asked for.
+        Whether each cluster winds along each box vector; None without ``winding=True``.
 
     Examples
     --------

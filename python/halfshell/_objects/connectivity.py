@@ -32,28 +32,29 @@ if TYPE_CHECKING:
 class Connectivity(NodePictures):
     """All neighbours of each node in each list, and each pair of neighbours once.
 
-    Nodes i and j are neighbours where ``|x_i - x_j| <= extent * h_i`` or ``<= extent * h_j``, or,
+    Nodes i and j are neighbours if ``|x_i - x_j| <= extent * h_i`` or ``<= extent * h_j`` or,
     if supports are matrices, ``|H_i @ (x_i - x_j)| <= extent`` or ``|H_j @ (x_i - x_j)| <=
-    extent``, for the real numbers that were given: nothing is rounded. Coincident nodes are
-    neighbours, and no node is its own.
+    extent``, decided exactly, without rounding. Coincident nodes are neighbours; no node is its
+    own neighbour.
 
     Parameters
     ----------
     lists : sequence of NodeList
-        Their numbers are their places here. Names must differ.
+        Lists are numbered in this order. Names must differ.
     extent : float, default 2.0
         How many smoothing lengths supports reach, in all lists; from 2**-64 to 2**64.
     box : float, array_like of float, shape (d,) or (d, d), or Box, optional
-        As of `pairs`. Where it repeats, rows and pairs have shifts.
+        As in `pairs`. In a periodic box, rows and pairs have shifts.
     periodic : bool or sequence of bool, shape (d,), optional
-        Which box vectors repeat. Default: all with a box, none without.
+        Which box vectors are periodic. Default: all with a box, none without.
     ghosts : bool, default False
         Whether ghosts have rows, and pairs with each other.
     overlap : bool, default False
-        Whether to find nodes whose supports have a node in common; then ghosts have rows, too.
-        Not in a box that repeats.
+        Whether to find nodes whose supports have a node in common; ghosts then have rows, too.
+        Not in a periodic box.
     intersection : bool, default False
-        Whether to find the nodes between the two of each pair; likewise.
+        Whether to find the nodes between the two nodes of each pair. As for `overlap`, ghosts then
+        have rows, and the box must not be periodic.
     order : {"index", "morton"}, default "index"
         Order of rows and pairs: by list and node, or by the place on the Z curve, which does not
         depend on how nodes are stored, nor on which are ghosts. With "morton" ghosts have rows.
@@ -61,7 +62,7 @@ class Connectivity(NodePictures):
         The lowest and the highest corner of the box of that curve, which holds all nodes. Default:
         the bounding box. The parts of a divided scene need the same.
     exclude : array_like of int, shape (k, 4), or callable, optional
-        Pairs that do not count: rows (i_node, i_list, j_node, j_list), in whatever order, or a
+        Pairs that do not count: rows (i_node, i_list, j_node, j_list), in any order, or a
         function of four such arrays that returns bools. Kept for `rebuild`.
     threads : int, optional
         As of `pairs`.
@@ -73,7 +74,7 @@ class Connectivity(NodePictures):
     names : tuple of str
         Of the lists.
     pairs : PairTable
-        Each pair once, if one of its nodes is no ghost or `ghosts` is set.
+        Each pair once, if one of its nodes is not a ghost, or `ghosts` is set.
     offsets : ndarray of int64, shape (n_rows * n_lists + 1,)
         Where rows begin: ``indices[offsets[r]:offsets[r + 1]]`` are the neighbours in list m of
         node i of list l for ``r = (row_start[l] + i) * n_lists + m``.
@@ -81,7 +82,7 @@ class Connectivity(NodePictures):
         Their numbers in their lists, ascending; with "morton" by the Z curve. Read-only, as are
         all of these.
     shifts : ndarray of int32, shape (entries, d)
-        S of each entry, in a box that repeats; entries of one neighbour ascend by S.
+        S of each entry, in a periodic box; entries of one neighbour ascend by S.
     row_start : ndarray of int64, shape (n_lists + 1,)
         Nodes with rows before each list.
     overlap_offsets, overlap_indices : ndarray
@@ -96,9 +97,9 @@ class Connectivity(NodePictures):
     Raises
     ------
     TypeError, ValueError, OverflowError, MemoryError
-        As `pairs`; ValueError also if names repeat, lists differ in their dimensions, `exclude`
-        names a node that there is not, a node lies outside `morton_box`, or `overlap` or
-        `intersection` is wanted in a box that repeats.
+        As for `pairs`; ValueError also if names repeat, lists differ in their dimensions, `exclude`
+        names a node that does not exist, a node lies outside `morton_box`, or `overlap` or
+        `intersection` is set in a periodic box.
 
     See Also
     --------
@@ -107,17 +108,17 @@ class Connectivity(NodePictures):
 
     Notes
     -----
-    Lists are searched together, small supports apart from large ones. Nothing is computed or kept
-    that was not asked for. A change that fails changes nothing.
+    Lists are searched together, small supports apart from large ones. Only what you request is
+    computed or kept. A change that fails changes nothing.
 
     ``overlap`` holds all neighbours, and all nodes j such that the supports of i and j contain a
-    common node of any list; that supports touch is not enough. ``intersection`` of a pair holds
-    those neighbours of both nodes whose foot on the line through these lies on the closed segment
-    between them, decided exactly, and then the two nodes themselves; all common neighbours where
-    the two coincide.
+    common node of any list; touching supports are not enough. ``intersection`` of a pair holds
+    the neighbours of both nodes whose foot on the line through these lies on the closed segment
+    between them, decided exactly, and then the two nodes themselves; if the two coincide, all
+    common neighbours.
 
-    Removed and excluded pairs count nowhere: not in rows, pairs and overlap, nor as a way from
-    one node to another in overlap and intersection. So `remove` comes to the same as `exclude`.
+    Removed and excluded pairs count nowhere: not in rows, pairs and overlap, nor as a link from
+    one node to another in overlap and intersection. So `remove` has the same effect as `exclude`.
 
     The design follows Spheral's ``ConnectivityMap``; ``docs/systems/spheral.md`` compares them.
 
@@ -175,10 +176,10 @@ class Connectivity(NodePictures):
         self._seen = [(one, None) for one in given]
 
     def rebuild(self, lists: Sequence[NodeList]) -> None:
-        """Begin anew with the same lists, which may have other nodes.
+        """Build again from the same lists, which may have other nodes.
 
-        Every older `PairField` becomes stale. Arrays that were given out stay what they are; their
-        memory is used again once they are gone.
+        Every older `PairField` becomes stale. Arrays that you hold stay valid; their memory is
+        reused once you delete them.
 
         Parameters
         ----------
@@ -188,7 +189,7 @@ class Connectivity(NodePictures):
         Raises
         ------
         ValueError
-            If names differ, and as the constructor does. Then nothing has changed.
+            If names differ, and as for the constructor. Nothing has changed then.
 
         Examples
         --------
@@ -207,16 +208,16 @@ class Connectivity(NodePictures):
     def patch(
         self, keep: Sequence[npt.ArrayLike], old2new: Sequence[npt.ArrayLike] | None = None
     ) -> None:
-        """Leave nodes out: equal to a new connectivity of those that are kept.
+        """Leave nodes out; equal to a new connectivity of the remaining ones.
 
         The coupling of pairs stays. Every older `PairField` becomes stale.
 
         Parameters
         ----------
         keep : sequence of array_like of bool, each of shape (n,)
-            For each list, which nodes stay; `used` is such a sequence.
+            For each list, which nodes stay; `used` returns such a sequence.
         old2new : sequence of array_like of int, each of shape (n,), optional
-            The new number of each node in its list; of those that go any. Ghosts must stay behind
+            The new number of each node in its list; for removed nodes any. Ghosts must stay after
             other nodes. Default: in the same order, without gaps.
 
         Raises
@@ -248,10 +249,10 @@ class Connectivity(NodePictures):
         Parameters
         ----------
         which : array_like of bool, shape (m,), or callable
-            A mask over `pairs`, in which each image counts for itself, or a function of arrays
-            i_node, i_list, j_node, j_list that returns bools. It is called with pairs of the
-            table's orientation, for those of two ghosts and for pairs that merely overlap as well,
-            so a pair may come several times.
+            A mask over `pairs`, in which each image counts separately, or a function of arrays
+            i_node, i_list, j_node, j_list that returns bools. It is called with pairs in the
+            table's orientation, including pairs of two ghosts and pairs that merely overlap,
+            so it may get a pair several times.
 
         Raises
         ------
@@ -270,7 +271,7 @@ class Connectivity(NodePictures):
         self._become(made, "remove", self._seen)
 
     def used(self) -> tuple[npt.NDArray[np.bool_], ...]:
-        """Which nodes count: all but ghosts that are no neighbours of any other node.
+        """Which nodes are used: all but ghosts that are not a neighbour of any other node.
 
         Returns
         -------
@@ -296,12 +297,12 @@ class Connectivity(NodePictures):
         return tuple(np.split(flags, nodes.first[1:-1])) if nodes.n_lists else ()
 
     def validate(self) -> None:
-        """Check all that holds of rows and pairs; for tests of programs and of this class.
+        """Check the invariants of rows and pairs; for tests of programs and of this class.
 
         Raises
         ------
         ValueError
-            If something is wrong, with what it is.
+            If something is wrong; the message tells what.
 
         Notes
         -----

@@ -38,21 +38,21 @@ class DynamicCellList:
     dim : int
         Number of dimensions, 1 to 8.
     cell_size : float
-        Least width of the cells, in the unit of the positions; about the radius of the queries.
+        Minimum width of the cells, in the unit of the positions; about the radius of the queries.
     box, periodic : optional
-        As in `pairs`. Positions may lie anywhere; each image of a point counts for itself.
+        As in `pairs`. Positions may lie anywhere; each image of a point counts separately.
     storage : {"hash", "dense", "all-pairs"}, default "hash"
-        "hash": memory follows the occupied cells. "dense": every cell between the outermost ones
-        has its place, up to 1 GB of cells; the fastest. "all-pairs": no cells, for a few dozen
-        points; keys need no position, and `near` gives all of them.
+        "hash": only occupied cells are stored. "dense": every cell between the outermost ones
+        is stored, up to 1 GB of cells; the fastest. "all-pairs": no cells, for a few dozen
+        points; keys need no position, and `near` returns all of them.
     max_radius : float, optional
         Largest radius of a query. Default: `cell_size`.
     inclusive : bool, default True
-        Whether a point at exactly the radius is within. Hard disks that touch do not overlap:
-        False.
+        Whether a point at exactly the radius is within. For hard disks, which do not overlap when
+        they touch: False.
     tagged : bool, default False
-        Keys are tuples (tag, integer), as for owned sites and their ghosts, in place of integers.
-        Integers fit int64, tags int32.
+        Keys are tuples (tag, integer), as for owned sites and their ghosts, instead of integers.
+        Integers must fit int64, tags int32.
 
     Raises
     ------
@@ -68,14 +68,14 @@ class DynamicCellList:
 
     Notes
     -----
-    Whether a point is within a ball is decided for the real numbers that the positions and the
-    radius are, as everywhere in this package.
+    Whether a point is within a ball is decided exactly for the real values of the positions and
+    the radius, as everywhere in this package.
 
     Several threads may use one list: queries at the same time, changes one after the other. Each
-    row of `within_many` is answered for the list as it is then. A list that changes while it is
-    iterated over raises RuntimeError.
+    row of `within_many` is found in the list as it is at that time. A list that changes during an
+    iteration raises RuntimeError.
 
-    The order of results is not specified, but the same after the same history.
+    The order of results is not specified, but is the same after the same history.
 
     Examples
     --------
@@ -158,13 +158,13 @@ class DynamicCellList:
         key : int or tuple of int
             An integer, or with `tagged` a tuple (tag, integer).
         position : array_like of float, shape (dim,)
-            Anywhere. None, with storage "all-pairs" only: the key has no position.
+            Anywhere. None, only with storage "all-pairs": the key has no position.
 
         Raises
         ------
         TypeError, ValueError, OverflowError, MemoryError
             For a key of the wrong kind or size; a position of the wrong length, not finite, 2**51
-            boxes away or, with "dense", beyond 1 GB of cells. The list is as it was.
+            boxes away or, with "dense", beyond 1 GB of cells. The list is then unchanged.
 
         Examples
         --------
@@ -177,7 +177,7 @@ class DynamicCellList:
         self._cells.insert(key, position)
 
     def move(self, key: Key, position: ArrayLike | None) -> None:
-        """Move a point; KeyError if there is none of this key. Otherwise as `insert`."""
+        """Move a point; KeyError if the key does not exist. Otherwise as `insert`."""
         self._cells.move(key, position)
 
     def remove(self, key: Key) -> bool:
@@ -212,7 +212,7 @@ class DynamicCellList:
         Returns
         -------
         ndarray of int64, shape (m,), or (m, 2) with `tagged`
-            Each key once, however many images are near. No distance is computed.
+            Each key once, however many of its images are near. No distance is computed.
 
         Raises
         ------
@@ -234,7 +234,7 @@ class DynamicCellList:
         Returns
         -------
         keys : ndarray of int64, shape (m,), or (m, 2) with `tagged`
-            A key once for each image of its point within the ball. The cells nearest to the centre
+            Each key once for each image of its point in the ball. Cells nearest to the centre
             come first.
         S : ndarray of int32, shape (m, dim)
             Only with `shifts`: the point is within at position(key) + S @ box.
@@ -263,13 +263,13 @@ class DynamicCellList:
         position, radius
             As in `near`.
         skip : key, optional
-            A point whose image S = 0 does not count; its other images do. For a trial move: give
-            the new position next to the old one, not wrapped into the box by itself.
+            A point whose image S = 0 does not count; its other images do. For a trial move, give
+            the new position next to the old one, not wrapped into the box separately.
 
         Raises
         ------
         TypeError, ValueError, OverflowError, KeyError
-            As `within`; KeyError if the key to skip is not there.
+            As for `within`; KeyError if the key to skip does not exist.
         """
         return self._cells.any_within(position, radius, skip)
 
@@ -285,18 +285,18 @@ class DynamicCellList:
         Raises
         ------
         TypeError, ValueError, OverflowError, MemoryError
-            As `insert`; ValueError names a key that comes twice. The list is as it was.
+            As for `insert`; ValueError names a repeated key. The list is then unchanged.
         """
         ids, tags = dynamic.as_keys(keys, self.tagged)
         self._cells.insert_many(ids, tags, dynamic.as_positions(positions, self.dim, len(ids)))
 
     def move_many(self, keys: ArrayLike, positions: PointsLike) -> None:
-        """Move many points, all or none. As `insert_many`, but KeyError for one that is absent."""
+        """Move many points, all or none. As `insert_many`, but KeyError for an absent key."""
         ids, tags = dynamic.as_keys(keys, self.tagged)
         self._cells.move_many(ids, tags, dynamic.as_positions(positions, self.dim, len(ids)))
 
     def remove_many(self, keys: ArrayLike) -> npt.NDArray[np.bool_]:
-        """Remove many points. Returns which of them were there; ValueError if a key comes twice."""
+        """Remove many points. Returns which of them existed; ValueError if a key is repeated."""
         return self._cells.remove_many(*dynamic.as_keys(keys, self.tagged))
 
     def within_many(self, positions: PointsLike, radius: Number, *, shifts: bool = False) -> Any:
@@ -328,11 +328,11 @@ class DynamicCellList:
         return (offsets, *found) if shifts else (offsets, found)
 
     def clear(self) -> None:
-        """Remove all points, and give their memory back."""
+        """Remove all points, and release their memory."""
         self._cells.clear()
 
     def shrink_to_fit(self) -> None:
-        """Give back memory that the points do not need; MemoryError if it lacks some meanwhile."""
+        """Release memory that the points do not need; MemoryError if it needs more meanwhile."""
         self._cells.shrink_to_fit()
 
     def copy(self) -> DynamicCellList:

@@ -14,12 +14,12 @@ __all__ = ["Graph", "check_complete", "turned"]
 
 
 class Graph(NamedTuple):
-    """What `NeighborTable.graph` returns.
+    """A graph, as `NeighborTable.graph` returns it.
 
     Attributes
     ----------
     edge_index : ndarray of the type of `indices`, shape (2, m)
-        Row 0 is the source, row 1 the target of each edge: the neighbour j and the point i in whose
+        Row 0 is the source of each edge, the neighbour j; row 1 is the target, the point i in whose
         row it is.
     shifts : ndarray of int32, shape (m, d)
         Box vectors to add, with ``vectors = points[edge_index[1]] - points[edge_index[0]] +
@@ -52,7 +52,7 @@ def check_complete(quantities: str) -> None:
     """Raise unless a table of these has what a graph needs."""
     if lacking := "".join(letter for letter in "jDS" if letter not in quantities):
         raise AttributeError(
-            "a graph needs indices, vectors and shifts: ask for them by quantities='jDS', got "
+            "a graph needs indices, vectors and shifts: request them with quantities='jDS', got "
             f"{quantities!r} without {lacking!r}"
         )
 

@@ -19,13 +19,13 @@ from halfshell._objects.table_rows import Array, Row
 class NeighborTable(TablePictures):
     """All neighbours of each point, or of each query, row after row.
 
-    Made by `neighbors`; it does not change, and all its arrays are read-only.
+    Made by `neighbors`. A table is immutable, and all its arrays are read-only.
 
     Attributes
     ----------
     offsets : ndarray of int64, shape (n_rows + 1,)
-        Row i is made of the entries ``offsets[i]`` to ``offsets[i + 1]``, the last one not
-        included.
+        Row i consists of the entries from ``offsets[i]`` up to, but not including,
+        ``offsets[i + 1]``.
     counts : ndarray of int64, shape (n_rows,)
         Length of each row.
     indices : ndarray of int64 or int32, shape (m,)
@@ -56,13 +56,13 @@ class NeighborTable(TablePictures):
     -----
     ``table[i]`` is row i, without a copy: one array, or a tuple of them, one for each letter of
     `quantities`. ``table[a:b]``, ``table[[5, 0, 5]]`` and ``table[mask]`` are tables of these rows,
-    numbered from 0: their indices still mean points of the whole, so that they count as tables of
+    numbered from 0. Their indices still number all points, so they count as tables of
     queries. ``len(table)`` is the number of rows, and iteration goes over them.
 
-    A table with indices and distances also keeps points, queries and box, for `sort`: copies, or,
-    if it is from a `CellList`, what that holds. Tables of some rows keep it all alive. A pickle has
-    the points that its rows name and no others, and the shifts of its entries if the box repeats:
-    for them the scene is searched once more if the table has no 'S'.
+    A table with indices and distances also keeps points, queries and box, for `sort`: as copies
+    or, from a `CellList`, as references to those of the list. Tables of some rows keep them all. A
+    pickle has only the points that its rows name and, in a periodic box, the shifts of its entries,
+    for which the points are searched once more if the table has no 'S'.
 
     Examples
     --------
@@ -83,7 +83,7 @@ class NeighborTable(TablePictures):
     ...     table.shifts
     ... except AttributeError as error:
     ...     print(error)
-    this table has no shifts: ask for them by an 'S' in quantities, got 'jd'
+    this table has no shifts: request them with an 'S' in quantities, got 'jd'
     """
 
     __slots__ = ()
@@ -91,7 +91,7 @@ class NeighborTable(TablePictures):
     # ---- other tables ----------------------------------------------------------------------
 
     def filter(self, mask: npt.ArrayLike) -> NeighborTable:
-        """Leave entries out.
+        """Keep only some of the entries.
 
         Parameters
         ----------
@@ -120,13 +120,13 @@ class NeighborTable(TablePictures):
         return self._with(starts_of(keep)[self.offsets], keep, complete, self._is_in_order)
 
     def sort(self, by: Literal["distance"] = "distance") -> NeighborTable:
-        """Put the entries of each row in another order.
+        """Sort the entries of each row.
 
         Parameters
         ----------
         by : {"distance"}
-            Ascending by distance, exactly, as `nearest` orders: where rounded distances cannot
-            tell, the true ones are compared. Entries at the same distance by (j, S).
+            Ascending by exact distance, as in `nearest`: distances that are equal after rounding
+            are compared exactly. Entries at the same distance ascend by (j, S).
 
         Returns
         -------
@@ -138,14 +138,14 @@ class NeighborTable(TablePictures):
         AttributeError
             If the table has no distances or no indices, or was not made by a search.
         ValueError
-            If `by` is another word.
+            If `by` is not "distance".
         MemoryError
             If the exact comparison does not fit.
 
         Notes
         -----
-        For this the table keeps points, queries and box. One without shifts searches for them once
-        more if the box repeats. Entries that rounded distances cannot tell apart are compared about
+        For this the table keeps points, queries and box. In a periodic box, a table without shifts
+        searches once more to find them. Entries with equal rounded distances are compared about
         16 MB at a time, those at one distance in one row always together.
 
         Examples
@@ -166,11 +166,11 @@ class NeighborTable(TablePictures):
         Parameters
         ----------
         quantities : str, default "ij"
-            Any of the letters ``i j d D S P``, each at most once, as far as the table has them.
+            Any of the letters ``i j d D S P``, each at most once, that the table has.
         half : bool, default False
-            Each pair once: i < j, or i == j and the first nonzero component of S is positive,
-            as `pairs` has them. Only for a table of one set of points; shifts are needed if it has
-            images of a point in the row of the point itself.
+            Each pair once, as in `pairs`: i < j, or i == j and the first nonzero component of S is
+            positive. Only for a table of one set of points; it needs shifts if a point has its own
+            images in its row.
 
         Returns
         -------
@@ -217,13 +217,13 @@ class NeighborTable(TablePictures):
         Parameters
         ----------
         duplicates : {"raise", "min"}, default "raise"
-            What to do where a row has several images of one point, and the array only one place
-            for them: refuse, or keep the nearest.
+            What to do if a row has several images of one point, for which the array has only one
+            entry: raise an error, or keep the nearest.
 
         Returns
         -------
         scipy.sparse.csr_array of float64, shape (n_rows, n_points)
-            Neighbours at distance 0 are stored entries like others. Its arrays are copies.
+            Neighbours at distance 0 are stored explicitly. Its arrays are copies.
 
         Raises
         ------
@@ -253,17 +253,17 @@ class NeighborTable(TablePictures):
     def to_padded(
         self, capacity: int | None = None, fill: Any = -1, *, quantity: str = "j"
     ) -> Array:
-        """One quantity as a rectangular array, rows filled up to the same length.
+        """One quantity as a rectangular array, with rows padded to the same length.
 
         Parameters
         ----------
         capacity : int, optional
             Length of the rows. Default: that of the longest one.
         fill : number, default -1
-            What to fill them up with: for `quantity` "j" and "S" a whole number that their type
-            holds, otherwise any, such as ``math.inf``.
+            Padding value: for `quantity` "j" and "S" a whole number that fits their type,
+            otherwise any number, such as ``math.inf``.
         quantity : {"j", "d", "D", "S"}, default "j"
-            Which one; the table must have it.
+            The quantity, which the table must have.
 
         Returns
         -------
@@ -277,7 +277,7 @@ class NeighborTable(TablePictures):
         AttributeError
             If the table lacks the quantity.
         ValueError
-            If `quantity` is none, or `fill` is no number of its type.
+            If `quantity` is not one of these, or `fill` is not a number of its type.
 
         Examples
         --------
@@ -300,8 +300,7 @@ class NeighborTable(TablePictures):
         Returns
         -------
         ndarray of the type of `indices`, shape (2, m)
-            Row 0 is j, the source, row 1 is i, the target, as PyTorch Geometric has them. A new
-            array.
+            Row 0 is j, the source; row 1 is i, the target, as in PyTorch Geometric. A new array.
 
         Raises
         ------
@@ -326,7 +325,7 @@ class NeighborTable(TablePictures):
         return np.stack((self.indices, self._row_numbers()))
 
     def graph(self) -> Graph:
-        """The entries as edges of a graph with their vectors, as graph networks take them.
+        """The entries as edges of a graph with their vectors, as graph neural networks take them.
 
         Returns
         -------
@@ -365,7 +364,7 @@ class NeighborTable(TablePictures):
         return turned(self.edge_index(), self.shifts, self.vectors, distances)
 
     def reverse(self) -> npt.NDArray[np.int64]:
-        """Where the other direction of each entry is: (j, i, -S) of (i, j, S).
+        """For each entry (i, j, S), the position of its reverse (j, i, -S).
 
         Returns
         -------
@@ -378,8 +377,8 @@ class NeighborTable(TablePictures):
         AttributeError
             If the table has no indices, or was filtered or sorted and has no shifts.
         ValueError
-            If it is a table of queries or of a rule with a direction, or a filter has left an entry
-            without its other direction.
+            If it is a table of queries or of a rule with a direction, or a filter has removed the
+            reverse of an entry.
 
         Examples
         --------

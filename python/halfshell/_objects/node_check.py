@@ -103,7 +103,7 @@ def _check_rows(
     lengths = np.diff(offsets)
     of_list = np.resize(links.nodes.counts, len(lengths))
     if ((indices < 0) | (indices >= np.repeat(of_list, lengths))).any():
-        raise ValueError(f"{name} name nodes that there are not")
+        raise ValueError(f"{name} name nodes that do not exist")
 
 
 def _check_same(name: str, one: Any, other: Any) -> None:

@@ -37,7 +37,8 @@ def as_mask(which: Any, pairs: PairTable) -> npt.NDArray[np.bool_]:
     if mask.dtype.kind != "b":
         raise TypeError(f"which must hold bools, got dtype {mask.dtype}")
     if mask.shape != (len(pairs),):
-        raise ValueError(f"which must have shape ({len(pairs)},), one a pair, got {mask.shape}")
+        shape = f"({len(pairs)},), one for each pair"
+        raise ValueError(f"which must have shape {shape}, got {mask.shape}")
     return np.ascontiguousarray(mask)
 
 
@@ -52,7 +53,7 @@ def _by_rows(values: Any, nodes: Nodes) -> Cut:
     if ranks is None:
         for row in rows:
             if nodes.ranks_of(row[None]) is None:
-                raise ValueError(f"exclude names a node that there is not: {row.tolist()}")
+                raise ValueError(f"exclude names a node that does not exist: {row.tolist()}")
     assert ranks is not None
     for row in rows[ranks[0] == ranks[1]]:
         raise ValueError(f"exclude must name two nodes, got one with itself: {row.tolist()}")

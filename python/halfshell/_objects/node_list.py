@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class NodeList:
-    """The nodes of one list: where they are, and how far their supports reach.
+    """The nodes of one list: their positions, and how far their supports reach.
 
     Parameters
     ----------
     name : str
-        What the list is called; a `Connectivity` needs names that differ.
+        Name of the list; the lists of a `Connectivity` need different names.
     positions : array_like of float, shape (n, d)
         Coordinates, any length unit, 1 <= d <= 8; finite. ``[]`` is a list without nodes, in any
         number of dimensions.
@@ -37,22 +37,22 @@ class NodeList:
         positive definite matrix for each node, in units of 1 / length, d at most 3: the support
         holds all points with ``|H @ D| <= extent``. The matrix I / h is the same as the length h.
     n_ghost : int, default 0
-        How many nodes, the last ones, are ghosts: copies of nodes that are elsewhere.
+        Number of ghosts, which are the last nodes: copies of nodes that are elsewhere.
     ids : array_like of int, shape (n,), optional
-        Numbers that tell nodes of all lists and processes apart, int64. A ghost has that of the
+        Numbers that identify nodes across all lists and processes, int64. A ghost has that of the
         node it copies. Default: their numbers among the nodes of all lists.
 
     Attributes
     ----------
     name : str
     positions : ndarray of float64, shape (n, d)
-        Read-only; the array that was given, if it is one of float64 in C order.
+        Read-only; the given array itself, if it is float64 in C order.
     H : ndarray of float64, shape (n,) or (n, d, d)
         Read-only.
     ids : ndarray of int64, shape (n,), or None
         Read-only.
     n_nodes, n_internal, n_ghost : int
-        Nodes, those that are no ghosts, and ghosts.
+        Numbers of all nodes, of those that are not ghosts, and of ghosts.
 
     Raises
     ------
@@ -60,8 +60,8 @@ class NodeList:
         If an argument is of the wrong kind.
     ValueError
         If a shape does not fit, a position is not finite, a support is negative, not finite, out
-        of range or no symmetric positive definite matrix, or `n_ghost` is less than 0 or more than
-        n.
+        of range or not a symmetric positive definite matrix, or `n_ghost` is less than 0 or more
+        than n.
 
     See Also
     --------
@@ -124,10 +124,10 @@ class NodeList:
         exit: tuple[ArrayLike, ArrayLike],
         extent: float = 2.0,
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """The nodes that a boundary of two parallel planes makes ghosts of, and their partners.
+        """The nodes that become ghosts at a boundary of two parallel planes, and their partners.
 
-        What leaves through `enter` comes back through `exit`: a node's image is the node moved by
-        the vector from the point of the first plane to that of the second.
+        Nodes that leave through `enter` come back through `exit`: the image of a node is the node
+        moved by the vector from the point of the first plane to that of the second.
 
         Parameters
         ----------
@@ -154,8 +154,7 @@ class NodeList:
 
         Notes
         -----
-        Ghosts count as any other node. This is what Spheral's ``setMasterList`` does with two
-        planes.
+        Ghosts count like any other node. Spheral's ``setMasterList`` does the same with two planes.
 
         Examples
         --------

@@ -117,7 +117,7 @@ def _both_stay(links: Links, target: npt.NDArray[np.int32]) -> npt.NDArray[np.bo
 
 def as_masks(keep: Any, nodes: Nodes) -> list[npt.NDArray[np.bool_]]:
     """A bool for each node of each list."""
-    given = as_list(keep, "keep", "arrays, one a list")
+    given = as_list(keep, "keep", "arrays, one for each list")
     if len(given) != nodes.n_lists:
         raise ValueError(
             f"keep must have an array for each of {nodes.n_lists} lists, got {len(given)}"
@@ -141,7 +141,7 @@ def _as_numbers(
     """The new number of each node in its list; of those that go, -1."""
     if old2new is None:
         return [np.where(mask, np.cumsum(mask) - 1, -1) for mask in kept]
-    given = as_list(old2new, "old2new", "arrays, one a list")
+    given = as_list(old2new, "old2new", "arrays, one for each list")
     if len(given) != nodes.n_lists:
         raise ValueError(
             f"old2new must have an array for each of {nodes.n_lists} lists, got {len(given)}"

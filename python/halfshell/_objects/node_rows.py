@@ -56,7 +56,7 @@ class NodeRows:
     @property
     def shifts(self) -> Ints:
         if self._links.shifts is None:
-            raise AttributeError("these rows have no shifts: there is no box that repeats")
+            raise AttributeError("these rows have no shifts: there is no periodic box")
         return self._links.shifts
 
     @property

@@ -161,7 +161,7 @@ class NodeSets(NodeRows):
     def _two_nodes(self, *four: Any) -> tuple[tuple[int, int], tuple[int, int]]:
         if self._links.shifts is not None:
             raise ValueError(
-                "in a box that repeats, nodes have no common neighbours without their images: "
+                "in a periodic box, nodes have no common neighbours without their images: "
                 "give these as ghosts"
             )
         first, second = self._list_of(four[0]), self._list_of(four[2])

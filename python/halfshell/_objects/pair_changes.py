@@ -23,14 +23,14 @@ MOST_KEYS = 2**62  # i, j and the image of a pair are one number where there are
 
 
 class PairChanges(NamedTuple):
-    """What `VerletList.changes` returns.
+    """The changes that `VerletList.changes` returns.
 
     Attributes
     ----------
     formed : ndarray or tuple of ndarray
-        The pairs of the last step that were none in the step before, as of the last step.
+        The pairs of the last step that did not exist in the previous step, as of the last step.
     broken : ndarray or tuple of ndarray
-        The pairs of the step before that are none any more, as of the step before.
+        The pairs of the previous step that no longer exist, as of the previous step.
 
     Examples
     --------

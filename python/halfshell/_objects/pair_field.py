@@ -33,16 +33,16 @@ class PairField:
     values : ndarray of `dtype`, shape (m,), or (m, n_elements) if there are several
         All values, zero at first; can be written to.
     pairs : PairTable
-        The pairs that they are of.
+        The pairs to which they belong.
 
     Raises
     ------
     StaleError
-        By every access once the connectivity has been rebuilt or patched, or pairs were removed:
-        by number, by pair, to `values` and `pairs`, for ever. An array that was taken from
-        `values` before is one of NumPy's, and stays what it was.
+        On every access, by number, by pair, to `values` or to `pairs`, after the connectivity has
+        been rebuilt or patched, or pairs have been removed. An array taken from
+        `values` before that is a plain NumPy array, and stays as it was.
     KeyError
-        By an access to a pair that is not in the table.
+        On access to a pair that is not in the table.
 
     Notes
     -----

@@ -49,15 +49,15 @@ class Columns(NamedTuple):
 class PairTable:
     """Every pair of nodes that are neighbours, each once.
 
-    Made by `Connectivity`, of which it is the attribute ``pairs``; it does not change but for
-    `coupling`, and the other arrays are read-only.
+    Made by `Connectivity`, as its attribute ``pairs``. Only `coupling` can be changed; all other
+    arrays are read-only.
 
     Attributes
     ----------
     i_node, i_list, j_node, j_list : ndarray of int32, shape (m,)
         The numbers of both nodes in their lists, and of their lists.
     shifts : ndarray of int32, shape (m, d)
-        S of each pair, in a box that repeats: D = x_j - x_i + S @ box.
+        S of each pair, in a periodic box: D = x_j - x_i + S @ box.
     coupling : ndarray of float64, shape (m,)
         A number for each pair, 1 at first. It takes no memory, and cannot be written to, until
         it is assigned to: ``pairs.coupling = 1.0``.
@@ -77,7 +77,7 @@ class PairTable:
     the lower and the higher of the two. With ``order="morton"`` both go by the order of the nodes
     on the Z curve.
 
-    The arrays are made when one of them is first looked at, out of the rows.
+    The arrays are made from the rows when you first access one of them.
 
     ``pairs[k]`` is pair k as a tuple (i_node, i_list, j_node, j_list), and ``len(pairs)`` the
     number of pairs.
@@ -167,7 +167,7 @@ class PairTable:
     @property
     def shifts(self) -> Ints:
         if self._shifts is None:
-            raise AttributeError("these pairs have no shifts: there is no box that repeats")
+            raise AttributeError("these pairs have no shifts: there is no periodic box")
         return self._shifts
 
     @property
@@ -209,7 +209,7 @@ class PairTable:
         return table
 
     def index(self, pair: npt.ArrayLike, shift: npt.ArrayLike | None = None) -> Any:
-        """Where a pair is in the table, in whatever order its nodes are given.
+        """The position of a pair in the table, with its nodes in any order.
 
         Parameters
         ----------
@@ -227,12 +227,12 @@ class PairTable:
         KeyError
             If a pair is not in the table.
         TypeError, ValueError
-            If these are no pairs, a pair is there in several images and `shift` does not say
-            which, or `shift` is given where no box repeats.
+            If these are not pairs, a pair occurs in several images and `shift` does not tell
+            which, or `shift` is given without a periodic box.
 
         Notes
         -----
-        The first call makes an index of 8 bytes a pair; after that a pair takes a binary search.
+        The first call makes an index of 8 bytes per pair; then each pair takes a binary search.
 
         Examples
         --------
@@ -266,7 +266,7 @@ class PairTable:
     ) -> int:
         given = as_array(shift, "shift")
         if self._shifts is None:
-            raise ValueError("shift is for boxes that repeat: these pairs have none")
+            raise ValueError("shift is for periodic boxes: these pairs have none")
         shifts = self.shifts
         if given.dtype.kind not in "iu" or given.shape != shifts.shape[1:] or len(ranks[0]) != 1:
             raise ValueError(

@@ -28,46 +28,46 @@ _Names = tuple[str, ...] | tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class RadialDistribution:
-    """What `rdf` returns, or a sum of these.
+    """The result of `rdf`, or a sum of such results.
 
     Attributes
     ----------
     r : ndarray of float64, shape (bins,)
         The middle of each bin, in the unit of the points.
     g : ndarray of float64, shape (bins,) or (t, t, bins)
-        g(r), ``counts / expected``: 1 on average where points ignore each other. 0 in each bin
-        without pairs: so also where there are no points, or none of a type, and the density to
-        divide by is 0 as well. Infinite where a bin has pairs, but its shell is so small a part of
-        the box that float64 does not hold it.
+        g(r), ``counts / expected``: 1 on average for points that ignore each other. 0 in each bin
+        without pairs, even without points, or without points of a type, when the density to
+        divide by is 0 as well. Infinite if a bin has pairs, but its shell is too small a fraction
+        of the box for float64.
     counts : ndarray of int64, the shape of `g`
         Pairs in each bin, as `pair_histogram` counts them, of all frames.
     edges : ndarray of float64, shape (bins + 1,)
         Limits of the bins.
     n_r : ndarray of float64, the shape of `g`
-        n(r), the coordination number: how many neighbours a point, or a query, has on average
+        n(r), the coordination number: the mean number of neighbours of a point, or a query,
         within ``edges[k + 1]``, in all bins up to k. [a, b] is the number of neighbours of type b
-        around a point of type a, which differs from [b, a]. 0 where there is no such point.
+        around a point of type a, which differs from [b, a]. 0 if there is no such point.
     types : tuple of str or int, length t, or None
-        What the first two axes stand for; None without types.
+        The types along the first two axes; None without types.
     expected : ndarray of float64, the shape of `g`
         Pairs that an ideal gas would have in each bin, of all frames.
     n_centers : ndarray of int64, shape () or (t,)
         Points, or queries, whose neighbours were counted, of all frames; with types, of each.
     n_frames : int
-        How many results were added up: 1 as `rdf` returns it.
+        Number of results in the sum: 1 as `rdf` returns it.
     is_half : bool
-        Whether the counts have each pair of points once, as without queries. Each then has two
+        Whether each pair of points is counted once, as without queries. Each pair then has two
         points that are neighbours of each other.
 
     Notes
     -----
-    ``result["Si", "O"]`` is what is known of these two types, as an object like this without types:
-    g(r) of oxygen around silicon, and their n(r). With numbers as types it is ``result[0, 1]``.
+    ``result["Si", "O"]`` selects two types and returns an object like this without types:
+    g(r) of oxygen around silicon, and their n(r). With numbers as types, use ``result[0, 1]``.
 
     Results with the same edges may be added, and ``sum`` takes any number of them: frames of a
     trajectory, each with its own box and number of points. Counts are added exactly. g of the sum
-    is all pairs over all pairs of ideal gases of the same frames; where these have one box and one
-    number of points that is the mean of their g. Frames may lack types that others have.
+    is all pairs divided by all pairs of ideal gases in the same frames; if these have the same box
+    and number of points, it is the mean of their g. Frames may lack types that others have.
 
     Examples
     --------
@@ -136,7 +136,7 @@ class RadialDistribution:
             if is_a(one, (str, int, np.integer)) and not is_a(one, bool) and known == one:
                 return k
         among = ", ".join(map(repr, self.types[:20])) + (", ..." if len(self.types) > 20 else "")
-        raise KeyError(f"{shown(one)} is none of the types {among}")
+        raise KeyError(f"{shown(one)} is not one of the types {among}")
 
     def __add__(self, other: object) -> RadialDistribution:
         """The sum over the frames of both."""
@@ -187,7 +187,7 @@ class RadialDistribution:
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw. Default: axes of a new figure.
+            Axes to draw on. Default: axes of a new figure.
         quantity : {"g", "n"}, default "g"
             g(r) as steps, a bin each, or n(r) at the edges.
         unit : str, optional
@@ -196,14 +196,14 @@ class RadialDistribution:
         Returns
         -------
         matplotlib.axes.Axes
-            What has been drawn on.
+            The axes drawn on.
 
         Raises
         ------
         ImportError
             If matplotlib is not installed: ``pip install matplotlib``.
         ValueError
-            If `quantity` is another word.
+            If `quantity` is neither "g" nor "n".
 
         Notes
         -----

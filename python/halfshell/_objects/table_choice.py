@@ -33,7 +33,8 @@ def as_rows(chosen: Any, n_rows: int) -> Positions:
     if array.dtype.kind == "b":
         if len(array) != n_rows:
             raise ValueError(
-                f"a mask of rows must have shape ({n_rows},), one bool a row, got {array.shape}"
+                f"a mask of rows must have shape ({n_rows},), one bool for each row, got "
+                f"{array.shape}"
             )
         return np.flatnonzero(array)
     if len(array) == 0 and is_a(chosen, list):
@@ -69,7 +70,7 @@ def row_sums(offsets: Array, values: npt.ArrayLike) -> Array:
     n_entries = int(offsets[-1])
     if array.ndim == 0 or len(array) != n_entries:
         raise ValueError(
-            f"values must have shape ({n_entries}, ...), one an entry, got {array.shape}"
+            f"values must have shape ({n_entries}, ...), one for each entry, got {array.shape}"
         )
     dtype = _SUMMED_IN.get(array.dtype.kind)
     if dtype is None or array.dtype.itemsize > 8:

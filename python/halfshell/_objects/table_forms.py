@@ -33,7 +33,7 @@ def as_mask(mask: npt.ArrayLike, n_entries: int) -> npt.NDArray[np.bool_]:
     array = as_array(mask, "mask", "hold bools")
     if array.shape != (n_entries,):
         raise ValueError(
-            f"mask must have shape ({n_entries},), one bool an entry, got {array.shape}"
+            f"mask must have shape ({n_entries},), one bool for each entry, got {array.shape}"
         )
     if array.dtype != np.bool_ and n_entries > 0:
         raise TypeError(f"mask must hold bools, got dtype {array.dtype}")
@@ -136,7 +136,7 @@ def sparse_array(
         k = int(np.flatnonzero(~is_first)[0])
         row = int(np.searchsorted(offsets, k, side="right")) - 1
         raise ValueError(
-            f"row {row} has several images of point {indices[k]}, and a matrix has one place for "
+            f"row {row} has several images of point {indices[k]}, and a matrix has one entry for "
             "them: duplicates='min' keeps the nearest"
         )
     nearest = np.minimum.reduceat(distances, np.flatnonzero(is_first))
@@ -178,7 +178,7 @@ def reverse_by_shift(offsets: Array, indices: Array, shifts: Array) -> Positions
     )
     if not fits.all():
         raise ValueError(
-            "an entry has no other direction in this table: filter both directions of a pair alike"
+            "an entry has no reverse in this table: filter both directions of a pair alike"
         )
     reverse = np.empty(len(order), np.int64)
     reverse[order] = other

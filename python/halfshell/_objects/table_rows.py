@@ -128,7 +128,7 @@ class TableRows:
         if at < 0:
             name = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}[letter]
             raise AttributeError(
-                f"this table has no {name}: ask for them by "
+                f"this table has no {name}: request them with "
                 f"{'an' if letter == 'S' else 'a'} {letter!r} in quantities, got "
                 f"{self._quantities!r}"
             )
@@ -196,7 +196,7 @@ class TableRows:
         return before + first if isinstance(before, int) else before[first : max(first, end)]
 
     def sum(self, values: npt.ArrayLike) -> Array:
-        """Add up the values of each row's entries.
+        """Sum the values of the entries in each row.
 
         Parameters
         ----------
@@ -212,7 +212,7 @@ class TableRows:
         Raises
         ------
         TypeError, ValueError
-            If `values` are no real numbers of up to 64 bits, or not one for each entry.
+            If `values` are not real numbers of up to 64 bits, or not one for each entry.
 
         Examples
         --------
@@ -235,10 +235,10 @@ class TableRows:
         Parameters
         ----------
         ordered : bool, default False
-            Whether both orders of two entries are there, and not the earlier one first alone.
+            Whether to return both orders of two entries, instead of only the earlier one first.
         block : int, optional
-            Give an iterator of blocks of whole rows, of at most so many triplets each, or of one
-            row that has more.
+            Return an iterator over blocks of whole rows. A block has at most this many triplets,
+            unless a single row has more.
 
         Returns
         -------
@@ -250,7 +250,7 @@ class TableRows:
         Raises
         ------
         TypeError, ValueError
-            If `ordered` is no bool, or `block` no whole number above 0.
+            If `ordered` is not a bool, or `block` is not a whole number above 0.
         MemoryError
             If they would not fit.
 
@@ -336,7 +336,7 @@ class TableRows:
         distances, indices, origin, shifts = self.distances, self.indices, self._origin, None
         if origin is None:
             raise AttributeError(
-                "this table does not know its points: sort one that neighbors or CellList has made"
+                "this table has no points: only tables from neighbors or CellList can be sorted"
             )
         if origin.has_images:
             shifts = origin.shifts()[self._entries] if self._lacks_shifts() else self.shifts

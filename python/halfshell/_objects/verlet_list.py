@@ -32,35 +32,35 @@ class _PairOptions(TypedDict, total=False):
 
 
 class VerletList(VerletRows):
-    """A list of pairs that is kept over many steps, and always exact.
+    """A list of pairs that is kept for many steps and is always exact.
 
-    The list is built with a larger cutoff, `cutoff` + `skin`. As long as no point can have come
-    near enough for a pair to be missing from it, a new step costs only a pass over the points and
-    a pass over the list, which decides each pair anew, for the points of that step.
+    The list is built with a larger cutoff, `cutoff` + `skin`. As long as no points can have moved
+    close enough for it to miss a pair, a new step takes only a pass over the points and a pass
+    over the list, in which each pair is decided anew for the points of that step.
 
     Parameters
     ----------
     cutoff : float
         Largest distance of a pair, in the unit of the points; finite, not negative.
     skin : float or "auto", default "auto"
-        By how much the list reaches farther, in the same unit; finite, not negative. Two points
-        may move towards each other by that much before it is built again. 0: it is built again
-        unless nothing has moved. "auto" looks at how fast points move and how many pairs are
-        listed, settles after a few changes, and searches in every step where that is faster. It
+        How far the list extends beyond the cutoff, in the same unit; finite, not negative. Two
+        points may approach each other by that much before the list is rebuilt. With 0 it is rebuilt
+        unless nothing has moved. "auto" adapts to the speed of the points and the number of listed
+        pairs, settles after a few changes, and searches in every step if that is faster. It
         reads no clock; the pairs never depend on it.
     box, periodic : optional
         As in `pairs`; `update` may give others.
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
     track_changes : bool, default False
-        Whether `changes` is wanted. The points of the step before are kept for it, too.
+        Whether to allow calls of `changes`, for which the points of the previous step are kept.
     kernel, threads, memory_limit : optional
         As in `pairs`.
 
     Raises
     ------
     TypeError, ValueError, OverflowError
-        As `pairs`, for all of these arguments; ValueError also if `skin` is negative or not finite.
+        As for `pairs`; ValueError also if `skin` is negative or not finite.
 
     See Also
     --------
@@ -69,14 +69,13 @@ class VerletList(VerletRows):
     Notes
     -----
     Points may be wrapped into the box or not, at any time; the box may change in every step. The
-    points are copied: what happens to the array afterwards does not matter. If another list is
-    needed (other points, another number or type of them, a box that deformed too much), it is
-    built; that is no error.
+    points are copied, so you may change the array afterwards. The list is rebuilt whenever this is
+    needed (other points, another number or dtype of them, too large a deformation of the box);
+    that is not an error.
 
-    A list saves something only where it lasts for some steps: ``docs/verlet.md`` has measurements.
+    A list pays only if it lasts for several steps: ``docs/verlet.md`` has measurements.
 
-    Several threads may use one list, one at a time: the others wait. It cannot be copied or
-    pickled.
+    Several threads may use one list; calls run one at a time. It cannot be copied or pickled.
 
     Examples
     --------
@@ -148,19 +147,19 @@ class VerletList(VerletRows):
         points : array_like of float, shape (n, d)
             As in `pairs`. They are copied.
         box, periodic : optional
-            The box of this step, as in `pairs`. Default: those given last, to the list or here.
+            The box of this step, as in `pairs`. Default: as last given, to the list or here.
 
         Returns
         -------
         bool
-            Whether the list was built again. True, too, where "auto" does without a list: then
-            pairs come in a new order in each step.
+            Whether the list was rebuilt. Also True if "auto" works without a list: the order of
+            the pairs is then new in each step.
 
         Raises
         ------
         TypeError, ValueError, OverflowError, MemoryError
-            As `pairs` with S; OverflowError also where the S of a listed pair does not fit int32.
-            The list is then as it was before, with the points of the step before.
+            As for `pairs` with S; OverflowError also if the S of a listed pair does not fit int32.
+            The list is then unchanged, with the points of the previous step.
 
         Examples
         --------
@@ -261,11 +260,11 @@ class VerletList(VerletRows):
         Returns
         -------
         ndarray or tuple of ndarray
-            As `halfshell.pairs`: the same pairs, and the same bits of d, D and S. Their order is
-            that of the list: first those whose points were in one image when the list was built,
-            then the others, each as found then. It stays the same until the list is built again,
-            but for the pairs that come and go, and is the same for any kernel and number of
-            threads. Where "auto" does without a list it is that of `halfshell.pairs`. With `sort`
+            As from `halfshell.pairs`: the same pairs, and the same bits of d, D and S. Their order
+            is that of the list: first the pairs within one image when the list was built,
+            then the others, each in the order in which they were found. Apart from pairs that come
+            and go, it stays the same until the list is rebuilt, for any kernel and number of
+            threads. If "auto" works without a list, it is that of `halfshell.pairs`. With `sort`
             it is ascending (i, j, S).
 
         Raises
@@ -301,7 +300,7 @@ class VerletList(VerletRows):
     def changes(
         self, *, quantities: str = "ij", index_dtype: npt.DTypeLike = np.int64
     ) -> PairChanges:
-        """The pairs that came and went between the step before and the last one, each once.
+        """The pairs that formed and broke between the previous and the last step, each once.
 
         Parameters
         ----------
@@ -311,23 +310,23 @@ class VerletList(VerletRows):
         Returns
         -------
         PairChanges
-            Named tuple (formed, broken) of what `pairs` returns: `formed` are the rows of the last
-            step whose pair was none in the step before, `broken` those of the step before whose
-            pair is none any more, with the d, D and S that they had then. Both ascend by
+            Named tuple (formed, broken) of what `pairs` returns: `formed` has the pairs of the last
+            step that did not exist in the previous one; `broken` has the pairs of the previous step
+            that no longer exist, with the d, D and S that they had then. Both ascend by
             (i, j, S). In the first step every pair is formed.
 
-            Each image of a point counts for itself. A point that is wrapped into the box breaks
-            nothing, although its S change, nor does another basis of the lattice, as in a sheared
-            box that is flipped back: a pair goes on as the one whose vector, in units of the box
-            vectors, has changed by less than a half along each. Points are told by their numbers;
-            pairs of those at the end that only one step has form or break.
+            Each image of a point counts separately. Wrapping a point into the box breaks no pair,
+            although S changes. Nor does a change of the lattice basis, as when a sheared box is
+            flipped back: a pair continues as the one whose vector, in units of the box
+            vectors, has changed by less than a half along each. Points are identified by their
+            numbers; pairs of points that only one of the two steps has form or break.
 
         Raises
         ------
         RuntimeError
             Before the first `update`, or if the list was made without `track_changes`.
         TypeError, ValueError, OverflowError, MemoryError
-            As `pairs` with S.
+            As for `pairs` with S.
 
         Examples
         --------
@@ -353,12 +352,12 @@ class VerletList(VerletRows):
 
     @property
     def skin(self) -> float:
-        """By how much the list reaches beyond the cutoff: as given, or chosen last."""
+        """How far the list extends beyond the cutoff: as given, or as last chosen."""
         return self._skin
 
     @property
     def margin(self) -> float:
-        """By how much pairs may still come closer before the list is built again, rounded down.
+        """How much closer pairs may still come before the list is rebuilt, rounded down.
 
         In the unit of the points; never negative; 0 without a list. RuntimeError before the first
         `update`.
@@ -376,12 +375,12 @@ class VerletList(VerletRows):
 
     @property
     def n_builds(self) -> int:
-        """How many times the list was built."""
+        """Number of times that the list was built."""
         return self._n_builds
 
     @property
     def n_updates(self) -> int:
-        """How many steps were taken."""
+        """Number of steps taken."""
         return self._n_updates
 
     def _state(self) -> dict[str, Any]:

@@ -51,8 +51,8 @@ class VerletRows:
         -------
         NeighborTable
             The table of `halfshell.neighbors`, bit for bit, with a row for each point: the full
-            list. It does not keep the points, so that it cannot ``sort()``; to sort rows by
-            distance, ask `halfshell.neighbors`.
+            list. It does not keep the points, so it cannot ``sort()``; to sort rows by
+            distance, use `halfshell.neighbors`.
 
         Raises
         ------
@@ -63,8 +63,8 @@ class VerletRows:
 
         Notes
         -----
-        The pairs are sorted into rows for this, which takes longer than `pairs`. It pays where the
-        rows are needed and the list lasts for many steps.
+        The pairs are sorted into rows, which takes longer than `pairs`. It pays if you need the
+        rows and the list lasts for many steps.
 
         Examples
         --------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drop-ins: functions and classes of other libraries, under their names and by their rules.
+"""Drop-ins for functions and classes of other libraries, with the same names and rules.
 
 A module for each library, which must be installed. None of them is imported with ``halfshell``:
 write ``from halfshell.compat.ase import neighbor_list``. See ``docs/drop-ins.md``.

@@ -176,7 +176,7 @@ def _reach(cutoff: Any, numbers: Any) -> tuple[Any, dict[str, Any]]:
     """The cutoff of halfshell, and what each atom brings to it."""
     if isinstance(cutoff, Mapping):
         if numbers is None:
-            raise TypeError("numbers must be given where cutoff is a dict")
+            raise TypeError("numbers must be given if cutoff is a dict")
         kinds, types = np.unique(np.asarray(numbers), return_inverse=True)
         places = {kind: place for place, kind in enumerate(kinds.tolist())}
         table: dict[tuple[int, int], Any] = {}
@@ -227,8 +227,8 @@ def _own(letter: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):
     """In place of ``ase.neighborlist.NewPrimitiveNeighborList``, of which it is a subclass.
 
-    Parameters, attributes and methods are ASE's. With ``bothways=False`` a pair stands once: the
-    one of (i, j, S) and (j, i, -S) whose S has a positive first component that is not zero, or
+    Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once: the
+    one of (i, j, S) and (j, i, -S) in which the first nonzero component of S is positive, or
     i <= j where S is zero. Neighbours ascend by (j, S), also with ``sorted=False``.
 
     Parameters
@@ -272,7 +272,7 @@ class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):
 class PrimitiveNeighborList(_owner.PrimitiveNeighborList):
     """In place of ``ase.neighborlist.PrimitiveNeighborList``, of which it is a subclass.
 
-    Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair stands once, at
+    Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once, at
     the atom where `NewPrimitiveNeighborList` has it; which of the two that is ASE does not say, and
     its own two classes differ. Neighbours ascend by (j, S), also with ``sorted=False``.
 

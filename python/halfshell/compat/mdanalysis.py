@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stand-ins for `MDAnalysis.lib.distances`: pairs within a cutoff, in their nearest images.
+"""Drop-ins for `MDAnalysis.lib.distances`: pairs within a cutoff, in their nearest images.
 
 As there, coordinates and box are float32, and a pair counts up to `max_cutoff` and beyond
 `min_cutoff`. There rounded distances decide, and how they are rounded depends on the method; here

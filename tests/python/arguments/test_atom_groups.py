@@ -82,7 +82,7 @@ def test_cutoffs_and_types_by_element(universe, box):
 
 
 def test_without_elements_types_are_needed(boxless):
-    with pytest.raises(TypeError, match="types must be given where cutoff is a dict"):
+    with pytest.raises(TypeError, match="types must be given if cutoff is a dict"):
         hs.pairs(boxless, {("Si", "O"): 2.0})
 
 

@@ -489,7 +489,7 @@ def test_a_tensor_that_only_speaks_dlpack_may_fail_too():
 
 def test_a_single_number_has_no_place():
     refused = [
-        (None, TypeError, "^cutoff must be a number, got NoneType: None goes with radii or"),
+        (None, TypeError, "^cutoff must be a number, got NoneType: None needs radii or"),
         ("1", TypeError, "^cutoff must be a number, got str$"),
         (object(), TypeError, "^cutoff must be a number, got object$"),
         (1j, TypeError, "^cutoff must be a number, got dtype complex128$"),

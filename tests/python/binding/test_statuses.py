@@ -53,7 +53,7 @@ RAISED = {
     "HS_ERR_SUPPORT_REACH": (ValueError, "supports must reach at most 2**1022"),
     "HS_ERR_EXTENT": (ValueError, "extent must be finite and not negative, got 0.5"),
     "HS_ERR_ARGUMENT": (ValueError, "an argument is out of its range, or an array is missing"),
-    "HS_ERR_KEY": (KeyError, "'a key is not there, comes twice, or has no position'"),
+    "HS_ERR_KEY": (KeyError, "'a key is missing, repeated, or has no position'"),
 }
 
 

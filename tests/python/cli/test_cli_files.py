@@ -71,7 +71,7 @@ def test_small_files_of_large_arrays_are_refused_before_they_are_unpacked(tmp_pa
     assert (tmp_path / "zeros.npz").stat().st_size < 100_000
     line = refused(path)
     assert line.startswith(f"{path}: 'points' of shape (2000000, 3) and dtype float64")
-    assert "would take 0.096 GB, more than there is" in line
+    assert "would take 0.096 GB, more than is available" in line
 
 
 @pytest.mark.usefixtures("little_memory")

@@ -110,7 +110,7 @@ def test_rdf(told, run, text, tmp_path):
     assert numbers(found["counts"]) == result.counts.tolist()
     assert facts["pairs"] == int(result.counts.sum()) and facts["bins"] == 30
     status, out, err = run("rdf", text, "--cutoff", "3")
-    assert (status, out) == (2, "") and "needs a box that repeats" in err
+    assert (status, out) == (2, "") and "needs a box that is periodic" in err
 
 
 def test_summaries_for_people(run, text):

@@ -197,7 +197,7 @@ def test_an_object_with_its_own_box(rng):
     ([-1, 0, 0, 0], ValueError, r"batch must not be negative, got batch\[0\] = -1"),
     ([0, 0, 0, 2**62], ValueError, r"batch must be less than 2\*\*62, got batch\[3\]"),
     (np.array([0, 0, 0, 2**64 - 1], dtype=np.uint64), ValueError, r"2\*\*62, got batch\[3\]"),
-    ([0, 0, 1], ValueError, r"batch must have shape \(4,\), one number a point, got \(3,\)"),
+    ([0, 0, 1], ValueError, r"batch must have shape \(4,\), one number for each point, got \(3,\)"),
     ([[0], [0], [0], [0]], ValueError, r"batch must have shape \(4,\)"),
     (0, ValueError, r"batch must have shape \(4,\)"),
     ([0.0, 0.0, 1.0, 1.0], TypeError, "batch must hold integers, got dtype float64"),
@@ -226,9 +226,9 @@ def stack(entry, system):
     (1.0, stack(1.0, 2), r"vectors of box\[2\] must be linearly independent"),
     (1.0, stack(1.0, 1), r"vectors of box\[1\] must be linearly independent"),
     (1.0, np.ones((3, 3)), "vectors of box must be linearly independent"),
-    (1.0, np.ones((4, 3)), r"or one a system \(s, d, d\), got \(4, 3\)"),
-    (1.0, np.ones((4, 3, 2)), r"box must have shape .* one a system \(s, 3, 3\).* got \(4, 3, 2\)"),
-    (np.ones((2, 2)), None, r"or, one a system, have shape \(s,\), got \(2, 2\)"),
+    (1.0, np.ones((4, 3)), r"or one for each system \(s, d, d\), got \(4, 3\)"),
+    (1.0, np.ones((4, 3, 2)), r"shape .* one for each system \(s, 3, 3\).* got \(4, 3, 2\)"),
+    (np.ones((2, 2)), None, r"have shape \(s,\), one for each system, got \(2, 2\)"),
     (-1.0, None, "cutoff must be finite and not negative, got -1.0"),
 ])  # fmt: skip
 def test_bad_boxes_and_cutoffs_are_named(cutoff, box, message):

@@ -105,7 +105,7 @@ def test_rdf_needs_all_axes_of_each():
         scene.points, 2.0, 5, periodic=every, **how
     )
     assert np.array_equal(plain.g, given.g)
-    with pytest.raises(ValueError, match="rdf needs a box that repeats along every axis"):
+    with pytest.raises(ValueError, match="rdf needs a box that is periodic along every axis"):
         hs.rdf(scene.points, 2.0, 5, periodic=scene.periodic, **how)
 
 

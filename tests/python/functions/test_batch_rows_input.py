@@ -23,7 +23,7 @@ def test_bad_input():
             search(points, 1.0, batch=batch, queries=queries, query_batch=[2, 0])
         with pytest.raises(ValueError, match=r"query_batch must not be negative"):
             search(points, 1.0, batch=batch, queries=queries, query_batch=[-2, 0])
-        with pytest.raises(ValueError, match=r"query_batch must have shape \(2,\), one number a q"):
+        with pytest.raises(ValueError, match=r"shape .2,., one number for each q"):
             search(points, 1.0, batch=batch, queries=queries, query_batch=[0])
         with pytest.raises(TypeError, match="query_batch must hold integers"):
             search(points, 1.0, batch=batch, queries=queries, query_batch=[0.0, 1.0])
@@ -46,7 +46,7 @@ def test_bad_input():
         with pytest.raises(ValueError, match="queries must be an array"):
             search(points, 1.0, batch=batch, queries=atoms, query_batch=[0])
     for search in (hs.neighbors, hs.coordination):
-        with pytest.raises(ValueError, match="indices does not go with batch"):
+        with pytest.raises(ValueError, match="indices cannot be combined with batch"):
             search(points, 1.0, batch=batch, indices=[0])
         with pytest.raises(ValueError, match=r"radii.*radii\[2\] = -1"):
             search(points, None, batch=batch, radii=[1.0, 1.0, -1.0, 1.0])

@@ -232,5 +232,5 @@ def test_what_is_no_pair_is_in_no_shell():
     again, needed = cells.pairs([1.0, 2.5], quantities="k", capacity=1, on_overflow="flag")
     assert again.tolist() == [2] and needed == 2
     for searched in (hs.pairs, lambda points, *rest, **how: cells.pairs(*rest, **how)):
-        with pytest.raises(ValueError, match="touching does not go with capacity"):
+        with pytest.raises(ValueError, match="touching cannot be combined with capacity"):
             searched(points, 1.0, touching=[1], capacity=4)

@@ -127,7 +127,7 @@ REFUSED = {
     "negative types": ({"types": [0, -1]}, ValueError, r"types\[1\] = -1"),
     "bytes": ({"types": [b"A", b"B"]}, TypeError, "integers"),
     "queries and indices": (
-        {"types": [0, 1], "queries": [[0.0]], "indices": [0]}, ValueError, "no queries beside",
+        {"types": [0, 1], "queries": [[0.0]], "indices": [0]}, ValueError, "do not give queries",
     ),
     "a negative cutoff": ({"types": [0, 1], "cutoff": -1.0}, ValueError, "cutoff"),
     "a cutoff that is NaN": ({"types": ["A", "B"], "cutoff": np.nan}, ValueError, "cutoff"),

@@ -288,7 +288,7 @@ def test_extreme_units(scale):
 
 
 BAD = [
-    ({"groups": [0, 1]}, ValueError, r"groups must have shape \(3,\), one a point"),
+    ({"groups": [0, 1]}, ValueError, r"groups must have shape \(3,\), one for each point"),
     ({"groups": [0.0, 1.0, 2.0]}, TypeError, "groups must hold integers or names"),
     ({"groups": [True, False, True]}, TypeError, "groups must hold integers or names"),
     ({"groups": np.array([2**64 - 1, 0, 0], np.uint64)}, ValueError, "groups must be less than"),
@@ -299,9 +299,9 @@ BAD = [
     ({"exclude": [[0, 3]]}, ValueError, r"exclude\[:, 1\] must be numbers of points, from 0 to 2"),
     ({"exclude": [[-1, 0]]}, ValueError, r"exclude\[:, 0\] must be numbers of points"),
     ({"exclude": [[0.0, 1.0]]}, TypeError, "must hold integers"),
-    ({"exclude": [[0, 1]], "query_exclude": [0]}, ValueError, "query_exclude goes with labels"),
-    ({"exclude_within": 1}, ValueError, "exclude_within goes with labels"),
-    ({"exclude": [[0, 1]], "exclude_within": 1}, ValueError, "exclude_within goes with labels"),
+    ({"exclude": [[0, 1]], "query_exclude": [0]}, ValueError, "query_exclude needs labels"),
+    ({"exclude_within": 1}, ValueError, "exclude_within needs labels"),
+    ({"exclude": [[0, 1]], "exclude_within": 1}, ValueError, "exclude_within needs labels"),
     ({"exclude": [0, 1, 2], "exclude_within": -1}, ValueError, "exclude_within must be from 0"),
     ({"exclude": [0, 1, 2], "exclude_within": 2**63}, ValueError, "exclude_within must be from 0"),
     ({"exclude": [0, 1, 2], "exclude_within": 0.5}, TypeError, "whole number"),
@@ -310,7 +310,7 @@ BAD = [
     ({"min_distance": np.nan}, ValueError, "min_distance must be finite and not negative"),
     ({"min_distance": np.inf}, ValueError, "min_distance must be finite and not negative"),
     ({"min_distance": "1"}, TypeError, "min_distance must"),
-    ({"min_distance": 0.5, "precision": "single"}, ValueError, "does not go with precision"),
+    ({"min_distance": 0.5, "precision": "single"}, ValueError, "cannot be combined with precision"),
 ]
 
 

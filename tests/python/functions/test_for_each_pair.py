@@ -303,7 +303,7 @@ def test_other_functions_of_ctypes_are_refused():
         hs.for_each_pair(POINTS, 0.5, untyped)
     types = (ctypes.c_int, I64, I64, I32_POINTER, F64_POINTER, F64, ctypes.c_void_p)
     needs_lock = ctypes.PYFUNCTYPE(*types)(lambda *arguments: 0)
-    with pytest.raises(TypeError, match="lock"):
+    with pytest.raises(TypeError, match="GIL"):
         hs.for_each_pair(POINTS, 0.5, needs_lock)
     with pytest.raises(ValueError, match="NULL"):
         hs.for_each_pair(POINTS, 0.5, SIGNATURE())

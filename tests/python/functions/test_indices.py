@@ -107,15 +107,15 @@ def test_wrong_indices(wrong, error, said):
     for search in (cells.neighbors, cells.coordination):
         with pytest.raises(error, match=said):
             search(indices=wrong)
-        with pytest.raises(ValueError, match="give no queries beside them"):
+        with pytest.raises(ValueError, match="do not give queries as well"):
             search(indices=[0], queries=points)
 
 
 def test_what_does_not_go_with_indices():
     points = np.zeros((3, 2))
-    with pytest.raises(ValueError, match="give no queries beside them"):
+    with pytest.raises(ValueError, match="do not give queries as well"):
         hs.neighbors(points, 1.0, indices=[0], queries=points)
-    with pytest.raises(ValueError, match="does not go with precision 'single'"):
+    with pytest.raises(ValueError, match="cannot be combined with precision 'single'"):
         hs.coordination(points, 1.0, indices=[0], precision="single")
     with pytest.raises(ValueError, match="letters"):
         hs.neighbors(points, 1.0, indices=[0], quantities="jj")

@@ -91,7 +91,7 @@ def test_shells_that_float64_does_not_hold_are_0_or_infinite():
 
 
 REFUSED = {
-    "no box": ({}, ValueError, "repeats along every axis"),
+    "no box": ({}, ValueError, "periodic along every axis"),
     "a slab": ({"box": [1.0] * 2, "periodic": [True, False]}, ValueError, "along every axis"),
     "no bins": ({"box": [1.0] * 2, "bins": 0}, ValueError, "bins"),
     "bins that are no number": ({"box": [1.0] * 2, "bins": 1.5}, TypeError, "bins"),

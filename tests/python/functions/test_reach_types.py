@@ -156,7 +156,7 @@ def test_tables_that_are_none(table, fragments):
         ({(0, -1): 1.0}, TYPES, ValueError, ["-1"]),
         ({("H", "O"): 1.0}, TYPES, ValueError, ["names.*types are numbers"]),
         ({(0, 1): 1.0}, ["H"] * 20, ValueError, ["numbers.*types are names"]),
-        ({("H", "Hx"): 1.0}, ["H"] * 20, ValueError, ["'Hx' is no element"]),
+        ({("H", "Hx"): 1.0}, ["H"] * 20, ValueError, ["'Hx' is neither an element"]),
         ({(0, 1): 1.0}, None, TypeError, ["types must be given.*dict"]),
         ({(0, 1): 1.0}, [0, 1], ValueError, [r"types.*\(20,\).*\(2,\)"]),
         ({(0, 1): 1.0}, np.full(20, -1), ValueError, [r"types.*types\[0\] = -1"]),

@@ -178,8 +178,8 @@ POINTS = [[0.0, 0.0], [1.0, 0.0]]
 @pytest.mark.parametrize(
     ("how", "error", "message"),
     [
-        ({"cutoff": 1.0}, ValueError, "k in quantities goes with several cutoffs, got one"),
-        ({"cutoff": 1}, ValueError, "k in quantities goes with several cutoffs, got one"),
+        ({"cutoff": 1.0}, ValueError, "k in quantities needs several cutoffs, got one"),
+        ({"cutoff": 1}, ValueError, "k in quantities needs several cutoffs, got one"),
         ({"cutoff": []}, ValueError, r"shape \(k,\), with one at least, got \(0,\)"),
         ({"cutoff": [[1.0]]}, ValueError, r"shape \(k,\), with one at least, got \(1, 1\)"),
         ({"cutoff": [2.0, 1.0]}, ValueError, r"ascending, got cutoff\[0\] = 2.0 before"),
@@ -188,12 +188,12 @@ POINTS = [[0.0, 0.0], [1.0, 0.0]]
         ({"cutoff": ["1", "2"]}, TypeError, "cutoff must hold real numbers"),
         ({"cutoff": None}, TypeError, "several cutoffs, in an array of numbers, got NoneType"),
         ({"cutoff": {(0, 0): 1.0}}, TypeError, "several cutoffs, in an array.*, got dict"),
-        ({"radii": [1.0, 1.0]}, ValueError, "not with radii, types or supports"),
-        ({"types": [0, 0]}, ValueError, "not with radii, types or supports"),
-        ({"supports": [np.eye(2)] * 2, "extent": 1.0}, ValueError, "not with radii, types or"),
-        ({"batch": [0, 0]}, ValueError, "does not go with batch"),
-        ({"precision": "double"}, ValueError, "goes with precision 'exact', got 'double'"),
-        ({"precision": "single"}, ValueError, "goes with precision 'exact', got 'single'"),
+        ({"radii": [1.0, 1.0]}, ValueError, "combined with radii, types or supports"),
+        ({"types": [0, 0]}, ValueError, "combined with radii, types or supports"),
+        ({"supports": [np.eye(2)] * 2, "extent": 1.0}, ValueError, "combined with radii, types or"),
+        ({"batch": [0, 0]}, ValueError, "cannot be combined with batch"),
+        ({"precision": "double"}, ValueError, "needs precision 'exact', got 'double'"),
+        ({"precision": "single"}, ValueError, "needs precision 'exact', got 'single'"),
     ],
 )
 def test_what_does_not_go_together(how, error, message):
@@ -202,7 +202,7 @@ def test_what_does_not_go_together(how, error, message):
 
 
 def test_several_cutoffs_need_the_letter():
-    message = "cutoff must be a number; several go with the letter k in quantities"
+    message = "cutoff must be a number; several need the letter k in quantities"
     cells = hs.CellList(POINTS, 2.0)
     for cutoffs in ([1.0, 2.0], (1.0,), np.array([1.0, 2.0])):
         for call in (
@@ -214,9 +214,9 @@ def test_several_cutoffs_need_the_letter():
             with pytest.raises(TypeError, match=message):
                 call(cutoffs)
     for call in (cells.pairs, cells.iter_pairs):
-        with pytest.raises(ValueError, match="goes with several cutoffs, got one"):
+        with pytest.raises(ValueError, match="needs several cutoffs, got one"):
             call(1.0, quantities="k")
-        with pytest.raises(TypeError, match="goes with several cutoffs"):
+        with pytest.raises(TypeError, match="needs several cutoffs"):
             call(quantities="k")
 
 

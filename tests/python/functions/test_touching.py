@@ -222,16 +222,16 @@ def test_bad_numbers(touching, error, message):
 
 def test_what_does_not_go_together():
     cells = hs.CellList(POINTS, 2.0)
-    with pytest.raises(ValueError, match="touching does not go with batch"):
+    with pytest.raises(ValueError, match="touching cannot be combined with batch"):
         hs.pairs(POINTS, 1.0, touching=[0], batch=[0, 0, 0])
     for find in (lambda *a, **how: hs.pairs(POINTS, *a, **how), cells.pairs):
-        with pytest.raises(ValueError, match="touching does not go with the letter k"):
+        with pytest.raises(ValueError, match="touching cannot be combined with the letter k"):
             find([1.0, 2.0], touching=[0], quantities="k")
-        with pytest.raises(ValueError, match="goes with several cutoffs, got one"):
+        with pytest.raises(ValueError, match="needs several cutoffs, got one"):
             find(1.0, touching=[0], quantities="k")
         with pytest.raises(ValueError, match="some of the letters i j d D S P, each at most once"):
             find(1.0, touching=[0], quantities="x")
-    with pytest.raises(ValueError, match="touching does not go with precision 'single'"):
+    with pytest.raises(ValueError, match="touching cannot be combined with precision 'single'"):
         hs.pairs(POINTS, 1.0, touching=[0], precision="single")
     with pytest.raises(ValueError, match="there are no points"):
         hs.pairs(np.zeros((0, 2)), 1.0, touching=[0])

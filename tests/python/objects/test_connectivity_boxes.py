@@ -98,5 +98,5 @@ def test_rows_and_pairs_have_every_image(seed, ghosts):
 
 def test_a_shift_where_no_box_repeats_is_refused():
     c = hs.Connectivity([hs.NodeList("a", [[0.0], [1.0]], [1.0, 1.0])])
-    with pytest.raises(ValueError, match="boxes that repeat"):
+    with pytest.raises(ValueError, match="periodic boxes"):
         c.pairs.index((0, 0, 1, 0), [0])

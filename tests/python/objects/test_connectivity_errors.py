@@ -34,8 +34,8 @@ CONNECTIVITIES = {
     ),
     "extent must be": lambda: hs.Connectivity(three(), 0.0),
     "extent must be from": lambda: hs.Connectivity(three(), 2.0**65),
-    "names a node that there is not": lambda: hs.Connectivity(three(), exclude=[(3, 0, 0, 1)]),
-    r"there is not: \[0, 0, 9223372036854775807, 0\]": lambda: hs.Connectivity(
+    "names a node that does not exist": lambda: hs.Connectivity(three(), exclude=[(3, 0, 0, 1)]),
+    r"does not exist: \[0, 0, 9223372036854775807, 0\]": lambda: hs.Connectivity(
         three(), exclude=np.array([(0, 0, 2**64 - 1, 0)], np.uint64)
     ),
     "two nodes": lambda: hs.Connectivity(three(), exclude=[(1, 0, 1, 0)]),

@@ -282,7 +282,7 @@ def test_a_long_tie_that_does_not_fit_is_refused(monkeypatch):
 def test_what_sorting_needs_is_named():
     table = hs.neighbors(SCENE, 0.25, quantities="jd")
     bare = hs.NeighborTable((table.offsets, table.indices, table.distances), "jd", 64, True)
-    with pytest.raises(AttributeError, match="sort one that neighbors or CellList has made"):
+    with pytest.raises(AttributeError, match="only tables from neighbors or CellList"):
         bare.sort()
     with pytest.raises(AttributeError, match="'j' in quantities"):
         hs.neighbors(SCENE, 0.25, quantities="d").sort()

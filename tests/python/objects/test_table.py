@@ -393,7 +393,7 @@ def test_reverse_of_filtered_tables(scene, seed):
     if np.array_equal(keep, keep[table.reverse()]):
         assert_reverses(one, one.reverse())
     else:
-        assert_refused(lambda: one.reverse(), ValueError, "no other direction")
+        assert_refused(lambda: one.reverse(), ValueError, "no reverse in this table")
 
 
 def test_reverse_of_many_points(rng):

@@ -70,7 +70,7 @@ def test_rows_of_rows_sort_and_are_pickled_as_those_of_the_whole(queries, letter
         ([0.0], TypeError, "whole number"),
         (np.empty(0), TypeError, "float64"),
         (["a"], TypeError, "whole number"),
-        ([True] * 29, ValueError, "one bool a row"),
+        ([True] * 29, ValueError, "one bool for each row"),
         ([[0, 1]], ValueError, "one axis"),
         ([[0], [0, 1]], ValueError, "rows must be a rectangular array"),
         (np.ma.array([0, 1], mask=[0, 1]), ValueError, "masked"),

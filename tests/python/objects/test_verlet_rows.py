@@ -73,7 +73,7 @@ def test_what_cannot_be_answered_is_refused():
     with pytest.raises(ValueError, match="index_dtype"):
         pair_list.neighbors(index_dtype=np.uint32)
     table = pair_list.neighbors(quantities="jd")
-    with pytest.raises(AttributeError, match="does not know its points"):
+    with pytest.raises(AttributeError, match="this table has no points"):
         table.sort()
     assert pickle.loads(pickle.dumps(table)).indices.tolist() == table.indices.tolist()
 

@@ -21,9 +21,11 @@ DRAWS = r"plt\.(figure|subplots)\(|\bplot_pairs\(|\.plot\("
 
 #: What newcomers ask -> where the start page sends them.
 QUESTIONS = {
+    "installing": "start/ten-minutes.md#install",
     "which function": "start/which-function.md",
     "only these points": "recipes/selected-points.md",
     "cutoffs by element": "recipes/bonds.md",
+    "ASE": "start/coming-from.md#ase",
     "MDAnalysis": "start/coming-from.md#mdanalysis",
     "signs and batches of a graph": "recipes/graph-batches.md",
     "adding up forces": "recipes/sums-over-pairs.md",

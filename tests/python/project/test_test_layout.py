@@ -16,7 +16,7 @@ FOLDERS = {
     "arguments": "what goes in, and what is refused",
     "laws": "scenes on which the answer is known, or must not change",
     "process": "memory, threads, signals, the environment",
-    "compat": "stand-ins for other libraries",
+    "compat": "drop-ins for other libraries",
     "frameworks": "tensors of PyTorch and JAX",
     "distributed": "Dask and MPI",
     "scenes": "the scenes and structures of the package",
