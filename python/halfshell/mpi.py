@@ -108,7 +108,7 @@ def exchange(
         raise TypeError(
             f"comm must be a communicator of mpi4py (the extra halfshell[mpi]), got {kind_of(comm)}"
         )
-    array, given = _given(points, cutoff, box, periodic)
+    array, given = _given(points, cutoff, box, periodic, comm.Get_size())
     gathered = comm.gather(given)
     answer: Division | Exception | None = None
     if gathered is not None:
@@ -133,7 +133,7 @@ def exchange(
 
 
 def _given(
-    points: Any, cutoff: Any, box: Any, periodic: Any
+    points: Any, cutoff: Any, box: Any, periodic: Any, n_ranks: int
 ) -> tuple[npt.NDArray[Any], _Given]:
     """Arguments of this rank, with what is wrong with them, so that no other waits in vain."""
     try:
@@ -141,7 +141,8 @@ def _given(
         ndim, dtype = array.shape[1], array.dtype.name
         vectors, bits = as_own_box(box, periodic, ndim)
         shown = None if vectors is None else np.ascontiguousarray(vectors, np.float64).tobytes()
-        return array, _Given(ndim, dtype, summary(array), as_cutoff(cutoff), shown, bits, None)
+        short = summary(array, n_ranks)
+        return array, _Given(ndim, dtype, short, as_cutoff(cutoff), shown, bits, None)
     except Exception as error:
         return np.empty((0, 1)), _Given(0, "", None, 0.0, None, 0, _plain(error, ""))
 

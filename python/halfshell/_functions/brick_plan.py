@@ -22,7 +22,8 @@ Array = npt.NDArray[Any]
 Bits = npt.NDArray[np.bool_]
 Numbers = npt.NDArray[np.int64]
 
-_SAMPLE = 1 << 13  # points of each piece, at most, by which bricks are cut
+# Points of each piece, and of all pieces, by which bricks are cut: not many more than these.
+_SAMPLE, _SAMPLES = 1 << 13, 1 << 22
 
 
 class Summary(NamedTuple):
@@ -66,10 +67,10 @@ class Piece(NamedTuple):
     is_owned: Bits
 
 
-def summary(points: Array) -> Summary:
-    """Sum up a piece; points are named by their places in it."""
+def summary(points: Array, n_pieces: int) -> Summary:
+    """Sum up one of some pieces; points are named by their places in it."""
     n_points = len(points)
-    step = 1 + n_points // _SAMPLE
+    step = 1 + n_points // max(1, min(_SAMPLE, _SAMPLES // n_pieces))
     largest = float(max(points.max(initial=0.0), -points.min(initial=0.0)))
     error = None
     if not np.isfinite(largest):

@@ -62,10 +62,12 @@ def of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Array:
     return as_real_array(array, "points")
 
 
-def summary_of(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Summary:
+def summary_of(
+    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, n_chunks: int
+) -> Summary:
     """What a division must know of a chunk; what is wrong with its coordinates is a part of it."""
     try:
-        return summary(of_chunk(chunk, ndim, dtype, place))
+        return summary(of_chunk(chunk, ndim, dtype, place), n_chunks)
     except (ValueError, OverflowError) as error:
         return Summary(len(chunk), 0.0, np.empty((0, ndim)), 1.0, error)
 

@@ -71,7 +71,8 @@ def divided(
     tasks = (brick_tasks.summary_of, divide, brick_tasks.pieces_of, brick_tasks.part_of)
     summary_of, divide_by, pieces_of, part_of = (dask.delayed(one, pure=True) for one in tasks)
     each = [(chunk, ndim, dtype, place) for place, chunk in enumerate(chunks)]
-    division = divide_by([summary_of(*one) for one in each], cutoff, n_bricks, vectors, flags)
+    summaries = [summary_of(*one, len(each)) for one in each]
+    division = divide_by(summaries, cutoff, n_bricks, vectors, flags)
     pieces = [pieces_of(*one, division) for one in each]
     parts = [part_of([piece[k] for piece in pieces], division) for k in range(n_bricks)]
     return Scene(parts, division, n_points, ndim, scene)

@@ -22,7 +22,7 @@ def parts_of(points, cutoff, options, n):
     vectors, bits = as_own_box(options.get("box"), options.get("periodic"), ndim)
     flags = tuple(bool(bits >> k & 1) for k in range(ndim))
     each = [(chunk, ndim, array.dtype, k) for k, chunk in enumerate(chunks)]
-    summaries = [tasks.summary_of(*one) for one in each]
+    summaries = [tasks.summary_of(*one, len(each)) for one in each]
     division = pickle.loads(pickle.dumps(divide(summaries, cutoff, n, vectors, flags)))
     pieces = [tasks.pieces_of(*one, division) for one in each]
     parts = [tasks.part_of([piece[k] for piece in pieces], division) for k in range(n)]

@@ -76,6 +76,9 @@ class Alone:
     def Get_rank(self):
         return 0
 
+    def Get_size(self):
+        return 1
+
 
 class Others(Alone):
     """A communicator in which other ranks bring what they are told to."""
@@ -117,7 +120,7 @@ def test_one_rank(name):
         ({"periodic": 1}, "periodic must be the same"),
         ({"ndim": 2}, "one width and type on all ranks, got 3 columns of float64"),
         ({"dtype": "float32"}, "3 of float32 on rank 1"),
-        ({"summary": summary(np.full((2, 3), np.nan))}, r"points\[4, 0\]"),
+        ({"summary": summary(np.full((2, 3), np.nan), 2)}, r"points\[4, 0\]"),
         ({"error": ValueError("no points")}, "rank 1: no points"),
     ],
 )
