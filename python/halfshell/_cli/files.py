@@ -25,9 +25,10 @@ from halfshell._cli.text_files import BadLine, read_points
 from halfshell._extras import needs
 from halfshell._terminal import printable
 
-__all__ = ["InputError", "Scene", "missing_extra", "one_line", "read_scene", "replacing"]
+__all__ = ["InputError", "Scene", "missing_extra", "one_line", "read_frames", "read_scene",
+           "replacing"]  # fmt: skip
 
-
+_NUMPY, _TEXT = (".npy", ".npz"), (".csv", ".txt", ".dat", ".tsv")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
 MOST_CHARACTERS = 1000  # of a line that says what is wrong
 
@@ -139,16 +140,46 @@ def read_scene(
     else:
         suffix = Path(file).suffix.lower()
         try:
-            if file_format is None and suffix in (".npy", ".npz"):
+            if file_format is None and suffix in _NUMPY:
                 scene = _read_numpy(file, index)
-            elif file_format is None and suffix in (".csv", ".txt", ".dat", ".tsv"):
+            elif file_format is None and suffix in _TEXT:
                 scene = _read_text(file, index)
             else:
-                scene = _read_ase(file, file_format, index)
+                (scene,) = _read_ase(file, file_format, index)
         except MemoryError:
             raise InputError(f"{file}: does not fit in memory") from None
     _check(scene)
     return _with_overrides(scene, box, periodic)
+
+
+def read_frames(
+    file: str,
+    frames: slice,
+    *,
+    file_format: str | None = None,
+    box: NDArray[np.float64] | None = None,
+    periodic: tuple[bool, ...] | None = None,
+) -> list[Scene]:
+    """Read some frames of a file, at least one, as `read_scene` reads one.
+
+    Raises
+    ------
+    InputError
+        With the reason in one line.
+    """
+    if not os.path.exists(file):
+        raise InputError(f"{file}: no such file")
+    if file_format is None and Path(file).suffix.lower() in (*_NUMPY, *_TEXT):
+        raise InputError(f"{file}: --index is for formats with several frames")
+    try:
+        scenes = _read_ase(file, file_format, frames)
+    except MemoryError:
+        raise InputError(f"{file}: does not fit in memory") from None
+    if not scenes:
+        raise InputError(f"{file}: has none of these frames")
+    for scene in scenes:
+        _check(scene)
+    return [_with_overrides(scene, box, periodic) for scene in scenes]
 
 
 def _shipped_scene() -> Scene:
@@ -205,7 +236,8 @@ def _read_text(file: str, index: int | None) -> Scene:
     return Scene(points, None, (False,) * points.shape[1], file)
 
 
-def _read_ase(file: str, file_format: str | None, index: int | None) -> Scene:
+def _read_ase(file: str, file_format: str | None, index: int | slice | None) -> list[Scene]:
+    """The frames that are meant: one, unless `index` is a range."""
     try:
         import ase.io
         from ase.io.formats import UnknownFileTypeError
@@ -229,7 +261,7 @@ def _read_ase(file: str, file_format: str | None, index: int | None) -> Scene:
         except OSError as error:
             raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
         except (IndexError, StopIteration) as error:
-            what = f"has no frame {index}" if index is not None else "holds no atoms"
+            what = f"has no frame {index}" if isinstance(index, int) else "holds no atoms"
             detail = f" ({one_line(error)})" if str(error) else ""
             raise InputError(f"{file}: {what}{detail}") from None
         except MemoryError:
@@ -241,15 +273,18 @@ def _read_ase(file: str, file_format: str | None, index: int | None) -> Scene:
     remarks = dict.fromkeys(
         " ".join(str(w.message).split()) for w in caught if issubclass(w.category, UserWarning)
     )
-    return Scene(
-        atoms.positions,
-        atoms.cell.array if atoms.cell.rank > 0 else None,
-        tuple(bool(flag) for flag in atoms.pbc),
-        file,
-        np.array(atoms.get_chemical_symbols()),
-        "angstrom",
-        tuple(remarks),
-    )
+    return [
+        Scene(
+            one.positions,
+            one.cell.array if one.cell.rank > 0 else None,
+            tuple(bool(flag) for flag in one.pbc),
+            file,
+            np.array(one.get_chemical_symbols()),
+            "angstrom",
+            tuple(remarks),
+        )
+        for one in (atoms if isinstance(index, slice) else [atoms])
+    ]
 
 
 def _check(scene: Scene) -> None:

@@ -17,9 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.files import InputError, Scene, one_line, read_scene
 from halfshell._cli.output import open_output, write_columns
-from halfshell._cli.scene import describe_box, load_scene, read_points, unit_suffix
+from halfshell._cli.scene import (
+    describe_box,
+    load_frames,
+    load_scene,
+    read_points,
+    unit_suffix,
+)
 from halfshell._terminal import printable
 
 __all__ = ["run_coordination", "run_nearest", "run_neighbors", "run_rdf"]
@@ -39,7 +45,7 @@ class Found(NamedTuple):
 def run_neighbors(args: Namespace) -> int:
     """Carry out ``halfshell neighbors``."""
 
-    def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
+    def find(scene: Scene, cutoff: float, asking: Scene, options: dict[str, Any]) -> Found:
         letters = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
         if not set(letters) <= set("ijdDS"):
             raise InputError(f"--quantities {letters}: rows have some of the letters i j d D S")
@@ -47,7 +53,7 @@ def run_neighbors(args: Namespace) -> int:
         table = hs.neighbors(scene.points, cutoff, quantities=wanted, **options)
         arrays = table.to_pairs(quantities=letters)
         columns = dict(zip(letters, (arrays,) if len(letters) == 1 else arrays, strict=True))
-        return Found(columns, *_of_counts(table.counts, scene))
+        return Found(columns, *_of_counts(table.counts, asking))
 
     return _run(args, find)
 
@@ -55,12 +61,12 @@ def run_neighbors(args: Namespace) -> int:
 def run_coordination(args: Namespace) -> int:
     """Carry out ``halfshell coordination``."""
 
-    def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
+    def find(scene: Scene, cutoff: float, asking: Scene, options: dict[str, Any]) -> Found:
         counts = hs.coordination(scene.points, cutoff, **options)
         columns: Columns = {"i": np.arange(len(counts)), "count": counts}
-        if scene.species is not None:
-            columns["species"] = scene.species
-        return Found(columns, *_of_counts(counts, scene))
+        if asking.species is not None:
+            columns["species"] = asking.species
+        return Found(columns, *_of_counts(counts, asking))
 
     return _run(args, find)
 
@@ -68,7 +74,8 @@ def run_coordination(args: Namespace) -> int:
 def run_nearest(args: Namespace) -> int:
     """Carry out ``halfshell nearest``."""
     scene = read_points(args)
-    options = _options(scene, args)
+    asking = _asking(args, scene)
+    options = _options(scene, asking, args)
     del options["inclusive"]
     letters = "jdS" if any(scene.periodic) else "jd"
     with ExitStack() as stack:
@@ -88,9 +95,9 @@ def run_nearest(args: Namespace) -> int:
             write_columns(output, args.output, columns)
     d, unit = columns["d"], unit_suffix(scene)
     largest = float(d.max()) if len(d) else None
-    facts = {"points": n, "k": k, "entries": len(d), "largest_distance": largest}
+    facts = {"k": k, "entries": len(d), "largest_distance": largest}
     lines = [
-        ("nearest points", f"{k:,} of each of {n:,} points: {len(d):,} entries"),
+        ("nearest points", f"{k:,} of each of {n:,}: {len(d):,} entries"),
         ("largest distance", "none" if largest is None else f"{largest:.6g}{unit}"),
     ]
     _print(args, scene, facts, lines, seconds)
@@ -100,36 +107,55 @@ def run_nearest(args: Namespace) -> int:
 def run_rdf(args: Namespace) -> int:
     """Carry out ``halfshell rdf``."""
 
-    def find(scene: Scene, cutoff: float, options: dict[str, Any]) -> Found:
-        del options["inclusive"]
-        if scene.box is None or not all(scene.periodic):
-            raise InputError(f"{scene.source}: g(r) needs a box that is periodic along every axis")
-        result = hs.rdf(scene.points, cutoff, args.bins, **options)
+    def find(frames: list[Scene], cutoff: float) -> Found:
+        found = [_distribution(frame, cutoff, args) for frame in frames]
+        result = sum(found[1:], start=found[0])
         columns: Columns = {"r": result.r, "g": result.g, "counts": result.counts}
         highest = int(result.g.argmax())
         peak = [float(result.r[highest]), float(result.g[highest])]
-        facts = {"bins": args.bins, "pairs": int(result.counts.sum()), "highest": peak}
-        unit = unit_suffix(scene)
+        facts: dict[str, Any] = {"frames": len(frames), "bins": args.bins, "highest": peak}
+        facts["pairs"] = int(result.counts.sum())
+        unit = unit_suffix(frames[0])
+        all_frames = f", of {len(frames):,} frames" if len(frames) > 1 else ""
         lines = [
             ("bins", f"{args.bins:,}, of {cutoff / args.bins:.6g}{unit}"),
-            ("pairs", f"{facts['pairs']:,}   (each once)"),
+            ("pairs", f"{facts['pairs']:,}   (each once{all_frames})"),
             ("highest g(r)", f"{peak[1]:.6g} at r = {peak[0]:.6g}{unit}"),
         ]
         return Found(columns, facts, lines)
 
-    return _run(args, find)
+    frames, cutoff, reason = load_frames(args)
+    return _run_loaded(args, frames[0], cutoff, reason, lambda: find(frames, cutoff))
+
+
+def _distribution(scene: Scene, cutoff: float, args: Namespace) -> Any:
+    if scene.box is None or not all(scene.periodic):
+        raise InputError(f"{scene.source}: g(r) needs a box that is periodic along every axis")
+    options = _options(scene, scene, args)
+    del options["inclusive"]
+    return hs.rdf(scene.points, cutoff, args.bins, **options)
 
 
 # ---- what they share -------------------------------------------------------------------------
 
 
-def _run(args: Namespace, find: Callable[[Scene, float, dict[str, Any]], Found]) -> int:
+def _run(args: Namespace, find: Callable[[Scene, float, Scene, dict[str, Any]], Found]) -> int:
     """A command with a cutoff."""
     scene, cutoff, reason = load_scene(args)
+    asking = _asking(args, scene)
+    options = _options(scene, asking, args)
+    return _run_loaded(
+        args, scene, cutoff, reason, lambda: find(scene, cutoff, asking, options)
+    )
+
+
+def _run_loaded(
+    args: Namespace, scene: Scene, cutoff: float, reason: str, find: Callable[[], Found]
+) -> int:
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)
         start = time.perf_counter()
-        found = _call(scene, lambda: find(scene, cutoff, _options(scene, args)))
+        found = _call(scene, find)
         seconds = time.perf_counter() - start
         if output:
             write_columns(output, args.output, found.columns)
@@ -140,8 +166,23 @@ def _run(args: Namespace, find: Callable[[Scene, float, dict[str, Any]], Found])
     return 0
 
 
-def _options(scene: Scene, args: Namespace) -> dict[str, Any]:
+def _asking(args: Namespace, scene: Scene) -> Scene:
+    """The points whose neighbours are wanted: those of --queries, or the points themselves."""
+    if getattr(args, "queries", None) is None:
+        return scene
+    queries = read_scene(args.queries)
+    if queries.points.shape[1] != scene.points.shape[1]:
+        raise InputError(
+            f"{args.queries}: has {queries.points.shape[1]} coordinates a point, {scene.source} "
+            f"has {scene.points.shape[1]}"
+        )
+    return queries
+
+
+def _options(scene: Scene, asking: Scene, args: Namespace) -> dict[str, Any]:
+    queries = {} if asking is scene else {"queries": asking.points}
     return {
+        **queries,
         "box": scene.box,
         "periodic": scene.periodic if scene.box is not None else None,
         "inclusive": not getattr(args, "strict", False),
@@ -158,7 +199,7 @@ def _call(scene: Scene, function: Callable[[], Any]) -> Any:
 
 
 def _of_counts(
-    counts: NDArray[np.int64], scene: Scene
+    counts: NDArray[np.int64], asking: Scene
 ) -> tuple[dict[str, Any], list[tuple[str, str]]]:
     """Facts and lines of the number of neighbours of each point."""
     numbers, times = np.unique(counts, return_counts=True)
@@ -171,10 +212,10 @@ def _of_counts(
         ("of a point", f"{facts['mean_coordination']:.6g} on average, "
                        f"{facts['least']:,} to {facts['most']:,}"),
     ]  # fmt: skip
-    if scene.species is not None:
+    if asking.species is not None:
         means = {
-            str(name): float(counts[scene.species == name].mean())
-            for name in np.unique(scene.species)
+            str(name): float(counts[asking.species == name].mean())
+            for name in np.unique(asking.species)
         }
         facts["by_species"] = means
         lines += [(f"  of {name}", f"{mean:.6g} on average") for name, mean in means.items()]
@@ -195,10 +236,14 @@ def _print(
     if args.output == "-":
         return
     if args.json:
-        first = {"file": scene.source, "points": len(scene.points)}
+        first: dict[str, Any] = {"file": scene.source, "points": len(scene.points)}
+        if getattr(args, "queries", None) is not None:
+            first["queries"] = args.queries
         print(json.dumps({**first, **facts, "seconds": took, "output": args.output}, indent=2))
         return
     shown = [("points", f"{len(scene.points):,}"), ("box", describe_box(scene)), *lines]
+    if getattr(args, "queries", None) is not None:
+        shown.insert(1, ("queries", args.queries))
     shown.append(("time", f"{took:.3g} s" if took >= 1 else f"{took * 1e3:.3g} ms"))
     if args.output:
         shown.append(("written to", args.output))

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line: ``halfshell pairs``, ``neighbors``, ``coordination``, ``nearest``, ``rdf``,
-``verify``, ``report``, ``info`` and ``selftest``; without any of these, the help.
+``verify``, ``bench``, ``report``, ``info`` and ``selftest``; without any of these, the help.
 
-Exit status: 0 done; 1 a check failed (``verify``, ``report``, ``selftest``); 2 the input or an
-option is wrong, said in one line on standard error; 130 interrupted.
+Exit status: 0 done; 1 a check failed (``verify``, ``bench``, ``report``, ``selftest``); 2 the input
+or an option is wrong, said in one line on standard error; 130 interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import platform
 import sys
@@ -18,11 +17,10 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 import halfshell as hs
+from halfshell._cli import values
 from halfshell._cli.files import InputError, one_line
-from halfshell._convert.options import LETTERS, are_letters
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
@@ -85,6 +83,7 @@ def _parser() -> _Parser:
     _add_pairs(commands)
     _add_lists(commands)
     _add_verify(commands)
+    _add_bench(commands)
     _add_report(commands)
     info = commands.add_parser("info", help="what this installation consists of")
     info.add_argument("--json", action="store_true", help="the same for machines")
@@ -97,7 +96,11 @@ def _parser() -> _Parser:
 
 
 def _add_scene_options(
-    command: argparse.ArgumentParser, has_cutoff: bool = True, has_rule: bool = True
+    command: argparse.ArgumentParser,
+    has_cutoff: bool = True,
+    has_rule: bool = True,
+    has_kernel: bool = True,
+    has_frames: bool = False,
 ) -> None:
     """Add what says which points are meant, in which box."""
     command.add_argument(
@@ -110,37 +113,47 @@ def _add_scene_options(
     if has_cutoff:
         command.add_argument(
             "--cutoff",
-            type=_cutoff,
+            type=values.cutoff,
             metavar="R",
             help="largest distance of a pair; without it, one with about 50 neighbours",
         )
     command.add_argument(
         "--box",
-        type=_box,
+        type=values.box,
         metavar="LX,LY,LZ",
         help="edge lengths, or one for all edges; lengths and angles (six numbers); or all "
         "components of the edge vectors",
     )
     command.add_argument(
         "--periodic",
-        type=_periodic,
+        type=values.periodic,
         metavar="TTF",
         help="which axes repeat, T or F for each, or one letter for all",
     )
     command.add_argument("--format", metavar="NAME", help="ase format, where it is not guessed")
-    command.add_argument("--index", type=int, metavar="N", help="frame; default: the last")
+    if has_frames:
+        command.add_argument(
+            "--index", type=values.frames, metavar="N",
+            help="frame, or frames to average: : for all, 100:, ::10; default: the last"
+        )  # fmt: skip
+    else:
+        command.add_argument("--index", type=int, metavar="N", help="frame; default: the last")
     if has_rule:
         command.add_argument(
             "--strict", action="store_true", help="d < cutoff; default: d <= cutoff"
         )
-    command.add_argument("--kernel", type=_kernel, metavar="NAME", help="one of `halfshell info`")
+    if has_kernel:
+        command.add_argument(
+            "--kernel", type=values.kernel, metavar="NAME", help="one of `halfshell info`"
+        )
     command.add_argument("--json", action="store_true", help="print JSON for machines")
 
 
 def _add_threads(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "--threads", type=_count, metavar="N", help="at most so many; default: as many as pay"
-    )
+        "--threads", type=values.count, metavar="N",
+        help="at most so many; default: as many as pay"
+    )  # fmt: skip
 
 
 def _add_pairs(commands: Any) -> None:
@@ -151,17 +164,17 @@ def _add_pairs(commands: Any) -> None:
     _add_threads(command)
     command.add_argument(
         "-o", "--output", metavar="OUT",
-        help="write the pairs: .npz, .csv, or - for CSV on standard output"
+        help="write the pairs: .npz, .csv, .parquet, or - for CSV on standard output"
     )
     command.add_argument(
         "--quantities",
-        type=_quantities,
+        type=values.quantities,
         metavar="LETTERS",
         help="columns of OUT, any of i j d D S P; default: ijdS, or ijd without a box",
     )
     command.add_argument("--sort", action="store_true", help="OUT ascending by (i, j, S)")
     command.add_argument(
-        "--max-output", type=_size, metavar="SIZE",
+        "--max-output", type=values.size, metavar="SIZE",
         help="write at most so much, such as 500MB or 4GB; default: 1GB"
     )
     command.add_argument("--plot", metavar="PNG", help="draw g(r): .png, .pdf or .svg")
@@ -187,22 +200,31 @@ def _add_lists(commands: Any) -> None:
     }
     for name, words in told.items():
         command = commands.add_parser(name, help=words)
-        _add_scene_options(command, name != "nearest", name in ("neighbors", "coordination"))
+        _add_scene_options(
+            command, name != "nearest", name in ("neighbors", "coordination"),
+            has_frames=name == "rdf",
+        )  # fmt: skip
         _add_threads(command)
         command.add_argument(
-            "-o", "--output", metavar="OUT", help="write the columns: .npz, .csv, or - for CSV here"
-        )
+            "-o", "--output", metavar="OUT", help="write the columns: .npz, .csv, .parquet, or - "
+            "for CSV here"
+        )  # fmt: skip
+        if name != "rdf":
+            command.add_argument(
+                "--queries", metavar="FILE",
+                help="whose neighbours are wanted, in the box of the points; default: the points"
+            )  # fmt: skip
         command.set_defaults(run=_run_list, name=name)
         if name == "neighbors":
             command.add_argument(
-                "--quantities", type=_quantities, metavar="LETTERS",
+                "--quantities", type=values.quantities, metavar="LETTERS",
                 help="columns of OUT, any of i j d D S; default: ijdS, or ijd without a box",
             )  # fmt: skip
         if name == "nearest":
-            command.add_argument("-k", type=_count, default=1, help="how many; default: 1")
+            command.add_argument("-k", type=values.count, default=1, help="how many; default: 1")
         if name == "rdf":
             command.add_argument(
-                "--bins", type=_count, default=100, metavar="N", help="default: 100"
+                "--bins", type=values.count, default=100, metavar="N", help="default: 100"
             )
 
 
@@ -219,11 +241,22 @@ def _add_verify(commands: Any) -> None:
     )
     command.add_argument(
         "--sample",
-        type=_sample,
+        type=values.sample,
         metavar="N",
         help="points to check by integers at most, 0 for all; default: 400, or what takes seconds",
     )
     command.set_defaults(run=_run_verify)
+
+
+def _add_bench(commands: Any) -> None:
+    from halfshell._cli.report import add_peers
+
+    command = commands.add_parser(
+        "bench", help="run times on a file, ours and other libraries', whose answers come first"
+    )
+    _add_scene_options(command, has_kernel=False)
+    add_peers(command)
+    command.set_defaults(run=_run_bench)
 
 
 def _add_report(commands: Any) -> None:
@@ -234,73 +267,6 @@ def _add_report(commands: Any) -> None:
     )
     add_options(command)
     command.set_defaults(run=_run_report)
-
-
-def _cutoff(text: str) -> float:
-    value = _number(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{text} is negative")
-    return value
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
-    return value
-
-
-def _box(text: str) -> NDArray[np.float64]:
-    return np.array([_number(part) for part in text.replace(",", " ").split()])
-
-
-def _periodic(text: str) -> tuple[bool, ...]:
-    if not text or set(text.upper()) - set("TF"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not made of the letters T and F")
-    return tuple(letter == "T" for letter in text.upper())
-
-
-def _quantities(text: str) -> str:
-    if not are_letters(text):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not some of the letters {' '.join(LETTERS)}, each at most once"
-        )
-    return text
-
-
-def _kernel(text: str) -> str:
-    if text not in hs.kernels():
-        known = ", ".join(hs.kernels())
-        raise argparse.ArgumentTypeError(f"{text!r} is not a kernel of this CPU ({known})")
-    return text
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
-    return int(text)
-
-
-def _size(text: str) -> float:
-    """Bytes, of a number with kB, MB, GB or TB behind it, or with none."""
-    number = text.strip().upper().removesuffix("B")
-    power = "KMGT".find(number[-1:]) + 1 if number[-1:] else 0
-    try:
-        value = float(number[:-1] if power else number) * 1000.0**power
-    except ValueError:
-        value = 0.0
-    if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 500MB or 4GB")
-    return value
-
-
-def _sample(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
-    return int(text)
 
 
 # Commands ----------------------------------------------------------------------------------
@@ -326,6 +292,12 @@ def _run_list(args: argparse.Namespace) -> int:
 
 def _run_verify(args: argparse.Namespace) -> int:
     from halfshell._cli.verify import run
+
+    return run(args)
+
+
+def _run_bench(args: argparse.Namespace) -> int:
+    from halfshell._cli.bench import run
 
     return run(args)
 

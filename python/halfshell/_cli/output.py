@@ -1,29 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of the command line as a file: CSV, a NumPy archive, or CSV on standard output."""
+"""Columns of the command line as a file: CSV, NumPy, Parquet, or CSV on standard output."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack
+from importlib import import_module
+from importlib.util import find_spec
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.files import InputError, replacing
+from halfshell._cli.files import InputError, missing_extra, replacing
 
 __all__ = ["check_size", "open_output", "write_columns", "write_csv"]
 
 # About how many characters a number has in text, with what separates it from the next.
 _DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT = 19, 3
+_ROWS = 1 << 16  # written at a time: some megabytes of text
+_PARQUET_ROWS = 1 << 20  # of a row group
 
 
 def open_output(
     target: str | None,
     source: str | None,
     stack: ExitStack,
-    suffixes: tuple[str, ...] = (".npz", ".csv"),
+    suffixes: tuple[str, ...] = (".npz", ".csv", ".parquet"),
     json: bool = False,
 ) -> IO[bytes] | None:
     """Open what will replace `target`, before the search; ``-`` is standard output."""
@@ -35,7 +40,10 @@ def open_output(
         sys.stdout.flush()
         return sys.stdout.buffer
     if not target.lower().endswith(suffixes):
-        raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
+        *first, last = suffixes
+        raise InputError(f"{target}: the name must end in {', '.join(first)} or {last}")
+    if target.lower().endswith(".parquet") and find_spec("pyarrow") is None:
+        raise missing_extra(f"{target}: writing Parquet", "pyarrow")
     if source is not None and os.path.exists(target) and os.path.samefile(target, source):
         raise InputError(f"{target}: is the input; it is not overwritten")
     return stack.enter_context(replacing(target))
@@ -45,7 +53,7 @@ def check_size(
     target: str, letters: str, n_pairs: int, n_points: int, ndim: int, most: float
 ) -> None:
     """InputError for an output that would be larger than `most` bytes, told beforehand."""
-    in_text = not target.lower().endswith(".npz")
+    in_text = not target.lower().endswith((".npz", ".parquet"))
     number = (len(str(n_points)) + 1, _DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT) if in_text else (8, 8, 4)
     of_each = {
         "i": number[0], "j": number[0], "P": 2 * number[0], "d": number[1],
@@ -73,9 +81,37 @@ def write_columns(
     """Write them as the name says; `extra` goes into archives alone."""
     if target.lower().endswith(".npz"):
         np.savez(stream, **columns, **extra)  # type: ignore[arg-type]
+    elif target.lower().endswith(".parquet"):
+        write_parquet(stream, columns)
     else:
         write_csv(stream, columns)
     stream.flush()
+
+
+def write_parquet(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
+    """Write columns of their own types, vectors as in `write_csv`, in row groups."""
+    pyarrow: Any = import_module("pyarrow")
+    parquet: Any = import_module("pyarrow.parquet")
+
+    series = dict(_series(columns))
+    n_rows = len(next(iter(series.values())))
+
+    def rows(first: int) -> Any:
+        some = {name: values[first : first + _PARQUET_ROWS] for name, values in series.items()}
+        return pyarrow.table({name: np.ascontiguousarray(one) for name, one in some.items()})
+
+    with parquet.ParquetWriter(stream, rows(0).schema) as writer:
+        for first in range(0, n_rows, _PARQUET_ROWS):
+            writer.write_table(rows(first))
+
+
+def _series(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Each column, and each component of a vector: ``S0``, ``S1``, ``S2``."""
+    for letter, column in columns.items():
+        if column.ndim == 1:
+            yield letter, column
+        else:
+            yield from ((f"{letter}{k}", column[:, k]) for k in range(column.shape[1]))
 
 
 def write_csv(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
@@ -83,19 +119,10 @@ def write_csv(stream: IO[bytes], columns: dict[str, NDArray[Any]]) -> None:
 
     Floats are written with the fewest digits that read back as the same number.
     """
-    names: list[str] = []
-    series: list[NDArray[Any]] = []
-    for letter, column in columns.items():
-        if column.ndim == 1:
-            names.append(letter)
-            series.append(column)
-        else:
-            names += [f"{letter}{k}" for k in range(column.shape[1])]
-            series += list(column.T)
+    names, series = zip(*_series(columns), strict=True)
     stream.write((",".join(names) + "\n").encode())
     line = ",".join("%s" if values.dtype.kind == "U" else "%r" for values in series)
-    block = 1 << 16  # lines turned into text at a time: some megabytes
-    for start in range(0, len(series[0]), block):
-        parts = [values[start : start + block].tolist() for values in series]
+    for start in range(0, len(series[0]), _ROWS):
+        parts = [values[start : start + _ROWS].tolist() for values in series]
         rows = zip(*parts, strict=True)
         stream.writelines((line % row + "\n").encode() for row in rows)

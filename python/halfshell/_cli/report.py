@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from halfshell._report.measure.run import Plan
     from halfshell._report.page.rows import ReportRow
 
-__all__ = ["add_options", "run"]
+__all__ = ["add_options", "add_peers", "run"]
 
 #: What ``--quick`` runs unless scenes are named: one of each kind, under a minute in all.
 QUICK = (
@@ -47,15 +47,7 @@ def add_options(command: ArgumentParser) -> None:
         "--methods", type=_names, metavar="A,B",
         help="of exact, double, single, float32, verlet, stale; default: all",
     )  # fmt: skip
-    command.add_argument(
-        "--peers", type=_names, metavar="A,B",
-        help="other libraries, 'all' or 'none'; default: all that are installed",
-    )  # fmt: skip
-    command.add_argument(
-        "--patience", type=_seconds, metavar="S",
-        help="seconds another library may take for a scene; default: 60, with --quick 3, and 4 "
-        "for all scenes together",
-    )  # fmt: skip
+    add_peers(command, "; default: 60, with --quick 3, and 4 for all scenes together")
     command.add_argument(
         "-o", "--output", metavar="DIR", default="halfshell-report",
         help="folder for report.csv and report.html; default: halfshell-report",
@@ -65,6 +57,18 @@ def add_options(command: ArgumentParser) -> None:
     command.add_argument(
         "--no-progress", dest="progress", action="store_false", help="no progress bar"
     )
+
+
+def add_peers(command: ArgumentParser, usual: str = "; default: 3") -> None:
+    """Add what says which other libraries are run, and how long each may take."""
+    command.add_argument(
+        "--peers", type=_names, metavar="A,B",
+        help="other libraries, 'all' or 'none'; default: all that are installed",
+    )  # fmt: skip
+    command.add_argument(
+        "--patience", type=_seconds, metavar="S",
+        help=f"seconds another library may take for a scene{usual}",
+    )  # fmt: skip
 
 
 def _seconds(text: str) -> float:

@@ -12,7 +12,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.files import InputError, Scene, missing_extra, read_scene
+from halfshell._cli.files import InputError, Scene, missing_extra, read_frames, read_scene
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._functions.ideal_gas import over_ideal_gas, shell_shares, unit_ball
 from halfshell._terminal import printable
@@ -41,6 +41,22 @@ def load_scene(args: Namespace) -> tuple[Scene, float, str]:
     return scene, *choose_cutoff(scene)
 
 
+def load_frames(args: Namespace) -> tuple[list[Scene], float, str]:
+    """Return the frames that --index names, and the cutoff as `load_scene` does, of the first."""
+    if not isinstance(args.index, slice):
+        scene, cutoff, reason = load_scene(args)
+        return [scene], cutoff, reason
+    if args.file is None:
+        raise InputError("--index names frames: give a file that has some")
+    scenes = read_frames(
+        args.file, args.index, file_format=args.format, box=args.box, periodic=args.periodic
+    )
+    _tell_remarks(scenes[0])
+    if args.cutoff is not None:
+        return scenes, args.cutoff, ""
+    return scenes, *choose_cutoff(scenes[0])
+
+
 def read_points(args: Namespace) -> Scene:
     """Return the scene that the options name; what its reader warned of is said."""
     scene = read_scene(
@@ -50,9 +66,13 @@ def read_points(args: Namespace) -> Scene:
         box=args.box,
         periodic=args.periodic,
     )
+    _tell_remarks(scene)
+    return scene
+
+
+def _tell_remarks(scene: Scene) -> None:
     for remark in scene.remarks:
         print(printable(f"halfshell: warning: {scene.source}: {remark}"), file=sys.stderr)
-    return scene
 
 
 def choose_cutoff(scene: Scene) -> tuple[float, str]:

@@ -273,8 +273,8 @@ class PrimitiveNeighborList(_owner.PrimitiveNeighborList):
     """In place of ``ase.neighborlist.PrimitiveNeighborList``, of which it is a subclass.
 
     Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once,
-    at the atom where `NewPrimitiveNeighborList` has it; which of the two that is ASE does not say, and
-    its own two classes differ. Neighbours ascend by (j, S), also with ``sorted=False``.
+    at the atom where `NewPrimitiveNeighborList` has it; which of the two that is ASE does not say,
+    and its own two classes differ. Neighbours ascend by (j, S), also with ``sorted=False``.
 
     Parameters
     ----------

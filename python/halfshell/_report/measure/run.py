@@ -122,32 +122,37 @@ def _named(kind: str, given: Sequence[str] | None, known: Sequence[str]) -> tupl
     return tuple(dict.fromkeys(given))
 
 
-def run(plan: Plan, progress: Progress = lambda done, total, text: None) -> list[ReportRow]:
-    """Run all of it; return the rows, scene by scene."""
+def run(
+    plan: Plan,
+    progress: Progress = lambda done, total, text: None,
+    scene: catalogue.Scene | None = None,
+) -> list[ReportRow]:
+    """Run all of it, or this scene in place of those of the plan; return the rows in order."""
     effort = plan.effort
+    scenes: Sequence[str | catalogue.Scene] = plan.scenes if scene is None else (scene,)
     rows: list[ReportRow] = []
     with ExitStack() as stack:
         others = [
             stack.enter_context(PeerProcess(name, effort.give_up, effort.budget))
             for name in plan.peers
         ]
-        progress(0, len(plan.scenes), "importing")
+        progress(0, len(scenes), "importing")
         for other in others:
             other.wait()
-        for done, name in enumerate(plan.scenes):
-            progress(done, len(plan.scenes), name)
-            rows += _Stage(name, plan, effort).rows(others)
-        progress(len(plan.scenes), len(plan.scenes), "")
+        for done, one in enumerate(scenes):
+            progress(done, len(scenes), one if isinstance(one, str) else one.name)
+            rows += _Stage(one, plan, effort).rows(others)
+        progress(len(scenes), len(scenes), "")
     return rows
 
 
 class _Stage:
     """One scene with its truth, and what is worked out from it when it is first needed."""
 
-    def __init__(self, name: str, plan: Plan, effort: Effort) -> None:
+    def __init__(self, scene: str | catalogue.Scene, plan: Plan, effort: Effort) -> None:
         self.plan = plan
         self.effort = effort
-        self.scene: Any = catalogue.load(name, plan.size)
+        self.scene: Any = catalogue.load(scene, plan.size) if isinstance(scene, str) else scene
         self.reach = reach_of(self.scene)
         self.cutoff = self.scene.cutoff if self.reach is None else self.reach.largest
         self.rows_of_box = _rows_of(self.scene, self.cutoff)
