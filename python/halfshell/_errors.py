@@ -5,17 +5,17 @@ from __future__ import annotations
 
 
 class CapacityError(ValueError):
-    """Arrays or a capacity that the caller gave are too small for the result.
+    """The given arrays or capacity are too small for the result.
 
     Attributes
     ----------
     needed : int
-        The number of pairs that there are, or for `NeighborTable.to_padded` of entries in the
+        The true number of pairs or, for `NeighborTable.to_padded`, of entries in the
         longest row.
 
     See Also
     --------
-    pairs : has `capacity`, and ``on_overflow="flag"``, with which it is not raised.
+    pairs : its `capacity`, and ``on_overflow="flag"`` to return the number instead.
 
     Examples
     --------
@@ -38,7 +38,7 @@ class CapacityError(ValueError):
 
 
 class StaleError(RuntimeError):
-    """A pair field is used whose pairs are no longer those of its connectivity.
+    """A pair field is out of date, as the pairs of its connectivity have changed.
 
     Raised by every access to a `PairField` after `Connectivity.rebuild`, ``patch`` or ``remove``.
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Check every kernel of this CPU against integers: ``halfshell selftest``.
 
-The answers come from `halfshell._check.reference`, which uses Python integers and nothing of the
-compiled code. The scenes are those where rounding, wrapping or overflow would show: ties at
+The answers come from `halfshell._check.reference`, which uses Python integers and no compiled
+code. The scenes are chosen to reveal errors in rounding, wrapping or overflow: ties at
 the cutoff, skewed boxes, points far away, subnormal numbers.
 """
 
@@ -125,12 +125,12 @@ def run(write: Callable[[str], Any] = print) -> int:
     Parameters
     ----------
     write : callable, default print
-        Called with one line a check, and one at the end.
+        Called with one line for each check, and one at the end.
 
     Returns
     -------
     int
-        How many checks failed.
+        Number of failed checks.
     """
     kernels = ", ".join(hs.kernels())
     write(f"halfshell {hs.__version__}, kernels {kernels}, each against Python integers")

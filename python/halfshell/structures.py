@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A measured crystal to try things on: alpha-quartz, without any other package or file.
+"""A measured crystal for examples: alpha-quartz, without any other package or file.
 
 The same crystal ships as a CIF file, ``structures.ALPHA_QUARTZ_CIF``, for programs that read
-one.
+such files.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Structure(NamedTuple):
     positions : ndarray of float64, shape (n, 3)
         Cartesian, in angstrom.
     box : ndarray of float64, shape (3, 3)
-        Edge vectors as rows, in angstrom; all of them repeat.
+        Edge vectors as rows, in angstrom; all are periodic.
     species : ndarray of str, shape (n,)
         Chemical symbols.
     """

@@ -107,30 +107,30 @@ def _add_scene_options(
         "file",
         nargs="?",
         metavar="FILE",
-        help=".npy, .npz, text with a point a line, or anything that ase.io.read reads; without "
-        "it, alpha-quartz",
+        help=".npy, .npz, text with one point per line, or anything that ase.io.read reads; "
+        "default: alpha-quartz",
     )
     if has_cutoff:
         command.add_argument(
             "--cutoff",
             type=values.cutoff,
             metavar="R",
-            help="largest distance of a pair; without it, one with about 50 neighbours",
+            help="largest distance of a pair; default: one with about 50 neighbours",
         )
     command.add_argument(
         "--box",
         type=values.box,
         metavar="LX,LY,LZ",
-        help="edge lengths, or one for all edges; lengths and angles (six numbers); or all "
+        help="edge lengths, or one length for all edges; lengths and angles (six numbers); or all "
         "components of the edge vectors",
     )
     command.add_argument(
         "--periodic",
         type=values.periodic,
         metavar="TTF",
-        help="which axes repeat, T or F for each, or one letter for all",
+        help="which axes are periodic, T or F for each, or one letter for all",
     )
-    command.add_argument("--format", metavar="NAME", help="ase format, where it is not guessed")
+    command.add_argument("--format", metavar="NAME", help="ase format, if it is not recognised")
     if has_frames:
         command.add_argument(
             "--index", type=values.frames, metavar="N",
@@ -144,21 +144,20 @@ def _add_scene_options(
         )
     if has_kernel:
         command.add_argument(
-            "--kernel", type=values.kernel, metavar="NAME", help="one of `halfshell info`"
+            "--kernel", type=values.kernel, metavar="NAME", help="see `halfshell info`"
         )
     command.add_argument("--json", action="store_true", help="print JSON for machines")
 
 
 def _add_threads(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "--threads", type=values.count, metavar="N",
-        help="at most so many; default: as many as pay"
-    )  # fmt: skip
+        "--threads", type=values.count, metavar="N", help="maximum number; default: as many as pay"
+    )
 
 
 def _add_pairs(commands: Any) -> None:
     command = commands.add_parser(
-        "pairs", help="find the pairs of a file, sum them up, save them, plot g(r)"
+        "pairs", help="find the pairs of a file, summarise them, save them, plot g(r)"
     )
     _add_scene_options(command)
     _add_threads(command)
@@ -172,10 +171,10 @@ def _add_pairs(commands: Any) -> None:
         metavar="LETTERS",
         help="columns of OUT, any of i j d D S P; default: ijdS, or ijd without a box",
     )
-    command.add_argument("--sort", action="store_true", help="OUT ascending by (i, j, S)")
+    command.add_argument("--sort", action="store_true", help="sort OUT by (i, j, S)")
     command.add_argument(
         "--max-output", type=values.size, metavar="SIZE",
-        help="write at most so much, such as 500MB or 4GB; default: 1GB"
+        help="largest output, such as 500MB or 4GB; default: 1GB"
     )
     command.add_argument("--plot", metavar="PNG", help="draw g(r): .png, .pdf or .svg")
     command.add_argument(
@@ -230,7 +229,7 @@ def _add_lists(commands: Any) -> None:
 
 def _add_verify(commands: Any) -> None:
     command = commands.add_parser(
-        "verify", help="check a list of pairs, ours or another library's, by exact arithmetic"
+        "verify", help="check a list of pairs, of halfshell or another library, exactly"
     )
     _add_scene_options(command)
     command.add_argument(
@@ -243,7 +242,7 @@ def _add_verify(commands: Any) -> None:
         "--sample",
         type=values.sample,
         metavar="N",
-        help="points to check by integers at most, 0 for all; default: 400, or what takes seconds",
+        help="most points to check by integers, 0 for all; default: 400, or what takes seconds",
     )
     command.set_defaults(run=_run_verify)
 
@@ -263,7 +262,7 @@ def _add_report(commands: Any) -> None:
     from halfshell._cli.report import add_options
 
     command = commands.add_parser(
-        "report", help="error against run time, ours and other libraries', on hard scenes"
+        "report", help="error against run time, of halfshell and other libraries, on hard scenes"
     )
     add_options(command)
     command.set_defaults(run=_run_report)

@@ -117,7 +117,7 @@ def measure(
 
     See Also
     --------
-    pairs : finds pairs, and measures them.
+    pairs : find pairs, and measure them.
     nearest : the nearest points, or images.
 
     Notes

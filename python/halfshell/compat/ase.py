@@ -228,7 +228,7 @@ class NewPrimitiveNeighborList(_owner.NewPrimitiveNeighborList):
     """In place of ``ase.neighborlist.NewPrimitiveNeighborList``, of which it is a subclass.
 
     Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once:
-    the one of (i, j, S) and (j, i, -S) in which the first nonzero component of S is positive, or
+    as the one of (i, j, S) and (j, i, -S) in which the first nonzero component of S is positive, or
     i <= j where S is zero. Neighbours ascend by (j, S), also with ``sorted=False``.
 
     Parameters
@@ -273,8 +273,8 @@ class PrimitiveNeighborList(_owner.PrimitiveNeighborList):
     """In place of ``ase.neighborlist.PrimitiveNeighborList``, of which it is a subclass.
 
     Parameters, attributes and methods are ASE's. With ``bothways=False`` each pair is listed once,
-    at the atom where `NewPrimitiveNeighborList` has it; which of the two that is ASE does not say,
-    and its own two classes differ. Neighbours ascend by (j, S), also with ``sorted=False``.
+    at the same atom as in `NewPrimitiveNeighborList`; ASE does not specify which atom that is, and
+    its own two classes differ. Neighbours ascend by (j, S), even with ``sorted=False``.
 
     Parameters
     ----------

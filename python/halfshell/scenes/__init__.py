@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Named scenes that are hard to search: exact ties, far coordinates, thin boxes, stiff steps.
 
-Each scene is an input of `halfshell.pairs` and the reason why it is hard. It is made when it is
-asked for, and its numbers are the same bits on every machine: they come from the raw stream of
-PCG64 and from written constants by additions, multiplications, divisions and square roots
-alone, one number at a time and in a fixed order, which IEEE arithmetic rounds in one way only.
+Each scene is an input of `halfshell.pairs`, with the reason why it is hard. It is made on demand,
+and its numbers have the same bits on every machine: they are computed from the raw stream of
+PCG64 and from written constants with additions, multiplications, divisions and square roots
+alone, one number at a time and in a fixed order, which IEEE arithmetic rounds in only one way.
 
 Examples
 --------
