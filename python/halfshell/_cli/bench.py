@@ -106,4 +106,4 @@ def _print(rows: Sequence[ReportRow], reason: str) -> None:
         lines.append(f"the cutoff was chosen: {reason}; --cutoff sets it")
     lines.append(f"medians, one thread for each, on {cpu_name()}")
     for line in lines:
-        console.print(f"* {printable(line)}", markup=False)
+        console.print(f"* {printable(line)}", markup=False, soft_wrap=True)

@@ -387,7 +387,7 @@ def test_output_is_checked_before_the_search(monkeypatch, refusal, npz, tmp_path
     monkeypatch.setattr(hs, "pairs", pairs)
     missing = tmp_path / "missing" / "out.npz"
     assert "cannot be written: No such file" in refusal("pairs", npz, "-o", missing)
-    assert "must end in .npz or .csv" in refusal("pairs", npz, "-o", tmp_path / "out.txt")
+    assert "must end in .npz, .csv or .parquet" in refusal("pairs", npz, "-o", tmp_path / "out.txt")
     assert "must end in .png" in refusal("pairs", npz, "--plot", tmp_path / "out.gif")
     assert "not overwritten" in refusal("pairs", npz, "-o", npz)
     (tmp_path / "folder.npz").mkdir()

@@ -242,3 +242,108 @@ def test_numbers_that_are_not_finite_are_named_by_their_line(run, tmp_path, word
     text.write_text(f"# three points\n0 0 0\n1 {word} 0\n0 0 1\n")
     status, _, err = run("pairs", text, "--cutoff", "1")
     assert status != 0 and "line 3: " in err and "is not a finite number" in err
+
+
+# ---- queries, frames, Parquet ----------------------------------------------------------------
+
+
+@pytest.fixture
+def queries(tmp_path):
+    np.save(tmp_path / "queries.npy", POINTS[:5] + 0.25)
+    return tmp_path / "queries.npy"
+
+
+def test_queries_have_their_own_rows(told, text, queries, tmp_path):
+    asking, out = np.load(queries), tmp_path / "rows.npz"
+    scene = [text, "--box", "8,7.5,9", "--queries", queries, "-o", out]
+    facts = told("neighbors", *scene, "--cutoff", 2)
+    table = hs.neighbors(POINTS, 2.0, box=LENGTHS, queries=asking, quantities="jdS")
+    assert facts["entries"] == len(table.indices) and facts["queries"] == str(queries)
+    assert np.load(out)["j"].tolist() == table.indices.tolist()
+    assert told("coordination", *scene, "--cutoff", 2)["entries"] == facts["entries"]
+    assert np.load(out)["count"].tolist() == table.counts.tolist()
+    told("nearest", *scene, "-k", 3)
+    j, d = hs.nearest(POINTS, 3, box=LENGTHS, queries=asking, quantities="jd")
+    assert np.load(out)["j"].tolist() == j.ravel().tolist()
+    assert np.load(out)["d"].tolist() == d.ravel().tolist()
+
+
+def test_queries_that_cannot_be_searched(run, text, tmp_path):
+    np.save(tmp_path / "flat.npy", POINTS[:, :2])
+    for options, words in (
+        (["--queries", tmp_path / "flat.npy"], "has 2 coordinates a point"),
+        (["--queries", tmp_path / "none.npy"], "no such file"),
+    ):
+        status, _, err = run("coordination", text, "--cutoff", 1, *options)
+        assert status == 2 and words in err and err.count("\n") == 1
+    status, _, err = run("rdf", text, "--queries", text)
+    assert status == 2 and "unrecognized arguments: --queries" in err
+
+
+@pytest.fixture
+def trajectory(tmp_path):
+    ase = pytest.importorskip("ase", reason="ase is not installed")
+    io = pytest.importorskip("ase.io", reason="ase is not installed")
+    frames = [
+        ase.Atoms("H60", POINTS * (1 + k / 10), cell=np.array(LENGTHS) * (1 + k / 10), pbc=True)
+        for k in range(4)
+    ]
+    io.write(tmp_path / "run.extxyz", frames)
+    return tmp_path / "run.extxyz", frames
+
+
+@pytest.mark.parametrize(
+    ("index", "chosen"), [(":", slice(None)), ("1:", slice(1, None)), ("::2", slice(None, None, 2)),
+                          ("-1:", slice(-1, None)), ("2", slice(2, 3))],
+)  # fmt: skip
+def test_g_of_r_is_averaged_over_frames(told, trajectory, tmp_path, index, chosen):
+    path, frames = trajectory
+    facts = told("rdf", path, f"--index={index}", "--cutoff", 3, "--bins", 12,
+                 "-o", tmp_path / "g.npz")
+    own = [hs.rdf(frame, 3.0, 12) for frame in frames[chosen]]
+    whole = sum(own[1:], start=own[0])
+    assert facts["frames"] == len(own)
+    assert np.load(tmp_path / "g.npz")["counts"].tolist() == whole.counts.tolist()
+    assert np.allclose(np.load(tmp_path / "g.npz")["g"], whole.g)
+
+
+def test_frames_that_are_not_there(run, trajectory, text):
+    path, _ = trajectory
+    for arguments, words in (
+        (["rdf", path, "--index", "9:"], "has none of these frames"),
+        (["rdf", path, "--index", "9"], "has no frame 9"),
+        (["rdf", path, "--index", "x"], "'x' is not a frame"),
+        (["rdf", path, "--index", "::0"], "'::0' is not a frame"),
+        (["rdf", path, "--index", "1:2:3:4"], "is not a frame"),
+        (["rdf", path, "--index", ""], "is not a frame"),
+        (["rdf", text, "--index", ":"], "--index is for formats with several frames"),
+        (["rdf", "missing.xyz", "--index", ":"], "no such file"),
+        (["rdf", "--index", ":"], "give a file that has some"),
+        (["pairs", path, "--index", ":"], "invalid int value: ':'"),
+    ):
+        status, _, err = run(*arguments)
+        assert status == 2 and words in err and err.count("\n") == 1, arguments
+
+
+def test_parquet_has_the_columns_of_the_archive(told, text, tmp_path, monkeypatch):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    monkeypatch.setattr("halfshell._cli.output._PARQUET_ROWS", 10)
+    scene = [text, "--box", "8,7.5,9", "--cutoff", 2, "--quantities", "ijdS"]
+    told("pairs", *scene, "--sort", "-o", tmp_path / "pairs.parquet")
+    told("pairs", *scene, "--sort", "-o", tmp_path / "pairs.npz")
+    table, held = parquet.read_table(tmp_path / "pairs.parquet"), np.load(tmp_path / "pairs.npz")
+    assert table.column_names == ["i", "j", "d", "S0", "S1", "S2"]
+    for name in "ijd":
+        assert table[name].to_numpy().tobytes() == held[name].tobytes()
+    for axis in range(3):
+        assert table[f"S{axis}"].to_pylist() == held["S"][:, axis].tolist()
+    assert parquet.ParquetFile(tmp_path / "pairs.parquet").num_row_groups > 1
+    told("pairs", text, "--cutoff", 0, "-o", tmp_path / "none.parquet")
+    assert parquet.read_table(tmp_path / "none.parquet").num_rows == 0
+
+
+def test_without_pyarrow_one_line_says_what_is_missing(run, text, tmp_path, monkeypatch):
+    monkeypatch.setattr("halfshell._cli.output.find_spec", lambda name: None)
+    status, _, err = run("pairs", text, "--cutoff", 1, "-o", tmp_path / "pairs.parquet")
+    assert status == 2 and "needs pyarrow" in err and err.count("\n") == 1
+    assert not (tmp_path / "pairs.parquet").exists()
