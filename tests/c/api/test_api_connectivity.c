@@ -184,7 +184,10 @@ arguments_that_do_not_fit_are_refused(void)
     wrong = lists;
     wrong.n_lists = -1;
     CHECK(hs_connectivity_build(&among, &wrong, &options, &made, NULL) == HS_ERR_ARGUMENT);
-    CHECK(hs_connectivity_overlap(NULL, NULL, &lists, &options, &rows, NULL) == HS_ERR_ARGUMENT);
+    CHECK(hs_connectivity_overlap(NULL, &no_rows, &lists, &options, &rows, NULL) ==
+          HS_ERR_ARGUMENT);
+    CHECK(hs_connectivity_overlap(&points, &no_rows, &lists, &options, NULL, NULL) ==
+          HS_ERR_ARGUMENT);
     CHECK(hs_connectivity_intersect(NULL, &none, &lists, &options, &rows, NULL) == HS_ERR_ARGUMENT);
     options.memory_limit = NAN;
     CHECK(hs_connectivity_overlap(&points, &no_rows, &lists, &options, &rows, NULL) ==
