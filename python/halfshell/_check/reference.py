@@ -15,7 +15,7 @@ taken as the real number that it is. The half list has each pair once:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -36,7 +36,13 @@ _Reach = list[list[Fraction | None]]
 
 
 def reference_pairs(
-    points: Any, cutoff: Any, box: Any = None, periodic: Any = None, inclusive: bool = True
+    points: Any,
+    cutoff: Any,
+    box: Any = None,
+    periodic: Any = None,
+    inclusive: bool = True,
+    *,
+    progress: Callable[[float], object] | None = None,
 ) -> list[_Pair]:
     """Find every pair within the cutoff, each once, in exact arithmetic.
 
@@ -54,6 +60,8 @@ def reference_pairs(
         Which axes repeat. Default: all with a box, none without.
     inclusive : bool, default True
         Whether a pair at exactly `cutoff` counts.
+    progress : callable, optional
+        Called with the fraction of the work done, from 0 to 1.
 
     Returns
     -------
@@ -88,6 +96,8 @@ def reference_pairs(
 
     pairs = []
     for i, p in enumerate(table):
+        if progress is not None:
+            progress(1.0 - (1.0 - i / len(table)) ** 2)
         for j in range(i, len(table)):
             radius = reach[i][j] if is_own else reach[0][0]
             if radius < 0:

@@ -8,7 +8,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from halfshell._cli.files import InputError, missing_extra
+from halfshell._cli.errors import InputError, missing_extra
 from halfshell._cli.scene import load_scene, unit_suffix
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import secrets
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -20,21 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
+from halfshell._cli.errors import InputError, one_line
 from halfshell._cli.numpy_files import Unreadable, read_arrays
+from halfshell._cli.structure_files import read_structures
 from halfshell._cli.text_files import BadLine, read_points
-from halfshell._extras import needs
 from halfshell._terminal import printable
 
-__all__ = ["InputError", "Scene", "missing_extra", "one_line", "read_frames", "read_scene",
-           "replacing"]  # fmt: skip
+__all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 
 _NUMPY, _TEXT = (".npy", ".npz"), (".csv", ".txt", ".dat", ".tsv")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
-MOST_CHARACTERS = 1000  # of a line that says what is wrong
-
-
-class InputError(Exception):
-    """What the caller of the command can put right, in one line."""
 
 
 @dataclass(frozen=True)
@@ -74,28 +68,6 @@ class Scene:
             return None
         box = np.asarray(self.box, dtype=np.float64)
         return np.diag(box) if box.ndim == 1 else box
-
-
-def one_line(error: BaseException) -> str:
-    """Return the message of an exception on one line, or its kind if it has none.
-
-    What is in it that a terminal would obey is escaped.
-    """
-    if isinstance(error, OSError) and error.strerror:
-        return printable(error.strerror)
-    if isinstance(error, MemoryError) and not str(error):
-        return "not enough memory"
-    # Messages of ours are of one line; line breaks in them are those of a name.
-    text = str(error) if isinstance(error, InputError) else " ".join(str(error).split())
-    text = printable(text) or type(error).__name__
-    # What was wrong stands at the beginning or at the end; between them may be a very long name.
-    half = MOST_CHARACTERS // 2
-    return text if len(text) <= MOST_CHARACTERS else f"{text[:half]} ... {text[-half:]}"
-
-
-def missing_extra(what: str, *packages: str) -> InputError:
-    """Return the error for optional packages that are not installed."""
-    return InputError(needs(what, *packages))
 
 
 # Reading -----------------------------------------------------------------------------------
@@ -145,7 +117,7 @@ def read_scene(
             elif file_format is None and suffix in _TEXT:
                 scene = _read_text(file, index)
             else:
-                (scene,) = _read_ase(file, file_format, index)
+                (scene,) = _read_structures(file, file_format, index)
         except MemoryError:
             raise InputError(f"{file}: does not fit in memory") from None
     _check(scene)
@@ -172,7 +144,7 @@ def read_frames(
     if file_format is None and Path(file).suffix.lower() in (*_NUMPY, *_TEXT):
         raise InputError(f"{file}: --index is for formats with several frames")
     try:
-        scenes = _read_ase(file, file_format, frames)
+        scenes = _read_structures(file, file_format, frames)
     except MemoryError:
         raise InputError(f"{file}: does not fit in memory") from None
     if not scenes:
@@ -236,54 +208,11 @@ def _read_text(file: str, index: int | None) -> Scene:
     return Scene(points, None, (False,) * points.shape[1], file)
 
 
-def _read_ase(file: str, file_format: str | None, index: int | slice | None) -> list[Scene]:
-    """The frames that are meant: one, unless `index` is a range."""
-    try:
-        import ase.io
-        from ase.io.formats import UnknownFileTypeError
-    except ImportError:
-        raise missing_extra(f"{file}: reading this file", "ase") from None
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            atoms: Any = ase.io.read(
-                file,
-                index=-1 if index is None else index,
-                format=file_format,
-                do_not_split_by_at_sign=True,
-            )
-        except UnknownFileTypeError as error:
-            name = file_format or one_line(error)
-            raise InputError(
-                f"{file}: unknown format{f' {name!r}' if name else ''} "
-                "(see `ase info --formats`; force one with --format)"
-            ) from None
-        except OSError as error:
-            raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
-        except (IndexError, StopIteration) as error:
-            what = f"has no frame {index}" if isinstance(index, int) else "holds no atoms"
-            detail = f" ({one_line(error)})" if str(error) else ""
-            raise InputError(f"{file}: {what}{detail}") from None
-        except MemoryError:
-            raise
-        except Exception as error:  # a reader may fail in any way on a broken file
-            raise InputError(
-                f"{file}: cannot be read: {type(error).__name__}: {one_line(error)}"
-            ) from None
-    remarks = dict.fromkeys(
-        " ".join(str(w.message).split()) for w in caught if issubclass(w.category, UserWarning)
-    )
+def _read_structures(file: str, file_format: str | None, index: int | slice | None) -> list[Scene]:
+    found = read_structures(file, file_format, index)
     return [
-        Scene(
-            one.positions,
-            one.cell.array if one.cell.rank > 0 else None,
-            tuple(bool(flag) for flag in one.pbc),
-            file,
-            np.array(one.get_chemical_symbols()),
-            "angstrom",
-            tuple(remarks),
-        )
-        for one in (atoms if isinstance(index, slice) else [atoms])
+        Scene(one.points, one.box, one.periodic, file, one.species, "angstrom", one.remarks)
+        for one in found
     ]
 
 

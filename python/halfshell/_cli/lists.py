@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import halfshell as hs
-from halfshell._cli.files import InputError, Scene, one_line, read_scene
+from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.files import Scene, read_scene
 from halfshell._cli.output import open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,

@@ -20,7 +20,7 @@ import numpy as np
 
 import halfshell as hs
 from halfshell._cli import values
-from halfshell._cli.files import InputError, one_line
+from halfshell._cli.errors import InputError, one_line
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
@@ -155,6 +155,12 @@ def _add_threads(command: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_no_progress(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--no-progress", dest="progress", action="store_false", help="no progress bar"
+    )
+
+
 def _add_pairs(commands: Any) -> None:
     command = commands.add_parser(
         "pairs", help="find the pairs of a file, summarise them, save them, plot g(r)"
@@ -183,9 +189,7 @@ def _add_pairs(commands: Any) -> None:
         default="exact",
         help="how a pair near the cutoff is decided; default: exact",
     )
-    command.add_argument(
-        "--no-progress", dest="progress", action="store_false", help="no progress bar"
-    )
+    _add_no_progress(command)
     command.set_defaults(run=_run_pairs)
 
 
@@ -244,6 +248,7 @@ def _add_verify(commands: Any) -> None:
         metavar="N",
         help="most points to check by integers, 0 for all; default: 400, or what takes seconds",
     )
+    _add_no_progress(command)
     command.set_defaults(run=_run_verify)
 
 

@@ -14,7 +14,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.files import InputError, missing_extra, replacing
+from halfshell._cli.errors import InputError, missing_extra
+from halfshell._cli.files import replacing
 
 __all__ = ["check_size", "open_output", "write_columns", "write_csv"]
 

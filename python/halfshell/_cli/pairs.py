@@ -4,13 +4,10 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +16,10 @@ from numpy.typing import NDArray
 
 import halfshell as hs
 from halfshell import _core
-from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.files import Scene
 from halfshell._cli.output import check_size, open_output, write_columns
+from halfshell._cli.progress import progress_bar
 from halfshell._cli.scene import (
     describe_box,
     load_scene,
@@ -32,7 +31,6 @@ from halfshell._terminal import printable
 
 __all__ = ["run"]
 
-BAR_AFTER = 0.5  # seconds without a progress bar
 MOST_BYTES = 1e9  # of an output, unless --max-output says otherwise
 
 
@@ -149,47 +147,11 @@ def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[
     """Find the pairs; return one array for each letter."""
     options = {**_options(scene, args), "quantities": letters, "sort": args.sort}
     try:
-        with _progress_bar(args.progress and not args.json) as advance:
+        with progress_bar(args.progress and not args.json, "searching") as advance:
             found = hs.pairs(scene.points, cutoff, progress=advance, **options)
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise InputError(f"{scene.source}: {one_line(error)}") from None
     return dict(zip(letters, (found,) if len(letters) == 1 else found, strict=True))
-
-
-@contextmanager
-def _progress_bar(wanted: bool) -> Iterator[Callable[[float], None] | None]:
-    """Yield a function to tell the work done, or None where no bar could be shown.
-
-    The bar appears on a terminal only, and only once the work has taken `BAR_AFTER` seconds.
-    """
-    if not (wanted and sys.stderr.isatty() and find_spec("rich")):
-        yield None
-        return
-    start = time.monotonic()
-    bar: Any = None
-    task: Any = None
-    drawn = start
-
-    def advance(fraction: float) -> None:
-        nonlocal bar, task, drawn
-        now = time.monotonic()
-        if now - start < BAR_AFTER or (bar is not None and now - drawn < 0.1):
-            return
-        if bar is None:
-            from rich.console import Console
-            from rich.progress import Progress
-
-            bar = Progress(console=Console(stderr=True), transient=True, auto_refresh=False)
-            task = bar.add_task("searching", total=1.0)
-            bar.start()
-        bar.update(task, completed=fraction, refresh=True)
-        drawn = now
-
-    try:
-        yield advance
-    finally:
-        if bar is not None:
-            bar.stop()
 
 
 # The summary -------------------------------------------------------------------------------

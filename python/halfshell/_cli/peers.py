@@ -12,7 +12,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.files import Scene
 from halfshell._extras import how_to_install
 from halfshell._peers import LIBRARIES, Library, Question, wrapped
 

@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from halfshell._cli.files import InputError, missing_extra, one_line, replacing
+from halfshell._cli.errors import InputError, missing_extra, one_line
+from halfshell._cli.files import replacing
 from halfshell._machine import unknown_kernel
 from halfshell._terminal import printable
 

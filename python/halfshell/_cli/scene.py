@@ -12,7 +12,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.files import InputError, Scene, missing_extra, read_frames, read_scene
+from halfshell._cli.errors import InputError, missing_extra
+from halfshell._cli.files import Scene, read_frames, read_scene
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._functions.ideal_gas import over_ideal_gas, shell_shares, unit_ball
 from halfshell._terminal import printable

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -16,8 +17,10 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell._check.reference import exact_square, reference_pairs
 from halfshell._check.verify import LIST, compare
-from halfshell._cli.files import InputError, Scene, one_line
+from halfshell._cli.errors import InputError, one_line
+from halfshell._cli.files import Scene
 from halfshell._cli.peers import PairList, ask_peer, find_peer
+from halfshell._cli.progress import progress_bar
 from halfshell._cli.scene import load_scene, unit_suffix
 from halfshell._terminal import printable
 
@@ -74,7 +77,11 @@ def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> Check:
 
 
 def check_by_integers(
-    pairs: PairList, scene: Scene, cutoff: float, limit: int | None = None
+    pairs: PairList,
+    scene: Scene,
+    cutoff: float,
+    limit: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Check:
     """Compare with Python integers, every point with every other, at most `limit` points.
 
@@ -89,7 +96,9 @@ def check_by_integers(
     part = pairs.among(rows, n)
     points = scene.points if rows is None else scene.points[rows]
     periodic = scene.periodic if scene.box is not None else None
-    truth = reference_pairs(points, cutoff, scene.box, periodic, pairs.inclusive)
+    truth = reference_pairs(
+        points, cutoff, scene.box, periodic, pairs.inclusive, progress=progress
+    )
     rows_of_truth = [(i, j, *shift) for i, j, shift in truth]
     verdict = compare(
         np.array(rows_of_truth, dtype=np.int64).reshape(-1, 2 + ndim),
@@ -156,7 +165,8 @@ def run(args: Namespace) -> int:
             author = peer.name_and_version()
             pairs = ask_peer(peer, scene, cutoff)
             checks.append(check_by_search(pairs, scene, cutoff))
-        checks.append(check_by_integers(pairs, scene, cutoff, args.sample))
+        with progress_bar(args.progress and not args.json, "checking by integers") as advance:
+            checks.append(check_by_integers(pairs, scene, cutoff, args.sample, advance))
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise InputError(f"{scene.source}: {one_line(error)}") from None
     if args.json:

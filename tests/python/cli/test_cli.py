@@ -16,11 +16,13 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli, selftest
-from halfshell._cli import pairs as cli_pairs
+from halfshell._check.reference import reference_pairs
 from halfshell._cli import peers as cli_peers
+from halfshell._cli import progress as cli_progress
 from halfshell._cli import scene as cli_scene
 from halfshell._cli import verify as cli_verify
-from halfshell._cli.files import InputError, Scene, read_scene, replacing
+from halfshell._cli.errors import InputError
+from halfshell._cli.files import Scene, read_scene, replacing
 from halfshell._cli.output import write_csv
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
@@ -514,7 +516,10 @@ def test_wrong_options_are_refused(refusal, args):
 
 def test_what_is_not_installed_is_named(monkeypatch, refusal, npz, tmp_path):
     (tmp_path / "a.xyz").write_text("1\n\nH 0 0 0\n")
-    for name in ("ase", "ase.io", "ase.neighborlist", "matplotlib", "matplotlib.figure", "vesin"):
+    for name in (
+        "ase", "ase.io", "ase.neighborlist", "MDAnalysis", "matplotlib", "matplotlib.figure",
+        "vesin",
+    ):  # fmt: skip
         monkeypatch.setitem(sys.modules, name, None)
     assert "needs ase: pip install ase" in refusal("pairs", tmp_path / "a.xyz")
     plot = refusal("pairs", npz, "--plot", tmp_path / "g.png")
@@ -831,11 +836,31 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
     time = types.SimpleNamespace(monotonic=lambda: clock.now, perf_counter=lambda: clock.now)
     screen = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(cli_pairs, "time", time)
+    monkeypatch.setattr(cli_progress, "time", time)
     monkeypatch.setattr(hs, "pairs", searching(seconds, clock))
     monkeypatch.setenv("TERM", "xterm")
     assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
     assert ("searching" in screen.getvalue()) == shown
+
+
+def test_progress_of_a_check_by_integers(monkeypatch, npz):
+    pytest.importorskip("rich")
+    screen, seconds = Terminal(), iter(range(1000))
+    clock = types.SimpleNamespace(monotonic=lambda: float(next(seconds)))
+    monkeypatch.setattr(cli_progress, "time", clock)
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    assert cli.main(["verify", str(npz), "--cutoff", "2", "--sample", "20"]) == 0
+    assert "checking by integers" in screen.getvalue()
+    before = screen.getvalue()
+    assert cli.main(["verify", str(npz), "--cutoff", "2", "--no-progress"]) == 0
+    assert screen.getvalue() == before
+
+
+def test_progress_of_the_reference_ascends():
+    told = []
+    reference_pairs(POINTS, 2.0, BOX, progress=told.append)
+    assert told == sorted(told) and told[0] == 0.0 and 0.9 < told[-1] <= 1.0
 
 
 def test_progress_comes_from_the_search(monkeypatch, npz):

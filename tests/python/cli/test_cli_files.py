@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from halfshell._cli import files
-from halfshell._cli.files import InputError, read_scene
+from halfshell._cli.errors import InputError
+from halfshell._cli.files import read_scene
 from halfshell._convert import memory
 
 POINTS = np.random.default_rng(5).random((60, 3))
