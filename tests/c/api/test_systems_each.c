@@ -101,6 +101,8 @@ a_poll_may_stop_it(void)
 static void
 memory_may_be_short(void)
 {
+    static const int64_t pair[] = {0, 1};
+    const hs_selection   one_excluded = {.n_excluded = 1, .excluded = pair};
     make_scene();
     s.systems.n = 6;
     s.points.n = s.first[6];
@@ -109,6 +111,9 @@ memory_may_be_short(void)
         CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
         CHECK(fail_each_allocation(find_rows, &s.queries, 2000) > 10);
         CHECK(raise_memory_limit(find_rows, NULL, &s.options.memory_limit) > 3);
+        s.systems.selection = &one_excluded;
+        CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
+        s.systems.selection = NULL;
     }
 }
 

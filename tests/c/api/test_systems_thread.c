@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_systems_thread.c: when a thread that searches many systems asks whether to go on. */
 #include "../../../csrc/core/api/systems_thread.h"
+#include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
 
 void test_systems_thread(void);
@@ -70,9 +71,41 @@ work_of_all_threads_is_added_up(void)
     CHECK(two.bytes_peak >= one.bytes_peak);
 }
 
+/* Where memory does not suffice to sort the pairs of a system, all of them have been found. */
+static void
+pairs_that_cannot_be_sorted_are_told(void)
+{
+    enum { N = 2000 };
+    static double    many[N];
+    const int64_t    first[2] = {0, N};
+    const hs_points  points = {many, N, 1, HS_FLOAT64, 8, 8};
+    const hs_systems systems = {.n = 1, .first = first};
+    hs_options       options = hs_options_default();
+    int64_t          count, n_told = 0;
+    bool             ended = false;
+    options.threads = 1;
+    options.sorted = true;
+    options.cutoff = 1.0 / 64;
+    for (int e = 0; e < N; e++)
+        many[e] = (double)((e * 77) % 1024) / 1024; /* more pairs than their density tells */
+    CHECK(hs_systems_count(&points, &systems, &options, &count, NULL) == HS_OK);
+    for (int64_t nth = 1; !ended && nth < 1000; nth++) {
+        hs_pairs  *pairs = NULL;
+        hs_failure failure;
+        hs_test_fail_allocation(nth);
+        const hs_status status = hs_systems_find(&points, &systems, &options, &pairs, &failure);
+        ended = hs_test_failure_is_due();
+        hs_test_fail_allocation(0);
+        n_told += status == HS_ERR_MEMORY && failure.expected_pairs == (double)count;
+        hs_pairs_free(pairs);
+    }
+    CHECK(ended && n_told >= 3);
+}
+
 void
 test_systems_thread(void)
 {
     RUN(small_systems_are_polled_between_now_and_then);
     RUN(work_of_all_threads_is_added_up);
+    RUN(pairs_that_cannot_be_sorted_are_told);
 }

@@ -288,6 +288,66 @@ the_earliest_failure_is_told(void)
     }
 }
 
+/* Both ranges are begun before one ends: the caller's thread then has none left, while the other
+ * goes on until it hears of a failure. */
+static int n_begun;
+
+static hs_status
+end_or_go_on(void *worker, int64_t range)
+{
+    collector *me = worker;
+    bool       both = false;
+    (void)range;
+    for (int begins = 1; !both; begins = 0) {
+        hs_mutex_lock(&mutex);
+        n_begun += begins;
+        both = n_begun >= 2;
+        hs_mutex_unlock(&mutex);
+    }
+    hs_status status = HS_OK;
+    while (status == HS_OK && me->options.poll_context != &me->committer) {
+        status = hs_poll(&me->options, 0.0);
+    }
+    return status;
+}
+
+static bool
+refuse(void *context, double fraction)
+{
+    (void)context;
+    (void)fraction;
+    return false;
+}
+
+static void
+work_refused(void *context, int64_t task)
+{
+    crew      *all = context;
+    collector *me = &all->of[task];
+    me->options = hs_options_default();
+    me->options.poll = refuse;
+    me->committer = (hs_committer){.options = &me->options};
+    hs_commits_join(all->commits, &me->committer);
+    hs_commits_work(&me->committer, end_or_go_on, me);
+}
+
+/* The caller may stop the others while its thread waits for them. */
+static void
+waiting_for_others_may_be_stopped(void)
+{
+    static crew all;
+    hs_failure  failure = HS_NO_FAILURE;
+    hs_team    *team = hs_team_create(2);
+    const bool  alone = hs_team_size(team) < 2;
+    n_begun = alone;
+    hs_mutex_init(&mutex);
+    all.commits = hs_commits_new(NULL, NULL, 2);
+    hs_team_run(team, 2, work_refused, &all);
+    CHECK(hs_commits_end(NULL, all.commits, &failure) == (alone ? HS_OK : HS_ERR_INTERRUPTED));
+    hs_mutex_destroy(&mutex);
+    hs_team_free(team);
+}
+
 void
 test_in_turn(void)
 {
@@ -296,4 +356,5 @@ test_in_turn(void)
     RUN(parts_behind_a_gap_stay);
     RUN(enough_is_a_number_of_pairs);
     RUN(the_earliest_failure_is_told);
+    RUN(waiting_for_others_may_be_stopped);
 }

@@ -138,6 +138,77 @@ numbers_go_with_queries(void)
     CHECK(count(&line) == 3 * PAIRS + CROWD);
 }
 
+/* Distances in float32 need not be as far as the least distance, of which there is none. */
+static void
+single_precision_chooses_as_well(void)
+{
+    make_crowd(0.0);
+    selection.labels = labels;
+    options.precision = HS_SINGLE;
+    CHECK(count(&line) == 2 * PAIRS + CROWD && count_rows(&line) == 2 * (2 * PAIRS + CROWD));
+}
+
+/* Of several systems as of one, in a box or without. */
+static void
+systems_choose_as_well(void)
+{
+    static int64_t counted[CROWD];
+    int64_t        first[] = {0, 100, CROWD}, counts[2];
+    make_crowd(0.0);
+    hs_systems systems = {.n = 2, .first = first, .selection = &selection};
+    selection.labels = labels;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_OK);
+    CHECK(counts[0] == 0 && counts[1] == 0);
+    selection.labels = NULL;
+    selection.min_distance = 1.0;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_OK);
+    CHECK(counts[0] == 0 && counts[1] == 0);
+    systems.box = &line;
+    CHECK(hs_systems_count(&points, &systems, &options, counts, NULL) == HS_OK);
+    CHECK(counts[0] == 99 * 100 + 100 && counts[1] == 199 * 200 + 200);
+    selection.min_distance = -1.0;
+    CHECK(hs_systems_coordination(&points, NULL, &systems, &options, counted, NULL) ==
+          HS_ERR_ARGUMENT);
+}
+
+/* Queries of systems that have numbers of points pair as these do. */
+static void
+numbers_of_queries_hold_in_systems(void)
+{
+    static int64_t numbers[CROWD], counted[CROWD];
+    const int64_t  first[] = {0, 100, CROWD}, first_query[] = {0, 1, 2};
+    make_crowd(0.0);
+    hs_points queries = points;
+    queries.n = 2;
+    numbers[0] = 5;
+    numbers[1] = 100;
+    selection.query_numbers = numbers;
+    selection.labels = labels;
+    const hs_systems systems = {
+        .n = 2, .first = first, .box = &line, .selection = &selection, .first_query = first_query};
+    CHECK(hs_systems_coordination(&points, &queries, &systems, &options, counted, NULL) == HS_OK);
+    CHECK(counted[0] == 2 * 99 + 3 && counted[1] == 2 * 199 + 3); /* itself at S = 0 too */
+    numbers[1] = CROWD;
+    CHECK(hs_systems_coordination(&points, &queries, &systems, &options, counted, NULL) ==
+          HS_ERR_ARGUMENT);
+}
+
+/* Images of excluded pairs are those of each system's box, which is looked at first. */
+static void
+a_bad_box_of_a_system_is_told(void)
+{
+    static const double rows[] = {1.0, 0.0};
+    const int64_t       first[] = {0, 100, CROWD};
+    int64_t             counts[2];
+    hs_failure          failure;
+    make_crowd(0.0);
+    selection.labels = labels;
+    const hs_systems systems = {
+        .n = 2, .first = first, .box = &line, .rows = rows, .selection = &selection};
+    CHECK(hs_systems_count(&points, &systems, &options, counts, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(failure.system == 1 && failure.row == 0);
+}
+
 void
 test_choice(void)
 {
@@ -146,4 +217,8 @@ test_choice(void)
     RUN(units_may_be_extreme);
     RUN(numbers_may_be_far_apart);
     RUN(numbers_go_with_queries);
+    RUN(single_precision_chooses_as_well);
+    RUN(systems_choose_as_well);
+    RUN(numbers_of_queries_hold_in_systems);
+    RUN(a_bad_box_of_a_system_is_told);
 }

@@ -11,14 +11,33 @@ void test_large_blocks(void);
 
 enum { SPOTS = 1024, N = 180 * SPOTS }; /* more than 2^18 candidates within 1.5 box lengths */
 
-/* Rows with the points' numbers, or in a plane with distances alone, which are written at once. */
+enum { WITHIN = SPOTS + SPOTS / 2 + 1 }; /* 1.5 box lengths: every spot, half of them twice, ends */
+
+static const int64_t      labels[N];
+static const hs_selection but_nearest = {.labels = labels, .query_labels = labels};
+static const hs_selection but_near = {.min_distance = 0.5};
+
+/* Rows with the points' numbers, or in a plane with distances alone, which are written at once; all
+ * pairs, or those in a further image, or far enough apart. */
 static const struct {
-    hs_box   box;
-    unsigned want;
+    hs_box              box;
+    unsigned            want;
+    const hs_selection *selection;
+    int64_t             found; /* at each spot */
 } kinds[] = {
     {{.ndim = 1, .periodic = {true}, .rows = {{1.0}}},
-     HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT},
-    {{.ndim = 2, .periodic = {true}, .rows = {{1.0, 0.0}, {0.0, 1.0}}}, HS_WANT_DISTANCE},
+     HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_SHIFT,
+     NULL,
+     WITHIN},
+    {{.ndim = 2, .periodic = {true}, .rows = {{1.0, 0.0}, {0.0, 1.0}}},
+     HS_WANT_DISTANCE,
+     NULL,
+     WITHIN},
+    {{.ndim = 1, .periodic = {true}, .rows = {{1.0}}}, HS_WANT_J, &but_nearest, WITHIN - SPOTS},
+    {{.ndim = 1, .periodic = {true}, .rows = {{1.0}}},
+     HS_WANT_J | HS_WANT_DISTANCE,
+     &but_near,
+     WITHIN - SPOTS + 1},
 };
 
 typedef struct refusal {
@@ -42,8 +61,10 @@ search(int kind, bool sorted, int threads, refusal *once, int64_t *found)
     const hs_box       *box = &kinds[kind].box;
     const hs_points     points = {x, N, box->ndim, HS_FLOAT64, 16, 8};
     const hs_points     query = {at, 1, box->ndim, HS_FLOAT64, 16, 8};
-    hs_options          options = hs_options_default();
-    hs_pairs           *rows = NULL;
+    const hs_among      among = {
+             .points = &points, .box = box, .queries = &query, .selection = kinds[kind].selection};
+    hs_options options = hs_options_default();
+    hs_pairs  *rows = NULL;
     for (int p = 0; p < N; p++)
         x[2 * p] = (p * 77 % SPOTS) / (double)SPOTS;
     options.cutoff = 0.75;
@@ -52,8 +73,7 @@ search(int kind, bool sorted, int threads, refusal *once, int64_t *found)
     options.threads = threads;
     options.poll = refuse_once;
     options.poll_context = once;
-    const hs_status status =
-        hs_neighbors_find(QUERIED(&points, &query, box), &options, &rows, NULL);
+    const hs_status status = hs_neighbors_find(&among, &options, &rows, NULL);
     CHECK((status == HS_OK) == (rows != NULL));
     *found = status == HS_OK ? hs_pairs_length(rows) : 0;
     hs_pairs_free(rows);
@@ -64,7 +84,7 @@ static void
 any_poll_ends_a_search_of_many_candidates(void)
 {
     const int64_t before = hs_test_live_blocks();
-    for (int trial = 0; trial < 8; trial++) {
+    for (int trial = 0; trial < 16; trial++) {
         const int  kind = trial / 4, threads = 1 + trial % 2;
         const bool sorted = trial / 2 % 2;
         hs_status  status = HS_ERR_INTERRUPTED;
@@ -76,8 +96,7 @@ any_poll_ends_a_search_of_many_candidates(void)
         }
         /* Of two threads the other one, which does not poll, may do the work. */
         CHECK((nth > 2 || threads > 1) && nth < 200);
-        /* 1.5 box lengths: every spot once, half of them twice, and both ends. */
-        CHECK(found == (int64_t)(N / SPOTS) * (SPOTS + SPOTS / 2 + 1));
+        CHECK(found == N / SPOTS * kinds[kind].found);
     }
     CHECK(hs_test_live_blocks() == before);
 }

@@ -85,11 +85,27 @@ expect(const question *ask)
     return n;
 }
 
+/* Lanes behind the last candidate are zeros, which no kernel takes long for. */
+static void
+check_lanes(const hs_scanner *scanner)
+{
+    const hs_block *block = &scanner->block;
+    const int       n_numbers = hs_support_numbers(scanner->search->scene.ndim);
+    int             wrong = 0;
+    for (int e = 0; e < n_numbers; e++) {
+        const float *row = block->radius + e * block->pitch;
+        for (int32_t c = block->n; c < block->n + HS_PADDING; c++)
+            wrong += row[c] != 0.0f;
+    }
+    CHECK(wrong == 0);
+}
+
 static hs_status
 count_pairs(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
-    (void)scanner;
     (void)first;
+    if (scanner->search->limits->supports->of_points.near != NULL)
+        check_lanes(scanner);
     *(int64_t *)context += hits->end[hits->n - 1];
     return HS_OK;
 }
@@ -202,7 +218,8 @@ what_the_filter_leaves_is_decided(void)
             least = all < least ? all : least;
             most = all > most ? all : most;
         }
-        CHECK(most >= expected && least < most);
+        /* Without an error beyond its own, the filter leaves next to none. */
+        CHECK(most >= expected && 32 * least <= expected);
     }
 }
 
