@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -102,8 +102,23 @@ def as_rest(
 ) -> Rest:
     """Those that say how to search. What is not converted here the core checks."""
     if progress is not None and not callable(progress):
-        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+        from halfshell._convert.progress import as_progress  # here: others do without
+
+        progress = as_progress(progress)
     return as_flag(inclusive, "inclusive"), precision, kernel, memory_limit, progress, threads
+
+
+def with_bar(search: Callable[..., Any], arguments: dict[str, Any]) -> Any:
+    """Call a search, whose `progress` is a bool, with a bar that goes away at its end."""
+    from halfshell._convert.progress import ProgressBar, as_progress  # here, as above
+
+    unknown = arguments.pop("unknown", {})
+    bar = as_progress(arguments["progress"])
+    try:
+        return search(**{**arguments, "progress": bar}, **unknown)
+    finally:
+        if isinstance(bar, ProgressBar):
+            bar.close()
 
 
 def refuse_indefinite(search: Search, reach: Reach) -> None:

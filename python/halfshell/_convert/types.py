@@ -160,7 +160,7 @@ class PairOptions(ReachOptions, total=False):
     index_dtype: npt.DTypeLike
     out: Out | None
     capacity: int | None
-    progress: Progress
+    progress: Progress | bool
     batch: npt.ArrayLike | None
     touching: npt.ArrayLike | None
 

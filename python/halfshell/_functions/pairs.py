@@ -12,7 +12,7 @@ from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import AUTO, RAISE, as_flag, as_index_bytes, as_room
 from halfshell._convert.scene import check_apart
-from halfshell._convert.search import as_rest, as_search_of_each
+from halfshell._convert.search import as_rest, as_search_of_each, with_bar
 from halfshell._convert.shells import as_shells
 from halfshell._objects.box import Box
 from halfshell._unknown import refuse_unknown
@@ -98,7 +98,7 @@ def pairs(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
     batch: npt.ArrayLike | None = None,
     touching: npt.ArrayLike | None = None,
     groups: npt.ArrayLike | None = None,
@@ -174,9 +174,8 @@ def pairs(
     precision : {"exact", "double", "single"}, default "exact"
         "exact" decides for the exact real values of the inputs. The others make one rounded
         comparison, as most libraries do, and exist for comparison: "double" uses a fixed
-        formula in float64; "single" uses float32 relative to the centre of a group of neighbouring
-        points, so that its answer near the cutoff also depends on the other points and their
-        order.
+        formula in float64; "single" uses float32 relative to the centre of a group of points, so
+        that its answer near the cutoff also depends on the other points and their order.
     algorithm : {"auto", "all-pairs", "grid", "hash", "hierarchy"}, default "auto"
         How pairs are searched for. It may change time, memory and, without `sort`, the order, but
         not the pairs. "all-pairs" tests every pair. "grid" sorts the points into cells, as many as
@@ -195,12 +194,11 @@ def pairs(
         variable ``OMP_NUM_THREADS``, or the number of cores that this process may run on.
         The arrays are the same for any number. Threads end before the call returns.
     memory_limit : float, optional
-        Bytes that search and result may take. Default: what the machine and its control group
-        have available.
-    progress : callable, optional
-        Called now and then as ``progress(fraction)``, with the fraction of the work done, from
-        0 to 1; it never falls. A search of only a few milliseconds may not call it. An
-        exception ends the search and is raised here.
+        Bytes that search and result may take. Default: what the machine has available.
+    progress : bool or callable, optional
+        True: show a bar in a long search, on a terminal by rich or in a notebook. A function is
+        called now and then as ``progress(fraction)``, from 0 to 1, never falling; not by a
+        search of a few milliseconds. An exception ends the search.
     batch : array_like of int, shape (n,), optional
         Many systems in one call: the system of each point, ascending from 0 or above; numbers may
         be skipped. Only points of the same system pair. The result is that of one call for
@@ -356,10 +354,11 @@ def pairs(
     """
     if unknown:
         refuse_unknown(pairs, unknown)
+    if isinstance(progress, bool):
+        return cast("Arrays", with_bar(pairs, locals()))
     box = box.vectors if type(box) is Box else box
-    room = None
-    if capacity is not None or on_overflow is not RAISE:
-        room = as_room(capacity, on_overflow, out)
+    is_bound = capacity is not None or on_overflow is not RAISE
+    room = as_room(capacity, on_overflow, out) if is_bound else None
     if batch is None and touching is None and (
         radii is None and types is None and rule is None and supports is None and extent is None
         and algorithm is AUTO

@@ -36,7 +36,7 @@ class _StreamOptions(ReachOptions, total=False):
 
     max_pairs: int
     index_dtype: npt.DTypeLike
-    progress: Callable[[float], object] | None
+    progress: Callable[[float], object] | bool | None
 
 
 @overload
@@ -75,7 +75,7 @@ def iter_pairs(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
     groups: npt.ArrayLike | None = None,
     exclude: npt.ArrayLike | None = None,
     exclude_within: int | None = None,
@@ -99,8 +99,9 @@ def iter_pairs(
     memory_limit : float, optional
         Bytes that the search and its buffers may take, not counting blocks already
         returned. Default: what the machine and its control group have available.
-    progress : callable, optional
-        Called now and then, at least once each time the iterator searches for more pairs, as
+    progress : bool or callable, optional
+        True: show a bar, as in `pairs`, until the iterator ends or is closed. A function is called
+        now and then, at least once each time the iterator searches for more pairs, as
         ``progress(fraction)``, with the fraction of the points that are done, from 0 to 1. It
         never falls, for any number of threads, and is 1 once all pairs have been found; without
         points it is not called. An exception ends the call; the iterator can continue afterwards.

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from halfshell._convert.foreign import kind_of
 from halfshell._convert.frames import as_frame, frames_of, of_frame
 from halfshell._convert.options import as_flag, as_index_bytes, check_letters
+from halfshell._convert.progress import as_progress
 from halfshell._convert.types import Arrays, BoxLike, Letter, Number, PeriodicLike, PointsLike
 from halfshell._errors import shorten
 from halfshell._functions.pairs import pairs
@@ -36,7 +37,7 @@ class _FrameOptions(TypedDict, total=False):
     kernel: str | None
     threads: int | None
     memory_limit: float | None
-    progress: Callable[[float], object] | None
+    progress: Callable[[float], object] | bool | None
 
 
 @overload
@@ -69,7 +70,7 @@ def trajectory_pairs(
     kernel: str | None = None,
     threads: int | None = None,
     memory_limit: float | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
     **unknown: Never,
 ) -> Generator[Any, None, None]:
     """Find the pairs of each frame of a trajectory, one frame after the other; always exact.
@@ -97,10 +98,10 @@ def trajectory_pairs(
         As in `pairs`, for each frame. With ``skin=None`` and a number above 1, this many frames of
         1000 points or more are searched at a time, by one thread each; as many are then read ahead
         and copied.
-    progress : callable, optional
-        Called once for each frame, as ``progress(fraction)``, before its pairs are returned, with
-        the fraction of the frames done, up to 1. The frames must have a length. An
-        exception ends the iteration.
+    progress : bool or callable, optional
+        True: show a bar, as in `pairs`. A function is called once for each frame, as
+        ``progress(fraction)``, before its pairs are returned, with the fraction of the frames
+        done, up to 1. The frames must have a length. An exception ends the iteration.
 
     Returns
     -------
@@ -153,11 +154,9 @@ def trajectory_pairs(
         inclusive=inclusive, kernel=kernel, threads=threads, memory_limit=memory_limit,
     )  # fmt: skip
     iterator, n_frames = frames_of(frames)
-    if progress is not None:
-        if not callable(progress):
-            raise TypeError(f"progress must be callable, got {kind_of(progress)}")
-        if n_frames is None:
-            raise TypeError(f"progress needs frames that have a length, got {kind_of(frames)}")
+    told = as_progress(progress)
+    if told is not None and n_frames is None:
+        raise TypeError(f"progress needs frames that have a length, got {kind_of(frames)}")
 
     is_shared = skin is None and threads is not None and threads > 1
 
@@ -185,7 +184,7 @@ def trajectory_pairs(
         found = search_ahead(iterator, search, box, periodic, threads)
     else:
         found = _each(iterator, find, box, periodic)
-    return found if progress is None else _told(found, n_frames or 1, progress)
+    return found if told is None else _told(found, n_frames or 1, told)
 
 
 def _each(

@@ -13,6 +13,7 @@ from halfshell import _core
 from halfshell._convert.callbacks import target_of
 from halfshell._convert.options import AUTO, as_flag, as_index_bytes, as_room, most_pairs
 from halfshell._convert.scene import check_apart
+from halfshell._convert.search import with_bar
 from halfshell._convert.shells import as_shells
 from halfshell._convert.types import Arrays, Number, Out, PairBlocks
 from halfshell._objects.kept_cells import KeptCells
@@ -37,7 +38,7 @@ class CellPairs(KeptCells):
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
-        progress: Callable[[float], object] | None = None,
+        progress: Callable[[float], object] | bool | None = None,
         touching: npt.ArrayLike | None = None,
     ) -> Arrays | tuple[Any, ...]:
         """Find every pair of points within a cutoff, as `halfshell.pairs` does.
@@ -66,6 +67,8 @@ class CellPairs(KeptCells):
         >>> cells.pairs(1.0, quantities="P").tolist()
         [[0, 1]]
         """
+        if isinstance(progress, bool):
+            return cast("Arrays", with_bar(CellPairs.pairs, locals()))
         options = inclusive, kernel, threads, memory_limit
         cutoff, shells = as_shells(cutoff, quantities, self._precision)
         search = self._arguments(cutoff, options, progress)
@@ -93,7 +96,7 @@ class CellPairs(KeptCells):
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
-        progress: Callable[[float], object] | None = None,
+        progress: Callable[[float], object] | bool | None = None,
     ) -> PairBlocks[Any]:
         """Iterate over the pairs in blocks of bounded size, as `halfshell.iter_pairs` does.
 

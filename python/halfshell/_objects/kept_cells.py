@@ -8,7 +8,7 @@ from typing import Any
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.scene import as_queries, check_own_box
 from halfshell._convert.search import as_rest
-from halfshell._convert.types import PointArray, Precision, Progress, Search
+from halfshell._convert.types import PointArray, Precision, Search
 from halfshell._objects.origin import Origin
 
 # Of methods that search: inclusive, kernel, threads, memory_limit.
@@ -41,7 +41,7 @@ class KeptCells:
         check_own_box(name, own, self._origin.scene()[1:])
         return array
 
-    def _arguments(self, cutoff: Any, options: Options, progress: Progress = None) -> Search:
+    def _arguments(self, cutoff: Any, options: Options, progress: Any = None) -> Search:
         inclusive, kernel, threads, memory_limit = options
         reach = self._cutoff if cutoff is None else as_cutoff(cutoff)
         threads = self._threads if threads is None else threads

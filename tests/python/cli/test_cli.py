@@ -18,12 +18,12 @@ import halfshell as hs
 from halfshell import cli, selftest
 from halfshell._check.reference import reference_pairs
 from halfshell._cli import peers as cli_peers
-from halfshell._cli import progress as cli_progress
 from halfshell._cli import scene as cli_scene
 from halfshell._cli import verify as cli_verify
 from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene, read_scene, replacing
 from halfshell._cli.output import write_csv
+from halfshell._convert import progress as bar
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
@@ -836,7 +836,7 @@ def test_progress_bar_only_for_long_work_on_a_terminal(
     time = types.SimpleNamespace(monotonic=lambda: clock.now, perf_counter=lambda: clock.now)
     screen = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(cli_progress, "time", time)
+    monkeypatch.setattr(bar, "time", time)
     monkeypatch.setattr(hs, "pairs", searching(seconds, clock))
     monkeypatch.setenv("TERM", "xterm")
     assert cli.main(["pairs", str(npy), "--cutoff", "2", *options]) == 0
@@ -847,7 +847,7 @@ def test_progress_of_a_check_by_integers(monkeypatch, npz):
     pytest.importorskip("rich")
     screen, seconds = Terminal(), iter(range(1000))
     clock = types.SimpleNamespace(monotonic=lambda: float(next(seconds)))
-    monkeypatch.setattr(cli_progress, "time", clock)
+    monkeypatch.setattr(bar, "time", clock)
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
     assert cli.main(["verify", str(npz), "--cutoff", "2", "--sample", "20"]) == 0

@@ -217,10 +217,10 @@ def test_exceptions_of_the_hook_end_the_search(rng):
     for search in (lambda **how: hs.pairs(points, 0.08, **how), hs.CellList(points, 0.08).pairs):
         with pytest.raises(KeyError):
             search(progress=hook)
-        with pytest.raises(TypeError, match="progress must be callable, got int"):
+        with pytest.raises(TypeError, match="progress must be callable or a bool, got int"):
             search(progress=1)
     for few in (points[:4], points[:4].tolist()):
-        with pytest.raises(TypeError, match="progress must be callable, got str"):
+        with pytest.raises(TypeError, match="progress must be callable or a bool, got str"):
             hs.pairs(few, 0.1, progress="yes")
 
 

@@ -267,7 +267,7 @@ def test_progress():
     ({"threads": 0}, ValueError, "threads"),
     ({"memory_limit": -1}, ValueError, "memory_limit"),
     ({"box": [1.0, np.nan, 1.0]}, ValueError, "box"),
-    ({"progress": 3}, TypeError, "progress must be callable, got int"),
+    ({"progress": 3}, TypeError, "progress must be callable or a bool, got int"),
     ({"frames": iter([]), "progress": print}, TypeError, "progress needs frames that have a len"),
     ({"frames": 3}, TypeError, "frames must be a sequence or iterator of frames, got int"),
     ({"frames": "abc"}, TypeError, "frames must be a sequence of frames, got str"),

@@ -104,7 +104,7 @@ def test_progress_is_told_and_may_stop_a_block():
 
 def test_what_cannot_be_called_is_refused():
     cells, _ = cells_of("plane")
-    with pytest.raises(TypeError, match="progress must be callable, got int"):
+    with pytest.raises(TypeError, match="progress must be callable or a bool, got int"):
         cells.iter_pairs(progress=3)
     with pytest.raises(ValueError, match="max_pairs must be 1 or more"):
         cells.iter_pairs(max_pairs=0)
