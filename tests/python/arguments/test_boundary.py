@@ -129,6 +129,7 @@ def several_wild(draw):
     return name, {argument: draw(anything()) for argument in chosen}
 
 
+@pytest.mark.slow
 def test_any_objects_as_several_arguments():
     def check(drawn):
         name, wild = drawn

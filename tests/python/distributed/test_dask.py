@@ -91,6 +91,7 @@ def cluster(workers, **options):
         yield client
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_a_cluster(workers):

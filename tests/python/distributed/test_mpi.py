@@ -33,12 +33,14 @@ def mpiexec():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["answers", "refusals"])
 @pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_ranks(ranks, what):
     start(ranks, SUPPORT / "ranks.py", what)
 
 
+@pytest.mark.slow
 def test_the_page_runs(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/mpi.md").read_text(), re.DOTALL)
     (tmp_path / "program.py").write_text(code)

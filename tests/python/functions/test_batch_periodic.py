@@ -37,43 +37,42 @@ class Scene:
 def test_axes_of_each_system(d, has_boxes, threads):
     scene = Scene(d, has_boxes)
     cutoff = 1.5 + 0.5 * d
-    how = {"box": scene.box, "batch": scene.batch, "threads": threads}
-    for periodic in (scene.periodic, scene.periodic.astype(int).tolist()):
-        how["periodic"] = periodic
-        found = hs.pairs(scene.points, cutoff, quantities="ijdS", sort=True, **how)
-        table = hs.neighbors(scene.points, cutoff, quantities="jdS", **how)
-        asked = {"queries": scene.queries, "query_batch": scene.query_batch}
-        rows = hs.neighbors(scene.points, cutoff, quantities="jdS", **how, **asked)
-        near = hs.nearest(scene.points, 3, quantities="jdS", **how, **asked)
-        counts = hs.count_pairs(scene.points, cutoff, **how)
-        binned = hs.pair_histogram(scene.points, [0.0, 1.0, cutoff], **how)
-        at = row_at = 0
-        for s, (own, asking, one) in enumerate(scene.parts()):
-            first = own[0] if len(own) else 0
-            i, j, length, S = hs.pairs(
-                scene.points[own], cutoff, quantities="ijdS", sort=True, **one
-            )
-            part = slice(at, at + len(i))
-            for ours, theirs in zip(found, (i + first, j + first, length, S), strict=True):
-                assert np.array_equal(ours[part], theirs)
-            at += len(i)
-            assert counts[s] == len(i) and binned[s].sum() == len(i)
-            each = hs.neighbors(scene.points[own], cutoff, quantities="jdS", **one)
-            many = table[own]
-            assert np.array_equal(many.indices, each.indices + first)
-            assert np.array_equal(many.shifts, each.shifts)
-            assert np.array_equal(many.sort().indices, each.sort().indices + first)
-            mine = scene.queries[asking]
-            each = hs.neighbors(scene.points[own], cutoff, queries=mine, quantities="jdS", **one)
-            part = slice(row_at, row_at + each.n_entries)
-            assert np.array_equal(rows.indices[part], each.indices + first)
-            assert np.array_equal(rows.distances[part], each.distances)
-            row_at += each.n_entries
-            j, length, S = hs.nearest(scene.points[own], 3, queries=mine, quantities="jdS", **one)
-            assert np.array_equal(near[0][asking], np.where(j < 0, -1, j + first))
-            assert np.array_equal(near[1][asking], length)
-            assert np.array_equal(near[2][asking], S)
-        assert at == len(found[0]) > 50 and row_at == rows.n_entries > 20
+    periodic = scene.periodic if threads == 1 else scene.periodic.astype(int).tolist()
+    how = {"box": scene.box, "batch": scene.batch, "threads": threads, "periodic": periodic}
+    found = hs.pairs(scene.points, cutoff, quantities="ijdS", sort=True, **how)
+    table = hs.neighbors(scene.points, cutoff, quantities="jdS", **how)
+    asked = {"queries": scene.queries, "query_batch": scene.query_batch}
+    rows = hs.neighbors(scene.points, cutoff, quantities="jdS", **how, **asked)
+    near = hs.nearest(scene.points, 3, quantities="jdS", **how, **asked)
+    counts = hs.count_pairs(scene.points, cutoff, **how)
+    binned = hs.pair_histogram(scene.points, [0.0, 1.0, cutoff], **how)
+    at = row_at = 0
+    for s, (own, asking, one) in enumerate(scene.parts()):
+        first = own[0] if len(own) else 0
+        i, j, length, S = hs.pairs(
+            scene.points[own], cutoff, quantities="ijdS", sort=True, **one
+        )
+        part = slice(at, at + len(i))
+        for ours, theirs in zip(found, (i + first, j + first, length, S), strict=True):
+            assert np.array_equal(ours[part], theirs)
+        at += len(i)
+        assert counts[s] == len(i) and binned[s].sum() == len(i)
+        each = hs.neighbors(scene.points[own], cutoff, quantities="jdS", **one)
+        many = table[own]
+        assert np.array_equal(many.indices, each.indices + first)
+        assert np.array_equal(many.shifts, each.shifts)
+        assert np.array_equal(many.sort().indices, each.sort().indices + first)
+        mine = scene.queries[asking]
+        each = hs.neighbors(scene.points[own], cutoff, queries=mine, quantities="jdS", **one)
+        part = slice(row_at, row_at + each.n_entries)
+        assert np.array_equal(rows.indices[part], each.indices + first)
+        assert np.array_equal(rows.distances[part], each.distances)
+        row_at += each.n_entries
+        j, length, S = hs.nearest(scene.points[own], 3, queries=mine, quantities="jdS", **one)
+        assert np.array_equal(near[0][asking], np.where(j < 0, -1, j + first))
+        assert np.array_equal(near[1][asking], length)
+        assert np.array_equal(near[2][asking], S)
+    assert at == len(found[0]) > 50 and row_at == rows.n_entries > 20
 
 
 def test_nearest_images_of_excluded_pairs_are_those_of_each_system():

@@ -14,10 +14,9 @@ from halfshell._check.reference import exact_square, reference_pairs
 from oracles import BOX_KINDS, lattice, random_scene, rotation, same_arrays
 
 
-def bin_of(square, edges):
-    """The bin of a squared distance, a rational; None beyond the first and the last edge."""
-    last = len(edges) - 2
-    limits = [Fraction(float(edge)) ** 2 for edge in edges]
+def bin_of(square, limits):
+    """The bin of a squared distance among squared edges, all rational; None outside of them."""
+    last = len(limits) - 2
     if square == limits[-1]:
         below = [k for k in range(last + 1) if limits[k] <= square]
         return max(below)
@@ -29,8 +28,9 @@ def expected(points, edges, box=None, periodic=None, types=None, weights=None):
     """The histogram in rational arithmetic: counts, or sums of products as fractions."""
     t = 1 if types is None else max(types, default=0) + 1
     bins = np.full((t, t, len(edges) - 1), Fraction(0), dtype=object)
+    limits = [Fraction(float(edge)) ** 2 for edge in edges]
     for i, j, S in reference_pairs(points, edges[-1], box, periodic, True):
-        k = bin_of(exact_square(points, i, j, S or None, box), edges)
+        k = bin_of(exact_square(points, i, j, S or None, box), limits)
         if k is None:
             continue
         a, b = (0, 0) if types is None else (types[i], types[j])
