@@ -7,10 +7,32 @@ undefined-behaviour sanitizers, HS_WERROR=1 turns warnings into errors.
 
 import os
 import sys
+import sysconfig
 from glob import glob
 
 import numpy
 from setuptools import Extension, setup
+
+# -O3 without what takes much room and gains next to nothing here: copies of functions and loops,
+# and long loops written out. Over 25 kinds of search it takes 1.01 of the time, and the compressed
+# library 0.84 of the size. Loops are aligned: their speed is not that of what precedes them.
+smaller = [
+    "-fno-ipa-cp-clone",
+    "-fno-unswitch-loops",
+    "-fno-split-loops",
+    "-fno-version-loops-for-strides",
+    "--param=max-completely-peel-times=6",
+    "--param=max-completely-peeled-insns=60",
+    "--param=max-inline-insns-auto=15",
+    "-falign-loops=32",
+]
+
+
+def is_for_gcc():
+    """Whether the compiler is GCC on Linux; others have no such options."""
+    compiler = os.environ.get("CC") or sysconfig.get_config_var("CC") or ""
+    return sys.platform.startswith("linux") and "clang" not in compiler
+
 
 if sys.platform == "win32":
     compile_args = ["/std:c11", "/O2", "/fp:precise"]
@@ -20,6 +42,7 @@ else:
     compile_args = [
         "-std=c11",
         "-O3",
+        *(smaller if is_for_gcc() else []),
         "-g0",
         "-ffp-contract=off",
         "-fvisibility=hidden",
@@ -31,6 +54,8 @@ else:
         "-Wmissing-prototypes",
     ]
     link_args = ["-pthread"]
+    if sys.platform.startswith("linux") and not {"HS_DEBUG", "HS_SANITIZE"} & set(os.environ):
+        link_args += ["-Wl,--strip-all"]  # of names that only a debugger reads
     include_dirs = []
     compile_args += ["-isystem", numpy.get_include()]  # no warnings of NumPy's headers
     if os.environ.get("HS_WERROR"):
