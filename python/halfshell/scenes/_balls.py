@@ -70,9 +70,9 @@ def ties(size: Size, inclusive: bool) -> Scene:
     kind="radii",
 )
 def rounded(size: Size) -> Scene:
-    """Sums that are no float64, and points as far apart as their rounded values.
+    """Sums that float64 cannot hold, and points as far apart as their rounded values.
 
-    About half of the pairs really touch. Who adds radii in float64 finds that all of them do.
+    About half of the pairs really touch. Radii added in float64 say that all of them do.
     """
     n, draw = pick(size, 75, 2000, 50_000), stream(63)
     radii = draw((2, n)) * np.array([[1.0], [0.37]]) + 2.0**-20
@@ -85,7 +85,7 @@ def rounded(size: Size) -> Scene:
 
 @add({"balls-giant": ("one ball that holds a quarter of the box, among dwarfs",)}, kind="radii")
 def giant(size: Size) -> Scene:
-    """One large radius: a grid as wide as the largest reach is no grid, and tests all pairs.
+    """One large radius: with cells as wide as the largest reach, all pairs are tested.
 
     The giant has as many contacts as it holds dwarfs, the others a handful each.
     """

@@ -58,7 +58,7 @@ def strict(size: Size) -> Scene:
 
 @add({"silicon-shell": ("silicon, cutoff at the lattice constant of 5.431",)})
 def silicon(size: Size) -> Scene:
-    """A shell within rounding of the cutoff: 5.431 and its quarters are no binary numbers.
+    """A shell within rounding of the cutoff: 5.431 and its quarters are rounded in binary.
 
     Whether a pair counts depends on how its two coordinates were rounded. Equal vectors of the
     crystal get different answers, and only exact arithmetic tells which.

@@ -79,7 +79,7 @@ def _two_clusters(size: Size) -> Floats:
 def two_clusters(size: Size) -> Scene:
     """A volume of 1e27 cells with points in two corners: no grid over it can be stored.
 
-    Their numbers alternate, so that neighbours in the list are never neighbours in space.
+    Their numbers alternate, so that points next to each other in the array never are in space.
     """
     return Scene(_two_clusters(size), 5.0)
 
@@ -140,7 +140,7 @@ def coincident(size: Size) -> Scene:
 
 @add({"twice": ("every point twice",)})
 def twice(size: Size) -> Scene:
-    """Coincident pairs among others: distance 0 is a pair, a point with itself is none."""
+    """Coincident points among others: two of them are a pair at distance 0, one alone is none."""
     points, edge = cube(size, 33)
     half = points[: len(points) // 2]
     return Scene(np.concatenate([half, half]), 5.0, np.full(3, edge), CUBE)

@@ -35,8 +35,8 @@ def needles(size: Size, inclusive: bool, rule: Rule) -> Scene:
     """An aspect of 1e6 turned every way, and a point on the surface of each ellipsoid.
 
     Turns, lengths and places are whole numbers, so that the points are exactly on the surfaces;
-    of two thirds of the supports an entry is one unit in the last place off. Who computes H @ D
-    in float64 adds numbers up to a million times as large as their sum, and errs as often as not.
+    in two thirds of the supports one entry is off by one unit in the last place. H @ D in float64
+    is a sum of numbers up to a million times as large as it, and wrong as often as not.
     The ball around a needle holds 1e12 times what it does: almost no candidate is a pair.
     """
     half, draw = pick(size, 60, 800, 30_000), stream(66)

@@ -14,7 +14,7 @@ from halfshell.scenes._scene import Scene, Size, pick
 def tiny(size: Size) -> Scene:
     """Cells of the size of the cutoff would be 1e18: memory must follow points, not volume.
 
-    Points come in twos, about half of them within the cutoff.
+    Points come in pairs, about half of which are within the cutoff.
     """
     draw = stream(17)
     points = draw((pick(size, 50, 2000, 50_000), 3))

@@ -53,7 +53,7 @@ def line(size: Size) -> Scene:
 
 @add({"line-1d-ties": ("tenths on a line, cutoff 1",)})
 def line_ties(size: Size) -> Scene:
-    """Two neighbours of each point within rounding of the cutoff: 0.1 is no binary number."""
+    """Two neighbours of each point within rounding of the cutoff: 0.1 is rounded in binary."""
     n = pick(size, 100, 4000, 100_000)
     return Scene(np.arange(float(n)).reshape(n, 1) * 0.1, 1.0)
 
