@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fill the marked sections of docs/errors.md from a report.
+"""Fill the marked sections of docs/errors.md from a report, and from one of full size.
 
     halfshell report -o docs/report
-    python benchmarks/fill_errors.py docs/report/report.csv
+    halfshell report --size full -o docs/report/full
+    python benchmarks/fill_errors.py docs/report/report.csv --full docs/report/full/report.csv
 
 How sections are marked is said in `marks`.
 """
@@ -122,21 +123,27 @@ SECTIONS: dict[str, Callable[[Facts, Rows], Lines]] = {
     "failures": failures,
 }
 
+FULL_SECTIONS = {f"full {name}": SECTIONS[name] for name in ("machine", "methods", "scenes")}
 
-def fill_page(page: str, report: Path) -> str:
-    """Return the page with every section filled from a report."""
-    with report.open(newline="", encoding="utf-8") as stream:
-        facts, rows = read_csv(stream)
-    return fill(page, {name: make(facts, rows) for name, make in SECTIONS.items()})
+
+def fill_page(page: str, report: Path, full: Path | None = None) -> str:
+    """Return the page with every section filled from a report, and from one of full size."""
+    for path, sections in ((report, SECTIONS), (full, FULL_SECTIONS)):
+        if path is not None:
+            with path.open(newline="", encoding="utf-8") as stream:
+                facts, rows = read_csv(stream)
+            page = fill(page, {name: make(facts, rows) for name, make in sections.items()})
+    return page
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("report", type=Path, metavar="CSV", help="of halfshell report")
+    parser.add_argument("--full", type=Path, metavar="CSV", help="of one of full size")
     parser.add_argument("--page", type=Path, default=_DOCS / "errors.md", metavar="MD")
     options = parser.parse_args(arguments)
-    page = fill_page(options.page.read_text(encoding="utf-8"), options.report)
+    page = fill_page(options.page.read_text(encoding="utf-8"), options.report, options.full)
     options.page.write_text(page, encoding="utf-8")
     print(f"wrote {options.page}")
     return 0
