@@ -40,6 +40,13 @@ load_records(const double *from, const int32_t *at)
                     _mm256_castsi256_si128(numbers)};
 }
 
+/* LANES entries of an array. */
+HS_ALWAYS_INLINE places
+load_places(const int32_t *from, const int32_t *at)
+{
+    return _mm_setr_epi32(from[at[0]], from[at[1]], from[at[2]], from[at[3]]);
+}
+
 /* The first three entries of LANES records of int32. */
 HS_ALWAYS_INLINE void
 load_triples(const int32_t *from, const int32_t *at, places *entries)

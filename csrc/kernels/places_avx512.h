@@ -49,6 +49,14 @@ load_records(const double *from, const int32_t *at)
                     _mm512_cvtepi64_epi32(_mm512_castpd_si512(number))};
 }
 
+/* LANES entries of an array. */
+HS_ALWAYS_INLINE places
+load_places(const int32_t *from, const int32_t *at)
+{
+    return _mm256_setr_epi32(from[at[0]], from[at[1]], from[at[2]], from[at[3]], from[at[4]],
+                             from[at[5]], from[at[6]], from[at[7]]);
+}
+
 /* Two records of int32. */
 HS_ALWAYS_INLINE places
 load_two_triples(const int32_t *from, int32_t first, int32_t second)

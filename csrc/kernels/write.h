@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * write.h: the contract of the writers, which turn hits into pairs with all that is measured of
+ * write.h: the contract of the writers, which turn hits into pairs with what else is wanted of
  * them, i, j, d, D and S, in one pass over the hits.
  *
  * A writer gives the bits of hs_metric_measure (core/exact/metric.h), of hs_keep_within and of
@@ -34,9 +34,11 @@ typedef struct hs_write {
     bool             is_shifted; /* some shift may not be zero; needs metric->floats_usable */
     bool             by_S;       /* the metric's shift is S */
     const hs_metric *metric;
-    const double    *q;     /* of candidates: coordinates; last, the bits of an int64, the number */
-    const int32_t   *image; /* of candidates, in each row; NULL: zeros */
-    const int32_t   *few;   /* of candidates: image less turns; NULL: no turns */
+    const double    *q;      /* of candidates: coordinates; last, the bits of an int64, the number;
+                             * NULL: no d and no D are wanted */
+    const int32_t   *number; /* of candidates, one each: needed where q is NULL */
+    const int32_t   *image;  /* of candidates, in each row; NULL: zeros */
+    const int32_t   *few;    /* of candidates: image less turns; NULL: no turns */
     const double    *p[HS_WRITE_MOST_DIM];      /* of points */
     const int32_t   *turns[HS_WRITE_MOST_DIM];  /* of points, in each row; NULL: zeros */
     int              column[HS_WRITE_MOST_DIM]; /* of S that each row is */

@@ -188,13 +188,32 @@ put_vectors(const hs_write *write, int64_t e, const lanes *of, const int ndim)
     hs_prefetch_later(to, LANES * sizeof *to * (size_t)ndim);
 }
 
+/* Whether each row is the box vector of the same number: then S need not go through memory. */
+HS_ALWAYS_INLINE bool
+are_in_order(const hs_write *write, const int ndim)
+{
+    bool in_order = write->metric->n_rows == ndim;
+    for (int r = 0; r < ndim && in_order; r++) {
+        in_order = write->column[r] == r;
+    }
+    return in_order;
+}
+
 HS_ALWAYS_INLINE void
-put_shifts(const hs_write *write, int64_t e, const lanes *of, const int ndim)
+put_shifts(const hs_write *write, int64_t e, bool in_order, const lanes *of, const int ndim)
 {
     int32_t *to = write->shift + e * ndim;
-    places   S[HS_WRITE_MOST_DIM] = {broadcast_place(0), broadcast_place(0), broadcast_place(0)};
-    for (int r = 0; r < write->metric->n_rows; r++) {
-        S[write->column[r]] = write->is_half ? negate_places(of->flips, of->S[r]) : of->S[r];
+    places   rows[HS_WRITE_MOST_DIM], S[HS_WRITE_MOST_DIM];
+    for (int r = 0; r < HS_WRITE_MOST_DIM; r++) {
+        S[r] = rows[r] = write->is_half ? negate_places(of->flips, of->S[r]) : of->S[r];
+    }
+    if (!in_order) {
+        for (int l = 0; l < HS_WRITE_MOST_DIM; l++) {
+            S[l] = broadcast_place(0);
+        }
+        for (int r = 0; r < write->metric->n_rows; r++) {
+            S[write->column[r]] = rows[r];
+        }
     }
     if (ndim == 2) {
         put_two_places(to, S[0], S[1]);
@@ -218,12 +237,43 @@ put_index(void *column, int index_bytes, int64_t e, places number)
     hs_prefetch_later((char *)column + e * index_bytes, LANES * (size_t)index_bytes);
 }
 
+/* i and j; S. */
+HS_ALWAYS_INLINE void
+put_known(const hs_write *write, int64_t e, places point, bool in_order, const lanes *of,
+          const int ndim)
+{
+    put_index(write->i, write->index_bytes, e, lower_place(of->number, point));
+    put_index(write->j, write->index_bytes, e, higher_place(of->number, point));
+    if (write->shift != NULL) {
+        put_shifts(write, e, in_order, of, ndim);
+    }
+}
+
+/* Nothing is measured. */
+HS_ALWAYS_INLINE bool
+write_known(const hs_write *write, const hs_hits *hits, const int ndim)
+{
+    const bool in_order = are_in_order(write, ndim);
+    for (int32_t t = 0, h = 0; t < hits->n; h = hits->end[t++]) {
+        const places point = broadcast_place(hits->point[t]);
+        for (int32_t e = h; e < hits->end[t]; e += LANES) {
+            lanes of;
+            of.number = load_places(write->number, hits->label + e);
+            find_shifts(write, t, hits->label + e, &of);
+            find_flips(write, point, &of);
+            put_known(write, e, point, in_order, &of, ndim);
+        }
+    }
+    return true;
+}
+
 HS_ALWAYS_INLINE bool
 write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bool shifted)
 {
     /* An error e of D is of no matter up to a quarter of the last place of |D|. */
     const double unit = HS_DW_ADD_ERROR * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT);
     const double least = 0x1p58 * unit * HS_WRITE_MOST_DIM;
+    const bool   in_order = are_in_order(write, ndim);
     unsigned     unsure = 0;
     int32_t      h = 0;
     for (int32_t t = 0; t < hits->n; t++) {
@@ -246,16 +296,12 @@ write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bo
                 left &= ~coinciding(write, &of, ndim);
             }
             unsure |= left;
-            put_index(write->i, write->index_bytes, e, lower_place(of.number, point));
-            put_index(write->j, write->index_bytes, e, higher_place(of.number, point));
+            put_known(write, e, point, in_order, &of, ndim);
             if (write->distance != NULL) {
                 put_distances(write, e, distance);
             }
             if (write->vector != NULL) {
                 put_vectors(write, e, &of, ndim);
-            }
-            if (write->shift != NULL) {
-                put_shifts(write, e, &of, ndim);
             }
         }
         h = end;
@@ -269,6 +315,9 @@ write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bo
 bool
 WRITE(const hs_write *write, const hs_hits *hits)
 {
+    if (write->q == NULL) {
+        return write->ndim == 2 ? write_known(write, hits, 2) : write_known(write, hits, 3);
+    }
     if (write->ndim == 2) {
         return write->is_shifted ? write_pairs(write, hits, 2, true)
                                  : write_pairs(write, hits, 2, false);

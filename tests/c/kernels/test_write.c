@@ -20,6 +20,7 @@ typedef struct scene {
     int32_t   turns[3][POINTS];
     int32_t   point[POINTS], end[POINTS], label[ROOM];
     bool      has_images, has_turns, is_inclusive;
+    int       first_column; /* of S, for the first row */
     int64_t   wide[2][ROOM];
     int32_t   narrow[2][ROOM];
     double    distance[ROOM], vector[3 * ROOM];
@@ -62,6 +63,7 @@ make_scene(int ndim, bool is_coupled, bool has_images, bool has_turns, double gr
     it.has_images = has_images;
     it.has_turns = has_turns;
     it.is_inclusive = true;
+    it.first_column = (int)(random_bits(random) % 2);
     for (int32_t c = 0; c < PLACES; c++) {
         set_number(c, (int64_t)(random_bits(random) % 70));
         for (int k = 0; k < ndim; k++) {
@@ -110,7 +112,7 @@ write_of(bool is_half, bool by_S, int index_bytes)
     for (int k = 0; k < ndim; k++) {
         write.p[k] = it.p[k];
         write.turns[k] = it.has_turns ? it.turns[k] : NULL;
-        write.column[k] = (k + 1) % ndim;
+        write.column[k] = (k + it.first_column) % ndim;
     }
     return write;
 }
@@ -198,6 +200,37 @@ static void
 pairs_have_the_bits_of_single_ones(void)
 {
     with_each_writer(random_pairs);
+}
+
+/* Where nothing is measured, the rest is what it is beside d and D. */
+static void
+unmeasured_pairs(const hs_kernel *kernel)
+{
+    harness_random random = {12};
+    int32_t        number[PLACES];
+    int            taken = 0;
+    for (int trial = 0; trial < TRIALS(1000); trial++) {
+        make_scene(2 + (trial & 1), false, trial & 2, trial & 4, 0.0, &random);
+        hs_write  write = write_of(trial & 8, false, trial & 16 ? 8 : 4);
+        const int before = taken;
+        CHECK(are_right(kernel, &write, &taken));
+        for (int32_t c = 0; c < PLACES; c++) {
+            number[c] = (int32_t)number_of(c);
+        }
+        memset(it.wide, 1, sizeof it.wide);
+        memset(it.narrow, 1, sizeof it.narrow);
+        memset(it.shift, 1, sizeof it.shift);
+        write.q = NULL;
+        write.number = number;
+        CHECK(taken == before || (are_right(kernel, &write, &taken) && taken == before + 2));
+    }
+    CHECK(taken > TRIALS(1000) * 9 / 5);
+}
+
+static void
+pairs_that_are_not_measured_are_the_same(void)
+{
+    with_each_writer(unmeasured_pairs);
 }
 
 /* One pair, of point 0 and a candidate at some distance from it along x. */
@@ -294,6 +327,7 @@ void
 test_write(void)
 {
     RUN(pairs_have_the_bits_of_single_ones);
+    RUN(pairs_that_are_not_measured_are_the_same);
     RUN(what_is_not_sure_is_declined);
     RUN(no_distance_passes_the_cutoff);
     RUN(only_wanted_columns_are_written);
