@@ -15,6 +15,7 @@ static PyMethodDef methods[] = {
     {"histogram", FASTCALL(hs_py_histogram), METH_FASTCALL, "See halfshell.pair_histogram."},
     {"plain", FASTCALL(hs_py_plain), METH_FASTCALL,
      "One of these functions, of plain arguments, or NotImplemented."},
+    {"quick", FASTCALL(hs_py_quick), METH_FASTCALL, "The same, of arguments by name."},
     {"pairs_between", FASTCALL(hs_py_pairs_between), METH_FASTCALL, "See halfshell.pairs_between."},
     {"count_between", FASTCALL(hs_py_count_between), METH_FASTCALL,
      "See halfshell.count_pairs: of two sets."},

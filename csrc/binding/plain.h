@@ -24,6 +24,13 @@
  */
 PyObject *hs_py_plain(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
 
+/*
+ * quick(function, usual, places, points, cutoff, options): plain() of the arguments in `usual`, a
+ * tuple, with points and cutoff as its first two and the values of `options` at the places that the
+ * dict `places` has for their names. NotImplemented also for a name that it does not have.
+ */
+PyObject *hs_py_quick(PyObject *module, PyObject *const *arguments, Py_ssize_t n_arguments);
+
 /* Added to the number of arguments that a function gets: they are to be plain. */
 #define HS_PLAIN ((Py_ssize_t)1 << 16)
 

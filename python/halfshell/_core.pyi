@@ -137,6 +137,15 @@ def explain(*arguments: *tuple[*_Search, str, bool, int, bool, _Reach, str]) -> 
 # bits, index_dtype in place of index_bytes and no reach. What needs a conversion is answered with
 # NotImplemented.
 def plain(function: Callable[..., Any], /, *arguments: Any) -> Any: ...
+def quick(
+    function: Callable[..., Any],
+    usual: tuple[Any, ...],
+    places: dict[str, int],
+    points: Any,
+    cutoff: Any,
+    options: dict[str, Any],
+    /,
+) -> Any: ...
 
 # cell_size, or 0 -> a capsule
 def cells_build(*arguments: *tuple[*_Search, float]) -> Any: ...

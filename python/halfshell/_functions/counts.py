@@ -12,6 +12,7 @@ from halfshell._convert.foreign import is_a
 from halfshell._convert.given import Chosen, Given
 from halfshell._convert.lengths import as_cutoffs
 from halfshell._convert.options import AUTO
+from halfshell._convert.quick import quick
 from halfshell._convert.search import as_rest, as_search_of_each, count_within
 from halfshell._objects.box import Box
 from halfshell._unknown import refuse_unknown
@@ -79,6 +80,7 @@ def count_pairs(
     types: None = None,
     **options: Unpack[CountOptions],
 ) -> int | npt.NDArray[np.int64]: ...
+@quick(_core.count_pairs)
 def count_pairs(
     points: PointsLike,
     cutoff: npt.ArrayLike | PairCutoff,

@@ -11,6 +11,7 @@ from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Chosen, Given
 from halfshell._convert.options import AUTO, RAISE, as_flag, as_index_bytes, as_room
+from halfshell._convert.quick import quick
 from halfshell._convert.scene import check_apart
 from halfshell._convert.search import as_rest, as_search_of_each, with_bar
 from halfshell._convert.shells import as_shells
@@ -75,6 +76,7 @@ def pairs(
     on_overflow: Literal["flag"],
     **options: Unpack[PairOptions],
 ) -> tuple[Any, ...]: ...
+@quick(_core.pairs, "quantities", "sort", "index_dtype", "out")
 def pairs(
     points: PointsLike,
     cutoff: npt.ArrayLike | PairCutoff,
@@ -364,8 +366,7 @@ def pairs(
         and algorithm is AUTO
         and groups is None and exclude is None and exclude_within is None and min_distance is None
     ):
-        # A small search takes as long as a handful of Python operations: none are made where the
-        # arguments need no conversion.
+        # Plain, but for a Box or with a capacity: else it has been answered (quick.py).
         result: Any = _core.plain(
             _core.pairs, points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit,
             progress, threads, quantities, sort, index_dtype, out, None, AUTO, None, room,
