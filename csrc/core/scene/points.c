@@ -27,88 +27,94 @@
 #define NAME(x) x##_f64
 #include "points_template.h"
 
-/* Range of one column, one lane for every LANES-th entry. */
+/* Range of a column. */
 typedef struct range {
-    double lower[LANES];
-    double upper[LANES];
-    double poison[LANES]; /* 0, or NaN once an entry was infinite or NaN */
+    double lower, upper;
+    double poison; /* 0, or NaN once an entry was infinite or NaN */
 } range;
 
-/* Range of one column, of all lanes. */
-typedef struct joined_range {
-    double lower, upper, poison;
-} joined_range;
+static const range no_range = {INFINITY, -INFINITY, 0.0};
 
 typedef struct loading {
     const hs_points *points;
     hs_cloud        *cloud;
-    joined_range     found[HS_SLABS][HS_MAX_DIM]; /* of slabs that have points */
+    range            found[HS_SLABS][HS_MAX_DIM]; /* of slabs that have points */
 } loading;
 
 HS_ALWAYS_INLINE void
-widen(range *found, int lane, double x)
+join_range(double lower, double upper, double poison, range *found)
 {
-    found->lower[lane] = x < found->lower[lane] ? x : found->lower[lane];
-    found->upper[lane] = x > found->upper[lane] ? x : found->upper[lane];
-    found->poison[lane] += x - x;
+    found->lower = hs_smaller(lower, found->lower);
+    found->upper = hs_larger(upper, found->upper);
+    found->poison += poison;
 }
 
 #if HAS_SSE2
-/* What `widen` does, written out: compilers do not find it. Returns how many entries are done. */
-static int64_t
+/* What `join_range` does of each of LANES entries or more, written out: compilers do not find it.
+ * The last LANES are looked at together, even if some have been before. */
+HS_ALWAYS_INLINE void
 widen_lanes(const double *x, int64_t n, range *found)
 {
     __m128d lower[LANES / 2], upper[LANES / 2], poison[LANES / 2];
-    int64_t i = 0;
+    double  ends[3][2];
     for (int pair = 0; pair < LANES / 2; pair++) {
-        lower[pair] = _mm_loadu_pd(found->lower + 2 * pair);
-        upper[pair] = _mm_loadu_pd(found->upper + 2 * pair);
-        poison[pair] = _mm_loadu_pd(found->poison + 2 * pair);
+        lower[pair] = _mm_set1_pd(INFINITY);
+        upper[pair] = _mm_set1_pd(-INFINITY);
+        poison[pair] = _mm_setzero_pd();
     }
-    for (; i + LANES <= n; i += LANES) {
+    for (int64_t i = 0; i < n; i += LANES) {
+        const double *from = x + (i + LANES <= n ? i : n - LANES);
         for (int pair = 0; pair < LANES / 2; pair++) {
-            const __m128d entries = _mm_loadu_pd(x + i + 2 * pair);
+            const __m128d entries = _mm_loadu_pd(from + 2 * pair);
             lower[pair] = _mm_min_pd(entries, lower[pair]); /* the second of them if one is NaN */
             upper[pair] = _mm_max_pd(entries, upper[pair]);
             poison[pair] = _mm_add_pd(poison[pair], _mm_sub_pd(entries, entries));
         }
     }
-    for (int pair = 0; pair < LANES / 2; pair++) {
-        _mm_storeu_pd(found->lower + 2 * pair, lower[pair]);
-        _mm_storeu_pd(found->upper + 2 * pair, upper[pair]);
-        _mm_storeu_pd(found->poison + 2 * pair, poison[pair]);
+    for (int pair = 1; pair < LANES / 2; pair++) {
+        lower[0] = _mm_min_pd(lower[pair], lower[0]);
+        upper[0] = _mm_max_pd(upper[pair], upper[0]);
+        poison[0] = _mm_add_pd(poison[0], poison[pair]);
     }
-    return i;
+    _mm_storeu_pd(ends[0], lower[0]);
+    _mm_storeu_pd(ends[1], upper[0]);
+    _mm_storeu_pd(ends[2], poison[0]);
+    join_range(ends[0][0], ends[1][0], ends[2][0], found);
+    join_range(ends[0][1], ends[1][1], ends[2][1], found);
 }
 #else
-static int64_t
+HS_ALWAYS_INLINE void
 widen_lanes(const double *x, int64_t n, range *found)
 {
-    int64_t i = 0;
-    for (; i + LANES <= n; i += LANES) {
+    double lower[LANES], upper[LANES], poison[LANES] = {0.0};
+    for (int lane = 0; lane < LANES; lane++) {
+        lower[lane] = INFINITY;
+        upper[lane] = -INFINITY;
+    }
+    for (int64_t i = 0; i < n; i += LANES) {
+        const double *from = x + (i + LANES <= n ? i : n - LANES);
         for (int lane = 0; lane < LANES; lane++) {
-            widen(found, lane, x[i + lane]);
+            const double entry = from[lane];
+            lower[lane] = entry < lower[lane] ? entry : lower[lane];
+            upper[lane] = entry > upper[lane] ? entry : upper[lane];
+            poison[lane] += entry - entry;
         }
     }
-    return i;
+    for (int lane = 0; lane < LANES; lane++) {
+        join_range(lower[lane], upper[lane], poison[lane], found);
+    }
 }
 #endif
 
 static void
 find_range(const double *x, int64_t n, range *found)
 {
-    for (int64_t i = widen_lanes(x, n, found); i < n; i++) {
-        widen(found, 0, x[i]);
+    if (n >= LANES) {
+        widen_lanes(x, n, found);
+        return;
     }
-}
-
-static void
-join_lanes(const range *found, joined_range *joined)
-{
-    for (int lane = 0; lane < LANES; lane++) {
-        joined->lower = hs_smaller(found->lower[lane], joined->lower);
-        joined->upper = hs_larger(found->upper[lane], joined->upper);
-        joined->poison += found->poison[lane];
+    for (int64_t i = 0; i < n; i++) {
+        join_range(x[i], x[i], x[i] - x[i], found);
     }
 }
 
@@ -118,14 +124,6 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
     loading         *load = context;
     const hs_points *points = load->points;
     double *const   *x = load->cloud->x;
-    range            found[HS_MAX_DIM];
-    for (int k = 0; k < points->ndim; k++) {
-        for (int lane = 0; lane < LANES; lane++) {
-            found[k].lower[lane] = INFINITY;
-            found[k].upper[lane] = -INFINITY;
-            found[k].poison[lane] = 0.0;
-        }
-    }
     for (int64_t begin = first; begin < last; begin += TILE) {
         const int64_t end = last - begin < TILE ? last : begin + TILE;
         if (points->real == HS_FLOAT32) {
@@ -134,11 +132,8 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
             load_rows_f64(points, begin, end, x);
         }
         for (int k = 0; k < points->ndim; k++) {
-            find_range(x[k] + begin, end - begin, &found[k]);
+            find_range(x[k] + begin, end - begin, &load->found[slab][k]);
         }
-    }
-    for (int k = 0; k < points->ndim; k++) {
-        join_lanes(&found[k], &load->found[slab][k]);
     }
     return HS_OK;
 }
@@ -153,7 +148,7 @@ join_ranges(const loading *load, int n_slabs)
         cloud->lower[k] = INFINITY;
         cloud->upper[k] = -INFINITY;
         for (int slab = 0; slab < n_slabs; slab++) {
-            const joined_range *found = &load->found[slab][k];
+            const range *found = &load->found[slab][k];
             cloud->lower[k] = hs_smaller(found->lower, cloud->lower[k]);
             cloud->upper[k] = hs_larger(found->upper, cloud->upper[k]);
             poison += found->poison;
@@ -217,7 +212,7 @@ hs_cloud_load(hs_account *account, hs_team *team, const hs_points *points,
     load.cloud = cloud;
     for (int slab = 0; slab < n_slabs; slab++) {
         for (int k = 0; k < cloud->ndim; k++) {
-            load.found[slab][k] = (joined_range){INFINITY, -INFINITY, 0.0};
+            load.found[slab][k] = no_range;
         }
     }
     hs_status status = hs_walk_slabs(team, options, points->n, load_slab, &load);
