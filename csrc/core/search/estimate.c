@@ -267,14 +267,27 @@ hs_estimate_pairs(hs_search *search, double *pairs)
     return status == HS_STOPPED ? HS_OK : status;
 }
 
+/* Whether to take a sample before the limit is looked up, which takes longer: the result may be too
+ * large to do without, and does not seem to be. */
+static bool
+samples_first(const hs_search *search, double bytes_per_pair, double bound)
+{
+    const double by_density = search->grid.expected_pairs * search->pairs_per_half;
+    return search->call->account.find_limit != NULL && bound > HS_LIMIT_FREE &&
+           by_density * bytes_per_pair < 0.75 * HS_LIMIT_FREE;
+}
+
 hs_status
 hs_estimate_by_sample(hs_search *search, hs_failure *failure)
 {
+    hs_account   *account = &search->call->account;
     const double  bytes_per_pair = find_bytes_per_pair(search);
     const int64_t n = hs_search_asking(search)->n;
+    const double  bound = n > 0 ? bound_pairs(search) * bytes_per_pair : 0.0;
     hs_walker     walker;
     sample        taken;
-    if (n == 0 || hs_account_allows(&search->call->account, bound_pairs(search) * bytes_per_pair)) {
+    if (n == 0 ||
+        (!samples_first(search, bytes_per_pair, bound) && hs_account_allows(account, bound))) {
         return HS_OK;
     }
     hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
@@ -291,7 +304,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double variance = fmax(0.0, taken.squares / many - mean * mean);
     const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
     const double least = (mean - SURE_ERRORS * error) * (double)n;
-    if (hs_account_allows(&search->call->account, least * bytes_per_pair)) {
+    if (hs_account_allows(account, least * bytes_per_pair) || hs_account_allows(account, bound)) {
         return HS_OK;
     }
     return refuse(search, mean * (double)n, bytes_per_pair, failure);
