@@ -45,9 +45,6 @@ hs_block_init(hs_account *account, int ndim, hs_block_use use, int32_t most, int
         hs_parts_add(&parts, (void **)&block->place, capacity, sizeof(int32_t));
     }
     block->memory = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
-    for (int32_t c = 0; block->place != NULL && c < capacity; c++) {
-        block->place[c] = c;
-    }
     return block->memory != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
@@ -150,6 +147,18 @@ gather_in_parts(const hs_kernel *kernel, const hs_options *options, const hs_blo
     return HS_OK;
 }
 
+/* Those that there are candidates for, and the padding. */
+static void
+set_places(hs_block *block)
+{
+    const int32_t end = block->n + HS_PADDING;
+    int32_t      *place = block->place;
+    for (int32_t c = block->n_places; c < end; c++) {
+        place[c] = c;
+    }
+    block->n_places = end > block->n_places ? end : block->n_places;
+}
+
 hs_status
 hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *options,
                 bool is_first, hs_block *block, hs_group *group)
@@ -178,6 +187,9 @@ hs_block_gather(const hs_bins *bins, const hs_kernel *kernel, const hs_options *
         hs_pad_lanes(block->y[k], block->n);
     }
     hs_pad_lanes(block->norm, block->n);
+    if (block->place != NULL) {
+        set_places(block);
+    }
     if (is_first) {
         HS_ASSERT(block->runs[0].si == group->first && block->n >= group->last - group->first);
         const size_t bytes = (size_t)(group->last - group->first) * sizeof(float);

@@ -25,7 +25,7 @@ typedef struct hs_block {
     float     *norm;    /* sum of y_k^2 */
     int32_t   *id;      /* point numbers of the candidates */
     int32_t   *number;  /* their numbers in cell order, as they were gathered */
-    int32_t   *place;   /* 0, 1, 2, ...; NULL unless hits are places */
+    int32_t   *place;   /* 0, 1, 2, ..., set as far as needed; NULL unless hits are places */
     int32_t   *origin;  /* where candidates were before neighbourhood_sort.h put them in order; NULL
                         * when it did not */
     int32_t   *hits;    /* most_hits + HS_PADDING; NULL when only counting */
@@ -36,7 +36,8 @@ typedef struct hs_block {
     hs_run    *runs;    /* most_runs + 1; runs[n_runs].at is the number of candidates */
     int32_t    capacity, most_hits, most_runs;
     int32_t    n_runs;
-    int32_t    n; /* candidates, of all runs */
+    int32_t    n;        /* candidates, of all runs */
+    int32_t    n_places; /* entries of `place` that are set */
 } hs_block;
 
 /* What a block has room for. */

@@ -55,7 +55,7 @@ is_filled(const void *array, int64_t length, size_t size, int mark)
     return true;
 }
 
-/* All of a block's arrays but `place` are filled, or compared with what they were filled with. */
+/* All of a block's arrays are filled, or compared with what they were filled with. */
 static bool
 each_array(const hs_block *block, int ndim, bool fills)
 {
@@ -73,9 +73,10 @@ each_array(const hs_block *block, int ndim, bool fills)
                   {block->runs, block->most_runs + 1, sizeof(hs_run)},
                   {block->y[0], n, sizeof(float)},
                   {ndim > 1 ? block->y[1] : NULL, n, sizeof(float)},
-                  {ndim > 2 ? block->y[2] : NULL, n, sizeof(float)}};
+                  {ndim > 2 ? block->y[2] : NULL, n, sizeof(float)},
+                  {block->place, n, sizeof(int32_t)}};
     bool right = true;
-    for (int a = 0; a < 10; a++) {
+    for (int a = 0; a < 11; a++) {
         if (arrays[a].array == NULL)
             continue;
         if (fills)
@@ -104,8 +105,6 @@ blocks_have_room_for_what_they_say(void)
         CHECK((block.squares != NULL) == squares && block.origin == NULL);
         CHECK((block.place != NULL) == (squares || use == HS_BLOCK_LISTS_PLACES));
         CHECK(each_array(&block, ndim, true) && each_array(&block, ndim, false));
-        for (int32_t c = 0; block.place != NULL && c < capacity + HS_PADDING; c++)
-            CHECK(block.place[c] == c);
         for (int k = 0; k < ndim; k++)
             CHECK((uintptr_t)block.y[k] % HS_ALIGNMENT == 0);
         hs_block_free(&account, &block);
@@ -200,7 +199,7 @@ what_is_near_is_gathered(void)
         hs_block   block;
         float      largest = 0.0f;
         int32_t    n = 0;
-        CHECK(hs_block_init(NULL, 2, HS_BLOCK_COUNTS, 2 * N, 5, &block) == HS_OK);
+        CHECK(hs_block_init(NULL, 2, HS_BLOCK_LISTS_PLACES, 2 * N, 5, &block) == HS_OK);
         hs_group_start(&bins, 20, 50, &group);
         if (prunes) {
             (void)hs_group_bound(&bins, &group);
@@ -244,6 +243,8 @@ what_is_near_is_gathered(void)
         CHECK(n == block.n && block.runs[0].at == 0 && block.runs[2].at == n);
         CHECK((prunes && !is_first) == (n < N - first + N) && n > 30);
         CHECK(group.largest == hs_bits_of_float(largest));
+        for (int32_t c = 0; c < n + HS_PADDING; c++)
+            CHECK(block.place[c] == c);
         for (int p = 0; p < HS_PADDING; p++)
             CHECK(block.y[0][n + p] == 0.0f && block.y[1][n + p] == 0.0f &&
                   block.norm[n + p] == 0.0f);
