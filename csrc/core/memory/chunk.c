@@ -20,6 +20,10 @@ hs_chunk_of(void *data)
     return (hs_chunk *)data - 1;
 }
 
+/* What malloc gave is not shrunk by less than this part of it: lists are a little shorter than was
+ * foreseen, and a chunk that was cut has no room for the next such list. */
+#define WORTH_CUTTING 8
+
 static uintptr_t
 round_up(uintptr_t address, size_t multiple)
 {
@@ -260,6 +264,9 @@ hs_chunk_cut(void *data, size_t bytes, void **rest)
     }
     if (chunk->length > 0) {
         cut_in_pages(data, bytes, rest);
+        return data;
+    }
+    if (chunk->capacity - bytes <= chunk->capacity / WORTH_CUTTING) {
         return data;
     }
     void *shrunk = resize_in_malloc(data, bytes, bytes);

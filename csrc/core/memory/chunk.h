@@ -39,8 +39,8 @@ void hs_chunk_expect(void *data, size_t bytes);
 void hs_chunk_touch(void *data, size_t used);
 
 /*
- * Gives back what lies beyond `bytes`; may move. *rest, if not NULL: what was touched beyond, if
- * that is large enough for a chunk of its own, else NULL.
+ * Gives back what lies beyond `bytes`, if that is much; may move. *rest, if not NULL: what was
+ * touched beyond, if that is large enough for a chunk of its own, else NULL.
  */
 void *hs_chunk_cut(void *data, size_t bytes, void **rest);
 

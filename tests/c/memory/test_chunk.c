@@ -50,6 +50,20 @@ the_pool_wastes_no_more_than_half_of_a_chunk(void)
 
 #endif
 
+/* From malloc, that is: then the next list of about this length finds room in it. */
+static void
+little_is_not_cut_off(void)
+{
+    const size_t least = MB - MB / 8;
+    void        *data = hs_chunk_new(MB);
+    CHECK(data != NULL);
+    data = hs_chunk_cut(data, least, NULL);
+    CHECK(hs_chunk_of(data)->capacity == MB);
+    data = hs_chunk_cut(data, least - 1, NULL);
+    CHECK(hs_chunk_of(data)->capacity == least - 1);
+    hs_chunk_free(data);
+}
+
 #if CAN_LIMIT_ADDRESSES
 
 /* What the pool has no room for is given back, oldest first. */
@@ -129,6 +143,7 @@ a_limit_may_be_heard_of_while_it_is_passed(void)
 void
 test_chunk(void)
 {
+    RUN(little_is_not_cut_off);
     RUN(a_limit_may_be_heard_of_while_it_is_passed);
 #if !HS_WATCHED_MALLOC
     RUN(the_pool_wastes_no_more_than_half_of_a_chunk);
