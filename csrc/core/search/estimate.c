@@ -304,7 +304,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double variance = fmax(0.0, taken.squares / many - mean * mean);
     const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
     const double least = (mean - SURE_ERRORS * error) * (double)n;
-    if (hs_account_allows(account, least * bytes_per_pair) || hs_account_allows(account, bound)) {
+    if (hs_account_allows(account, hs_smaller(least * bytes_per_pair, bound))) {
         return HS_OK;
     }
     return refuse(search, mean * (double)n, bytes_per_pair, failure);

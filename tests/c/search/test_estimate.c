@@ -63,6 +63,44 @@ expectations_are_near_the_truth(void)
     }
 }
 
+/* A hs_limit_fn: little is left; counts how often it is asked. */
+static double
+little_left(void *context)
+{
+    *(int *)context += 1;
+    return 1e6;
+}
+
+/* What memory is left is not asked where the density and a sample say that the pairs are few,
+ * however many there might be: those of even points, of points in a clump, of more neighbours. */
+static void
+what_is_left_is_asked_for_if_it_matters(void)
+{
+    enum { N = 8000 };
+    static double       x[3 * N];
+    static const double sizes[] = {10.0, 1.0, 10.0}, cutoffs[] = {2.0, 2.0, 6.0};
+    harness_random      random = {23};
+    const hs_points     points = {x, N, 3, HS_FLOAT64, 24, 8};
+    hs_box              box = {.ndim = 3, .periodic = {true, true, true}};
+    for (int k = 0; k < 3; k++) {
+        box.rows[k][k] = 10.0;
+    }
+    for (int kind = 0; kind < 3; kind++) {
+        hs_options options = hs_options_default();
+        hs_pairs  *pairs = NULL;
+        hs_failure failure;
+        int        n_asked = 0;
+        options.cutoff = cutoffs[kind];
+        options.find_limit = little_left;
+        options.find_context = &n_asked;
+        scatter(&random, sizes[kind], N, x);
+        const hs_status status = hs_pairs_find(AMONG(&points, &box), &options, &pairs, &failure);
+        CHECK(status == (kind == 0 ? HS_OK : HS_ERR_MEMORY) && n_asked == (kind > 0));
+        CHECK(kind == 0 || failure.expected_pairs > 2e7);
+        hs_pairs_free(pairs);
+    }
+}
+
 /* More work than a sample may cost: all points are candidates of each other. */
 static void
 samples_end_early_in_a_crowd(void)
@@ -205,6 +243,7 @@ test_estimate(void)
     RUN(many_images_are_known_by_the_box);
     RUN(small_scenes_are_known_exactly);
     RUN(expectations_are_near_the_truth);
+    RUN(what_is_left_is_asked_for_if_it_matters);
     RUN(samples_end_early_in_a_crowd);
     RUN(endless_pairs_are_not_counted);
     RUN(shortages_leave_out_what_cannot_be_searched);
