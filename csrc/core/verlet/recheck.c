@@ -1,20 +1,36 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* recheck.c: rounds of slabs of the list, worked on by the team; each round's pairs are written at
- * its end. */
+/* recheck.c: slabs of the list, one after the other by one thread, or several at once by threads
+ * that write what they find in turn. */
 #include "recheck.h"
 
+#include "../base/outcome.h"
 #include "../base/poll.h"
+#include "../collect/crew.h"
 
-/* Slabs of a round for each of several threads: enough that none waits long for the others, and
- * their pairs still lie in the second-level cache when they are written. One thread alone takes one
- * slab after the other. */
-#define SLABS_A_THREAD 8
-#define MOST_SLABS     64
 /* Work between two polls, in pairs: a few milliseconds. */
 #define POLL_WORK (INT64_C(1) << 20)
 /* A decision by integers takes as long as so many pairs, and d or D of a pair as so many. */
 #define INTEGER_WORK 1000
 #define MEASURE_WORK 8
+
+/* What the threads share. */
+typedef struct recheck_job {
+    hs_recheck *recheck;
+    int64_t     n_plain, n_slabs; /* slabs: each ends where images begin, or is full */
+    int64_t     in_range;         /* of them */
+} recheck_job;
+
+/* What one thread works with. */
+typedef struct worker {
+    hs_committer committer;
+    recheck_job *job;
+    hs_options   options; /* with this thread's poll */
+    hs_recheck   recheck; /* the job's, with this thread's output */
+    hs_sifted   *slab;    /* owned */
+    hs_output    found;   /* owned; pairs that wait for their turn */
+    int64_t      work;    /* since the last poll */
+    hs_counters  done;
+} worker;
 
 /* Finds the hits of a slab. */
 static void
@@ -45,111 +61,186 @@ sift_slab(const hs_recheck *recheck, hs_sifted *slab)
     }
 }
 
-/* One round of slabs. */
-typedef struct round_of_slabs {
-    const hs_recheck *recheck;
-    hs_sifted        *slabs;
-    int               n;
-} round_of_slabs;
-
-static void
-sift_task(void *context, int64_t task)
+/* The first bundle that ends behind a pair of the list. */
+static int64_t
+bundle_of(const hs_listing *listing, int64_t pair)
 {
-    const round_of_slabs *doing = context;
-    sift_slab(doing->recheck, &doing->slabs[task]);
-}
-
-static void
-put_task(void *context, int64_t task)
-{
-    const round_of_slabs *doing = context;
-    hs_recheck_put(doing->recheck, &doing->slabs[task]);
-}
-
-/* How far the list has been cut into slabs. */
-typedef struct cut {
-    int64_t pair, bundle;
-} cut;
-
-static void
-cut_slabs(const hs_listing *listing, int most, cut *at, round_of_slabs *doing)
-{
-    for (doing->n = 0; doing->n < most && at->pair < listing->n_pairs; doing->n++) {
-        const int64_t end = at->pair < listing->n_plain ? listing->n_plain : listing->n_pairs;
-        hs_sifted    *slab = &doing->slabs[doing->n];
-        slab->first = at->pair;
-        slab->n = (int32_t)(end - at->pair < HS_SIFT ? end - at->pair : HS_SIFT);
-        slab->bundles = listing->bundles + at->bundle;
-        slab->status = HS_OK;
-        slab->stages = (hs_stages){0};
-        at->pair += slab->n;
-        while (at->bundle < listing->n_bundles && listing->bundles[at->bundle].end <= at->pair) {
-            at->bundle++;
+    int64_t first = 0, end = listing->n_bundles;
+    while (first < end) {
+        const int64_t middle = first + (end - first) / 2;
+        if (listing->bundles[middle].end <= pair) {
+            first = middle + 1;
+        } else {
+            end = middle;
         }
     }
+    return first;
 }
 
-/* Room for the hits of a round and places for them; *writes: they are to be written. */
-static hs_status
-place_hits(const hs_recheck *recheck, round_of_slabs *doing, int64_t end, int64_t *work,
-           bool *writes)
+static int64_t
+slabs_of(int64_t n_pairs)
 {
-    hs_output  *output = recheck->output;
-    hs_counters done = {.pairs = 0};
-    int64_t     n = 0;
-    for (int s = 0; s < doing->n; s++) {
-        hs_sifted *slab = &doing->slabs[s];
-        slab->at = output->n_pairs + n;
-        n += slab->n_hits;
-        done.candidates += slab->n;
-        done.ambiguous += slab->n_open;
-        done.by_float64 += slab->stages.by_float64;
-        done.by_double_word += slab->stages.by_double_word;
-        done.by_integers += slab->stages.by_integers;
-        *work += slab->n + INTEGER_WORK * slab->stages.by_integers +
-                 (recheck->measures ? MEASURE_WORK * (int64_t)slab->n_hits : 0);
+    return (n_pairs + HS_SIFT - 1) / HS_SIFT;
+}
+
+/* Pairs of slab s. */
+static void
+cut_slab(const recheck_job *job, int64_t s, hs_sifted *slab)
+{
+    const hs_listing *listing = &job->recheck->list->listing;
+    const bool        plain = s < job->n_plain;
+    const int64_t     end = plain ? listing->n_plain : listing->n_pairs;
+    slab->first = plain ? s * HS_SIFT : listing->n_plain + (s - job->n_plain) * HS_SIFT;
+    slab->n = (int32_t)(end - slab->first < HS_SIFT ? end - slab->first : HS_SIFT);
+    slab->bundles = listing->bundles + bundle_of(listing, slab->first);
+    slab->status = HS_OK;
+    slab->stages = (hs_stages){0};
+}
+
+static void
+note_slab(worker *me)
+{
+    const hs_sifted *slab = me->slab;
+    me->done.candidates += slab->n;
+    me->done.ambiguous += slab->n_open;
+    me->done.by_float64 += slab->stages.by_float64;
+    me->done.by_double_word += slab->stages.by_double_word;
+    me->done.by_integers += slab->stages.by_integers;
+    me->work += slab->n + INTEGER_WORK * slab->stages.by_integers +
+                (me->recheck.measures ? MEASURE_WORK * (int64_t)slab->n_hits : 0);
+}
+
+/* Adds the hits of slab s to the thread's output. */
+static hs_status
+do_slab(worker *me, int64_t s)
+{
+    const hs_listing *listing = &me->job->recheck->list->listing;
+    hs_output        *output = me->recheck.output;
+    hs_sifted        *slab = me->slab;
+    cut_slab(me->job, s, slab);
+    sift_slab(&me->recheck, slab);
+    note_slab(me);
+    const double done = (double)(slab->first + slab->n) / (double)listing->n_pairs;
+    hs_status    status = HS_OK;
+    slab->at = output->n_pairs;
+    if (!output->fixed) {
+        status = hs_output_reserve(output, slab->n_hits, output == &me->found ? 0.0 : done);
     }
-    hs_call_note(recheck->call, &done);
-    *writes = true;
-    if (output->fixed) {
-        *writes = output->n_pairs + n <= output->capacity;
-        return HS_OK;
+    if (status == HS_OK && (!output->fixed || slab->at + slab->n_hits <= output->capacity)) {
+        hs_recheck_put(&me->recheck, slab);
+        status = slab->status;
     }
-    return hs_output_reserve(output, n, (double)end / (double)recheck->list->listing.n_pairs);
+    if (status == HS_OK) {
+        output->n_pairs += slab->n_hits;
+    } else if (status == HS_ERR_SHIFT_RANGE) {
+        me->committer.failure.row = slab->failed_point;
+    }
+    if (status == HS_OK && me->work > POLL_WORK) {
+        me->work = 0;
+        status = hs_poll(&me->options, done);
+    }
+    return status;
+}
+
+/* A hs_range_fn. */
+static hs_status
+do_range(void *context, int64_t range)
+{
+    worker            *me = context;
+    const recheck_job *job = me->job;
+    const int64_t      first = range * job->in_range, left = job->n_slabs - first;
+    const int64_t      end = first + (left < job->in_range ? left : job->in_range);
+    hs_status          status = HS_OK;
+    for (int64_t s = first; s < end && status == HS_OK; s++) {
+        status = do_slab(me, s);
+    }
+    return status == HS_OK ? hs_commit(&me->committer, (double)end / (double)job->n_slabs, true)
+                           : status;
+}
+
+/* A worker that writes to the output itself. */
+static hs_status
+open_alone(recheck_job *job, worker *me)
+{
+    hs_call *call = job->recheck->call;
+    me->job = job;
+    me->options = call->options;
+    me->recheck = *job->recheck;
+    me->slab = hs_alloc(&call->account, HS_FOR_CANDIDATES, 1, sizeof *me->slab);
+    return me->slab != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
 static hs_status
-run_rounds(hs_recheck *recheck, hs_sifted *slabs, int most, hs_failure *failure)
+open_worker(void *context, void *place)
+{
+    recheck_job     *job = context;
+    worker          *me = place;
+    hs_recheck      *own = &me->recheck;
+    const hs_status  status = open_alone(job, me);
+    const hs_output *target = job->recheck->output;
+    hs_output_init(NULL, target->ndim, target->columns, target->index_bytes, &me->found);
+    me->committer.options = &me->options;
+    me->committer.pairs = &me->found;
+    own->output = &me->found;
+    own->of_a = NULL;
+    if (own->writes) {
+        own->of_a = hs_alloc(&own->call->account, HS_FOR_CANDIDATES, 1, sizeof *own->of_a);
+    }
+    return own->writes && own->of_a == NULL ? HS_ERR_MEMORY : status;
+}
+
+static void
+close_worker(void *context, void *place)
+{
+    worker  *me = place;
+    hs_call *call = ((recheck_job *)context)->recheck->call;
+    hs_call_note(call, &me->done);
+    hs_output_free(&me->found);
+    hs_free(&call->account, me->recheck.of_a);
+    hs_free(&call->account, me->slab);
+}
+
+static hs_status
+run_together(recheck_job *job, hs_failure *failure)
+{
+    const int64_t bytes = HS_SIFT * hs_output_bytes_per_pair(job->recheck->output);
+    job->in_range = bytes > 0 && bytes < HS_RANGE_BYTES ? HS_RANGE_BYTES / bytes : 1;
+    hs_crew crew = {.call = job->recheck->call,
+                    .job = job,
+                    .worker_size = sizeof(worker),
+                    .open = open_worker,
+                    .close = close_worker,
+                    .n_ranges = (job->n_slabs + job->in_range - 1) / job->in_range,
+                    .search = do_range,
+                    .output = job->recheck->output};
+    return hs_crew_run(&crew, failure);
+}
+
+static hs_status
+run_alone(recheck_job *job, hs_failure *failure)
+{
+    hs_call  *call = job->recheck->call;
+    worker    me = {.committer.failure = HS_NO_FAILURE};
+    hs_status status = open_alone(job, &me);
+    for (int64_t s = 0; s < job->n_slabs && status == HS_OK; s++) {
+        status = do_slab(&me, s);
+    }
+    if (status == HS_ERR_SHIFT_RANGE) {
+        failure->row = me.committer.failure.row;
+    }
+    hs_call_note(call, &me.done);
+    hs_free(&call->account, me.slab);
+    return status;
+}
+
+static hs_status
+run_slabs(hs_recheck *recheck, hs_failure *failure)
 {
     const hs_listing *listing = &recheck->list->listing;
-    hs_output        *output = recheck->output;
-    round_of_slabs    doing = {.recheck = recheck, .slabs = slabs};
-    int64_t           work = 0;
-    cut               at = {0};
-    while (at.pair < listing->n_pairs) {
-        bool writes;
-        cut_slabs(listing, most, &at, &doing);
-        hs_team_run(recheck->call->team, doing.n, sift_task, &doing);
-        hs_status status = place_hits(recheck, &doing, at.pair, &work, &writes);
-        if (status == HS_OK && writes) {
-            hs_team_run(recheck->call->team, doing.n, put_task, &doing);
-        }
-        for (int s = 0; s < doing.n; s++) {
-            if (status == HS_OK && doing.slabs[s].status != HS_OK) {
-                status = doing.slabs[s].status;
-                failure->row = doing.slabs[s].failed_point;
-            }
-            output->n_pairs += doing.slabs[s].n_hits;
-        }
-        if (status == HS_OK && work > POLL_WORK) {
-            work = 0;
-            status = hs_poll(&recheck->call->options, (double)at.pair / (double)listing->n_pairs);
-        }
-        if (status != HS_OK) {
-            return status;
-        }
-    }
-    return HS_OK;
+    recheck_job       job = {.recheck = recheck, .n_plain = slabs_of(listing->n_plain)};
+    job.n_slabs = job.n_plain + slabs_of(listing->n_pairs - listing->n_plain);
+    return recheck->call->team != NULL && job.n_slabs > 1 ? run_together(&job, failure)
+                                                          : run_alone(&job, failure);
 }
 
 static void
@@ -167,32 +258,18 @@ free_recheck(hs_recheck *recheck)
     hs_free(account, recheck->y);
 }
 
-static int
-slabs_of_a_round(const hs_recheck *recheck)
-{
-    const int64_t in_all =
-        recheck->list->listing.n_pairs / HS_SIFT + 2; /* a slab ends at n_plain */
-    const int     threads = hs_team_size(recheck->call->team);
-    const int64_t wanted = threads > 1 ? (int64_t)SLABS_A_THREAD * threads : 1;
-    return (int)(wanted < MOST_SLABS ? (wanted < in_all ? wanted : in_all) : MOST_SLABS);
-}
-
 hs_status
 hs_recheck_run(hs_recheck *recheck, hs_failure *failure)
 {
-    hs_account *account = &recheck->call->account;
-    const int   most = slabs_of_a_round(recheck);
-    hs_sifted  *slabs = hs_alloc(account, HS_FOR_CANDIDATES, most, sizeof *slabs);
-    const bool  more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
+    const bool more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
     recheck->numbers = !more && hs_sift_has_numbers(recheck->d);
-    hs_status status = slabs == NULL ? HS_ERR_MEMORY : hs_recheck_prepare(recheck);
+    hs_status status = hs_recheck_prepare(recheck);
     if (status == HS_OK && recheck->measures) {
         status = hs_recheck_open_scene(recheck, failure);
     }
     if (status == HS_OK && !(recheck->given.cutoff == 0.0 && !recheck->given.inclusive)) {
-        status = run_rounds(recheck, slabs, most, failure);
+        status = run_slabs(recheck, failure);
     }
     free_recheck(recheck);
-    hs_free(account, slabs);
     return status;
 }

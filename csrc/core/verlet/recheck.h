@@ -2,7 +2,7 @@
 /*
  * recheck.h: the pairs of a list that are within the cutoff now, decided as a search decides them:
  * in float32 (kernels/sift.h), and by the exact metric where float32 cannot tell. A slab of the
- * list at a time; a team works on several, and what they find is written in the order of the list.
+ * list at a time; threads work on one each, and what they find is written in the order of the list.
  */
 #ifndef HS_RECHECK_H
 #define HS_RECHECK_H
@@ -21,14 +21,15 @@ typedef struct hs_bundle_points {
 } hs_bundle_points;
 
 /*
- * Everything that slabs share, read only while they work. Points are those of the list: in the cell
+ * Everything that slabs share, read only while they work, but for `output` and `of_a`: each thread
+ * has a copy with its own. Points are those of the list: in the cell
  * order of the step it was built for.
  */
 typedef struct hs_recheck {
     const hs_verlet  *list;   /* borrowed */
     const hs_frame   *now;    /* the list's */
     hs_call          *call;   /* borrowed */
-    hs_output        *output; /* borrowed */
+    hs_output        *output; /* borrowed; the thread's, where there are several */
     int               d, m;
     int               vector_of_row[HS_MAX_DIM];
     hs_metric         given;  /* decides, on points and box vectors as given */
@@ -47,7 +48,7 @@ typedef struct hs_recheck {
     uint8_t          *lagging; /* owned; whether those are not all zero */
     bool              writes;  /* recheck_write.c measures. Then: */
     int32_t          *few;     /* owned; records of lags; NULL: all are zero */
-    hs_bundle_points *of_a;    /* owned */
+    hs_bundle_points *of_a;    /* owned; each thread has its own */
 } hs_recheck;
 
 /* The hits of one slab: consecutive pairs, all with or all without an image. */

@@ -2,8 +2,7 @@
 /*
  * recheck_put.c: the hits of a slab as pairs: i and j by the kernel that writes those of a search,
  * S, and what recheck_measure.c measures. The kernel writes a little beyond the last pair. Where
- * that is none of ours, which is so in arrays of the caller and where threads write side by side,
- * it writes to the slab, and the pairs are copied.
+ * that is none of ours, in arrays of the caller, it writes to the slab, and the pairs are copied.
  */
 #include "recheck.h"
 
@@ -60,7 +59,7 @@ put_indices(const hs_recheck *recheck, hs_sifted *slab)
     if (both == NULL && i == NULL && j == NULL) {
         return;
     }
-    if (both == NULL && !output->fixed && hs_team_size(recheck->call->team) == 1) {
+    if (both == NULL && !output->fixed) {
         (bytes == 8 ? kernel->emit_int64 : kernel->emit_int32)(&hits, i, j);
         return;
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
  * recheck_write.c: hits in 2-D and 3-D are measured while they are written, by the writer of a
- * search (kernels/write.h), where one thread writes to memory of ours. Its shift is the one that
+ * search (kernels/write.h), where a thread writes to memory of ours. Its shift is the one that
  * the metric multiplies: the lag of b, and for each bundle image less the lag of a.
  */
 #include "recheck.h"
@@ -69,18 +69,18 @@ hs_status
 hs_recheck_plan_write(hs_recheck *recheck)
 {
     const hs_scene *scene = &recheck->scene;
-    hs_account     *account = &recheck->call->account;
     const int       d = recheck->d, m = recheck->m;
+    const bool      is_ours = !recheck->output->fixed || hs_team_size(recheck->call->team) > 1;
     recheck->writes = recheck->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
-                      !recheck->output->fixed && !(recheck->output->columns & HS_WANT_BOTH) &&
-                      hs_team_size(recheck->call->team) == 1 && !scene->keeps_originals &&
-                      !scene->extreme && scene->metric.floats_usable && !has_own_images(recheck) &&
+                      is_ours && !(recheck->output->columns & HS_WANT_BOTH) &&
+                      !scene->keeps_originals && !scene->extreme && scene->metric.floats_usable &&
+                      !has_own_images(recheck) &&
                       are_small(recheck->lag, recheck->now->points.n * m) &&
                       are_small(recheck->image, recheck->list->listing.images.n * m);
     if (!recheck->writes) {
         return HS_OK;
     }
-    recheck->of_a = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *recheck->of_a);
+    recheck->of_a = hs_alloc(&recheck->call->account, HS_FOR_CANDIDATES, 1, sizeof *recheck->of_a);
     return recheck->of_a != NULL && set_few(recheck) ? HS_OK : HS_ERR_MEMORY;
 }
 
