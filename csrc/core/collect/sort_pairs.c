@@ -2,21 +2,22 @@
 /*
  * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
  * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
- * pair.
+ * pair. Threads count and deal out strips of the pairs; then they put rows in order and write them.
  */
 #include "sort_pairs.h"
 
 #include "../base/poll.h"
 #include "../base/sort_numbers.h"
+#include "../threads/passes.h"
+#include "crew.h"
 #include "sort_entries.h"
 
 #include <string.h>
 
-/* Pairs between two calls of poll(). */
-#define POLL_PAIRS (INT64_C(1) << 18)
-
-/* Pairs that are written at a time. */
-#define PUT 256
+#define POLL_ENTRIES  (INT64_C(1) << 17) /* sorted and written between two calls of poll() */
+#define STRIP_PAIRS   (INT64_C(1) << 15) /* of a strip, at least: fewer are no work for a thread */
+#define RANGE_ENTRIES 8192 /* of a range of rows: with what is written of them they fit a cache */
+#define PUT           256  /* entries that are written at a time */
 
 #ifdef HS_TESTING
 static int most_place_bits = 63;
@@ -52,48 +53,67 @@ hs_sort_columns(const hs_search *search)
     return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(search) ? HS_WANT_SHIFT : 0);
 }
 
-static hs_status
-poll_for(const hs_sorting *all, int64_t pair)
-{
-    const bool is_due = pair % POLL_PAIRS == POLL_PAIRS - 1;
-    return is_due ? hs_poll(&all->call->options, 1.0) : HS_OK;
-}
+/* Two passes over the pairs, by strips that each have numbers of their own for each row. */
+typedef struct strips {
+    hs_sorting *all;
+    int         n;
+    int64_t    *next[HS_SLABS]; /* how many, then the place of the next; the last are all->end */
+    int32_t     any[HS_SLABS];  /* the bits of all numbers j */
+} strips;
 
-/* Counts the pairs of each i, and settles where each row begins, which is in `end` for now. */
+/* A hs_slab_fn. */
 static hs_status
-count_rows(hs_sorting *all)
+count_strip(void *context, int strip, int64_t first, int64_t last)
 {
-    int64_t *begin = all->end;
-    int32_t  any = 0;
-    memset(begin, 0, (size_t)(all->n_points + 1) * sizeof *begin);
-    for (int64_t p = 0; p < all->found->n_pairs; p++) {
-        begin[all->i[p] - all->first_point + 1]++;
+    strips           *doing = context;
+    const hs_sorting *all = doing->all;
+    int64_t          *counts = doing->next[strip];
+    int32_t           any = 0;
+    for (int64_t p = first; p < last; p++) {
+        counts[all->i[p] - all->first_point]++;
         any |= all->j[p];
         if (all->both_ways) {
-            begin[all->j[p] - all->first_point + 1]++;
+            counts[all->j[p] - all->first_point]++;
             any |= all->i[p];
         }
-        if (poll_for(all, p) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
     }
-    for (int64_t row = 0; row < all->n_points; row++) {
-        all->longest = begin[row + 1] > all->longest ? begin[row + 1] : all->longest;
-        begin[row + 1] += begin[row];
-    }
-    all->n = begin[all->n_points];
-    all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
-    all->has_j =
-        all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
+    doing->any[strip] |= any;
     return HS_OK;
 }
 
-/* Puts the entries in rows. */
-static hs_status
-deal_out(const hs_sorting *all)
+/* From numbers of pairs to places: row by row, and in each row strip by strip. */
+static void
+accumulate(const strips *doing)
 {
-    int64_t *next = all->end;
-    for (int64_t p = 0; p < all->found->n_pairs; p++) {
+    hs_sorting *all = doing->all;
+    int64_t     place = 0;
+    int32_t     any = 0;
+    for (int64_t row = 0; row < all->n_points; row++) {
+        const int64_t begin = place;
+        for (int strip = 0; strip < doing->n; strip++) {
+            const int64_t count = doing->next[strip][row];
+            doing->next[strip][row] = place;
+            place += count;
+        }
+        all->longest = place - begin > all->longest ? place - begin : all->longest;
+    }
+    for (int strip = 0; strip < doing->n; strip++) {
+        any |= doing->any[strip];
+    }
+    all->n = place;
+    all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
+    all->has_j =
+        all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
+}
+
+/* A hs_slab_fn: puts the entries in rows. */
+static hs_status
+deal_strip(void *context, int strip, int64_t first, int64_t last)
+{
+    const strips     *doing = context;
+    const hs_sorting *all = doing->all;
+    int64_t          *next = doing->next[strip];
+    for (int64_t p = first; p < last; p++) {
         const int32_t i = all->i[p], j = all->j[p];
         if (all->both_ways) {
             all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, 2 * p);
@@ -101,27 +121,51 @@ deal_out(const hs_sorting *all)
         } else {
             all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, p);
         }
-        if (poll_for(all, p) != HS_OK) {
-            return HS_ERR_INTERRUPTED;
-        }
     }
     return HS_OK;
 }
 
-static hs_status
-sort_rows(const hs_sorting *all, uint64_t *spare)
+/* Strips for this team: each with pairs enough, and no more further numbers than pairs. */
+static int
+choose_strips(const hs_sorting *all)
 {
-    hs_status status = HS_OK;
-    for (int64_t row = 0, first = 0, work = 0; row < all->n_points && status == HS_OK;
-         first = all->end[row++]) {
-        const int64_t n = all->end[row] - first;
-        hs_sort_row(all, all->entries + first, n, spare);
-        work += n;
-        if (work > POLL_PAIRS) {
-            work = 0;
-            status = hs_poll(&all->call->options, 1.0);
-        }
+    const int64_t n_pairs = all->found->n_pairs;
+    const int     size = hs_team_size(all->call->team);
+    int           n = size < HS_SLABS ? size : HS_SLABS;
+    while (n > 1 && (n_pairs < n * STRIP_PAIRS || (n - 1) * all->n_points > n_pairs)) {
+        n--;
     }
+    return n;
+}
+
+/* Entries in their rows, which are in no order yet. */
+static hs_status
+deal_out(hs_sorting *all)
+{
+    hs_call      *call = all->call;
+    const int64_t n_pairs = all->found->n_pairs;
+    const size_t  size = (size_t)all->n_points * sizeof *all->end;
+    strips        doing = {.all = all, .n = choose_strips(all)};
+    int64_t      *others = NULL;
+    if (doing.n > 1) {
+        others =
+            hs_alloc(&call->account, HS_FOR_SORTING, (doing.n - 1) * all->n_points, sizeof *others);
+        doing.n = others == NULL ? 1 : doing.n;
+    }
+    for (int strip = 0; strip < doing.n; strip++) {
+        doing.next[strip] = strip == doing.n - 1 ? all->end : others + strip * all->n_points;
+        memset(doing.next[strip], 0, size);
+    }
+    hs_status status =
+        hs_walk_strips(call->team, &call->options, n_pairs, doing.n, count_strip, &doing);
+    if (status == HS_OK) {
+        accumulate(&doing);
+        all->entries = hs_alloc(&call->account, HS_FOR_SORTING, all->n, sizeof *all->entries);
+        status = all->entries == NULL ? HS_ERR_MEMORY
+                                      : hs_walk_strips(call->team, &call->options, n_pairs, doing.n,
+                                                       deal_strip, &doing);
+    }
+    hs_free(&call->account, others);
     return status;
 }
 
@@ -193,39 +237,125 @@ put_some(const hs_sorting *all, int64_t first, int64_t n, int64_t *row, hs_outpu
     sorted->n_pairs += n;
 }
 
-static hs_status
-put_all(const hs_sorting *all, hs_output *sorted)
+/* Rows are put in order and written. */
+typedef struct row_job {
+    const hs_sorting *all;
+    hs_output        *sorted;
+    int64_t           before;   /* pairs that it has already */
+    int64_t           in_range; /* rows */
+    int64_t           n_ranges;
+} row_job;
+
+/* What one thread works with. */
+typedef struct worker {
+    hs_committer committer;
+    hs_options   options; /* with this thread's poll */
+    row_job     *job;
+    hs_output    sorted; /* the job's; where this thread writes next */
+    uint64_t    *spare;  /* owned */
+    int64_t      work;   /* since the last poll */
+} worker;
+
+static int64_t
+begin_of(const hs_sorting *all, int64_t row)
 {
-    int64_t row = 0;
-    if (sorted->fixed && all->n > sorted->capacity) {
-        sorted->n_pairs = all->n; /* tells hs_pairs_conclude that they do not fit */
-        return HS_OK;
+    return row > 0 ? all->end[row - 1] : 0;
+}
+
+/* A hs_range_fn. */
+static hs_status
+do_range(void *context, int64_t range)
+{
+    worker           *me = context;
+    const hs_sorting *all = me->job->all;
+    const int64_t     first_row = range * me->job->in_range, left = all->n_points - first_row;
+    const int64_t     end_row = first_row + (left < me->job->in_range ? left : me->job->in_range);
+    const int64_t     begin = begin_of(all, first_row), end = begin_of(all, end_row);
+    hs_status         status = HS_OK;
+    me->sorted.n_pairs = me->job->before + begin;
+    if (all->call->team != NULL) {
+        hs_output_touch(&me->sorted, me->sorted.n_pairs, end - begin);
     }
-    hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n, 1.0);
-    for (int64_t first = 0; first < all->n && status == HS_OK; first += PUT) {
-        const int64_t n = all->n - first < PUT ? all->n - first : PUT;
-        put_some(all, first, n, &row, sorted);
-        status = poll_for(all, first + n - 1);
+    for (int64_t row = first_row; row < end_row; row++) {
+        const int64_t first = begin_of(all, row);
+        hs_sort_row(all, all->entries + first, all->end[row] - first, me->spare);
+    }
+    for (int64_t first = begin, row = first_row; first < end && status == HS_OK; first += PUT) {
+        const int64_t n = end - first < PUT ? end - first : PUT;
+        put_some(all, first, n, &row, &me->sorted);
+        me->work += n;
+        if (me->work > POLL_ENTRIES) {
+            me->work = 0;
+            status = hs_poll(&me->options, 1.0);
+        }
     }
     return status;
 }
 
-/* Once the rows are counted. */
 static hs_status
-sort_and_put(hs_sorting *all, hs_output *sorted)
+open_worker(void *context, void *place)
 {
-    hs_account *account = &all->call->account;
-    uint64_t   *spare = hs_alloc(account, HS_FOR_SORTING, all->longest, sizeof *spare);
-    all->entries = hs_alloc(account, HS_FOR_SORTING, all->n, sizeof *all->entries);
-    hs_status status = all->entries != NULL && spare != NULL ? deal_out(all) : HS_ERR_MEMORY;
-    if (status == HS_OK) {
-        status = sort_rows(all, spare);
+    row_job *job = context;
+    worker  *me = place;
+    hs_call *call = job->all->call;
+    me->job = job;
+    me->options = call->options;
+    me->committer.options = &me->options;
+    me->sorted = *job->sorted;
+    me->spare = hs_alloc(&call->account, HS_FOR_SORTING, job->all->longest, sizeof *me->spare);
+    return me->spare != NULL ? HS_OK : HS_ERR_MEMORY;
+}
+
+static void
+close_worker(void *context, void *place)
+{
+    const row_job *job = context;
+    hs_free(&job->all->call->account, ((worker *)place)->spare);
+}
+
+static hs_status
+do_ranges(row_job *job)
+{
+    hs_call *call = job->all->call;
+    if (call->team != NULL && job->n_ranges > 1) {
+        hs_failure ignored;
+        hs_crew    crew = {.call = call,
+                           .job = job,
+                           .worker_size = sizeof(worker),
+                           .open = open_worker,
+                           .close = close_worker,
+                           .n_ranges = job->n_ranges,
+                           .search = do_range};
+        return hs_crew_run(&crew, &ignored);
     }
-    if (status == HS_OK) {
-        status = put_all(all, sorted);
+    worker    me = {.work = 0};
+    hs_status status = open_worker(job, &me);
+    for (int64_t range = 0; range < job->n_ranges && status == HS_OK; range++) {
+        status = do_range(&me, range);
     }
-    hs_free(account, all->entries);
-    hs_free(account, spare);
+    close_worker(job, &me);
+    return status;
+}
+
+/* Once all entries are in their rows. */
+static hs_status
+put_all(const hs_sorting *all, hs_output *sorted)
+{
+    if (sorted->fixed && all->n > sorted->capacity) {
+        sorted->n_pairs = all->n; /* tells hs_pairs_conclude that they do not fit */
+        return HS_OK;
+    }
+    const int64_t in_range = all->n_points * RANGE_ENTRIES / (all->n + 1) + 1;
+    row_job       job = {.all = all,
+                         .sorted = sorted,
+                         .before = sorted->n_pairs,
+                         .in_range = in_range,
+                         .n_ranges = (all->n_points + in_range - 1) / in_range};
+    hs_status     status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n, 1.0);
+    if (status == HS_OK) {
+        status = do_ranges(&job);
+        sorted->n_pairs += status == HS_OK ? all->n : 0;
+    }
     return status;
 }
 
@@ -235,8 +365,12 @@ sort(hs_sorting *all, hs_output *sorted)
     all->i = hs_output_column(all->found, HS_WANT_I);
     all->j = hs_output_column(all->found, HS_WANT_J);
     all->shift = hs_output_column(all->found, HS_WANT_SHIFT);
-    const hs_status status = count_rows(all);
-    return status == HS_OK ? sort_and_put(all, sorted) : status;
+    hs_status status = deal_out(all);
+    if (status == HS_OK) {
+        status = put_all(all, sorted);
+    }
+    hs_free(&all->call->account, all->entries);
+    return status;
 }
 
 hs_status
