@@ -6,9 +6,6 @@
 #include "../scene/points.h"
 #include "../search/search_open.h"
 
-/* Sorting so many points takes as long as all of a search with one. */
-#define POINTS_FOR_ONE 4
-
 /* The points in memory of the cells: the caller cannot change them between searches. */
 static hs_status
 keep_points(const hs_points *points, hs_cells *cells)
@@ -55,7 +52,7 @@ build_cells(const hs_points *points, const hs_options *options, hs_cells *cells,
     if (status == HS_OK) {
         /* keeps_none: no pairs are kept by this call */
         const hs_sets sets = {.points = &cells->points, .is_kept = true, .keeps_none = true};
-        hs_call_gather(call, points->n / POINTS_FOR_ONE);
+        hs_call_gather(call, points->n / HS_POINTS_MADE_READY);
         status =
             hs_search_build(&sets, cells->has_box ? &cells->box : NULL, &cells->search, failure);
     }

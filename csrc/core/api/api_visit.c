@@ -138,6 +138,11 @@ hs_visit_columns(const hs_among *among, const hs_options *options, const hs_visi
     hs_request request = hs_request_among(among, HS_HALF_LIST, &of_visit);
     of_visit.sorted = false;
     of_visit.out = NULL;
+    if (!visit->thread_safe) { /* other threads would only make the search ready */
+        const int64_t n = request.sets.points == NULL ? 0 : request.sets.points->n;
+        const int     n_threads = hs_call_threads((double)(n / HS_POINTS_MADE_READY), options);
+        of_visit.threads = n_threads > 1 ? options->threads : 1;
+    }
     request.sets.keeps_none = true;
     *n_visited = 0;
     const hs_status status = hs_by_reach_use(&request, visit_pairs, &shared, failure);

@@ -50,6 +50,9 @@ void hs_call_leave(hs_call *call, int64_t n_pairs);
 /* Calls this in place of the options' poll; NULL: nothing. */
 void hs_call_set_poll(hs_poll_fn poll, void *context, hs_call *call);
 
+/* Making so many points ready for a search takes as long as all of a search with one. */
+#define HS_POINTS_MADE_READY 4
+
 /* How many threads these options mean for so many points, or for work that takes as long. */
 int hs_call_threads(double n_points, const hs_options *options);
 
