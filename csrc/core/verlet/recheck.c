@@ -204,7 +204,7 @@ static hs_status
 run_together(recheck_job *job, hs_failure *failure)
 {
     const int64_t bytes = HS_SIFT * hs_output_bytes_per_pair(job->recheck->output);
-    job->in_range = bytes > 0 && bytes < HS_RANGE_BYTES ? HS_RANGE_BYTES / bytes : 1;
+    job->in_range = 1 + HS_RANGE_BYTES / (bytes + 1);
     hs_crew crew = {.call = job->recheck->call,
                     .job = job,
                     .worker_size = sizeof(worker),

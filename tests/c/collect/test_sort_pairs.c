@@ -194,6 +194,38 @@ each_pass_is_polled(void)
     search_unit_close(&unit);
 }
 
+/* Sorts these pairs by the threads of the unit. */
+static hs_status
+sort_once(void *context)
+{
+    const hs_output *found = context;
+    hs_output        sorted;
+    const int64_t    held = unit.call.account.held;
+    hs_output_init(&unit.call.account, 2, found->columns, 4, &sorted);
+    const hs_status status = hs_sort_pairs(&unit.call, 0, POINTS, found, &sorted);
+    CHECK(status != HS_OK || sorted.n_pairs == found->n_pairs);
+    hs_output_free(&sorted);
+    CHECK(unit.call.account.held == held);
+    return status;
+}
+
+/* With too little memory for strips there is one. */
+static void
+threads_do_with_little_memory(void)
+{
+    harness_random random = {367};
+    hs_output      found;
+    search_unit_points(6, POINTS, 2, 1.0, &unit);
+    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+    fill_pairs(&random, 100000, POINTS, false, &found);
+    unit.call.team = hs_team_create(2);
+    CHECK(fail_each_allocation(sort_once, &found, 100) > 6);
+    hs_team_free(unit.call.team);
+    unit.call.team = NULL;
+    hs_output_free(&found);
+    search_unit_close(&unit);
+}
+
 /* Any number of threads writes the same bytes, as pairs and as rows both ways, and stops. */
 static void
 threads_sort_the_same_bytes(void)
@@ -209,7 +241,7 @@ threads_sort_the_same_bytes(void)
         fill_pairs(&random, N, POINTS, trial < 2, &found);
         hs_output *targets[] = {&alone, &sorted, &sorted, &sorted};
         for (int t = 0; t < 4; t++) {
-            refusal once = {.nth = t == 3 ? 5 : 0};
+            refusal once = {.nth = t == 3 ? 3 : 0};
             hs_call_set_poll(refuse_once, &once, &unit.call);
             unit.call.team = hs_team_create(1 + t);
             hs_output_init(&unit.call.account, 2, found.columns, 4, targets[t]);
@@ -248,4 +280,5 @@ test_sort_pairs(void)
     RUN(rows_have_each_pair_both_ways);
     RUN(each_pass_is_polled);
     RUN(threads_sort_the_same_bytes);
+    RUN(threads_do_with_little_memory);
 }

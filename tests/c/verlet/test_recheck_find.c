@@ -124,6 +124,7 @@ shifts_that_do_not_fit_are_named(void)
 typedef struct jumped {
     hs_verlet *list;
     unsigned   want;
+    int        threads;
     int64_t    n;
 } jumped;
 
@@ -133,7 +134,7 @@ find_once(void *context)
     const jumped *of = context;
     hs_options    options = options_of(&shared.scene);
     hs_pairs     *pairs = NULL;
-    options.threads = 1;
+    options.threads = of->threads;
     options.want = of->want;
     const hs_status status = hs_verlet_find(of->list, &options, &pairs, NULL);
     CHECK((status == HS_OK) == (pairs != NULL));
@@ -162,10 +163,14 @@ any_allocation_may_be_refused(void)
                            NULL) == HS_OK);
     CHECK(!rebuilt);
     CHECK(hs_pairs_count(AMONG(&points, shared.scene.box), &options, &of.n, NULL) == HS_OK);
-    of.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
-    CHECK(fail_each_allocation(find_once, &of, 100) > 8);
-    of.want = HS_WANT_BOTH;
-    CHECK(fail_each_allocation(find_once, &of, 100) > 4);
+    for (of.threads = 1; of.threads <= 2; of.threads++) {
+        of.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHIFT;
+        CHECK(fail_each_allocation(find_once, &of, 100) > 8);
+        of.want = HS_WANT_I | HS_WANT_DISTANCE;
+        CHECK(fail_each_allocation(find_once, &of, 100) > 8);
+        of.want = HS_WANT_BOTH;
+        CHECK(fail_each_allocation(find_once, &of, 100) > 4);
+    }
     hs_verlet_free(of.list);
 }
 
