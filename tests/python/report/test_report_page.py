@@ -31,7 +31,8 @@ def test_words_say_what_the_rows_say():
     ])  # fmt: skip
     text = "\n".join(said)
     assert "Precision 'exact' gave 1 list with 1,000 pairs in all, and every one was right." in text
-    assert "1 of the lists is wrong, by 3 pairs. Worst on s: 3 missed of 1,000 pairs." in text
+    assert "1 of the lists is wrong, by 3 pairs." in text
+    assert "Worst on s, which has 1,000 pairs: 3 missed." in text
     assert "2.00 times as long as 'double'" in text
     assert "off by 1 unit in the last place" in text
     assert "gone: not installed; no list to judge." in text
@@ -164,6 +165,19 @@ def test_figures_are_the_same_bytes_each_time(rows):
         overview.overview_figure, overview.map_figure, figures.cost_figure, figures.drift_figure
     ):  # fmt: skip
         assert looks.to_svg(make(rows)) == looks.to_svg(make(rows))
+
+
+def test_labels_keep_their_digits():
+    figure = looks.new_figure(2.0, 2.0)
+    figure.text(0.123456, 0.5, "skin 0.0312")
+    svg = looks.to_svg(figure)
+    assert b"skin 0.0312" in svg and b"23456" not in svg
+
+
+def test_the_map_says_why_there_is_no_list(rows):
+    more = [*rows, bare("freud", "timed out"), bare("ase", "crashed")]
+    svg = looks.to_svg(overview.map_figure(more)).decode()
+    assert ">timed out<" in svg and ">crashed<" in svg
 
 
 def test_every_method_has_a_mark():

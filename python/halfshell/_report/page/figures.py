@@ -102,7 +102,8 @@ def cost_figure(rows: Sequence[ReportRow]) -> Any | None:
         axes.set_xscale("log", base=2)
         low, high = axes.get_xlim()
         ticks = [k for k in _RATIOS if low <= k <= high]
-        axes.set_xticks(ticks or [1], [f"{k:.2g}" for k in ticks or [1]])
+        told = [f"{k}" if k >= 1 else f"1/{1 / k:.0f}" for k in ticks or [1]]
+        axes.set_xticks(ticks or [1], told)
         axes.minorticks_off()
         axes.set_xlabel("run time of the exact decision over that of a rounded one")
         axes.legend(frameon=False, loc="best")

@@ -42,38 +42,39 @@ dt { font-weight: 600; } dd { margin: 0 0 0.4rem 1rem; }
 """
 
 _HOW = (
-    "Every list is held against a truth that calls nothing of this library's compiled core: "
-    "explicit images, SciPy's k-d tree with a proven margin, and integer arithmetic inside the "
-    "margin, for the numbers that the floats are. A method is judged by its own rule for a pair "
-    "at exactly the cutoff (≤ or &lt;), and by what it tells: where it gives no shifts, by i "
-    "and j. What it does not offer is not held against it. Balls are pairs where the distance is "
-    "at most the real sum of two radii; precision 'double' and other libraries compare with the "
-    "rounded one. Where points have supports, a pair is judged by the length of H D, which they "
-    "compute in float64. Times are of one call for i and j on "
-    "one thread, other libraries each in a process of their own. Distances are compared with the "
-    "true ones rounded once, in units in the last place (ulp). Energy and forces are "
-    "Lennard-Jones sums over the list with sigma = cutoff / 2.5 unless the scene has its own, "
-    "cut and not shifted, against a sum that is rounded once."
+    "Every list is compared with a truth that does not use this library's compiled core: explicit "
+    "images and SciPy's k-d tree with a proven margin; inside the margin, integer arithmetic on "
+    "the exact values of the floats. Each method is judged by its own rule for a pair at exactly "
+    "the cutoff (≤ or &lt;), and only by what it returns: by i and j alone if it returns no "
+    "shifts. A feature that it does not offer is not an error. Two balls are a pair if their "
+    "distance is at most the exact sum of their radii; precision 'double' and other libraries "
+    "compare with the rounded sum. If points have supports, a pair is judged by the length of H D, "
+    "which those compute in float64. Times are those of one call for i and j on one thread; each "
+    "of the other libraries runs in a process of its own. Distances are compared with the true "
+    "ones rounded once, in units in the last place (ulp). Energy and forces are Lennard-Jones "
+    "sums over the list with sigma = cutoff / 2.5 (unless the scene sets its own), cut off and "
+    "not shifted, and compared with a sum that is rounded once."
 )
 
 
 #: What words of the page mean.
 _GLOSSARY = {
-    "scene": "Points, a box and a cutoff that are hard in some way, under a name.",
-    "exact, double, single": "Precisions of this library: pairs are decided for the real numbers "
-    "that were given, or by a float64 or float32 comparison.",
+    "scene": "Named points, with a box and a cutoff, that are difficult in some way.",
+    "exact, double, single": "Precisions of this library: pairs are decided for the exact values "
+    "of your numbers, or by a single comparison in float64 or float32.",
     "float32 input": "Points rounded to float32 beforehand, then decided exactly.",
-    "right": "No pair is missed, none is there that should not be, none comes twice.",
-    "missed, spurious, duplicate": "Pairs that a list lacks, that it should not have, that it has "
-    "more than once.",
-    "timed out, failed, crashed": "No list within the time that was given; an error; a process "
-    "that ended by itself.",
-    "not offered": "What a library does not claim to do, such as skewed boxes.",
+    "right": "No pair is missed, none is invented, and none is listed twice.",
+    "missed, spurious, duplicate": "Pairs that are not in the list but should be; pairs that are "
+    "in it but should not be; repetitions.",
+    "timed out, failed, crashed": "No list within the time limit; an error was raised; the process "
+    "died.",
+    "not offered": "A feature that the library does not claim to have, such as skewed boxes.",
     "tie": "A pair at exactly the cutoff.",
     "ulp": "A unit in the last place: the distance between neighbouring float64 numbers.",
     "rule": "Whether a pair at exactly the cutoff counts (≤) or does not (<).",
-    "skin": "By how much farther than the cutoff a list reaches that is kept for several steps.",
-    "energy drift": "How far the total energy has moved at the end of a run, over the kinetic one.",
+    "skin": "How much farther than the cutoff a list reaches if it is kept for several steps.",
+    "energy drift": "The largest change of the total energy during a run, divided by the kinetic "
+    "energy at the start.",
 }
 
 
@@ -94,11 +95,13 @@ def page(facts: Mapping[str, str], rows: Sequence[ReportRow]) -> str:
         f'<p class="lead">{escape(headline(rows))}</p>',
         *_picture(overview_figure(rows), "how often each method is right, against its run time"),
         "<h2>Who errs where</h2>",
-        "<p>The number in a field is the run time, relative to that of precision 'exact'.</p>",
+        "<p>Each row is a scene, each column a method. The number in a field is the run time "
+        "divided by that of precision 'exact'; the darker the red, the more pairs are wrong.</p>",
         *_picture(map_figure(rows), "wrong pairs by scene and method"),
         "<h2>All methods</h2>",
-        "<p>Scenes by what became of them, pairs over all lists, the largest error of a distance, "
-        "the median of the run time over that of precision 'exact'; most right lists first.</p>",
+        "<p>The number of scenes with a right list, a wrong one or none; the wrong pairs of all "
+        "lists together; the largest error of a distance; the median run time divided by that of "
+        "precision 'exact'. The method with the most right lists comes first.</p>",
         _table(SUMMARY, [(line, False) for line in summary_cells(rows)]),
         "<details><summary>In words</summary><ul>",
         *(f"<li>{escape(text)}</li>" for text in findings(rows)),
@@ -118,7 +121,7 @@ def page(facts: Mapping[str, str], rows: Sequence[ReportRow]) -> str:
     scenes = dict.fromkeys(row.scene for row in rows)
     parts += [
         "<h2>Scene by scene</h2>",
-        "<p>Error upwards, run time to the right; the grey band is error 0.</p>",
+        "<p>Errors increase upwards, run times to the right; in the grey band the error is 0.</p>",
         "<p>" + ", ".join(map(_link, scenes)) + "</p>",
     ]
     for name in scenes:

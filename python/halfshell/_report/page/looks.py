@@ -66,7 +66,8 @@ def _smaller(svg: str) -> str:
     svg = svg.replace("*{", "*{font-family: sans-serif; ", 1)
     svg = re.sub(r" ?\n(?=[LMCQz])", "", svg)
     svg = re.sub(r' transform="rotate\(-?0 [^"]*"', "", svg)
-    svg = re.sub(r"(\d\.\d)\d+", r"\1", svg)
+    # Coordinates, not the numbers that labels show.
+    svg = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d\.\d)\d+", r"\1", tag[0]), svg)
     svg = re.sub(r'<g id="(?!axes|legend)[^"]*"', "<g", svg)
     return re.sub(r">\s+<", "><", svg).strip()
 

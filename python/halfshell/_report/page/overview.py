@@ -15,6 +15,10 @@ from halfshell._report.page.standing import Standing, exact_times, standings
 
 __all__ = ["map_figure", "overview_figure"]
 
+#: States that leave a method without a list on a scene that it should be able to do.
+_NO_LIST = ("failed", "crashed", "timed out")
+
+
 def overview_figure(rows: Sequence[ReportRow]) -> Any | None:
     """Draw how often each method is right against how long it takes, or return None if none ran."""
     shown = [one for one in standings(rows) if one.slower and one.asked]
@@ -97,7 +101,7 @@ def map_figure(rows: Sequence[ReportRow]) -> Any:
     shades = part(".colors", "LinearSegmentedColormap").from_list(
         "wrong", ["#fde0c5", "#eb4a40", "#5a0d1c"]
     )
-    fixed = {"right": (0.80, 0.92, 0.86), "failed, crashed or timed out": (0.25, 0.25, 0.25),
+    fixed = {"right": (0.80, 0.92, 0.86), "no list: the reason in words": (0.25, 0.25, 0.25),
              "not offered": (0.90, 0.90, 0.90),
              "left out or not installed": (1.0, 1.0, 1.0)}  # fmt: skip
     for row in plain:
@@ -106,24 +110,27 @@ def map_figure(rows: Sequence[ReportRow]) -> Any:
             share = row.wrong_share or 0.0
             depth = 1.0 + math.log10(min(share, 1.0)) / 7.0 if share else 0.0
             table[cell] = shades(max(depth, 0.0))[:3] if share else fixed["right"]
-        elif row.status in ("failed", "crashed", "timed out"):
-            table[cell] = fixed["failed, crashed or timed out"]
+        elif row.status in _NO_LIST:
+            table[cell] = fixed["no list: the reason in words"]
         elif row.status == "not offered":
             table[cell] = fixed["not offered"]
     with rules():
-        figure = new_figure(2.4 + 0.42 * len(columns), 1.9 + 0.15 * len(scenes))
+        figure = new_figure(2.4 + 0.48 * len(columns), 1.9 + 0.18 * len(scenes))
         axes = figure.subplots()
         axes.imshow(table, aspect="auto", interpolation="nearest")
         for row in plain:
-            if row.status == "ok" and row.seconds and row.scene in exact:
-                across, down = columns.index(row.method), scenes.index(row.scene)
-                dark = table[down, across].mean() < 0.5
-                axes.text(across, down, _short(row.seconds / exact[row.scene]), fontsize=5.5,
-                          ha="center", va="center", color="white" if dark else "0.25")  # fmt: skip
+            across, down = columns.index(row.method), scenes.index(row.scene)
+            dark = table[down, across].mean() < 0.5
+            if row.status in _NO_LIST:
+                axes.text(across, down, row.status, fontsize=6.5, ha="center", va="center",
+                          color="white")  # fmt: skip
+            elif row.status == "ok" and row.seconds and row.scene in exact:
+                axes.text(across, down, _short(row.seconds / exact[row.scene]), fontsize=7,
+                          ha="center", va="center", color="white" if dark else "0.15")  # fmt: skip
         axes.set_xticks(range(len(columns)), columns, rotation=55, ha="left",
                         rotation_mode="anchor")  # fmt: skip
         axes.xaxis.tick_top()
-        axes.set_yticks(range(len(scenes)), scenes, fontsize=7)
+        axes.set_yticks(range(len(scenes)), scenes)
         axes.tick_params(length=0)
         axes.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
         axes.set_yticks(np.arange(len(scenes) + 1) - 0.5, minor=True)
@@ -135,7 +142,5 @@ def map_figure(rows: Sequence[ReportRow]) -> Any:
         patch = part(".patches", "Patch")
         keys = [patch(facecolor=color, edgecolor="0.7", label=name)
                 for name, color in {**fixed, **wrong}.items()]  # fmt: skip
-        figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False, fontsize=7)
+        figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
     return figure
-
-

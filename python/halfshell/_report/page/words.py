@@ -99,8 +99,8 @@ def _about(rows: Rows, method: str) -> str:
         worst = max(wrong, key=lambda row: row.wrong_share or 0.0)
         text += (
             f"; {len(wrong)} of the lists {'is' if len(wrong) == 1 else 'are'} wrong, by "
-            f"{_times(total, 'pair')}. Worst on {worst.scene}: {in_short(worst)} of "
-            f"{_times(worst.pairs_true or 0, 'pair')}."
+            f"{_times(total, 'pair')}. Worst on {worst.scene}, which has "
+            f"{_times(worst.pairs_true or 0, 'pair')}: {in_short(worst)}."
         )
     return text + _not_done(mine) + _distances(done)
 
@@ -109,7 +109,7 @@ def _not_done(rows: Rows) -> str:
     """What became of the other scenes."""
     states = [row.status for row in rows if row.status != "ok"]
     parts = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
-    return f" Without a list: {', '.join(parts)}." if parts else ""
+    return f" Scenes without a list: {', '.join(parts)}." if parts else ""
 
 
 def _distances(rows: Rows) -> str:
@@ -118,7 +118,7 @@ def _distances(rows: Rows) -> str:
         return ""
     worst = max(told, key=lambda row: row.d_max_ulp or 0.0)
     if not worst.d_max_ulp:
-        return " Every distance that was looked at is the true one, rounded once."
+        return " Every distance that was checked is the true one, rounded once."
     return (
         f" Distances are off by {number(worst.d_max_ulp)} "
         f"{'unit' if worst.d_max_ulp == 1 else 'units'} in the last place at worst "
@@ -146,8 +146,8 @@ def _reuse(rows: Rows) -> list[str]:
     said = []
     for scene in dict.fromkeys(row.scene for row in rows):
         mine = [row for row in rows if row.scene == scene]
-        for method, words in (("verlet", "lists with a skin that are rebuilt in time"),
-                              ("by the clock", "lists that are rebuilt by the clock")):  # fmt: skip
+        for method, words in (("verlet", "Verlet lists, rebuilt in time"),
+                              ("by the clock", "lists rebuilt by the clock")):  # fmt: skip
             runs = [row for row in mine if row.method == method]
             wrong = [row for row in runs if row.wrong]
             drifts = [row.drift_kinetic for row in runs if row.drift_kinetic is not None]
@@ -160,7 +160,7 @@ def _reuse(rows: Rows) -> list[str]:
                 text += f"; the energy drifts by {' to '.join(ends)} of the kinetic energy"
             every = [row.drift_kinetic for row in mine if row.method == "exact, every step"]
             if every and every[0] is not None:
-                text += f", {number(every[0])} with a new list in every step"
+                text += f" ({number(every[0])} with a new list in every step)"
             said.append(text + ".")
     return said
 
