@@ -104,9 +104,14 @@ def read_scene(
         With the reason in one line.
     """
     if file is None:
+        for option, value in (("--index", index), ("--format", file_format)):
+            if value is not None:
+                raise InputError(f"{option} is about a file: give one")
         scene = _shipped_scene()
     elif not os.path.exists(file):
         raise InputError(f"{file}: no such file")
+    elif os.path.isdir(file) and file_format is None and not Path(file).suffix:
+        raise InputError(f"{file}: is a folder")
     elif os.path.isfile(file) and os.path.getsize(file) == 0:
         raise InputError(f"{file}: is empty")
     else:

@@ -118,6 +118,9 @@ def run_rdf(args: Namespace) -> int:
         facts["pairs"] = int(result.counts.sum())
         unit = unit_suffix(frames[0])
         all_frames = f", of {len(frames):,} frames" if len(frames) > 1 else ""
+        sizes = sorted({len(frame.points) for frame in frames})
+        if len(sizes) > 1:
+            all_frames += f" of {sizes[0]:,} to {sizes[-1]:,} points"
         lines = [
             ("bins", f"{args.bins:,}, of {cutoff / args.bins:.6g}{unit}"),
             ("pairs", f"{facts['pairs']:,}   (each once{all_frames})"),

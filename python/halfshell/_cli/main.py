@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import platform
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
@@ -23,6 +24,7 @@ from halfshell._cli import values
 from halfshell._cli.errors import InputError, one_line
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
+from halfshell._unknown import nearest_word
 
 __all__ = ["main"]
 
@@ -63,10 +65,34 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """An argument parser whose complaints are one line, and which guesses no option."""
+    """An argument parser whose complaints are one line, and which guesses no option.
+
+    It names the option or command that is spelled most like one that there is not.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options, allow_abbrev=False)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        found, rest = super().parse_known_args(args, namespace)
+        if rest:  # here, where the options of the command are known
+            self.error(f"unrecognized arguments: {' '.join(rest)}{self._hint(rest)}")
+        return found, rest
+
+    def _hint(self, rest: Sequence[str]) -> str:
+        if all(re.fullmatch(r"[-+.\deE]+", word) for word in rest):
+            return "; numbers of one option are separated by commas"
+        meant = nearest_word(rest[0].partition("=")[0], self._option_string_actions)
+        return f"; did you mean {meant}?" if meant and rest[0].startswith("--") else ""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            meant = nearest_word(str(value), map(str, action.choices or ()))
+            if meant:
+                error.message += f"; did you mean {meant}?"
+            raise
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} (see {self.prog} --help)")
@@ -137,7 +163,9 @@ def _add_scene_options(
             help="frame, or frames to average: : for all, 100:, ::10; default: the last"
         )  # fmt: skip
     else:
-        command.add_argument("--index", type=int, metavar="N", help="frame; default: the last")
+        command.add_argument(
+            "--index", type=values.frame, metavar="N", help="frame; default: the last"
+        )
     if has_rule:
         command.add_argument(
             "--strict", action="store_true", help="d < cutoff; default: d <= cutoff"

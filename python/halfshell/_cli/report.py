@@ -128,11 +128,13 @@ def _require() -> None:
 
 def _list() -> int:
     from halfshell import scenes
+    from halfshell._report.measure.methods import METHODS
     from halfshell._report.measure.run import PEERS, SCENES
 
     print("scenes")
     for name in SCENES:
         print(f"  {name:<22}{scenes.load(name, size='small').title}")
+    print("methods\n  " + "  ".join(METHODS))
     print("libraries\n  " + "  ".join(PEERS))
     return 0
 

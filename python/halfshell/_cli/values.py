@@ -75,9 +75,21 @@ def size(text: str) -> float:
 
 
 def sample(text: str) -> int:
+    if text[:1] == "-" and text[1:].isdecimal():
+        raise argparse.ArgumentTypeError(f"{text} is negative")
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
     return int(text)
+
+
+def frame(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        only = "; only rdf reads several frames" if ":" in text else ""
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a whole number, the number of a frame{only}"
+        ) from None
 
 
 def frames(text: str) -> int | slice:

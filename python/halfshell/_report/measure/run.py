@@ -43,6 +43,8 @@ PEERS = tuple(LIBRARIES)
 #: Called with what is done, what there is, and a word on what comes next.
 Progress = Callable[[int, int, str], object]
 
+_SHOWN = 12  # names in a message
+
 _SKINS = (0.5, 1.0, 2.0)  # of the skin at which a scene is at its limit
 _INTERVALS = {"small": (10, 50), "quick": (10, 50), "full": (5, 10, 20, 50, 200)}
 
@@ -117,8 +119,15 @@ def _named(kind: str, given: Sequence[str] | None, known: Sequence[str]) -> tupl
         return tuple(known)
     for name in given:
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=3, cutoff=0.4) or known
-            raise ValueError(f"there is no {kind} {str(name)!r}; choose from {', '.join(near)}")
+            near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+            # Of few names all are shown, the nearest first.
+            others = [one for one in known if one not in near]
+            many = len(known) > _SHOWN
+            shown = near if near and many else [*near, *others][:_SHOWN]
+            rest = f", ... ({len(known)} in all)" if len(shown) < len(known) else ""
+            raise ValueError(
+                f"there is no {kind} {str(name)!r}; choose from {', '.join(shown)}{rest}"
+            )
     return tuple(dict.fromkeys(given))
 
 
