@@ -102,7 +102,10 @@ refuse_quantities(const char *known, PyObject *object)
         text[n++] = *letter;
         text[n++] = letter[1] != '\0' ? ' ' : ',';
     }
-    memcpy(text + n, " each at most once", sizeof " each at most once");
+    strcpy(text + n, " each at most once");
+    if (strchr(known, 'i') == NULL) {
+        strcat(text, " (i is the row itself)");
+    }
     hs_refuse(PyExc_ValueError, text, object);
 }
 

@@ -130,7 +130,11 @@ if not TYPE_CHECKING:  # for type checkers they are there
 
     def __getattr__(name: str) -> object:
         if name not in _LATER:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            from halfshell._unknown import nearest_word
+
+            meant = None if name.startswith("_") else nearest_word(name, __all__)
+            hint = f": did you mean {meant}?" if meant else ""
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
         value = getattr(importlib.import_module(f"{__name__}.{_LATER[name]}"), name)
         globals()[name] = value
         return value

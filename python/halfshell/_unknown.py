@@ -34,6 +34,10 @@ _MEANT = {
 }  # fmt: skip
 
 
+#: What other libraries call it whether a point is its own neighbour.
+_ITSELF = ["include_self", "include_myself", "self_interaction", "exclude_ii", "loop"]
+
+
 def refuse_unknown(function: Callable[..., Any], names: Iterable[str]) -> Never:
     """TypeError for the first of these keywords, with what it seems to mean."""
     import inspect  # here, as it takes some milliseconds
@@ -43,10 +47,12 @@ def refuse_unknown(function: Callable[..., Any], names: Iterable[str]) -> Never:
         parameter.name for parameter in inspect.signature(function).parameters.values()
         if parameter.kind is not inspect.Parameter.VAR_KEYWORD and parameter.name != "self"
     ]  # fmt: skip
-    meant = _meant(name, known)
+    meant = None if name in _ITSELF else _meant(name, known)
     hint = f": did you mean {meant}=?" if meant else ""
+    if name in _ITSELF and "queries" in known:
+        hint = ": no point is its own neighbour, unless queries= are the points"
     raise TypeError(
-        f"{function.__qualname__}() got an unexpected keyword argument {name!r}{hint}"
+        f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}"
     )
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Never
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from halfshell._convert.types import (
 from halfshell._functions.between import pairs_between as find_between
 from halfshell._functions.pairs import pairs as find_pairs
 from halfshell._objects.neighbor_table import NeighborTable
+from halfshell._unknown import refuse_unknown
 
 IntArray = npt.NDArray[np.int64]
 _CONFIRMED = 1000  # differences of each kind that are confirmed by rational arithmetic
@@ -98,6 +99,7 @@ def verify(
     periodic: PeriodicLike | None = None,
     inclusive: bool = True,
     full: bool = False,
+    **unknown: Never,
 ) -> Verdict:
     """Check a list of pairs, from any library; always exact.
 
@@ -150,6 +152,8 @@ def verify(
     >>> print(hs.verify(points, 2.0, hs.neighbors(points, 2.0)))
     correct: 4 pairs
     """
+    if unknown:
+        refuse_unknown(verify, unknown)
     full = as_flag(full, "full")
     given = Given(
         radii, query_radii, rule, types, query_types, supports, query_supports, extent

@@ -36,7 +36,11 @@ def frames_of(frames: Any) -> tuple[Iterator[Any], int | None]:
     except MemoryError:
         raise
     except Exception as error:
-        raise TypeError(f"frames must be a sequence or iterator of frames, got {kind}") from error
+        own = attribute(frames, "trajectory", "frames", _MISSING) is not _MISSING
+        hint = ": pass its trajectory" if own else ""
+        raise TypeError(
+            f"frames must be a sequence or iterator of frames, got {kind}{hint}"
+        ) from error
     try:
         return iterator, len(frames)
     except Exception:  # iterators have none, and objects may raise anything

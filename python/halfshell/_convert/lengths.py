@@ -28,7 +28,8 @@ def as_number(value: Any, name: str, single: str = "be a number") -> float:
 
     def check(shape: tuple[int, ...]) -> None:
         if shape != ():
-            raise TypeError(f"{name} must {single}, got shape {shape}")
+            hint = ": pass a length for each point as radii" if name == "cutoff" else ""
+            raise TypeError(f"{name} must {single}, got shape {shape}{hint}")
 
     return float(as_real_array(value, name, single, check))
 

@@ -17,13 +17,18 @@ def as_point_numbers(values: Any, name: str, n: int, numbered: str) -> IntArray:
     """Numbers of n points or queries."""
     column = as_array(values, name)
     if column.size and column.dtype.kind not in "iu":
-        raise TypeError(f"{name} must hold integers, got dtype {column.dtype}")
+        hint = f": use np.flatnonzero({name})" if column.dtype.kind == "b" else ""
+        raise TypeError(f"{name} must hold integers, got dtype {column.dtype}{hint}")
     if column.ndim != 1:
         raise ValueError(f"{name} must have shape (m,), got {column.shape}")
     if column.size and n == 0:
         raise ValueError(f"{name} must be empty: there are no {numbered}")
     if column.size and (int(column.min()) < 0 or int(column.max()) >= n):
-        raise ValueError(f"{name} must be numbers of {numbered}, from 0 to {n - 1}")
+        k = int(np.flatnonzero((column < 0) | (column >= n))[0])
+        raise ValueError(
+            f"{name} must be numbers of {numbered}, from 0 to {n - 1}, got {name}[{k}] = "
+            f"{column[k]}"
+        )
     return np.ascontiguousarray(column, np.int64)
 
 

@@ -6,10 +6,10 @@ The core looks after its own.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from halfshell import _core
-from halfshell._convert.foreign import is_a, kind_of, shown, whole_number
+from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, whole_number
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -110,12 +110,12 @@ def clear_cache() -> None:
     _core.clear_cache()
 
 
-def set_cache_limit(limit: SupportsIndex) -> int:
+def set_cache_limit(limit: float) -> int:
     """Set how many bytes of deleted results may be kept for the next ones.
 
     Parameters
     ----------
-    limit : int
+    limit : float
         Bytes, not negative; 0 keeps nothing. Memory kept beyond it is released at once. The
         limit is 256 MB at first and holds for the whole process.
 
@@ -127,9 +127,9 @@ def set_cache_limit(limit: SupportsIndex) -> int:
     Raises
     ------
     TypeError
-        If `limit` is not an integer.
+        If `limit` is not a number.
     ValueError
-        If it is negative.
+        If it is negative, or not a number (NaN).
 
     See Also
     --------
@@ -143,9 +143,11 @@ def set_cache_limit(limit: SupportsIndex) -> int:
     >>> hs.set_cache_limit(before)
     0
     """
-    wanted = None if is_a(limit, bool) else whole_number(limit, "limit")
-    if wanted is None:
+    wanted = exact_number(limit)
+    if wanted is None:  # what stands for an integer
+        wanted = whole_number(limit, "limit")
+    if wanted is None or is_a(wanted, bool):
         raise TypeError(f"limit must be a number of bytes, got {kind_of(limit)}")
-    if wanted < 0:
+    if not wanted >= 0:
         raise ValueError(f"limit must not be negative, got {shown(wanted)}")
-    return _core.set_cache_limit(min(wanted, 2**63 - 1))
+    return _core.set_cache_limit(int(min(wanted, 2**63 - 1)))

@@ -30,12 +30,26 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
 
     def check(shape: tuple[int, ...]) -> None:
         if shape != (0,) and (len(shape) != 2 or not 1 <= shape[1] <= MAX_DIM):
-            raise ValueError(f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {shape}")
+            raise ValueError(
+                f"{name} must have shape (n, d) with 1 <= d <= {MAX_DIM}, got {shape}"
+                f"{_hint_of_shape(values, shape, name)}"
+            )
         if shape[0] > MAX_POINTS:
             raise OverflowError(f"fewer than 2**31 {name} can be searched, got {shape[0]}")
 
     array = as_real_array(values, name, check_shape=check)
     return np.empty((0, ndim)) if array.shape == (0,) else array
+
+
+def _hint_of_shape(values: Any, shape: tuple[int, ...], name: str) -> str:
+    """What may be meant by points of this shape, if it is clear."""
+    if is_a(values, (list, tuple)) and values and brings_its_box(values[0], name):
+        return ": several systems are one array of points, with batch"
+    if len(shape) == 2 and 1 <= shape[0] <= MAX_DIM < shape[1]:
+        return f": one row for each point, as in {name}.T"
+    if len(shape) == 1:
+        return f": one point is {name}[None, :], points on a line are {name}[:, None]"
+    return ""
 
 
 def vectors_of(values: Any, name: str = "box", ndim: int | None = None) -> Any:
@@ -59,6 +73,8 @@ def as_box(values: Any, ndim: int) -> FloatArray:
     def check(shape: tuple[int, ...]) -> None:
         if shape not in ((), (ndim,), (ndim, ndim)):
             hint = f": {LENGTHS_AND_ANGLES}" if shape == (6,) else ""
+            if shape == (ndim * ndim,):
+                hint = f": one row for each vector, as in reshape({ndim}, {ndim})"
             raise ValueError(
                 f"box must have shape ({ndim},) or ({ndim}, {ndim}), or be one length, for points "
                 f"in {ndim} dimensions, got {shape}{hint}"
@@ -197,7 +213,7 @@ def as_scene(
             if box is not None or periodic is not None:
                 given = "box" if box is not None else "periodic"
                 raise ValueError(
-                    f"{given} comes from the {kind_of(points)} object itself that points are"
+                    f"points of type {kind_of(points)} bring their own box: leave {given} out"
                 )
             return _own_scene(points, ndim=ndim)
         array = as_points(points, ndim=ndim)

@@ -118,6 +118,11 @@ def _as_pairs(exclude: Any, n: int, q: int | None) -> npt.NDArray[np.int64] | No
     if exclude is None:
         return None
     array = as_array(exclude, "exclude", "hold integers")
+    if array.shape == (2,) and n != 2:
+        raise ValueError(
+            f"exclude must have shape (k, 2), pairs of numbers, or ({n},), labels, got (2,): "
+            "one pair is [[i, j]]"
+        )
     if array.ndim < 2 and not (array.size == 0 and n > 0):
         return None
     if array.size == 0:

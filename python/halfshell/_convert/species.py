@@ -146,7 +146,9 @@ def _lengths(cutoff: Mapping[Any, Any], kinds: list[_Kinds]) -> dict[tuple[Any, 
     for key, value in _items(cutoff):
         where = f"cutoff[{shown(key)}]"
         if not is_a(key, tuple) or len(key) != 2:
-            raise TypeError(f"cutoff must have pairs of types as keys, got {shown(key)}")
+            raise TypeError(
+                f"cutoff must have pairs of types as keys, such as ('Si', 'O'), got {shown(key)}"
+            )
         length = as_number(value, where)
         if not (math.isfinite(length) and length >= 0.0):
             raise ValueError(f"{where} must be finite and not negative, got {length}")

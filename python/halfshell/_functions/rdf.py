@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.batch import check_no_batch
+from halfshell._convert.foreign import is_a, shown
 from halfshell._convert.given import Chosen
 from halfshell._convert.lengths import as_positive
 from halfshell._convert.marks import as_named_marks, binned
@@ -177,6 +178,10 @@ def rdf(
 
 
 def _edges(r_max: Any, bins: Any) -> FloatArray:
+    if is_a(bins, (list, tuple, np.ndarray)):
+        raise TypeError(
+            f"bins must be a whole number, got {shown(bins)}: pair_histogram takes edges"
+        )
     n_bins = as_count(bins, "bins")
     largest = as_positive(r_max, "r_max")
     # Of float64: edges, what numpy needs to make them, r, g and the shells.

@@ -76,9 +76,10 @@ class Box:
             or not 1 <= array.shape[0] <= MAX_DIM
             or array.shape[0] != array.shape[-1]
         ):
+            hint = ": one length does not say how many dimensions" if array.ndim == 0 else ""
             raise ValueError(
                 f"box must have shape (d,) or (d, d) with 1 <= d <= {MAX_DIM}, "
-                f"got {array.shape}"
+                f"got {array.shape}{hint}"
             )
         if array.shape == (6,):
             raise ValueError(

@@ -7,7 +7,7 @@ cells; `cell_pairs`, `cell_rows` and `cell_counts` have the searches, by what th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from halfshell._objects.cell_counts import CellCounts
 from halfshell._objects.cell_pairs import CellPairs
 from halfshell._objects.cell_rows import CellRows
 from halfshell._objects.origin import Origin
+from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,7 +136,10 @@ class CellList(CellPairs, CellRows, CellCounts):
         precision: Precision = "exact",
         threads: int | None = None,
         memory_limit: float | None = None,
+        **unknown: Never,
     ) -> None:
+        if unknown:
+            refuse_unknown(CellList, unknown)
         array, vectors, bits = as_scene(points, box, periodic)
         self._cutoff = as_cutoff(cutoff)
         self._cells = _core.cells_build(

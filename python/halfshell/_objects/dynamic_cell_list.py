@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Never
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from halfshell._convert.arrays import in_order
 from halfshell._convert.lengths import as_positive
 from halfshell._convert.options import as_flag
 from halfshell._convert.scene import as_own_box
+from halfshell._unknown import refuse_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -73,9 +74,7 @@ class DynamicCellList:
 
     Several threads may use one list: queries at the same time, changes one after the other. Each
     row of `within_many` is found in the list as it is at that time. A list that changes during an
-    iteration raises RuntimeError.
-
-    The order of results is not specified, but is the same after the same history.
+    iteration raises RuntimeError. The same history gives the same order of results.
 
     Examples
     --------
@@ -105,7 +104,10 @@ class DynamicCellList:
         max_radius: Number | None = None,
         inclusive: bool = True,
         tagged: bool = False,
+        **unknown: Never,
     ) -> None:
+        if unknown:
+            refuse_unknown(DynamicCellList, unknown)
         ndim, kind = dynamic.as_dim(dim), dynamic.as_storage(storage)
         vectors, bits = as_own_box(box, periodic, ndim)
         radius = 0.0 if max_radius is None else as_positive(max_radius, "max_radius")

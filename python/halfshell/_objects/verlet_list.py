@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from contextlib import suppress
-from typing import Any, Literal, NoReturn, TypedDict, Unpack, overload
+from typing import Any, Literal, Never, NoReturn, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from halfshell._objects.pair_changes import PairChanges, Step
 from halfshell._objects.skin import AutoSkin
 from halfshell._objects.tracked_steps import TrackedSteps
 from halfshell._objects.verlet_rows import VerletRows
+from halfshell._unknown import refuse_unknown
 
 
 class _PairOptions(TypedDict, total=False):
@@ -69,12 +70,10 @@ class VerletList(VerletRows):
     Notes
     -----
     Points may be wrapped into the box or not, at any time; the box may change in every step. The
-    points are copied, so you may change the array afterwards. The list is rebuilt whenever this is
-    needed (other points, another number or dtype of them, too large a deformation of the box);
-    that is not an error.
+    points are copied, so you may change the array afterwards. The list is rebuilt whenever needed
+    (other points, another number or dtype of them, too large a deformation of the box).
 
     A list pays only if it lasts for several steps: ``docs/verlet.md`` has measurements.
-
     Several threads may use one list; calls run one at a time. It cannot be copied or pickled.
 
     Examples
@@ -105,7 +104,10 @@ class VerletList(VerletRows):
         kernel: str | None = None,
         threads: int | None = None,
         memory_limit: float | None = None,
+        **unknown: Never,
     ) -> None:
+        if unknown:
+            refuse_unknown(VerletList, unknown)
         self._cutoff = as_length(as_cutoff(cutoff), "cutoff")
         self._auto = AutoSkin(self._cutoff) if isinstance(skin, str) and skin == "auto" else None
         self._skin = self._auto.skin if self._auto is not None else as_skin(skin)
@@ -359,8 +361,7 @@ class VerletList(VerletRows):
     def margin(self) -> float:
         """How much closer pairs may still come before the list is rebuilt, rounded down.
 
-        In the unit of the points; never negative; 0 without a list. RuntimeError before the first
-        `update`.
+        Never negative; 0 without a list. RuntimeError before the first `update`.
         """
         if self._searched is not None:
             return 0.0

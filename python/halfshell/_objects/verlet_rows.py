@@ -78,8 +78,8 @@ class VerletRows:
         check_letters(quantities)
         if not set(quantities) <= set("jdDS"):
             raise ValueError(
-                "quantities must be some of the letters j d D S, each at most once, got "
-                f"{quantities!r}"
+                "quantities must be some of the letters j d D S, each at most once (i is the row "
+                f"itself), got {quantities!r}"
             )
         index_bytes = as_index_bytes(index_dtype)
         more = "".join(letter for letter in quantities if letter != "j")

@@ -119,9 +119,9 @@ def test_without_a_box(boxless, box):
 
 
 def test_a_box_given_twice_is_refused(universe, box):
-    with pytest.raises(ValueError, match="box comes from the AtomGroup object itself"):
+    with pytest.raises(ValueError, match="of type AtomGroup bring their own box: leave box"):
         hs.pairs(universe.atoms, 2.0, box=box)
-    with pytest.raises(ValueError, match="box comes from the Universe object itself"):
+    with pytest.raises(ValueError, match="of type Universe bring their own box: leave box"):
         hs.pairs(universe, 2.0, batch=np.zeros(60, int), box=box[None])
 
 

@@ -115,6 +115,66 @@ def test_keywords_of_other_libraries_are_answered_with_ours(name):
         )
 
 
+def test_keywords_of_other_libraries_are_answered_by_classes_too():
+    for make, given, meant in [
+        (lambda **how: hs.CellList(POINTS, 1.0, **how), "pbc", "periodic"),
+        (lambda **how: hs.VerletList(1.0, **how), "cell", "box"),
+        (lambda **how: hs.DynamicCellList(3, 1.0, **how), "boxsize", "box"),
+        (lambda **how: hs.verify(POINTS, 1.0, [0], [1], **how), "pbc", "periodic"),
+    ]:
+        with pytest.raises(TypeError, match=rf"\w\(\) got .* '{given}': did you mean {meant}=\?$"):
+            make(**{given: None})
+
+
+class Universe:
+    trajectory = ()
+
+
+class Atoms:
+    positions, cell, pbc = POINTS, np.eye(3), [True] * 3
+
+    def __len__(self):
+        return 10
+
+    def __getitem__(self, k):
+        return self.positions[k]
+
+
+#: What newcomers try -> what the message says besides what is wrong.
+HINTS = {
+    r"got \(3, 10\): one row for each point, as in points\.T$": lambda: hs.pairs(POINTS.T, 1.0),
+    r"got \(3,\): one point is points\[None, :\]": lambda: hs.pairs(POINTS[0], 1.0),
+    r"points on a line are queries\[:, None\]$": lambda: hs.neighbors(
+        POINTS, 1.0, queries=POINTS[:, 0]
+    ),
+    r"as in reshape\(3, 3\)$": lambda: hs.pairs(POINTS, 1.0, box=np.eye(3).ravel()),
+    r"one length does not say how many dimensions$": lambda: hs.Box(5.0),
+    r"keys, such as \('Si', 'O'\), got 'Si-O'$": lambda: hs.pairs(
+        POINTS, {"Si-O": 1.0}, types=["Si"] * 10
+    ),
+    r"use np\.flatnonzero\(indices\)$": lambda: hs.neighbors(
+        POINTS, 1.0, indices=POINTS[:, 0] > 0.5
+    ),
+    r"got indices\[1\] = 10$": lambda: hs.neighbors(POINTS, 1.0, indices=[0, 10]),
+    r"one pair is \[\[i, j\]\]$": lambda: hs.pairs(POINTS, 1.0, exclude=[0, 1]),
+    r"pass a length for each point as radii$": lambda: hs.neighbors(POINTS, np.ones(10)),
+    r"\(i is the row itself\), got 'ijd'$": lambda: hs.neighbors(POINTS, 1.0, quantities="ijd"),
+    r"pair_histogram takes edges$": lambda: hs.rdf(POINTS, 1.0, bins=[0.0, 1.0], box=5.0),
+    r"did you mean neighbors\?$": lambda: hs.neighbours,
+    r"no point is its own neighbour, unless queries= are the points$": lambda: hs.neighbors(
+        POINTS, 1.0, include_self=True
+    ),
+    r"got Universe: pass its trajectory$": lambda: hs.trajectory_pairs(Universe(), 1.0),
+    r"several systems are one array of points, with batch$": lambda: hs.pairs([Atoms()] * 2, 1.0),
+}
+
+
+@pytest.mark.parametrize("hint", HINTS)
+def test_common_mistakes_are_answered_with_what_is_meant(hint):
+    with pytest.raises((TypeError, ValueError, AttributeError), match=hint):
+        HINTS[hint]()
+
+
 @pytest.mark.parametrize("search, given, message", [
     (hs.pairs, {"threds": 2}, "did you mean threads=?"),
     (hs.pairs, {"quantity": "ij"}, "did you mean quantities=?"),

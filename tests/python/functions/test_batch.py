@@ -188,7 +188,7 @@ def test_an_object_with_its_own_box(rng):
     expected, _ = one_by_one(points, 1.0, batch, box=[2.0, 3.0, 4.0], periodic=[True, True, False])
     assert same_arrays(hs.pairs(atoms, 1.0, batch=batch), expected)
     for box in (np.ones((3, 3, 3)), [2.0, 3.0, 4.0]):
-        with pytest.raises(ValueError, match="box comes from the Atoms object"):
+        with pytest.raises(ValueError, match="of type Atoms bring their own box: leave box"):
             hs.pairs(atoms, 1.0, batch=batch, box=box)
 
 

@@ -294,7 +294,7 @@ BAD = [
     ({"groups": np.array([2**64 - 1, 0, 0], np.uint64)}, ValueError, "groups must be less than"),
     ({"query_groups": [0]}, ValueError, "query_groups needs queries"),
     ({"exclude": [0.5, 1, 2]}, TypeError, "exclude must hold integers"),
-    ({"exclude": [0, 1]}, ValueError, r"exclude must have shape \(3,\)"),
+    ({"exclude": [0, 1]}, ValueError, r"exclude must have shape \(k, 2\), .* or \(3,\)"),
     ({"exclude": [[0, 1, 2]]}, ValueError, r"exclude must have shape \(k, 2\)"),
     ({"exclude": [[0, 3]]}, ValueError, r"exclude\[:, 1\] must be numbers of points, from 0 to 2"),
     ({"exclude": [[-1, 0]]}, ValueError, r"exclude\[:, 0\] must be numbers of points"),

@@ -127,7 +127,7 @@ def test_atoms(skin):
         for k, points in enumerate(walk(4))
     ]
     check(follow(frames, skin=skin), [fresh(atoms) for atoms in frames])
-    with pytest.raises(ValueError, match="box comes from the Atoms object itself"):
+    with pytest.raises(ValueError, match="of type Atoms bring their own box: leave box"):
         next(follow(frames, skin=skin, box=3.0))
 
 
@@ -302,7 +302,7 @@ def test_periodic_needs_a_box_and_none_of_its_own(skin):
     with pytest.raises(ValueError, match="periodic needs a box"):
         next(follow(walk(1), skin=skin, periodic=True))
     atoms = ase.Atoms("C80", positions=walk(1)[0], cell=SKEWED, pbc=True)
-    with pytest.raises(ValueError, match="periodic comes from the Atoms object"):
+    with pytest.raises(ValueError, match="of type Atoms bring their own box: leave periodic"):
         next(follow([atoms], skin=skin, periodic=True))
     frames = [(points, SKEWED) for points in walk(3)]
     periodic = [True, False, True]

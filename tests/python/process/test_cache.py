@@ -91,11 +91,19 @@ def test_parts_of_a_result_live_on_alone():
 
 
 @pytest.mark.parametrize(
-    ("limit", "error"), [(-1, ValueError), (1.5, TypeError), (True, TypeError)]
-)
+    ("limit", "error"),
+    [(-1, ValueError), (-0.5, ValueError), (np.nan, ValueError), ("1", TypeError),
+     (True, TypeError), (np.True_, TypeError)],
+)  # fmt: skip
 def test_bad_limits(limit, error):
     with pytest.raises(error, match="limit must"):
         hs.set_cache_limit(limit)
+
+
+def test_limits_may_be_floats_as_memory_limits_are():
+    before = hs.set_cache_limit(2e6)
+    assert hs.set_cache_limit(np.inf) == 2_000_000
+    assert hs.set_cache_limit(before) == 2**63 - 1
 
 
 def test_arrays_of_results_can_be_pickled_viewed_and_resized_away():
