@@ -98,7 +98,7 @@ def giant(size: Size) -> Scene:
 
 @add({"balls-equal": ("fcc crystal of equal balls that reach the eighth shell",)}, kind="radii")
 def equal(size: Size) -> Scene:
-    """All sizes the same: what one cutoff does, down to the ties, and no slower."""
+    """All sizes are equal: the answer of a single cutoff, down to the ties, and no slower."""
     repeats = (pick(size, 3, 8, 20),) * 3
     points, rows = sites(4 * np.eye(3, dtype=np.int64), FCC, repeats)
     return Scene(
@@ -109,7 +109,7 @@ def equal(size: Size) -> Scene:
 
 @add({"balls-zero": ("points of radius 0 on, in and outside balls",)}, kind="radii")
 def zero(size: Size) -> Scene:
-    """A size of 0 has no octave, and no cell as wide as it; it meets balls, and its own kind at 0.
+    """A radius of 0 belongs to no octave; such points meet balls, and each other at distance 0.
 
     Half of the points have no extent; some of them are at one place, some exactly on a sphere.
     """

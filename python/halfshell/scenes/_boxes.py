@@ -93,7 +93,7 @@ def left_handed(size: Size) -> Scene:
 
 @add({"rotated-box": ("cube turned by a general angle",)})
 def rotated(size: Size) -> Scene:
-    """A cube whose vectors have no zeros: code for upper or lower triangles does not do."""
+    """A cube whose vectors have no zeros: code that expects triangular matrices fails."""
     return _filled(size, 15, ROTATION)
 
 

@@ -86,7 +86,7 @@ def two_clusters(size: Size) -> Scene:
 
 @add({"two-clusters-periodic": ("two clusters a billion cutoffs apart, in a periodic box",)})
 def two_clusters_periodic(size: Size) -> Scene:
-    """The same in a box, where bounds of the points are no way out."""
+    """The same in a box, where the bounds of the points do not help."""
     return Scene(_two_clusters(size), 5.0, np.full(3, 1e10), CUBE)
 
 
@@ -114,7 +114,7 @@ def sphere(size: Size) -> Scene:
 
 @add({"dense-core": ("a thin gas around a lump within one cutoff",)})
 def dense_core(size: Size) -> Scene:
-    """One cell in which every pair counts, among cells that hold hardly a point each."""
+    """One cell in which every pair counts, among cells with hardly a point in them."""
     points, edge = cube(size, 51)
     lump = points[: len(points) // pick(size, 2, 10, 40)]
     lump[:] = 0.5 * edge + (0.02 / edge) * lump
@@ -140,7 +140,7 @@ def coincident(size: Size) -> Scene:
 
 @add({"twice": ("every point twice",)})
 def twice(size: Size) -> Scene:
-    """Coincident points among others: two of them are a pair at distance 0, one alone is none."""
+    """Coincident points among others: each has a twin at distance 0, none is its own neighbour."""
     points, edge = cube(size, 33)
     half = points[: len(points) // 2]
     return Scene(np.concatenate([half, half]), 5.0, np.full(3, edge), CUBE)
@@ -148,7 +148,7 @@ def twice(size: Size) -> Scene:
 
 @add({"stacked": ("points in stacks of fifty at one place each",)})
 def stacked(size: Size) -> Scene:
-    """Crowded cells among empty ones: no cell size parts points at one place."""
+    """Crowded cells among empty ones: no cell size separates points at the same place."""
     points, edge = cube(size, 34)
     places = points[: len(points) // 50]
     return Scene(np.tile(places, (50, 1)), 1.0, np.full(3, edge), CUBE)
@@ -156,11 +156,11 @@ def stacked(size: Size) -> Scene:
 
 @add({"one-cell": ("all points within one cutoff",)})
 def one_cell(size: Size) -> Scene:
-    """A grid that has nothing to select: every pair counts, and cells only cost."""
+    """A grid cannot select anything: every pair counts, and cells only cost time."""
     return Scene(stream(35)((pick(size, 100, 1000, 4000), 3)), 2.0)
 
 
 @add({"few-cells": ("cutoff half the extent of the points",)})
 def few_cells(size: Size) -> Scene:
-    """A grid that selects hardly anything: a quarter of all pairs count."""
+    """A grid selects hardly anything: a quarter of all pairs count."""
     return Scene(stream(36)((pick(size, 100, 1000, 6000), 3)) * 10.0, 5.0)

@@ -12,7 +12,7 @@ from halfshell.scenes._scene import Scene, Size, pick
 
 @add({"cutoff-tiny": ("cutoff a millionth of the box",)})
 def tiny(size: Size) -> Scene:
-    """Cells of the size of the cutoff would be 1e18: memory must follow points, not volume.
+    """There would be 1e18 cells as wide as the cutoff: memory must follow points, not volume.
 
     Points come in pairs, about half of which are within the cutoff.
     """
@@ -24,7 +24,7 @@ def tiny(size: Size) -> Scene:
 
 @add({"cutoff-zero": ("cutoff 0: pairs are points at one place",)})
 def zero(size: Size) -> Scene:
-    """A cutoff that no cell size or relative margin can be made from.
+    """Neither a cell size nor a relative margin can be derived from this cutoff.
 
     Each point is there twice, the second time moved by whole box vectors.
     """
@@ -49,7 +49,7 @@ def thirty(size: Size) -> Scene:
 
 @add({"cutoff-2-boxes": ("a small cell, cutoff beyond two boxes",)})
 def cell(size: Size) -> Scene:
-    """A unit cell as simulations of crystals have it: each pair in dozens of images."""
+    """A unit cell as in simulations of crystals: each pair occurs in dozens of images."""
     n = pick(size, 8, 80, 200)
     return Scene(stream(20)((n, 3)) * 5.43, 12.0, np.full(3, 5.43), CUBE)
 

@@ -14,7 +14,7 @@ from halfshell.scenes._scene import Scene, Size, pick
 
 @add({"uniform": ("points uniform in a periodic cube",)})
 def uniform(size: Size) -> Scene:
-    """Nothing: the reference that the others are held against. About 52 neighbours a point."""
+    """Nothing: the reference with which the others are compared. About 52 neighbours a point."""
     points, edge = cube(size, 1)
     return Scene(points, 5.0, np.full(3, edge), CUBE)
 
