@@ -87,7 +87,7 @@ def stages():
     d = np.sqrt((D * D).sum(axis=2)).min(axis=1)
     gathered = ((points > 1.0) & (points < 4.0)).all(axis=1)
     band = 0.06  # a few millionths in truth
-    fig, axes = plt.subplots(1, 3, figsize=(9.6, 3.7), layout="constrained")
+    fig, axes = plt.subplots(1, 3, figsize=(9.6, 4.0), layout="constrained")
     steps = (
         ("gather: points of cells in reach", gathered, np.zeros_like(gathered)),
         ("filter in float32: within, beyond,\nor too close to call", gathered & (d < 1.0 - band),
@@ -132,7 +132,7 @@ def images():
 def levels():
     """Points of two sizes: one grid for the large, another for the small."""
     rng = np.random.default_rng(1)
-    small = rng.random((60, 2)) * 6.0
+    small = 0.2 + rng.random((60, 2)) * 5.6
     large = np.array([[1.6, 3.9], [4.3, 1.7]])
     fig, axes = plt.subplots(1, 2, figsize=(8.0, 4.3), layout="constrained")
     for ax, width, title in (
