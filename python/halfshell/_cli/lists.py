@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell._cli.errors import InputError, one_line
 from halfshell._cli.files import Scene, read_scene
-from halfshell._cli.output import open_output, write_columns
+from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,
     load_frames,
@@ -46,11 +46,19 @@ class Found(NamedTuple):
 def run_neighbors(args: Namespace) -> int:
     """Carry out ``halfshell neighbors``."""
 
+    for name, given in (("--quantities", args.quantities), ("--max-output", args.max_output)):
+        if given and not args.output:
+            raise InputError(f"{name} is about what -o writes: give -o as well")
+
     def find(scene: Scene, cutoff: float, asking: Scene, options: dict[str, Any]) -> Found:
         letters = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")
         if not set(letters) <= set("ijdDS"):
             raise InputError(f"--quantities {letters}: rows have some of the letters i j d D S")
         wanted = letters.replace("i", "") or "j"
+        if args.output:
+            n_rows = int(hs.coordination(scene.points, cutoff, **options).sum())
+            n, ndim = scene.points.shape
+            check_size(args.output, letters, n_rows, n, ndim, args.max_output)
         table = hs.neighbors(scene.points, cutoff, quantities=wanted, **options)
         arrays = table.to_pairs(quantities=letters)
         columns = dict(zip(letters, (arrays,) if len(letters) == 1 else arrays, strict=True))

@@ -183,6 +183,13 @@ def _add_threads(command: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_max_output(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--max-output", type=values.size, metavar="SIZE",
+        help="largest output, such as 500MB or 4GB; default: 1GB"
+    )  # fmt: skip
+
+
 def _add_no_progress(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--no-progress", dest="progress", action="store_false", help="no progress bar"
@@ -206,10 +213,7 @@ def _add_pairs(commands: Any) -> None:
         help="columns of OUT, any of i j d D S P; default: ijdS, or ijd without a box",
     )
     command.add_argument("--sort", action="store_true", help="sort OUT by (i, j, S)")
-    command.add_argument(
-        "--max-output", type=values.size, metavar="SIZE",
-        help="largest output, such as 500MB or 4GB; default: 1GB"
-    )
+    _add_max_output(command)
     command.add_argument("--plot", metavar="PNG", help="draw g(r): .png, .pdf or .svg")
     command.add_argument(
         "--precision",
@@ -251,6 +255,7 @@ def _add_lists(commands: Any) -> None:
                 "--quantities", type=values.quantities, metavar="LETTERS",
                 help="columns of OUT, any of i j d D S; default: ijdS, or ijd without a box",
             )  # fmt: skip
+            _add_max_output(command)
         if name == "nearest":
             command.add_argument("-k", type=values.count, default=1, help="how many; default: 1")
         if name == "rdf":

@@ -19,6 +19,8 @@ from halfshell._cli.files import replacing
 
 __all__ = ["check_size", "open_output", "write_columns", "write_csv"]
 
+MOST_BYTES = 1e9  # of an output, unless --max-output says otherwise
+
 # About how many characters a number has in text, with what separates it from the next.
 _DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT = 19, 3
 _ROWS = 1 << 16  # written at a time: some megabytes of text
@@ -51,9 +53,10 @@ def open_output(
 
 
 def check_size(
-    target: str, letters: str, n_pairs: int, n_points: int, ndim: int, most: float
+    target: str, letters: str, n_pairs: int, n_points: int, ndim: int, most: float | None
 ) -> None:
     """InputError for an output that would be larger than `most` bytes, told beforehand."""
+    most = MOST_BYTES if most is None else most
     in_text = not target.lower().endswith((".npz", ".parquet"))
     number = (len(str(n_points)) + 1, _DIGITS_OF_FLOAT, _DIGITS_OF_SHIFT) if in_text else (8, 8, 4)
     of_each = {

@@ -31,7 +31,6 @@ from halfshell._terminal import printable
 
 __all__ = ["run"]
 
-MOST_BYTES = 1e9  # of an output, unless --max-output says otherwise
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,7 @@ def _check_size(scene: Scene, cutoff: float, letters: str, args: Namespace) -> N
         n_pairs = hs.count_pairs(scene.points, cutoff, **_options(scene, args))
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise InputError(f"{scene.source}: {one_line(error)}") from None
-    most = MOST_BYTES if args.max_output is None else args.max_output
-    check_size(args.output, letters, n_pairs, n, ndim, most)
+    check_size(args.output, letters, n_pairs, n, ndim, args.max_output)
 
 
 def _search(scene: Scene, cutoff: float, letters: str, args: Namespace) -> dict[str, NDArray[Any]]:

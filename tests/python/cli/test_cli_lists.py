@@ -230,10 +230,44 @@ def test_large_outputs_are_told_beforehand(run, tmp_path):
         assert status == 2 and "is not a size such as 500MB or 4GB" in err
 
 
+def test_large_rows_are_told_beforehand(run, tmp_path):
+    points, output = tmp_path / "points.npy", tmp_path / "all.npz"
+    np.save(points, np.random.default_rng(0).random((400, 3)))
+    search = ("neighbors", points, "--cutoff", "2", "-o", output, "--quantities", "jd")
+    status, _, err = run(*search, "--max-output", "1MB")
+    assert status == 2 and "would have 159,600 pairs in about 2.55 MB, more than" in err
+    assert not output.exists() and run(*search)[0] == 0 and output.exists()
+
+
 @pytest.mark.parametrize("option", [["--sort"], ["--quantities", "ij"], ["--max-output", "1kB"]])
 def test_options_that_would_be_ignored_are_errors(run, option):
-    status, _, err = run("pairs", "--cutoff", "1.7", *option)
-    assert status != 0 and f"{option[0]} is about what -o writes: give -o as well" in err
+    for command in ("pairs", "neighbors"):
+        status, _, err = run(command, "--cutoff", "1.7", *option)
+        assert status == 2
+        if command == "pairs" or option[0] != "--sort":
+            assert f"{option[0]} is about what -o writes: give -o as well" in err
+
+
+@pytest.mark.parametrize("args, words", [
+    (["pairs", "--index", "2"], "--index is about a file: give one"),
+    (["verify", "--format", "xyz"], "--format is about a file: give one"),
+    (["pairs", "--cuttoff", "2"], "unrecognized arguments: --cuttoff; did you mean --cutoff?"),
+    (["pears"], "did you mean pairs?"),
+    (["pairs", "x.npy", "--box", "10", "10", "10"], "10 10; numbers of one option are separated"),
+    (["verify", "--sample", "-3"], "argument --sample: -3 is negative"),
+    (["pairs", "--index", ":"], "is not a whole number, the number of a frame; only rdf reads"),
+    (["report", "--methods", "exat"], "choose from exact, verlet, double, single, float32, stale"),
+    (["report", "--peers", "vessin"], "choose from vesin, cKDTree, neighborlist-rs,"),
+    (["report", "--scenes", "zzz"], "space-8d, sc-shell, fcc-shell, ... (86 in all)"),
+])  # fmt: skip
+def test_what_is_probably_meant(run, args, words):
+    status, out, err = run(*args)
+    assert (status, out) == (2, "") and words in err and err.count("\n") == 1
+
+
+def test_a_folder_is_no_file(run, tmp_path):
+    status, _, err = run("pairs", tmp_path)
+    assert status == 2 and err == f"halfshell: error: {tmp_path}: is a folder\n"
 
 
 @pytest.mark.parametrize("word", ["nan", "inf", "-Infinity"])
