@@ -179,7 +179,7 @@ def verify(
     elif j is None:
         raise TypeError("j must be given, unless i is a NeighborTable")
     elif full and is_directed:
-        raise ValueError("full is about pairs without a direction: leave it, queries or rule out")
+        raise ValueError("full is for pairs without a direction: leave out full, queries or rule")
     rows = _rows(i, j, S, array, asking)
     right = _right(array, asking, bound, reach, how)
     expected = right.rows(with_shifts=S is not None)

@@ -106,7 +106,7 @@ def read_scene(
     if file is None:
         for option, value in (("--index", index), ("--format", file_format)):
             if value is not None:
-                raise InputError(f"{option} is about a file: give one")
+                raise InputError(f"{option} needs a file: give one")
         scene = _shipped_scene()
     elif not os.path.exists(file):
         raise InputError(f"{file}: no such file")
@@ -186,7 +186,7 @@ def _read_numpy(file: str, index: int | None) -> Scene:
         if "Object arrays" in reason:
             reason = "it holds Python objects"
         elif "pickled" in reason:  # NumPy's guess where it knows no better
-            reason = "it is none"
+            reason = "it is not one"
         raise InputError(f"{file}: cannot be read as a NumPy file: {reason}") from None
     if "points" not in content:
         held = ", ".join(map(printable, names)) or "nothing"

@@ -48,7 +48,7 @@ def run_neighbors(args: Namespace) -> int:
 
     for name, given in (("--quantities", args.quantities), ("--max-output", args.max_output)):
         if given and not args.output:
-            raise InputError(f"{name} is about what -o writes: give -o as well")
+            raise InputError(f"{name} is for what -o writes: give -o as well")
 
     def find(scene: Scene, cutoff: float, asking: Scene, options: dict[str, Any]) -> Found:
         letters = args.quantities or ("ijdS" if any(scene.periodic) else "ijd")

@@ -69,7 +69,7 @@ def run(args: Namespace) -> int:
         ("--quantities", args.quantities), ("--sort", args.sort), ("--max-output", args.max_output)
     ):  # fmt: skip
         if given and not args.output:
-            raise InputError(f"{name} is about what -o writes: give -o as well")
+            raise InputError(f"{name} is for what -o writes: give -o as well")
 
     with ExitStack() as stack:
         output = open_output(args.output, args.file, stack, json=args.json)

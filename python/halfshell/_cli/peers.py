@@ -68,7 +68,7 @@ def _ask_scipy(library: Library, scene: Scene, cutoff: float) -> PairList:
     lengths = np.zeros(question.dim)  # 0: the axis does not repeat
     if question.rows is not None:
         if not question.orthorhombic or (np.diag(question.rows)[list(scene.periodic)] < 0).any():
-            raise InputError(f"{scene.source}: scipy has no boxes with other than right angles")
+            raise InputError(f"{scene.source}: scipy has only boxes with right angles")
         lengths = np.where(scene.periodic, np.diag(question.rows), 0.0)
         if wrapped(question)[1]:
             raise InputError(f"{scene.source}: scipy wants all points in the box [0, L)")
@@ -139,6 +139,6 @@ def ask_peer(peer: Peer, scene: Scene, cutoff: float) -> PairList:
         raise
     except Exception as error:  # a library may refuse a scene in any way
         raise InputError(
-            f"{scene.source}: {peer.package} gives no list: "
+            f"{scene.source}: {peer.package} returned no list: "
             f"{type(error).__name__}: {one_line(error)}"
         ) from None

@@ -138,7 +138,7 @@ def nodes_of(lists: Sequence[NodeList]) -> tuple[Nodes, FloatArray, FloatArray]:
         )
         raise ValueError(
             f"H must be lengths in all lists, or matrices in all: {flat!r} has matrices, "
-            f"{round_!r} has lengths, of which 1 / h is no float64 as a rule"
+            f"{round_!r} has lengths, whose 1 / h is usually not a float64"
         )
     counts = np.array([one.n_nodes for one in lists], np.int64)
     if counts.sum() >= 2**31:

@@ -258,7 +258,7 @@ class PairTable:
             return self._index_of_image(int(first[0]), int(end[0]), ranks, shift)
         if (end - first > 1).any():
             missing = tuple(rows[np.flatnonzero(end - first > 1)[0]].tolist())
-            raise ValueError(f"{missing} is a pair in several images: say which by shift")
+            raise ValueError(f"{missing} is a pair in several images: choose one by shift")
         return int(first[0]) if np.ndim(pair) == 1 else first.astype(np.int64)
 
     def _index_of_image(

@@ -2,9 +2,9 @@
 """Neighbour lists in place of those of ``ase.neighborlist``.
 
 All have ASE's arguments, units, dtypes and shapes, and its rule: a pair counts if it is closer
-than the cutoff, or than the sum of the radii of its two atoms (``<``). Here that is decided for the
-real numbers that the floats are, where ASE compares rounded distances with rounded sums; so the
-lists differ where rounding decides ASE's.
+than the cutoff, or than the sum of the radii of its two atoms (``<``). Here that is decided for
+the exact values of the floats, while ASE compares rounded distances with rounded sums. So the lists
+differ if rounding decides ASE's.
 
 The order is ascending (i, j, S), always. ASE promises ascending i alone.
 

@@ -3,7 +3,7 @@
 
 The functions have matscipy's arguments, quantities, dtypes and shapes, and its rule: a pair counts
 if it is closer than the cutoff, or than the sum of the radii of its two atoms (``<``). Here that is
-decided for the real numbers that the floats are.
+decided for the exact values of the floats.
 
 The order is ascending (i, j, S), always; matscipy promises ascending i alone. Points in a plane or
 on a line need no cell here: matscipy shrinks one around them, which has no volume, and fails.

@@ -2,8 +2,8 @@
 """Drop-ins for `MDAnalysis.lib.distances`: pairs within a cutoff, in their nearest images.
 
 As there, coordinates and box are float32, and a pair counts up to `max_cutoff` and beyond
-`min_cutoff`. There rounded distances decide, and how they are rounded depends on the method; here
-the real numbers that these float32 are do. Pairs are in an order that is not specified.
+`min_cutoff`. MDAnalysis compares rounded distances, and the rounding depends on its method; here
+the exact values of the float32 numbers decide. The order of the pairs is not specified.
 """
 
 from __future__ import annotations

@@ -3,9 +3,8 @@
 
 They are subclasses of SciPy's, with its arguments, attributes, dtypes, shapes and errors, and its
 rule: a pair counts up to the radius, that included (``<=``), and a nearest neighbour if it is
-closer than `distance_upper_bound` (``<``). Here that is decided for the real numbers that the
-floats are, where SciPy compares rounded squares; so the answers differ where rounding decides
-SciPy's.
+closer than `distance_upper_bound` (``<``). Here that is decided for the exact values of the
+floats, while SciPy compares rounded squares. So the answers differ if rounding decides SciPy's.
 
 With `boxsize` the nearest image of a point counts, as there. SciPy itself answers what is not
 decided here: `p` other than 2, `eps` above 0, more than 8 dimensions, radii that are negative or

@@ -3,7 +3,7 @@
 
 The transformers are subclasses of scikit-learn's, with its parameters, attributes, checks and
 sparse matrices, and its rule: a sample is a neighbour if its distance is at most the radius
-(``<=``). Here that is decided for the real numbers that the floats are, and no tree is built.
+(``<=``). Here that is decided for the exact values of the floats, and no tree is built.
 
 Euclidean distances of dense samples with at most 8 features are found by `halfshell`; other metrics
 and more features go on to scikit-learn.

@@ -430,7 +430,7 @@ def test_unreadable_files_are_refused(refusal, tmp_path):
     (tmp_path / "empty.npy").write_bytes(b"")
     assert "empty.npy: is empty" in refusal("pairs", tmp_path / "empty.npy")
     (tmp_path / "text.npz").write_text("hello")
-    assert "as a NumPy file: it is none" in refusal("pairs", tmp_path / "text.npz")
+    assert "as a NumPy file: it is not one" in refusal("pairs", tmp_path / "text.npz")
     np.save(tmp_path / "objects.npy", np.array([None]), allow_pickle=True)
     assert "Python objects" in refusal("pairs", tmp_path / "objects.npy")
     (tmp_path / "folder.npy").mkdir()
@@ -640,7 +640,7 @@ def test_a_peer_that_fails_is_an_error_in_one_line(monkeypatch, refusal, npz):
 
     monkeypatch.setitem(cli_peers.PEERS, "oracle", cli_peers.Peer((), "oracle", ask))
     line = refusal("verify", npz, "--against", "oracle")
-    assert "oracle gives no list: RuntimeError: no list" in line
+    assert "oracle returned no list: RuntimeError: no list" in line
 
 
 def test_large_scene_is_sampled_and_says_so(command, npz):

@@ -245,12 +245,12 @@ def test_options_that_would_be_ignored_are_errors(run, option):
         status, _, err = run(command, "--cutoff", "1.7", *option)
         assert status == 2
         if command == "pairs" or option[0] != "--sort":
-            assert f"{option[0]} is about what -o writes: give -o as well" in err
+            assert f"{option[0]} is for what -o writes: give -o as well" in err
 
 
 @pytest.mark.parametrize("args, words", [
-    (["pairs", "--index", "2"], "--index is about a file: give one"),
-    (["verify", "--format", "xyz"], "--format is about a file: give one"),
+    (["pairs", "--index", "2"], "--index needs a file: give one"),
+    (["verify", "--format", "xyz"], "--format needs a file: give one"),
     (["pairs", "--cuttoff", "2"], "unrecognized arguments: --cuttoff; did you mean --cutoff?"),
     (["pears"], "did you mean pairs?"),
     (["pairs", "x.npy", "--box", "10", "10", "10"], "10 10; numbers of one option are separated"),

@@ -283,7 +283,7 @@ OF_QUERIES = hs.neighbors([[0.0], [1.0], [3.0]], 2.0, queries=[[0.0], [1.0]])
         ({"i": TABLE[:2]}, ValueError, "rows of this one are of queries"),
         ({"i": OF_QUERIES, "queries": [[0.0]]}, ValueError, "table of 2 rows, got 1 queries"),
         ({"i": [0]}, TypeError, "j must be given"),
-        ({"i": [0], "j": [0], "queries": [[0.0]], "full": True}, ValueError, "full is about"),
+        ({"i": [0], "j": [0], "queries": [[0.0]], "full": True}, ValueError, "full is for"),
         ({"i": [1], "j": [0], "queries": [[0.0]]}, ValueError, "i must be numbers of queries"),
         ({"i": [0], "j": [0], "queries": []}, ValueError, "there are no queries"),
         ({"i": hs.neighbors([[0.0], [1.0], [3.0]], 2.0, quantities="d")}, AttributeError, "'j'"),

@@ -44,7 +44,7 @@ class ReportRow:
         Of the library.
     rule : str
         ``<=`` or ``<``: whether a pair at exactly the cutoff counts for this method. The truth
-        it is held against follows the same rule.
+        it is compared with follows the same rule.
     status : str
         One of `STATUSES`; all but "ok" come with a `note` and without figures.
     note : str
@@ -64,7 +64,7 @@ class ReportRow:
     missed, spurious, duplicate : int
         Wrong pairs.
     sampled : int
-        Pairs whose d and D were held against rational arithmetic.
+        Pairs whose d and D were compared with rational arithmetic.
     d_max_ulp, d_rms_ulp, d_max_relative, d_rms_relative : float
         Error of d against the true distance rounded once, in its units in the last place, and
         over the distance.

@@ -25,7 +25,7 @@ __all__ = ["EveryStep", "Lists", "Run", "Stale", "Verlet", "run_nve"]
 
 Floats = NDArray[np.float64]
 
-_LOOKS = 8  # steps at which the list is held against the truth, the last one among them
+_LOOKS = 8  # steps at which the list is compared with the truth, the last one among them
 _LAST_LOOKS = 64  # and at most so many steps that are the last ones of their list
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every pair of a scene, certainly: the list that all others are held against.
+"""Every pair of a scene, certainly: the list that all others are compared with.
 
 Nothing here calls the compiled core of this package. SciPy's k-d tree proposes the pairs within
 the cutoff and a margin (`replicas` says what it is made of and why it suffices); those nearer to
