@@ -43,7 +43,7 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
 
 def _hint_of_shape(values: Any, shape: tuple[int, ...], name: str) -> str:
     """What may be meant by points of this shape, if it is clear."""
-    if is_a(values, (list, tuple)) and values and brings_its_box(values[0], name):
+    if type(values) in (list, tuple) and values and brings_its_box(values[0], name):
         return ": several systems are one array of points, with batch"
     if len(shape) == 2 and 1 <= shape[0] <= MAX_DIM < shape[1]:
         return f": one row for each point, as in {name}.T"
