@@ -84,7 +84,7 @@ def bricks(
     """
     scene = divided(points, as_cutoff(cutoff), n, box, periodic)
     return dask.delayed(brick_tasks.bricks_of, pure=True)(
-        scene.each(brick_tasks.brick_of), scene.division
+        scene.division, *scene.each(brick_tasks.brick_of)
     )
 
 
@@ -208,7 +208,7 @@ def neighbors(
     scene = divided(points, as_cutoff(cutoff), n, box, periodic, kernel=kernel)
     options = options_of(inclusive, kernel, threads, memory_limit)
     found = scene.each(brick_tasks.neighbors_of, quantities, options)
-    table = dask.delayed(brick_tasks.table_of, pure=True)(found, quantities, scene.division)
+    table = dask.delayed(brick_tasks.table_of, pure=True)(quantities, scene.division, *found)
     if as_flag(sort, "sort"):
         found = scene.in_ranges(found)
     rows, counts = (joined(found, 0, place, (math.nan,), np.int64) for place in (0, 1))
@@ -311,8 +311,8 @@ def count_pairs(
     largest = float(np.max(cutoffs, initial=0.0)) if np.ndim(cutoffs) else float(cutoffs)
     scene = divided(points, largest, n, box, periodic, kernel=kernel)
     options = options_of(inclusive, kernel, threads, memory_limit)
-    doubled = scene.each(brick_tasks.counts_of, cutoffs, scene.box, options)
-    total = dask.delayed(brick_tasks.half_sum, pure=True)(doubled)
+    counts = scene.each(brick_tasks.counts_of, cutoffs, scene.box, options)
+    total = dask.delayed(brick_tasks.total, pure=True)(*counts)
     return da.from_delayed(total, np.shape(cutoffs), np.int64)
 
 
@@ -358,6 +358,6 @@ def pair_histogram(
     scene = divided(points, float(limits[-1]), n, box, periodic, kernel=kernel)
     options = options_of(True, kernel, threads, memory_limit)
     del options["inclusive"]
-    doubled = scene.each(brick_tasks.histogram_of, limits, scene.box, options)
-    total = dask.delayed(brick_tasks.half_sum, pure=True)(doubled)
+    counts = scene.each(brick_tasks.histogram_of, limits, scene.box, options)
+    total = dask.delayed(brick_tasks.total, pure=True)(*counts)
     return da.from_delayed(total, (len(limits) - 1,), np.int64)

@@ -13,15 +13,8 @@ from halfshell._convert.foreign import kind_of
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.scene import as_own_box, as_points
 from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike
-from halfshell._functions.brick_plan import (
-    Division,
-    Piece,
-    Summary,
-    divide,
-    joined,
-    split,
-    summary,
-)
+from halfshell._functions.brick_pieces import Piece, joined, split
+from halfshell._functions.brick_plan import Division, Summary, divide, summary
 from halfshell._functions.counts import count_pairs
 from halfshell._objects.brick import Brick
 
@@ -129,7 +122,7 @@ def exchange(
     for rank, one in enumerate(comm.allgather(error)):
         if one is not None:
             raise _plain(one, f"rank {rank}: ")
-    return Exchanged(*joined(comm.alltoall(pieces), division))
+    return Exchanged(*joined(division, *comm.alltoall(pieces)).in_order())
 
 
 def _given(
@@ -178,7 +171,7 @@ def _divided(given: list[_Given]) -> Division:
     # Refuses what a search would refuse.
     count_pairs(np.empty((0, ndim)), first.cutoff, box=vectors, periodic=flags)
     summaries = [one.summary for one in given if one.summary is not None]
-    return divide(summaries, first.cutoff, len(given), vectors, tuple(flags or [False] * ndim))
+    return divide(first.cutoff, len(given), vectors, tuple(flags or [False] * ndim), *summaries)
 
 
 def _plain(error: Exception, whose: str) -> Exception:

@@ -1,26 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Division of points that are in pieces, none of which sees the others.
 
-Each piece is summed up; the summaries say where bricks are cut; each piece is then split into what
-it gives to every brick. Any cuts are right: a sample of the points only makes bricks of about equal
-size.
+Each piece is summed up; the summaries say where bricks are cut. Any cuts are right: a sample of the
+points only makes bricks of about equal size.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from halfshell._functions.brick_places import Axes, axes_of, within
-from halfshell._objects.brick import Brick
+from halfshell._functions.brick_places import Axes, axes_of
 
 Array = npt.NDArray[Any]
-Bits = npt.NDArray[np.bool_]
-Numbers = npt.NDArray[np.int64]
 
 # Points of each piece, and of all pieces, by which bricks are cut: not many more than these.
 _SAMPLE, _SAMPLES = 1 << 13, 1 << 22
@@ -59,14 +55,6 @@ class Division(NamedTuple):
     scene: tuple[Any, tuple[bool, ...]]
 
 
-class Piece(NamedTuple):
-    """What one piece of the points gives to one brick, ascending by number."""
-
-    numbers: Numbers
-    points: Array
-    is_owned: Bits
-
-
 def summary(points: Array, n_pieces: int) -> Summary:
     """Sum up one of some pieces; points are named by their places in it."""
     n_points = len(points)
@@ -82,9 +70,8 @@ def summary(points: Array, n_pieces: int) -> Summary:
 
 
 def divide(
-    summaries: Sequence[Summary], cutoff: float, n_bricks: int, vectors: Any,
-    flags: tuple[bool, ...],
-) -> Division:  # fmt: skip
+    cutoff: float, n_bricks: int, vectors: Any, flags: tuple[bool, ...], *summaries: Summary
+) -> Division:
     """Where to cut; raises what is wrong with the first piece that has an error."""
     ends = np.cumsum([0, *(one.n_points for one in summaries)], dtype=np.int64).tolist()
     for one, first in zip(summaries, ends, strict=False):
@@ -98,9 +85,7 @@ def divide(
     high = np.where(flags, 1.0, np.inf)
     bricks = iter(range(n_bricks))
     cuts = _cut(places, weights, n_bricks, (low, high), axes.widths, bricks)
-    return Division(
-        cuts, n_bricks, axes, tuple(ends[:-1]), ends[-1], cutoff, (vectors, flags)
-    )
+    return Division(cuts, n_bricks, axes, tuple(ends[:-1]), ends[-1], cutoff, (vectors, flags))
 
 
 def _cut(
@@ -129,44 +114,6 @@ def _cut(
         _cut(places[:, ~is_below], weights[~is_below], n_parts - first, (begins, high), widths,
              bricks),
     )  # fmt: skip
-
-
-def split(points: Array, division: Division, place: int) -> list[Piece]:
-    """What a piece gives to each brick: points of its region, and those within reach of it."""
-    axes = division.axes
-    places = axes.places(points)
-    pieces = []
-    first = division.firsts[place]
-    every = np.arange(len(points), dtype=np.int32)
-    for numbers, is_owned in _leaves(division.cuts, places, axes, every, None):
-        owned = np.ones(len(numbers), bool) if is_owned is None else is_owned
-        pieces.append(Piece(first + numbers.astype(np.int64), points.take(numbers, axis=0), owned))
-    return pieces
-
-
-def _leaves(
-    cut: Cut | int, places: Array, axes: Axes, numbers: Any, is_inside: Bits | None
-) -> Iterator[tuple[Any, Bits | None]]:
-    """Of each brick, points within reach of its region, and which of them are inside."""
-    if isinstance(cut, int):
-        yield numbers, is_inside
-        return
-    own = places[cut.axis][numbers] if is_inside is not None else places[cut.axis]
-    reach, repeats = float(axes.reach[cut.axis]), axes.flags[cut.axis]
-    is_below = own < cut.at
-    for part, low, high, is_mine in (
-        (cut.below, cut.low, cut.at, is_below), (cut.above, cut.at, cut.high, ~is_below),
-    ):  # fmt: skip
-        near = np.flatnonzero(within(own, low - reach, high + reach, repeats))
-        mine = is_mine if is_inside is None else is_mine & is_inside
-        yield from _leaves(part, places, axes, numbers.take(near), mine.take(near))
-
-
-def joined(pieces: Sequence[Piece], division: Division) -> tuple[Brick, Array]:
-    """A brick, and the coordinates of its members."""
-    numbers, points, is_owned = (np.concatenate(column) for column in zip(*pieces, strict=True))
-    brick = Brick(numbers, is_owned, division.n_points, division.cutoff, division.scene)
-    return brick, points
 
 
 def renumbered(error: Exception, **numbers: Any) -> Exception:

@@ -7,36 +7,21 @@ is a tuple of arrays of one length, of which the first holds numbers of points, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from halfshell._convert.arrays import as_real_array
-from halfshell._functions.brick_plan import (
-    Division,
-    Piece,
-    Summary,
-    joined,
-    renumbered,
-    split,
-    summary,
-)
+from halfshell._functions.brick_pieces import Numbers, Part, Piece, split
+from halfshell._functions.brick_plan import Division, Summary, renumbered, summary
 from halfshell._objects.brick import Brick, Bricks
 from halfshell._objects.neighbor_table import NeighborTable
 
 Array = npt.NDArray[Any]
-Numbers = npt.NDArray[np.int64]
 Group = tuple[Array, ...]
-
-
-class Part(NamedTuple):
-    """A brick and the coordinates of its members."""
-
-    brick: Brick
-    points: Array
 
 
 def of_columns(frame: Any, dtype: np.dtype[Any]) -> Array:
@@ -62,9 +47,7 @@ def of_chunk(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int) -> Array:
     return as_real_array(array, "points")
 
 
-def summary_of(
-    chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, n_chunks: int
-) -> Summary:
+def summary_of(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, n_chunks: int) -> Summary:
     """What a division must know of a chunk; what is wrong with its coordinates is a part of it."""
     try:
         return summary(of_chunk(chunk, ndim, dtype, place), n_chunks)
@@ -79,16 +62,11 @@ def pieces_of(
     return split(of_chunk(chunk, ndim, dtype, place), division, place)
 
 
-def part_of(pieces: Sequence[Piece], division: Division) -> Part:
-    """A brick of what all chunks give to it."""
-    return Part(*joined(pieces, division))
-
-
 def brick_of(part: Part) -> Brick:
-    return part.brick
+    return part.in_order()[0]
 
 
-def bricks_of(made: Sequence[Brick], division: Division) -> Bricks:
+def bricks_of(division: Division, *made: Brick) -> Bricks:
     """All bricks."""
     return Bricks(made, division.n_points)
 
@@ -96,8 +74,9 @@ def bricks_of(made: Sequence[Brick], division: Division) -> Bricks:
 def pairs_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Group, ...]:
     """One group: i, and a column for each letter."""
     letters = "i" + quantities.replace("i", "")
-    with _numbered(points=part.brick.members):
-        found = part.brick.pairs(part.points, quantities=letters, **options)
+    brick, points = part.in_order()
+    with _numbered(lambda: brick.members):
+        found = brick.pairs(points, quantities=letters, **options)
     arrays = list(found) if isinstance(found, tuple) else [found]
     columns = dict(zip(letters, arrays, strict=True))
     return ((arrays[0], *(columns[letter] for letter in quantities)),)
@@ -105,10 +84,11 @@ def pairs_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Grou
 
 def neighbors_of(part: Part, quantities: str, options: dict[str, Any]) -> tuple[Group, ...]:
     """Two groups: points and how many neighbours they have; point and columns of each neighbour."""
-    with _numbered(points=part.brick.members):
-        table = part.brick.neighbors(part.points, quantities=quantities, **options)
+    brick, points = part.in_order()
+    with _numbered(lambda: brick.members):
+        table = brick.neighbors(points, quantities=quantities, **options)
     names = {"j": "indices", "d": "distances", "D": "vectors", "S": "shifts"}
-    owned, counts = part.brick.owned, np.asarray(table.counts, np.int64)
+    owned, counts = brick.owned, np.asarray(table.counts, np.int64)
     columns = [getattr(table, names[letter]) for letter in quantities]
     return (owned, counts), (np.repeat(owned, counts), *columns)
 
@@ -117,36 +97,29 @@ def coordination_of(part: Part, scene: Any, options: dict[str, Any]) -> tuple[Gr
     """One group: points, and how many neighbours they have."""
     import halfshell as hs
 
-    with _numbered(points=part.brick.members):
-        of_all = hs.coordination(part.points, part.brick.cutoff, **scene, **options)
-    return ((part.brick.owned, of_all[part.brick.is_owned]),)
+    brick, points = part.in_order()
+    with _numbered(lambda: brick.members):
+        of_all = hs.coordination(points, brick.cutoff, **scene, **options)
+    return ((brick.owned, of_all[brick.is_owned]),)
 
 
 def counts_of(part: Part, cutoff: Any, scene: Any, options: dict[str, Any]) -> Any:
-    """Twice the pairs of owned points, and once those with needed ones, which two bricks count."""
+    """Pairs of owned points, and of these with points of later bricks."""
     import halfshell as hs
 
-    inner, outer = _inner_and_outer(part)
-    with _numbered(points=part.brick.owned):
-        own = hs.count_pairs(inner, cutoff, **scene, **options)
-    with _numbered(points=part.brick.needed, queries=part.brick.owned):
-        return 2 * own + hs.count_pairs(outer, cutoff, queries=inner, **scene, **options)
+    return _own(part, lambda points: hs.count_pairs(points, cutoff, **scene, **options))
 
 
 def histogram_of(part: Part, edges: Any, scene: Any, options: dict[str, Any]) -> Any:
     """As `counts_of`, in each bin."""
     import halfshell as hs
 
-    inner, outer = _inner_and_outer(part)
-    with _numbered(points=part.brick.owned):
-        own = hs.pair_histogram(inner, edges, **scene, **options)
-    with _numbered(points=part.brick.needed, queries=part.brick.owned):
-        return 2 * own + hs.pair_histogram(outer, edges, queries=inner, **scene, **options)
+    return _own(part, lambda points: hs.pair_histogram(points, edges, **scene, **options))
 
 
-def half_sum(doubled: Sequence[Any]) -> Any:
-    """Pairs of all bricks from what `counts_of` or `histogram_of` return, without a remainder."""
-    return sum(doubled, start=np.int64(0)) // 2
+def total(*counts: Any) -> Any:
+    """Pairs of all bricks from what `counts_of` or `histogram_of` return."""
+    return sum(counts, start=np.int64(0))
 
 
 def cut(groups: Sequence[Group], division: Division, n: int) -> list[list[Group]]:
@@ -163,7 +136,7 @@ def cut(groups: Sequence[Group], division: Division, n: int) -> list[list[Group]
     ]
 
 
-def merged(cuts: Sequence[Sequence[Group]]) -> list[Group]:
+def merged(*cuts: Sequence[Group]) -> list[Group]:
     """One range of points from all bricks, ascending by point.
 
     All entries of a point are of one brick, and in order there.
@@ -176,25 +149,25 @@ def merged(cuts: Sequence[Sequence[Group]]) -> list[Group]:
     return whole
 
 
-def table_of(
-    found: Sequence[Sequence[Group]], quantities: str, division: Division
-) -> NeighborTable:
+def table_of(quantities: str, division: Division, *found: Sequence[Group]) -> NeighborTable:
     """The rows of all points, ascending, from what `neighbors_of` returns for each brick."""
-    (_, counts), (_, *columns) = merged(found)
+    (_, counts), (_, *columns) = merged(*found)
     offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)))
     return NeighborTable((offsets, *columns), quantities, division.n_points, False)
 
 
+def _own(part: Part, count: Callable[[Array], Any]) -> Any:
+    """What is counted of owned points and those of later bricks, less that of the latter alone."""
+    n_owned, n_later, _ = part.sizes
+    points = part.points[: n_owned + n_later]
+    with _numbered(part.numbers):
+        return count(points) - count(points[n_owned:])
+
+
 @contextmanager
-def _numbered(**numbers: Numbers) -> Iterator[None]:
+def _numbered(numbers: Callable[[], Numbers]) -> Iterator[None]:
     """Errors name points by their numbers among all points."""
     try:
         yield
     except (ValueError, OverflowError) as error:
-        raise renumbered(error, **numbers) from None
-
-
-def _inner_and_outer(part: Part) -> tuple[Array, Array]:
-    """Coordinates of the points that a brick owns, and of those that it needs."""
-    is_owned = part.brick.is_owned
-    return part.points[is_owned], part.points[~is_owned]
+        raise renumbered(error, points=numbers()) from None

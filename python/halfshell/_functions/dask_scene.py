@@ -14,6 +14,7 @@ from halfshell._convert.options import as_count
 from halfshell._convert.scene import MAX_DIM, as_own_box
 from halfshell._extras import needs
 from halfshell._functions import brick_tasks
+from halfshell._functions.brick_pieces import joined as join
 from halfshell._functions.brick_plan import divide
 from halfshell._functions.counts import count_pairs
 
@@ -53,7 +54,7 @@ class Scene(NamedTuple):
         do = dask.delayed(brick_tasks.cut, pure=True)
         cuts = [do(groups, self.division, n) for groups in found]
         merged = dask.delayed(brick_tasks.merged, pure=True)
-        return [merged([one[k] for one in cuts]) for k in range(n)]
+        return [merged(*[one[k] for one in cuts]) for k in range(n)]
 
 
 def divided(
@@ -68,13 +69,13 @@ def divided(
         scene["periodic"] = [bool(bits >> k & 1) for k in range(ndim)]
     count_pairs(np.empty((0, ndim)), cutoff, kernel=kernel, **scene)
     flags = tuple(scene["periodic"] or [False] * ndim)
-    tasks = (brick_tasks.summary_of, divide, brick_tasks.pieces_of, brick_tasks.part_of)
+    tasks = (brick_tasks.summary_of, divide, brick_tasks.pieces_of, join)
     summary_of, divide_by, pieces_of, part_of = (dask.delayed(one, pure=True) for one in tasks)
     each = [(chunk, ndim, dtype, place) for place, chunk in enumerate(chunks)]
     summaries = [summary_of(*one, len(each)) for one in each]
-    division = divide_by(summaries, cutoff, n_bricks, vectors, flags)
+    division = divide_by(cutoff, n_bricks, vectors, flags, *summaries)
     pieces = [pieces_of(*one, division) for one in each]
-    parts = [part_of([piece[k] for piece in pieces], division) for k in range(n_bricks)]
+    parts = [part_of(division, *[piece[k] for piece in pieces]) for k in range(n_bricks)]
     return Scene(parts, division, n_points, ndim, scene)
 
 

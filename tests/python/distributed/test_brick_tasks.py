@@ -2,6 +2,7 @@
 """What Dask and MPI do with bricks, without either: together the parts say what one search says."""
 
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -9,10 +10,18 @@ import pytest
 import halfshell as hs
 from brick_scenes import LETTERS, in_order, same, scenes, serial
 from halfshell._convert.scene import as_own_box
+from halfshell._functions import brick_pieces
 from halfshell._functions import brick_tasks as tasks
-from halfshell._functions.brick_plan import divide
+from halfshell._functions.brick_pieces import joined, split
+from halfshell._functions.brick_plan import divide, summary
 
 OPTIONS = {"inclusive": True, "kernel": None, "threads": 1, "memory_limit": None}
+
+
+@pytest.fixture(autouse=True, params=[7, 1 << 16], ids=["tiles", "one tile"])
+def _tiles(request, monkeypatch):
+    """Points of a piece are divided some at a time."""
+    monkeypatch.setattr(brick_pieces, "_TILE", request.param)
 
 
 def parts_of(points, cutoff, options, n):
@@ -23,9 +32,9 @@ def parts_of(points, cutoff, options, n):
     flags = tuple(bool(bits >> k & 1) for k in range(ndim))
     each = [(chunk, ndim, array.dtype, k) for k, chunk in enumerate(chunks)]
     summaries = [tasks.summary_of(*one, len(each)) for one in each]
-    division = pickle.loads(pickle.dumps(divide(summaries, cutoff, n, vectors, flags)))
+    division = pickle.loads(pickle.dumps(divide(cutoff, n, vectors, flags, *summaries)))
     pieces = [tasks.pieces_of(*one, division) for one in each]
-    parts = [tasks.part_of([piece[k] for piece in pieces], division) for k in range(n)]
+    parts = [joined(division, *[piece[k] for piece in pieces]) for k in range(n)]
     return pickle.loads(pickle.dumps(parts)), division
 
 
@@ -39,23 +48,23 @@ def test_parts_are_one_search(name, n):
     expected = serial(points, cutoff, scene)
     assert same(in_order(columns), expected)
     cuts = [tasks.cut(groups, division, n) for groups in found]
-    ranges = [tasks.merged([one[k] for one in cuts])[0][1:] for k in range(n)]
+    ranges = [tasks.merged(*[one[k] for one in cuts])[0][1:] for k in range(n)]
     assert same([np.concatenate(column) for column in zip(*ranges)], expected)
     cutoffs = np.array([0.0, cutoff / 2.0, cutoff])
-    doubled = [tasks.counts_of(part, cutoffs, scene, OPTIONS) for part in parts]
-    assert tasks.half_sum(doubled).tolist() == hs.count_pairs(points, cutoffs, **scene).tolist()
+    counts = [tasks.counts_of(part, cutoffs, scene, OPTIONS) for part in parts]
+    assert tasks.total(*counts).tolist() == hs.count_pairs(points, cutoffs, **scene).tolist()
     edges = np.array([0.0, cutoff / 3.0, cutoff])
     rest = {key: value for key, value in OPTIONS.items() if key != "inclusive"}
     binned = [tasks.histogram_of(part, edges, scene, rest) for part in parts]
-    assert tasks.half_sum(binned).tolist() == hs.pair_histogram(points, edges, **scene).tolist()
+    assert tasks.total(*binned).tolist() == hs.pair_histogram(points, edges, **scene).tolist()
     counts = [tasks.coordination_of(part, scene, OPTIONS) for part in parts]
-    assert same([tasks.merged(counts)[0][1]], [hs.coordination(points, cutoff, **scene)])
+    assert same([tasks.merged(*counts)[0][1]], [hs.coordination(points, cutoff, **scene)])
     rows = [tasks.neighbors_of(part, "jdDS", OPTIONS) for part in parts]
-    table = tasks.table_of(rows, "jdDS", division)
+    table = tasks.table_of("jdDS", division, *rows)
     whole = hs.neighbors(points, cutoff, quantities="jdDS", **scene)
     names = ("offsets", "indices", "distances", "vectors", "shifts")
     assert same([getattr(table, key) for key in names], [getattr(whole, key) for key in names])
-    made = tasks.bricks_of([tasks.brick_of(part) for part in parts], division)
+    made = tasks.bricks_of(division, *[tasks.brick_of(part) for part in parts])
     assert sum(made.sizes) == len(points) and len(made) == n
     owned = np.concatenate([brick.owned for brick in made])
     assert sorted(owned.tolist()) == list(range(len(points)))
@@ -79,3 +88,17 @@ def test_masked_points_are_refused_by_their_place():
     hidden = np.ma.masked_array(np.ones((3, 2)), [[False, False], [False, True], [False, False]])
     with pytest.raises(ValueError, match="masked"):
         tasks.of_chunk(hidden, 2, np.dtype(float), 0)
+
+
+def test_a_piece_that_is_sent_takes_only_its_points():
+    points = np.arange(60.0).reshape(20, 3)
+    division = divide(1.0, 4, None, (False,) * 3, summary(points, 1))
+    pieces = split(points, division, 0)
+    here, sent = joined(division, pieces[0]), pickle.loads(pickle.dumps(pieces[0]))
+    assert len(sent.points) == sum(here.sizes) < len(points)
+    assert sys.getsizeof(pieces[0]) < points.nbytes
+    again = pickle.loads(pickle.dumps(sent))  # what was sent may be sent on
+    for other in (sent, again):
+        there = joined(division, other)
+        assert there.sizes == here.sizes and same([there.points], [here.points])
+        assert there.numbers().tolist() == here.numbers().tolist()
