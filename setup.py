@@ -25,6 +25,8 @@ smaller = [
     "--param=max-completely-peeled-insns=60",
     "--param=max-inline-insns-auto=15",
     "-falign-loops=32",
+    "-fno-asynchronous-unwind-tables",  # no exception passes through: callbacks must return
+    "-fno-unwind-tables",
 ]
 
 
