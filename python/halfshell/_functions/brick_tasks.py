@@ -52,7 +52,7 @@ def summary_of(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, n_chunks
     try:
         return summary(of_chunk(chunk, ndim, dtype, place), n_chunks)
     except (ValueError, OverflowError) as error:
-        return Summary(len(chunk), 0.0, np.empty((0, ndim)), 1.0, error)
+        return Summary(sum(np.shape(chunk)[:1]), 0.0, np.empty((0, ndim)), 1.0, error)
 
 
 def pieces_of(

@@ -21,6 +21,7 @@ from halfshell._functions.counts import count_pairs
 try:
     import dask
     import dask.array as da
+    from dask.delayed import Delayed  # which has every attribute
 except ModuleNotFoundError as error:
     if error.name not in ("dask", "dask.array"):
         raise
@@ -112,7 +113,8 @@ def _chunks(points: Any) -> tuple[list[Any], float, int, np.dtype[Any]]:
     """Delayed arrays of rows, how many rows (NaN if unknown) and columns they have, their type."""
     if isinstance(points, da.Array):
         return _of_array(points)
-    if hasattr(points, "to_delayed") and hasattr(points, "dtypes") and hasattr(points, "columns"):
+    needed = ("to_delayed", "dtypes", "columns")
+    if not isinstance(points, Delayed) and all(hasattr(points, name) for name in needed):
         return _of_frame(points)
     raise TypeError(
         f"points must be a dask array or dataframe, got {kind_of(points)}; "

@@ -316,6 +316,8 @@ def test_bad_arguments_are_refused_at_once(shape, change, kind, words):
 def test_bad_collections_are_refused_at_once():
     with pytest.raises(TypeError, match=r"dask array or dataframe, got .*from_array"):
         hd.count_pairs(np.zeros((3, 3)), 1.0)
+    with pytest.raises(TypeError, match=r"dask array or dataframe, got .*Delayed"):
+        hd.count_pairs(dask.delayed(np.zeros((3, 3))), 1.0)
     with pytest.raises(TypeError, match="real numbers, got complex128"):
         hd.count_pairs(da.zeros((3, 3), dtype=complex), 1.0)
     unknown = da.from_delayed(dask.delayed(np.zeros)((3, 3)), (3, np.nan), float)
@@ -330,6 +332,27 @@ def test_chunks_that_are_not_what_was_said():
     blocks = [da.from_delayed(dask.delayed(chunk), (3, 3), float) for chunk in chunks]
     with pytest.raises(ValueError, match=r"chunk 1 has shape \(3, 2\)"):
         hd.count_pairs(da.concatenate(blocks), 1.0).compute()
+    for chunk, shape in ((5.0, r"\(\)"), (np.zeros(3), r"\(3,\)")):
+        given = da.from_delayed(dask.delayed(chunk), (3, 3), float)
+        with pytest.raises(ValueError, match=f"chunk 0 has shape {shape}"):
+            hd.count_pairs(given, 1.0).compute()
+
+
+def test_folders_that_cannot_be_read_or_written(tmp_path):
+    (tmp_path / "file").touch()
+    (i, _) = hd.pairs(collection(np.zeros((10, 2)), 5), 1.0)
+    for folder in (tmp_path / "file", tmp_path / "file" / "i"):
+        with pytest.raises(OSError, match=str(folder)):
+            da.to_npy_stack(str(folder), i.compute_chunk_sizes())
+    with pytest.raises(FileNotFoundError, match="none"):
+        hd.count_pairs(da.from_npy_stack(str(tmp_path / "none")), 1.0)
+
+
+def test_cutoffs_larger_than_a_brick_and_than_the_box():
+    points = np.random.default_rng(8).random((50, 3))
+    for cutoff in (0.6, 2.0):
+        found = hd.pairs(collection(points, 10), cutoff, quantities=LETTERS, sort=True, box=1.0)
+        assert same(dask.compute(*found), serial(points, cutoff, {"box": 1.0}))
 
 
 def test_examples_run():
