@@ -15,7 +15,7 @@ def _many_neighbours(bins: int, name: str) -> Scene:
     """Make the box of many neighbours, counted in bins."""
     return replace(
         pairs_1e5_k419(name), stresses=f"21 million pairs in {bins} bins", task="count", bins=bins,
-        want=8.0 if bins == 100 else None, limits=(), peers=HISTOGRAM_PEERS,
+        want=14.0 if bins == 100 else None, limits=(), peers=HISTOGRAM_PEERS,
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def _cube(name: str, stresses: str, n: int, length: float, cutoff: float, **rest
 def pairs_1e5_k52(name: str) -> Scene:
     """Make the main figure: a large uniform periodic box, int64 indices."""
     return _cube(
-        name, "everything at once: bins, search, output of int64", 100_000, 100.0, 5.0, want=20.0,
+        name, "everything at once: bins, search, output of int64", 100_000, 100.0, 5.0, want=24.0,
         limits=(_EXACT_COST, Limit("floor", 3.0), Limit("rewrite", None)),
     )  # fmt: skip
 
@@ -44,7 +44,7 @@ def pairs_1e5_k52_int32(name: str) -> Scene:
 def pairs_1e5_k419(name: str) -> Scene:
     """Make a box with many neighbours a point: output and hit rate decide."""
     return _cube(
-        name, "output: 21 million pairs, fresh pages", 100_000, 100.0, 10.0, want=25.0,
+        name, "output: 21 million pairs, fresh pages", 100_000, 100.0, 10.0, want=30.0,
         limits=(_EXACT_COST, Limit("floor", 1.8), Limit("rewrite", None)),
         peers=tuple(peer for peer in LIST_PEERS if peer not in ("ase", "pymatgen", "freud")),
     )  # fmt: skip
@@ -55,7 +55,7 @@ def pairs_1e5_k419_int32(name: str) -> Scene:
     """Make the box of many neighbours with indices half as wide."""
     return replace(
         pairs_1e5_k419(name), stresses="the same with half the output", index_dtype="int32",
-        want=35.0,
+        want=42.0,
     )  # fmt: skip
 
 
@@ -73,7 +73,7 @@ def vectors_1e5_k52(name: str) -> Scene:
     """Make the main figure with all five quantities."""
     return replace(
         pairs_1e5_k52(name), stresses="distances, vectors and shifts", quantities="ijdDS",
-        want=15.0, limits=(Limit("floor", None), Limit("rewrite", None)),
+        want=14.0, limits=(Limit("floor", None), Limit("rewrite", None)),
     )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def open_1e4(name: str) -> Scene:
     """Make a scene without a box."""
     return Scene(
         name, "open space: bounds instead of a box, no shifts",
-        uniform(20260103, 10_000, 3) * 46.4159, 5.0, want=20.0,
+        uniform(20260103, 10_000, 3) * 46.4159, 5.0, want=18.0,
     )  # fmt: skip
 
 
@@ -116,7 +116,7 @@ def clusters_1e5(name: str) -> Scene:
     offset = 2.0 * drawn[:, :3] - 1.0
     points = centres[(drawn[:, 3] * 300.0).astype(np.int64)] + size * offset * offset * offset
     return Scene(
-        name, "uneven density: 300 peaked clusters, most space empty", points, 0.405, want=12.0
+        name, "uneven density: 300 peaked clusters, most space empty", points, 0.405, want=9.0
     )
 
 
@@ -124,7 +124,7 @@ def clusters_1e5(name: str) -> Scene:
 def count_1e5_k52(name: str) -> Scene:
     """Make the main figure, counted without a list."""
     return replace(
-        pairs_1e5_k52(name), stresses="distance tests alone, no output", task="count", want=40.0,
+        pairs_1e5_k52(name), stresses="distance tests alone, no output", task="count", want=35.0,
         limits=(), peers=COUNT_PEERS,
     )  # fmt: skip
 
@@ -134,7 +134,7 @@ def count_1e5_k419(name: str) -> Scene:
     """Make the box of many neighbours, counted without a list."""
     return replace(
         pairs_1e5_k419(name), stresses="distance tests at a high hit rate", task="count",
-        want=12.0, limits=(), peers=COUNT_PEERS,
+        want=14.0, limits=(), peers=COUNT_PEERS,
     )  # fmt: skip
 
 
@@ -164,14 +164,14 @@ def threads_count_1e6(name: str) -> Scene:
 @add("S14")
 def threads_pairs_1e5_k52(name: str) -> Scene:
     """Make the main figure on two threads."""
-    return replace(_on_two(pairs_1e5_k52(name), 1.0 / 1.6), stresses="two threads, a short list")
+    return replace(_on_two(pairs_1e5_k52(name), 1.0 / 1.3), stresses="two threads, a short list")
 
 
 @add("S14")
 def threads_pairs_1e5_k419(name: str) -> Scene:
     """Make the box of many neighbours on two threads."""
     return replace(
-        _on_two(pairs_1e5_k419(name), 1.0 / 1.6), stresses="two threads that mostly write"
+        _on_two(pairs_1e5_k419(name), 1.0 / 1.5), stresses="two threads that mostly write"
     )
 
 

@@ -25,13 +25,13 @@ def _nearest(scene: Scene, stresses: str, k: int = 12, want: float | None = None
 def nearest_1e5_open(name: str) -> Scene:
     """Make the main figure of the trees: even points in open space."""
     scene = replace(pairs_1e5_k52(name), box=None, periodic=())
-    return _nearest(scene, "the 12 nearest, open", want=4.0)
+    return _nearest(scene, "the 12 nearest, open", want=6.0)
 
 
 @add("S15")
 def nearest_1e5_periodic(name: str) -> Scene:
     """Make the same in a periodic box."""
-    return _nearest(pairs_1e5_k52(name), "the 12 nearest, periodic", want=8.0)
+    return _nearest(pairs_1e5_k52(name), "the 12 nearest, periodic", want=10.0)
 
 
 @add("S15")

@@ -31,7 +31,7 @@ def rows_1e5_k52(name: str) -> Scene:
     """Make the large box, of which all rows are wanted."""
     return replace(
         pairs_1e5_k52(name), stresses="rows of all neighbours, sorted; a large box",
-        task="rows", quantities="j", want=20.0, limits=(), peers=_ROW_PEERS,
+        task="rows", quantities="j", want=12.0, limits=(), peers=_ROW_PEERS,
     )  # fmt: skip
 
 
