@@ -33,6 +33,19 @@ THEMES = {
     "py_visit": "for_each_pair",
     "py_info": "environment cache available",
     "py_batch": "batch core_arguments",
+    "many_systems": "batch core_arguments",
+    "reach": "reach_arguments reach_types supports_arguments core_arguments",
+    "selection": "exclusions shells core_arguments",
+    "py_results": "capacity quantities pairs_small",
+    "py_connectivity": "connectivity",
+    "node_call": "connectivity",
+    "py_node_changes": "connectivity_changes",
+    "py_dynamic": "dynamic",
+    "py_dynamic_arguments": "dynamic",
+    "py_dynamic_balls": "dynamic",
+    "py_dynamic_many": "dynamic",
+    "py_dynamic_new": "dynamic",
+    "groups": "available_memory",
     "capi": "capi",
     "module": "capi iter_pairs",
 }
@@ -40,7 +53,8 @@ THEMES = {
 # those that run other builds or other libraries.
 FIRST = ["core_arguments", "plain", "quantities", "errors", "no_memory"]
 LEFT_OUT = ["adversarial", "benchmark", "report", "cli", "c_interface", "packaging", "docs"]
-LEFT_OUT += ["typing", "golden", "selftest", "scene", "peers"]
+LEFT_OUT += ["typing", "golden", "selftest", "scene", "peers", "notebooks", "site", "dask", "mpi"]
+LEFT_OUT += ["framework", "torch", "jax"]
 SECONDS = 300  # of processor time, for the tests of one file
 
 

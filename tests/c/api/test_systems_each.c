@@ -117,27 +117,28 @@ memory_may_be_short(void)
     }
 }
 
-/* What a system is refused for names it, and the row among all. */
+/* What a system is refused for names it, and the row among all: its first one, too. */
 static void
 failures_name_the_row_among_all(void)
 {
-    hs_failure failure;
-    hs_pairs  *rows;
-    const int  bad = 17 * POINTS + 5;
-    for (int threads = 1; threads <= 2; threads++) {
+    static const int bad[] = {17 * POINTS, 17 * POINTS + 5, 18 * POINTS - 1};
+    hs_failure       failure;
+    hs_pairs        *rows;
+    for (int trial = 0; trial < 6; trial++) {
+        const int row = bad[trial / 2], query = 40 + trial / 2 % 2;
         make_scene();
-        s.options.threads = threads;
-        s.x[3 * bad + 1] = NAN;
+        s.options.threads = 1 + trial % 2;
+        s.x[3 * row + 1] = NAN;
         CHECK(hs_systems_neighbors(&s.points, NULL, &s.systems, &s.options, &rows, &failure) ==
               HS_ERR_NOT_FINITE);
-        CHECK(rows == NULL && failure.row == bad && failure.column == 1 && !failure.in_queries);
+        CHECK(rows == NULL && failure.row == row && failure.column == 1 && !failure.in_queries);
         CHECK(failure.system == 17);
         make_scene();
-        s.options.threads = threads;
-        s.q[3 * 41 + 2] = INFINITY;
+        s.options.threads = 1 + trial % 2;
+        s.q[3 * query + 2] = INFINITY;
         CHECK(hs_systems_neighbors(&s.points, &s.queries, &s.systems, &s.options, &rows,
                                    &failure) == HS_ERR_NOT_FINITE);
-        CHECK(failure.row == 41 && failure.in_queries && failure.system == 20);
+        CHECK(failure.row == query && failure.in_queries && failure.system == 20);
     }
 }
 
