@@ -190,21 +190,59 @@ without_systems_all_else_is_checked(void)
     CHECK(find_rows(NULL) == HS_ERR_KERNEL);
 }
 
-/* What each thread has done is done by the call. */
+/* Numbers of a call that are sums of those of others. */
 static void
-work_of_all_threads_is_added_up(void)
+add_work(const hs_counters *more, hs_counters *sum)
 {
-    hs_counters one, two;
+    sum->pairs += more->pairs;
+    sum->groups += more->groups;
+    sum->candidates += more->candidates;
+    sum->ambiguous += more->ambiguous;
+    sum->by_float64 += more->by_float64;
+    sum->by_double_word += more->by_double_word;
+    sum->by_integers += more->by_integers;
+}
+
+static bool
+is_same_work(const hs_counters *one, const hs_counters *other)
+{
+    return one->pairs == other->pairs && one->groups == other->groups &&
+           one->candidates == other->candidates && one->ambiguous == other->ambiguous &&
+           one->by_float64 == other->by_float64 && one->by_double_word == other->by_double_word &&
+           one->by_integers == other->by_integers;
+}
+
+/* What is done is what calls for each of the systems do, by however many threads: of lattice points
+ * many are at the cutoff, some but for 2^-30, for a rounding, or for the square of 2^-60. */
+static void
+work_of_all_systems_is_added_up(void)
+{
+    harness_random random = {78};
+    hs_counters    single = {.pairs = 0}, sum = {.pairs = 0}, all;
+    int64_t        most_bytes = 0;
     make_scene();
-    s.options.counters = &one;
-    CHECK(find_rows(NULL) == HS_OK);
-    s.options.counters = &two;
-    s.options.threads = 2;
-    CHECK(find_rows(NULL) == HS_OK);
-    CHECK(one.candidates > 0 && one.candidates == two.candidates && one.pairs == two.pairs);
-    CHECK(one.groups > 0 && one.groups == two.groups && one.ambiguous == two.ambiguous);
-    CHECK(one.bytes[HS_FOR_POINTS] > 0 && two.bytes[HS_FOR_POINTS] >= one.bytes[HS_FOR_POINTS]);
-    CHECK(one.bytes_peak > 0 && two.bytes_peak > 0);
+    for (int e = 0; e < N * 3; e++) {
+        const double at = (double)(random_bits(&random) % 6) / (e < N ? 3.0 : 2.0);
+        s.x[e] = at > 0.0 ? at + (double)(e % 7 == 0) * 0x1p-30 : (double)(e % 2) * 0x1p-60;
+    }
+    s.options.cutoff = 1.0;
+    s.options.counters = &single;
+    for (int n = 0; n < N_SYSTEMS; n++) {
+        hs_pairs       *rows;
+        const hs_points own = {s.x + s.first[n] * 3, POINTS, 3, HS_FLOAT64, 24, 8};
+        const hs_among  among = {.points = &own};
+        CHECK(hs_neighbors_find(&among, &s.options, &rows, NULL) == HS_OK);
+        hs_pairs_free(rows);
+        add_work(&single, &sum);
+        most_bytes = single.bytes_peak > most_bytes ? single.bytes_peak : most_bytes;
+    }
+    CHECK(sum.ambiguous > 0 && sum.by_float64 > 0 && sum.by_double_word > 0 && sum.by_integers > 0);
+    s.options.counters = &all;
+    for (s.options.threads = 1; s.options.threads <= 2; s.options.threads++) {
+        CHECK(find_rows(NULL) == HS_OK);
+        CHECK(is_same_work(&all, &sum));
+        CHECK(all.bytes[HS_FOR_POINTS] > 0 && all.bytes_peak >= most_bytes);
+    }
 }
 
 static double limit_of_all;
@@ -261,7 +299,7 @@ test_systems_each(void)
     RUN(failures_name_the_row_among_all);
     RUN(rows_of_boxes_stay);
     RUN(without_systems_all_else_is_checked);
-    RUN(work_of_all_threads_is_added_up);
+    RUN(work_of_all_systems_is_added_up);
     RUN(threads_share_the_limit);
     RUN(few_large_systems);
 }
