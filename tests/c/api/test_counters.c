@@ -151,9 +151,49 @@ counting_keeps_no_pairs(void)
     }
 }
 
+/* At any scale of the numbers, with a cutoff that some pairs have as their distance or of zero, and
+ * beside a point so far away that squares of differences overflow. */
+static void
+every_unsure_pair_is_decided_by_one_stage(void)
+{
+    enum { MANY = 90 };
+    static const double sizes[] = {1.0, 0x1p-1000, 0x1p900};
+    harness_random      random = {41};
+    for (int trial = 0; trial < 72; trial++) {
+        double          x[MANY * HS_MAX_DIM];
+        const int       d = 1 + trial % 3;
+        const bool      is_zero = trial / 3 % 2, is_far = trial / 6 % 2;
+        const double    size = sizes[trial / 12 % 3];
+        const hs_points points = {x, MANY, d, HS_FLOAT64, 8 * d, 8};
+        hs_options      options = hs_options_default();
+        hs_counters     c;
+        int64_t         count, n = 0;
+        for (int e = 0; e < MANY * d; e++)
+            x[e] = (double)(random_bits(&random) % 8) / 8.0 * size;
+        if (is_far)
+            x[0] = 0x1p1000;
+        options.cutoff = is_zero ? 0.0 : 0.25 * size;
+        options.counters = &c;
+        for (int i = 0; i < MANY; i++) {
+            for (int j = i + 1; j < MANY; j++) {
+                double square = 0.0;
+                for (int k = 0; k < d; k++) {
+                    const double along = (x[i * d + k] - x[j * d + k]) / size;
+                    square += along * along;
+                }
+                n += square <= (is_zero ? 0.0 : 0.0625);
+            }
+        }
+        CHECK(hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL) == HS_OK);
+        CHECK(count == n && c.pairs == n);
+        CHECK(c.ambiguous > 0 && c.by_float64 + c.by_double_word + c.by_integers == c.ambiguous);
+    }
+}
+
 void
 test_counters(void)
 {
+    RUN(every_unsure_pair_is_decided_by_one_stage);
     RUN(points_have_as_many_coordinates_as_axes);
     RUN(open_space_has_no_wraps_and_no_originals);
     RUN(aligned_boxes_keep_no_originals);
