@@ -341,6 +341,20 @@ what_has_no_meaning_is_refused(void)
           HS_ERR_ARGUMENT);
 }
 
+/* Where there is no system, none of its counts is written, however many there may be of one. */
+static void
+counts_of_a_system_are_fewer_than_2_to_31(void)
+{
+    hs_histogram wanted = {.n_edges = 2, .edges = s.edges, .n_types = 32767};
+    make_scene(9);
+    wanted.counts = s.first;
+    s.systems.n = s.points.n = 0;
+    CHECK(hs_systems_histogram(&s.points, NULL, &s.systems, &s.options, &wanted, NULL) == HS_OK);
+    wanted.n_types++;
+    CHECK(hs_systems_histogram(&s.points, NULL, &s.systems, &s.options, &wanted, NULL) ==
+          HS_ERR_MEMORY);
+}
+
 void
 test_api_systems_rows(void)
 {
@@ -349,5 +363,6 @@ test_api_systems_rows(void)
     RUN(rows_go_where_the_caller_says);
     RUN(histograms_are_those_of_single_calls);
     RUN(a_histogram_may_have_no_marks);
+    RUN(counts_of_a_system_are_fewer_than_2_to_31);
     RUN(what_has_no_meaning_is_refused);
 }
