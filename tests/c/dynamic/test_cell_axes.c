@@ -95,6 +95,47 @@ balls_meet_no_more_images_than_they_must(void)
     }
 }
 
+/* x + image * length, rounded up or down, by exact sums of what is rounded. */
+static double
+image_of(double x, double image, double length, double towards)
+{
+    const double shift = image * length, rest = fma(image, length, -shift);
+    const double sum = shift + x, back = sum - shift;
+    const double error = (shift - (sum - back)) + (x - back) + rest;
+    const bool   is_passed = towards > 0.0 ? error > 0.0 : error < 0.0;
+    return is_passed ? nextafter(sum, towards) : sum;
+}
+
+/* Periods whose multiples are rounded: the end of a ball that is the image of a number next to an
+ * edge of its cell still has this cell, on either side. */
+static void
+ends_in_far_images_are_held(void)
+{
+    harness_random random = {9};
+    for (int trial = 0; trial < TRIALS(20000); trial++) {
+        const double     length = 0.5 + 8.0 * random_unit(&random);
+        const int        n = 2 + (int)(random_bits(&random) % 9);
+        const hs_axes    axes = axes_of(length, length / (n + 0.25), 1.0);
+        const hs_axis   *axis = &axes.axis[0];
+        const int64_t    cell = 1 + (int64_t)(random_bits(&random) % (uint64_t)(n - 1));
+        const int64_t    image = (trial % 2 ? 1 : -1) * (2 + trial / 2 % 300);
+        const double     step = ldexp(1.0, ilogb(length) - 53); /* no coordinate has finer ones */
+        double           x = (double)cell * axis->width - axis->half;
+        hs_span_of_cells span;
+        while (hs_axis_cell(axis, x) >= cell)
+            x -= step;
+        while (hs_axis_cell(axis, x + step) < cell)
+            x += step;
+        const double low = image_of(x, (double)image, length, -HUGE_VAL);
+        hs_axis_images(axis, low, low + length, 0.0, &span);
+        CHECK(axis->n == n && span.first <= hs_axis_cell(axis, x) + image * n);
+        x += step;
+        const double high = image_of(x, (double)image, length, HUGE_VAL);
+        hs_axis_images(axis, high - length, high, 0.0, &span);
+        CHECK(span.last >= hs_axis_cell(axis, x) + image * n);
+    }
+}
+
 static void
 far_cells_are_one(void)
 {
@@ -112,6 +153,7 @@ test_cell_axes(void)
     RUN(open_balls_hold_what_is_within);
     RUN(periodic_balls_hold_what_is_within);
     RUN(balls_meet_no_more_images_than_they_must);
+    RUN(ends_in_far_images_are_held);
     RUN(far_cells_are_one);
     hs_fpenv_leave(env);
 }
