@@ -92,7 +92,7 @@ any_poll_ends_a_search_of_many_candidates(void)
         while (status != HS_OK && nth < 200) {
             refusal once = {0, ++nth};
             status = search(kind, sorted, threads, &once, &found);
-            CHECK(status == (once.n == nth ? HS_ERR_INTERRUPTED : HS_OK));
+            CHECK(status == (once.n >= nth ? HS_ERR_INTERRUPTED : HS_OK));
         }
         /* Of two threads the other one, which does not poll, may do the work. */
         CHECK((nth > 2 || threads > 1) && nth < 200);
