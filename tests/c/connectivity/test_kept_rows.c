@@ -403,20 +403,23 @@ long_rows_ask_the_caller(void)
 {
     enum { LONG = 1 << 21 };
     static int32_t       many[LONG];
-    static const int64_t ends[2] = {0, LONG}, count[1] = {1};
+    static const int64_t ends[5] = {0, LONG / 4, LONG / 2, LONG / 4 * 3, LONG}, count[1] = {1};
     static const int32_t stays[1] = {0};
-    const hs_list_rows   rows = {1, 1, ends, LONG, many, NULL, 1};
+    const hs_list_rows   rows = {4, 1, ends, LONG, many, NULL, 1};
     const hs_node_change change = {1, count, stays, NULL};
     hs_options           options = hs_options_default();
     int64_t              left = 0;
     hs_pairs            *kept;
     options.poll = stop_after;
     options.poll_context = &left;
-    CHECK(hs_rows_keep(&rows, &change, NULL, 1, &options, &kept, NULL) == HS_ERR_INTERRUPTED);
+    CHECK(hs_rows_keep(&rows, &change, NULL, 4, &options, &kept, NULL) == HS_ERR_INTERRUPTED);
     left = 0;
     CHECK(hs_rows_without(&rows, &rows, true, &options, &kept, NULL) == HS_ERR_INTERRUPTED);
+    left = 1; /* once only */
+    CHECK(hs_rows_keep(&rows, &change, NULL, 4, &options, &kept, NULL) == HS_OK && left == 0);
+    hs_pairs_free(kept);
     left = 1;
-    CHECK(hs_rows_keep(&rows, &change, NULL, 1, &options, &kept, NULL) == HS_OK && left == 0);
+    CHECK(hs_rows_without(&rows, &rows, true, &options, &kept, NULL) == HS_OK && left == 0);
     hs_pairs_free(kept);
 }
 

@@ -60,6 +60,16 @@ enum { POINTS = 200 };
 
 static double x[POINTS * 3];
 
+/* The place on the curve of a point whose coordinates are from 0 to 1, if it is finite. */
+static uint64_t
+key_of(const double *point)
+{
+    uint64_t slices[3];
+    for (int k = 0; k < 3; k++)
+        slices[k] = hs_morton_slice(point[k], 0.0, 1.0, hs_morton_bits(3));
+    return hs_morton_interleave(slices, 3);
+}
+
 static hs_status
 make_order(void *context)
 {
@@ -67,6 +77,7 @@ make_order(void *context)
     hs_space_order   order;
     hs_call          call;
     bool             seen[POINTS] = {false};
+    uint64_t         before = 0;
     (void)context;
     (void)hs_call_enter(&options, NULL, &call);
     const hs_status status = hs_space_order_make(&call, x, POINTS, 3, &order);
@@ -74,6 +85,10 @@ make_order(void *context)
         const int32_t own = order.order[p];
         CHECK(own >= 0 && own < POINTS && !seen[own] && order.place[own] == p);
         seen[own] = true;
+        if (isfinite(x[3 * own]) && isfinite(x[3 * own + 1]) && isfinite(x[3 * own + 2])) {
+            CHECK(key_of(x + 3 * own) >= before);
+            before = key_of(x + 3 * own);
+        }
     }
     hs_space_order_free(&call.account, &order);
     CHECK(call.account.held == 0);
@@ -83,11 +98,15 @@ make_order(void *context)
 }
 
 static void
-every_point_has_one_place(void)
+points_are_in_the_order_of_the_curve(void)
 {
     harness_random random = {12};
     for (int k = 0; k < POINTS * 3; k++)
         x[k] = k % 17 == 0 ? 0.5 : random_unit(&random);
+    for (int k = 0; k < 3; k++) { /* the corners of the box */
+        x[3 * 50 + k] = 0.0;
+        x[3 * 60 + k] = 1.0;
+    }
     x[4] = NAN;
     x[7] = -HUGE_VAL;
     CHECK(make_order(NULL) == HS_OK);
@@ -99,5 +118,5 @@ test_morton(void)
 {
     RUN(slices_never_descend);
     RUN(bits_come_in_turns);
-    RUN(every_point_has_one_place);
+    RUN(points_are_in_the_order_of_the_curve);
 }
