@@ -53,12 +53,12 @@ static void
 one_refusal_ends_any_search(void)
 {
     for (int trial = 0; trial < 18; trial++) {
-        refusal once = {0, 0};
+        refusal once = {.nth = 0, .twice = trial / 3 == 5};
         CHECK(search(trial / 3, trial % 3, &once) == HS_OK);
         const int64_t polls = once.n, step = 1 + polls / 8;
         CHECK(polls > 0);
         for (int64_t nth = 1; nth <= polls; nth += step) {
-            once = (refusal){0, nth};
+            once = (refusal){.nth = nth, .twice = once.twice};
             CHECK(search(trial / 3, trial % 3, &once) == HS_ERR_INTERRUPTED);
             CHECK(once.n == nth);
         }

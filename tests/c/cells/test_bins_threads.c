@@ -121,7 +121,7 @@ any_poll_ends_it(void)
     hs_status    status = HS_ERR_INTERRUPTED;
     int64_t      nth = 0;
     while (status != HS_OK && nth < 100) {
-        refusal once = {0, ++nth};
+        refusal once = {.nth = ++nth};
         sorted  s;
         hs_bins bins;
         open_scene(2, MANY, 0.01, &box, &s);

@@ -202,7 +202,7 @@ it_can_be_stopped(void)
         radii[i] = i % 2 ? 1.0 : 4.0;
     }
     for (int has_queries = 0; has_queries < 2; has_queries++) {
-        refusal    once = {0, 0};
+        refusal    once = {.nth = 0};
         hs_options options = quiet;
         planned    made;
         hs_failure failure;
@@ -216,7 +216,7 @@ it_can_be_stopped(void)
         const int64_t n = once.n;
         CHECK(n == (has_queries ? 6 : 4));
         for (int64_t nth = 1; nth <= n; nth++) {
-            once = (refusal){0, nth};
+            once = (refusal){.nth = nth};
             choose_plan_by(&options, &made, HS_ERR_INTERRUPTED);
             CHECK(once.n == nth);
         }

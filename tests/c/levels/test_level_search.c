@@ -382,7 +382,7 @@ opening_a_step_of_many_supports_can_be_stopped(void)
                                      .extent = 1.0,
                                      .supports = meets || !has_queries ? numbers : NULL,
                                      .query_supports = asks && has_queries ? numbers : NULL};
-            refusal         once = {0, 0};
+            refusal         once = {.nth = 0};
             hs_options      options = hs_options_default();
             hs_failure      failure = HS_NO_FAILURE;
             hs_levels       levels;
@@ -397,13 +397,13 @@ opening_a_step_of_many_supports_can_be_stopped(void)
                                    &levels, &failure) == HS_OK);
             CHECK(hs_level_plan_make(&call.account, &levels, HUGE_VAL, HS_AUTO, &plan) == HS_OK);
             const int64_t held = call.account.held;
-            once = (refusal){0, 0};
+            once = (refusal){.nth = 0};
             CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) == HS_OK);
             hs_level_close(&open);
             const int64_t n = once.n;
             CHECK(n >= 4); /* the width of one side at least, and what is laid out */
             for (int64_t nth = 1; nth <= n; nth++) {
-                once = (refusal){0, nth};
+                once = (refusal){.nth = nth};
                 CHECK(hs_level_open(&levels, &plan, 0, NULL, false, &call, &open, &failure) ==
                       HS_ERR_INTERRUPTED);
                 CHECK(once.n == nth && call.account.held == held);

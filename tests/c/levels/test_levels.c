@@ -382,7 +382,7 @@ a_division_can_be_stopped(void)
         numbers[i] = 1.0;
     }
     for (int kind = 0; kind < 3; kind++) {
-        refusal    once = {0, 0};
+        refusal    once = {.nth = 0};
         hs_options options = hs_options_default();
         hs_levels  levels;
         options.poll = refuse_once;
@@ -390,14 +390,14 @@ a_division_can_be_stopped(void)
         for (int has_queries = 0; has_queries < 2; has_queries++) {
             hs_account account = new_account();
             hs_failure failure = HS_NO_FAILURE;
-            once = (refusal){0, 0};
+            once = (refusal){.nth = 0};
             CHECK(hs_levels_divide(&account, &options, &p, has_queries ? &p : NULL, &reaches[kind],
                                    &levels, &failure) == HS_OK);
             hs_levels_free(&account, &levels);
             const int64_t n = once.n;
             CHECK(n >= (kind == 1 ? 6 : 8) * (has_queries + 1));
             for (int64_t nth = 1; nth <= n; nth += n > 40 && nth > 2 && nth < n - 12 ? 9 : 1) {
-                once = (refusal){0, nth};
+                once = (refusal){.nth = nth};
                 CHECK(hs_levels_divide(&account, &options, &p, has_queries ? &p : NULL,
                                        &reaches[kind], &levels, &failure) == HS_ERR_INTERRUPTED);
                 CHECK(once.n == nth && account.held == 0 && levels.n == 0);

@@ -43,7 +43,7 @@ find_hollow(refusal *once, hs_pairs **rows)
 static void
 one_refusal_ends_the_search(void)
 {
-    refusal   once = {0, 0};
+    refusal   once = {.nth = 0};
     hs_pairs *rows = NULL;
     CHECK(find_hollow(&once, &rows) == HS_OK);
     CHECK(hs_pairs_length(rows) == QUERIES * K);
@@ -51,7 +51,7 @@ one_refusal_ends_the_search(void)
     const int64_t polls = once.n;
     CHECK(polls > 2);
     for (int64_t nth = 1; nth <= polls; nth++) {
-        once = (refusal){0, nth};
+        once = (refusal){.nth = nth};
         CHECK(find_hollow(&once, &rows) == HS_ERR_INTERRUPTED);
         CHECK(rows == NULL && once.n == nth); /* there is no further question */
     }

@@ -84,7 +84,7 @@ any_poll_may_end_it(void)
     options.cutoff = 1.0;
     options.poll_context = NULL;
     while (status != HS_OK && nth < 50) {
-        refusal once = {0, ++nth};
+        refusal once = {.nth = ++nth};
         options.poll = refuse_once;
         options.poll_context = &once;
         status = hs_pairs_count(AMONG(&points, NULL), &options, &count, NULL);

@@ -176,7 +176,7 @@ large_blocks_are_polled_for(void)
         fill_block(OF_RUN, false, &block); /* five runs: one more than need no poll */
         CHECK(hs_records_load(&records, true) == (stop ? HS_ERR_INTERRUPTED : HS_OK));
         CHECK(once.n == 1 && records.has_metric == !stop && records.has_given == !stop);
-        once = (refusal){0};
+        once = (refusal){.nth = 0};
         hs_records_reset(&records);
         fill_block(OF_RUN - 1, false, &block);
         block.n = block.runs[--block.n_runs].at; /* four runs */

@@ -20,13 +20,16 @@ stop_after(void *context, double fraction)
 
 typedef struct refusal {
     int64_t n, nth; /* polls so far; the only one that says no */
+    double  done;   /* as the last one said */
+    bool    twice;  /* the search counts first, or sorts at last: its fractions begin anew */
 } refusal;
 
 static inline bool
 refuse_once(void *context, double fraction)
 {
     refusal *once = context;
-    (void)fraction;
+    CHECK((fraction >= once->done || once->twice) && fraction >= 0.0 && fraction <= 1.0);
+    once->done = fraction;
     return ++once->n != once->nth;
 }
 
