@@ -136,6 +136,21 @@ ends_in_far_images_are_held(void)
     }
 }
 
+/* A period is divided into as many cells as fit, each of which has its middle. */
+static void
+cells_divide_the_period(void)
+{
+    for (int n = 1; n <= 9; n++) {
+        const double   length = 4.0, wanted = length / (n + 0.5);
+        const hs_axes  axes = axes_of(length, wanted, 1.0);
+        const hs_axis *axis = &axes.axis[0];
+        CHECK(axis->n == n && axis->width == length / n);
+        CHECK(axis->inverse == (n > 1 ? 1.0 / axis->width : 0.0));
+        for (int cell = 0; cell < n; cell++)
+            CHECK(hs_axis_cell(axis, (cell + 0.5) * length / n - 0.5 * length) == cell);
+    }
+}
+
 static void
 far_cells_are_one(void)
 {
@@ -154,6 +169,7 @@ test_cell_axes(void)
     RUN(periodic_balls_hold_what_is_within);
     RUN(balls_meet_no_more_images_than_they_must);
     RUN(ends_in_far_images_are_held);
+    RUN(cells_divide_the_period);
     RUN(far_cells_are_one);
     hs_fpenv_leave(env);
 }
