@@ -465,6 +465,24 @@ def test_bad_keys(key):
     assert len(cells) == 0
 
 
+class NoInteger:
+    def __index__(self):
+        raise LookupError("no integer")
+
+
+@pytest.mark.parametrize("tagged", [False, True])
+def test_errors_of_keys_pass_through(tagged):
+    cells = hs.DynamicCellList(2, 1.0, tagged=tagged)
+    for key in ((0, NoInteger()), (NoInteger(), 0)) if tagged else (NoInteger(),):
+        for call in (
+            lambda key=key: cells.insert(key, [0.0, 0.0]), lambda key=key: cells.remove(key),
+            lambda key=key: key in cells, lambda key=key: cells.position(key),
+        ):  # fmt: skip
+            with pytest.raises(LookupError, match="no integer"):
+                call()
+    assert len(cells) == 0
+
+
 def test_keys_of_the_other_kind_and_size():
     tagged = hs.DynamicCellList(1, 1.0, tagged=True)
     for key in (1, (1,), (1, 2, 3), (1.0, 2), (1, True), [1, 2]):
