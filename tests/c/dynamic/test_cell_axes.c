@@ -122,9 +122,9 @@ ends_in_far_images_are_held(void)
         const double     step = ldexp(1.0, ilogb(length) - 53); /* no coordinate has finer ones */
         double           x = (double)cell * axis->width - axis->half;
         hs_span_of_cells span;
-        while (hs_axis_cell(axis, x) >= cell)
+        for (int n_steps = 0; n_steps < 1000 && hs_axis_cell(axis, x) >= cell; n_steps++)
             x -= step;
-        while (hs_axis_cell(axis, x + step) < cell)
+        for (int n_steps = 0; n_steps < 1000 && hs_axis_cell(axis, x + step) < cell; n_steps++)
             x += step;
         const double low = image_of(x, (double)image, length, -HUGE_VAL);
         hs_axis_images(axis, low, low + length, 0.0, &span);
