@@ -2,36 +2,19 @@
 /*
  * sort_pairs.c: a counting sort by i, then each point's few pairs by (j, S). A pair is one number
  * while it is sorted, j before its place, so that nothing is looked up but the S of images of one
- * pair. Threads count and deal out strips of the pairs; then they put rows in order and write them.
+ * pair. sort_deal.h has the counting sort; here threads put rows in order and write them.
  */
 #include "sort_pairs.h"
 
 #include "../base/poll.h"
-#include "../base/sort_numbers.h"
-#include "../threads/passes.h"
 #include "crew.h"
-#include "sort_entries.h"
+#include "sort_deal.h"
 
 #include <string.h>
 
 #define POLL_ENTRIES  (INT64_C(1) << 17) /* sorted and written between two calls of poll() */
-#define STRIP_PAIRS   (INT64_C(1) << 15) /* of a strip, at least: fewer are no work for a thread */
 #define RANGE_ENTRIES 8192 /* of a range of rows: with what is written of them they fit a cache */
 #define PUT           256  /* entries that are written at a time */
-
-#ifdef HS_TESTING
-static int most_place_bits = 63;
-
-int
-hs_test_sort_place_bits(int bits)
-{
-    const int before = most_place_bits;
-    most_place_bits = bits;
-    return before;
-}
-#else
-enum { most_place_bits = 63 };
-#endif
 
 /* A pair of points can occur in several images, so that sorting needs to tell these apart. */
 static bool
@@ -51,122 +34,6 @@ hs_sort_columns(const hs_search *search)
 {
     const unsigned wanted = search->call->options.want & ~(unsigned)HS_WANT_BOTH;
     return wanted | HS_WANT_I | HS_WANT_J | (images_repeat(search) ? HS_WANT_SHIFT : 0);
-}
-
-/* Two passes over the pairs, by strips that each have numbers of their own for each row. */
-typedef struct strips {
-    hs_sorting *all;
-    int         n;
-    int64_t    *next[HS_SLABS]; /* how many, then the place of the next; the last are all->end */
-    int32_t     any[HS_SLABS];  /* the bits of all numbers j */
-} strips;
-
-/* A hs_slab_fn. */
-static hs_status
-count_strip(void *context, int strip, int64_t first, int64_t last)
-{
-    strips           *doing = context;
-    const hs_sorting *all = doing->all;
-    int64_t          *counts = doing->next[strip];
-    int32_t           any = 0;
-    for (int64_t p = first; p < last; p++) {
-        counts[all->i[p] - all->first_point]++;
-        any |= all->j[p];
-        if (all->both_ways) {
-            counts[all->j[p] - all->first_point]++;
-            any |= all->i[p];
-        }
-    }
-    doing->any[strip] |= any;
-    return HS_OK;
-}
-
-/* From numbers of pairs to places: row by row, and in each row strip by strip. */
-static void
-accumulate(const strips *doing)
-{
-    hs_sorting *all = doing->all;
-    int64_t     place = 0;
-    int32_t     any = 0;
-    for (int64_t row = 0; row < all->n_points; row++) {
-        const int64_t begin = place;
-        for (int strip = 0; strip < doing->n; strip++) {
-            const int64_t count = doing->next[strip][row];
-            doing->next[strip][row] = place;
-            place += count;
-        }
-        all->longest = place - begin > all->longest ? place - begin : all->longest;
-    }
-    for (int strip = 0; strip < doing->n; strip++) {
-        any |= doing->any[strip];
-    }
-    all->n = place;
-    all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
-    all->has_j =
-        all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
-}
-
-/* A hs_slab_fn: puts the entries in rows. */
-static hs_status
-deal_strip(void *context, int strip, int64_t first, int64_t last)
-{
-    const strips     *doing = context;
-    const hs_sorting *all = doing->all;
-    int64_t          *next = doing->next[strip];
-    for (int64_t p = first; p < last; p++) {
-        const int32_t i = all->i[p], j = all->j[p];
-        if (all->both_ways) {
-            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, 2 * p);
-            all->entries[next[j - all->first_point]++] = hs_entry_of(all, i, 2 * p + 1);
-        } else {
-            all->entries[next[i - all->first_point]++] = hs_entry_of(all, j, p);
-        }
-    }
-    return HS_OK;
-}
-
-/* Strips for this team: each with pairs enough, and no more further numbers than pairs. */
-static int
-choose_strips(const hs_sorting *all)
-{
-    const int64_t n_pairs = all->found->n_pairs;
-    const int     size = hs_team_size(all->call->team);
-    int           n = size < HS_SLABS ? size : HS_SLABS;
-    while (n > 1 && (n_pairs < n * STRIP_PAIRS || (n - 1) * all->n_points > n_pairs)) {
-        n--;
-    }
-    return n;
-}
-
-/* Entries in their rows, which are in no order yet. */
-static hs_status
-deal_out(hs_sorting *all)
-{
-    hs_call      *call = all->call;
-    const int64_t n_pairs = all->found->n_pairs;
-    const size_t  size = (size_t)all->n_points * sizeof *all->end;
-    strips        doing = {.all = all, .n = choose_strips(all)};
-    int64_t      *others = NULL;
-    if (doing.n > 1) {
-        others =
-            hs_alloc(&call->account, HS_FOR_SORTING, (doing.n - 1) * all->n_points, sizeof *others);
-        doing.n = others == NULL ? 1 : doing.n;
-    }
-    for (int strip = 0; strip < doing.n; strip++) {
-        doing.next[strip] = strip == doing.n - 1 ? all->end : others + strip * all->n_points;
-        memset(doing.next[strip], 0, size);
-    }
-    hs_status status =
-        hs_walk_strips(call->team, &call->options, n_pairs, doing.n, count_strip, &doing);
-    if (status == HS_OK) {
-        accumulate(&doing);
-        all->entries = hs_alloc(&call->account, HS_FOR_SORTING, all->n, sizeof *all->entries);
-        status = all->entries == NULL ? HS_ERR_MEMORY
-                                      : hs_walk_strips(call->team, &call->options, n_pairs, doing.n,
-                                                       deal_strip, &doing);
-    }
-    hs_free(&call->account, others);
-    return status;
 }
 
 /* n indices to every `stride`-th element. */
@@ -359,17 +226,32 @@ put_all(const hs_sorting *all, hs_output *sorted)
     return status;
 }
 
+/* A hs_poll_fn: the caller's, by its options, who is told that all pairs are found. */
+static bool
+poll_when_found(void *context, double fraction)
+{
+    const hs_options *callers = context;
+    (void)fraction;
+    return callers->poll(callers->poll_context, 1.0);
+}
+
 static hs_status
 sort(hs_sorting *all, hs_output *sorted)
 {
+    hs_options *options = &all->call->options, callers = *options;
+    if (callers.poll != NULL) {
+        options->poll = poll_when_found;
+        options->poll_context = &callers;
+    }
     all->i = hs_output_column(all->found, HS_WANT_I);
     all->j = hs_output_column(all->found, HS_WANT_J);
     all->shift = hs_output_column(all->found, HS_WANT_SHIFT);
-    hs_status status = deal_out(all);
+    hs_status status = hs_deal_out(all);
     if (status == HS_OK) {
         status = put_all(all, sorted);
     }
     hs_free(&all->call->account, all->entries);
+    *options = callers;
     return status;
 }
 

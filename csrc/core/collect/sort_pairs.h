@@ -24,9 +24,4 @@ hs_status hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points,
 hs_status hs_sort_rows(hs_call *call, int64_t n_rows, const hs_output *found, bool both_ways,
                        int64_t *offsets, hs_output *sorted);
 
-#ifdef HS_TESTING
-/* How many bits a place may have at most. Returns what it was before. */
-int hs_test_sort_place_bits(int bits);
-#endif
-
 #endif

@@ -262,8 +262,7 @@ one_refusal_ends_any_entry(void)
     memset(&scene, 0, sizeof scene);
     scene.of.scene.ndim = 3;
     for (int which = 0; which < ENTRIES; which++) {
-        const bool twice = which == SORTED || which == ROWS;
-        refusal    once = {.nth = 0, .twice = twice};
+        refusal    once = {0};
         entry_call e = {.which = (entry)which,
                         .among = make_many(HS_RULE_SUM, &points, &reach),
                         .options = hs_options_default()};
@@ -277,7 +276,7 @@ one_refusal_ends_any_entry(void)
         const int64_t polls = once.n, step = 1 + polls / 6;
         CHECK(polls > 0);
         for (int64_t nth = 1; nth <= polls; nth += step) {
-            once = (refusal){.nth = nth, .twice = twice};
+            once = (refusal){.nth = nth};
             CHECK(run_entry(&e) == HS_ERR_INTERRUPTED && once.n == nth);
         }
     }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_sort_pairs.c: pairs are sorted by i, j and S, a few and a crowd of each i, and those that
  * are there twice stay. */
+#include "../../../csrc/core/collect/sort_deal.h"
 #include "../../../csrc/core/collect/sort_pairs.h"
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
