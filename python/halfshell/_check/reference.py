@@ -15,6 +15,7 @@ taken as the real number that it is. The half list has each pair once:
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
@@ -103,7 +104,7 @@ def reference_pairs(
             if radius < 0:
                 continue
             limit = radius**2
-            between = [a - b for a, b in zip(table[j], p)]
+            between = list(map(operator.sub, table[j], p))
             for shift, vector in lattice.images_within(between, limit):
                 square = _dot(vector, vector)
                 if square > limit or (square == limit and not inclusive):
@@ -203,29 +204,33 @@ class _Lattice:
             whole = [int(x * scale) for x in rest]
             common = math.gcd(*whole)
             self.ortho.append([x // common for x in whole])
+        # The component of D along ortho[k] is (start + s * step) / |ortho[k]|: squares of them are
+        # summed in units of 1 / unit, in which they are integers.
+        lengths2 = [_dot(along, along) for along in self.ortho]
+        self.unit = math.lcm(*lengths2)
+        self.shares = [self.unit // length2 for length2 in lengths2]
+        self.steps = [_dot(edge, along) for edge, along in zip(self.vectors, self.ortho)]
 
     def images_within(
         self, vector: _Vector, limit: int
     ) -> Iterator[tuple[tuple[int, ...], _Vector]]:
         """Yield (S, vector + S @ box), among them every one of squared length <= limit."""
-        shift = [0] * self.ndim
+        return self._descend(len(self.axes) - 1, vector, limit * self.unit, [0] * self.ndim)
 
-        def descend(
-            k: int, vector: _Vector, left: Fraction
-        ) -> Iterator[tuple[tuple[int, ...], _Vector]]:
-            if k < 0:
-                yield tuple(shift), vector
-                return
-            along, axis = self.ortho[k], self.axes[k]
-            length2 = _dot(along, along)
-            start, step = _dot(vector, along), _dot(self.vectors[k], along)
-            reach = math.isqrt(math.floor(left * length2))  # |start + s * step| <= reach
-            for s in range(-((reach + start) // step), (reach - start) // step + 1):
-                shift[axis] = s
-                moved = [x + s * y for x, y in zip(vector, self.vectors[k])]
-                yield from descend(k - 1, moved, left - Fraction((start + s * step) ** 2, length2))
-
-        yield from descend(len(self.axes) - 1, vector, Fraction(limit))
+    def _descend(
+        self, k: int, vector: _Vector, left: int, shift: list[int]
+    ) -> Iterator[tuple[tuple[int, ...], _Vector]]:
+        """Shift along vectors 0 to k, whose components have `left` / unit of the limit to share."""
+        if k < 0:
+            yield tuple(shift), vector
+            return
+        axis, edge, step, share = self.axes[k], self.vectors[k], self.steps[k], self.shares[k]
+        start = _dot(vector, self.ortho[k])
+        reach = math.isqrt(left // share)  # |start + s * step| <= reach
+        for s in range(-((reach + start) // step), (reach - start) // step + 1):
+            shift[axis] = s
+            moved = [x + s * y for x, y in zip(vector, edge)]
+            yield from self._descend(k - 1, moved, left - (start + s * step) ** 2 * share, shift)
 
 
 def exact_vector(
@@ -248,13 +253,8 @@ def exact_vector(
     >>> exact_vector([[0.0], [0.75]], 0, 1, S=(-1,), box=[1.0])
     [Fraction(-1, 4)]
     """
-    p, q = _fractions([points[i], points[j]])
-    vector = [b - a for a, b in zip(p, q)]
-    if S is not None and any(S):
-        rows, _ = _box_rows(box, None, len(vector))
-        for s, row in zip(S, rows):
-            vector = [x + int(s) * y for x, y in zip(vector, row)]
-    return vector
+    vector, unit = _whole_vector(points, i, j, S, box)
+    return [Fraction(x, unit) for x in vector]
 
 
 def exact_square(
@@ -267,7 +267,8 @@ def exact_square(
     >>> exact_square([[0.0, 0.0], [0.5, 1.0]], 0, 1)
     Fraction(5, 4)
     """
-    return sum((x * x for x in exact_vector(points, i, j, S, box)), Fraction(0))
+    vector, unit = _whole_vector(points, i, j, S, box)
+    return Fraction(_dot(vector, vector), unit**2)
 
 
 def ulp_error(distance: float, square: Fraction) -> Fraction:
@@ -299,6 +300,21 @@ def ulp_error(distance: float, square: Fraction) -> Fraction:
     return max(abs(Fraction(float(distance)) - end) for end in ends) / unit
 
 
+def _whole_vector(
+    points: Any, i: int, j: int, S: Sequence[int] | None, box: Any
+) -> tuple[_Vector, int]:
+    """Return `exact_vector` in units of 1 / unit, in which it is integers, and unit."""
+    ends = _fractions([points[i], points[j]])
+    rows: list[list[Fraction]] = []
+    if S is not None and any(S):
+        rows, _ = _box_rows(box, None, len(ends[0]))
+    (p, q), edges, ((unit,),) = _common_unit(ends, rows, [[Fraction(1)]])
+    vector = list(map(operator.sub, q, p))
+    for s, edge in zip(() if S is None else S, edges):
+        vector = [x + int(s) * y for x, y in zip(vector, edge)]
+    return vector, unit
+
+
 def _box_rows(box: Any, periodic: Any, ndim: int) -> tuple[list[list[Fraction]], list[bool]]:
     """Return the box as rows of Fractions, and which axes repeat."""
     if box is None:
@@ -325,4 +341,4 @@ def _common_unit(*tables: list[list[Fraction]]) -> list[list[_Vector]]:
 
 
 def _dot(a: Sequence[int], b: Sequence[int]) -> int:
-    return sum(x * y for x, y in zip(a, b))
+    return sum(map(operator.mul, a, b))
