@@ -14,6 +14,7 @@ from checkout import ROOT
 from frameworks import framework
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["torch", "jax"])
 def test_examples_run(name):
     module = framework(name)

@@ -25,7 +25,7 @@ def _doubles():
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("jitted", [False, True])
+@pytest.mark.parametrize("jitted", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_lists_are_those_of_neighbors(dtype, jitted):
     for points, cutoff, box, periodic in itertools.islice(scenes(dtype), jitted, None, 1 + jitted):
         expected = full_list(points, cutoff, box, periodic)
@@ -56,6 +56,7 @@ def test_without_doubles_the_float32_values_are_decided_exactly():
     assert hj.neighbor_list(jnp.asarray(points), 0.1, capacity=2, inclusive=False).needed == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", [False, True])
 def test_what_does_not_fit_is_flagged(rng, half):
     points = jnp.asarray(rng.random((20, 3)))
@@ -72,6 +73,7 @@ def test_what_does_not_fit_is_flagged(rng, half):
             assert np.array_equal(ours, other[:capacity])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boxes", ["each", "one", "fixed", "none"])
 @pytest.mark.parametrize("jitted", [False, True])
 def test_vmap_is_each_system_alone(rng, boxes, jitted):
@@ -101,6 +103,7 @@ def test_vmap_is_each_system_alone(rng, boxes, jitted):
     assert found.overflow.any() != found.overflow.all() or not found.overflow.any()
 
 
+@pytest.mark.slow
 def test_derivatives_of_positions_and_strain(rng):
     points = jnp.asarray(3.0 * rng.random((12, 3)))
 
@@ -124,6 +127,7 @@ def test_derivatives_of_positions_and_strain(rng):
     assert hessian.shape == (12, 3, 12, 3) and np.isfinite(hessian).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 1e-200, 1e200])
 def test_no_entry_and_no_length_have_finite_derivatives(scale):
     x = jnp.array([[0.0, 0.0], [0.0, 0.0], [3.0, 4.0]]) * scale

@@ -101,6 +101,7 @@ def test_no_length_has_a_gradient_that_is_not_finite(scale):
     assert second.isfinite().all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["eager", "aot_eager"])
 @pytest.mark.parametrize("box", [None, SKEWED, [4.0, 4.0, 4.0]])
 def test_compiled_functions_give_the_same(points, backend, box):

@@ -24,7 +24,10 @@ def integers_of(array, unit):
 
 
 def square(p, q, step):
-    return sum((b - a + c) ** 2 for a, b, c in zip(p, q, step, strict=True))
+    total = 0
+    for a, b, c in zip(p, q, step):
+        total += (b - a + c) ** 2
+    return total
 
 
 class Rule:

@@ -322,6 +322,7 @@ def test_the_same_bits_for_any_kernel_and_number_of_threads(rng):
             assert same_arrays(one, other)
 
 
+@pytest.mark.slow
 def test_cost_follows_the_points_not_their_distances(rng):
     # n^2 would be 1e10 distances, and minutes.
     n = 100_000

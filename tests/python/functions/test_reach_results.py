@@ -185,9 +185,9 @@ LARGE = {
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("kind", ["open", "triclinic"])
 def test_large_scenes_are_right(name, rule, kind, rng):
-    n = 3000
+    n = 1500
     points, scene = boxed(rng, kind, 3, n)
-    radii = LARGE[name](n, rng) * 0.03 * (1 if rule == "sum" else 2)
+    radii = LARGE[name](n, rng) * 0.04 * (1 if rule == "sum" else 2)
     how = {"radii": radii, "rule": rule, **scene}
     verdict = hs.verify(points, None, hs.neighbors(points, None, quantities="jS", **how), **how)
     assert verdict, str(verdict)
@@ -195,12 +195,12 @@ def test_large_scenes_are_right(name, rule, kind, rng):
     if rule in SYMMETRIC:
         found = hs.pairs(points, None, quantities="ijS", **how)
         assert hs.verify(points, None, *found, **how)
-    queries = {"queries": points[:900], "query_radii": radii[:900], "radii": radii[900:]}
+    queries = {"queries": points[:450], "query_radii": radii[:450], "radii": radii[450:]}
     if rule in ("gather", "scatter"):
         del queries["radii" if rule == "gather" else "query_radii"]
     how = scene | {"rule": rule} | queries
-    table = hs.neighbors(points[900:], None, quantities="jS", **how)
-    assert hs.verify(points[900:], None, table, **how)
+    table = hs.neighbors(points[450:], None, quantities="jS", **how)
+    assert hs.verify(points[450:], None, table, **how)
 
 
 def test_many_types_in_a_large_scene(rng):

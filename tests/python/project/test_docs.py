@@ -223,6 +223,7 @@ def test_example_of_clusters_runs():
     assert names["noise"].any() and names["core"].any()
 
 
+@pytest.mark.slow
 def test_examples_of_nearest_run():
     text = (ROOT / "docs/nearest.md").read_text()
     searches, masks, cells, given = re.findall(r"```python\n(.*?)```", text, re.DOTALL)

@@ -197,7 +197,13 @@ def outside(figure):
     return max(-drawn.x0, -drawn.y0, drawn.x1 - page.x1, drawn.y1 - page.y1)
 
 
-@pytest.mark.parametrize("n", range(1, len(looks.LOOKS) + 1))
+@pytest.mark.parametrize(
+    "n",
+    [
+        pytest.param(n, marks=[] if n in (1, 6, len(looks.LOOKS)) else pytest.mark.slow)
+        for n in range(1, len(looks.LOOKS) + 1)
+    ],
+)
 def test_every_method_has_its_name_beside_the_diagrams(n):
     ours = {"exact", "double", "single", "float32"}
     for names in (list(looks.LOOKS)[:n], list(looks.LOOKS)[-n:]):

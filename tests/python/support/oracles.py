@@ -27,7 +27,7 @@ EPS = 2.0**-53
 
 def as_set(i, j, S=None):
     """The pairs as a set of (i, j, S); a pair that is listed twice is an error at once."""
-    shifts = [()] * len(i) if S is None else map(tuple, np.asarray(S).tolist())
+    shifts = itertools.repeat(()) if S is None else zip(*np.asarray(S).T.tolist())
     pairs = list(zip(np.asarray(i).tolist(), np.asarray(j).tolist(), shifts))
     found = set(pairs)
     assert len(found) == len(pairs), f"{len(pairs) - len(found)} pairs are listed twice"
