@@ -3,6 +3,7 @@
 warnings are errors."""
 
 import gc
+import os
 
 import numpy as np
 import pytest
@@ -12,7 +13,11 @@ import halfshell as hs
 from checkout import BENCHMARKS, TESTS
 
 settings.register_profile(
-    "halfshell", derandomize=True, deadline=None, database=None, max_examples=100
+    "halfshell",
+    derandomize=True,
+    deadline=None,
+    database=None,
+    max_examples=int(os.environ.get("HALFSHELL_EXAMPLES", "50")),
 )
 settings.load_profile("halfshell")
 
@@ -33,10 +38,16 @@ def pytest_configure(config):
         config.addinivalue_line("filterwarnings", line)
 
 
-def pytest_collection_finish(session):
-    """Thousands of tests are many objects, which no later collection of garbage need look at."""
-    gc.collect()
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session):
+    """Thousands of tests are many objects, which no collection of garbage need look at."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 # For modules: tests of a wider scope would be sorted by kernel, and oracles asked again.
