@@ -10,6 +10,10 @@
  * no system call. More would only use up address space. */
 #define KEPT_SPARE ((size_t)64 << 20)
 
+/* What a new chunk has at least, so that it serves other calls from the pool. Where a sanitizer
+ * watches malloc, none goes there, and large ones would be mapped and marked anew for each call. */
+#define LEAST_NEW (HS_WATCHED_MALLOC ? (size_t)1 << 16 : HS_POOL_SCRATCH)
+
 static bool
 allocation_fails(void)
 {
@@ -62,7 +66,7 @@ take_recycled(size_t expected)
 static void *
 take_new(size_t expected)
 {
-    void *data = hs_chunk_new(expected > HS_POOL_SCRATCH ? expected : HS_POOL_SCRATCH);
+    void *data = hs_chunk_new(expected > LEAST_NEW ? expected : LEAST_NEW);
     if (data == NULL) {
         data = hs_chunk_new(expected);
     }
