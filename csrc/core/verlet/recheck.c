@@ -233,16 +233,6 @@ run_alone(recheck_job *job, hs_failure *failure)
     return status;
 }
 
-static hs_status
-run_slabs(hs_recheck *recheck, hs_failure *failure)
-{
-    const hs_listing *listing = &recheck->list->listing;
-    recheck_job       job = {.recheck = recheck, .n_plain = slabs_of(listing->n_plain)};
-    job.n_slabs = job.n_plain + slabs_of(listing->n_pairs - listing->n_plain);
-    return recheck->call->team != NULL && job.n_slabs > 1 ? run_together(&job, failure)
-                                                          : run_alone(&job, failure);
-}
-
 static void
 free_recheck(hs_recheck *recheck)
 {
@@ -261,14 +251,18 @@ free_recheck(hs_recheck *recheck)
 hs_status
 hs_recheck_run(hs_recheck *recheck, hs_failure *failure)
 {
-    const bool more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
+    const hs_listing *listing = &recheck->list->listing;
+    const bool        more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
+    recheck_job       job = {.recheck = recheck, .n_plain = slabs_of(listing->n_plain)};
+    job.n_slabs = job.n_plain + slabs_of(listing->n_pairs - listing->n_plain);
+    recheck->shared = recheck->call->team != NULL && job.n_slabs > 1;
     recheck->numbers = !more && hs_sift_has_numbers(recheck->d);
     hs_status status = hs_recheck_prepare(recheck);
     if (status == HS_OK && recheck->measures) {
         status = hs_recheck_open_scene(recheck, failure);
     }
     if (status == HS_OK && !(recheck->given.cutoff == 0.0 && !recheck->given.inclusive)) {
-        status = run_slabs(recheck, failure);
+        status = recheck->shared ? run_together(&job, failure) : run_alone(&job, failure);
     }
     free_recheck(recheck);
     return status;

@@ -22,14 +22,15 @@ typedef struct hs_bundle_points {
 
 /*
  * Everything that slabs share, read only while they work, but for `output` and `of_a`: each thread
- * has a copy with its own. Points are those of the list: in the cell
- * order of the step it was built for.
+ * has a copy with its own. Points are those of the list: in the cell order of the step it was built
+ * for.
  */
 typedef struct hs_recheck {
     const hs_verlet  *list;   /* borrowed */
     const hs_frame   *now;    /* the list's */
     hs_call          *call;   /* borrowed */
-    hs_output        *output; /* borrowed; the thread's, where there are several */
+    bool              shared; /* by threads, each of which has an output of its own first */
+    hs_output        *output; /* borrowed; the thread's, where it is shared */
     int               d, m;
     int               vector_of_row[HS_MAX_DIM];
     hs_metric         given;  /* decides, on points and box vectors as given */

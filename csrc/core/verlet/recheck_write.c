@@ -70,7 +70,7 @@ hs_recheck_plan_write(hs_recheck *recheck)
 {
     const hs_scene *scene = &recheck->scene;
     const int       d = recheck->d, m = recheck->m;
-    const bool      is_ours = !recheck->output->fixed || hs_team_size(recheck->call->team) > 1;
+    const bool      is_ours = !recheck->output->fixed || recheck->shared;
     recheck->writes = recheck->call->kernel->write != NULL && d >= 2 && d <= HS_WRITE_MOST_DIM &&
                       is_ours && !(recheck->output->columns & HS_WANT_BOTH) &&
                       !scene->keeps_originals && !scene->extreme && scene->metric.floats_usable &&

@@ -204,6 +204,56 @@ sorted_pairs_are_those_of_a_search(void)
     }
 }
 
+/* A short list of many points, for which there are threads but no work for two: nothing is written
+ * behind the last pair of the caller's arrays. */
+static void
+nothing_is_written_behind_a_short_list(void)
+{
+    enum { POINTS = 400, PAIRS = POINTS / 2, ROOM = PAIRS + 32 };
+    static double        x[3 * POINTS], distance[ROOM], vector[3 * ROOM];
+    static int32_t       i[ROOM], j[ROOM];
+    const hs_pair_arrays arrays = {.capacity = PAIRS,
+                                   .index_bytes = 4,
+                                   .i = i,
+                                   .j = j,
+                                   .distance = distance,
+                                   .vector = vector};
+    hs_verlet           *list = hs_verlet_new();
+    const hs_points      points = {.data = x,
+                                   .n = POINTS,
+                                   .ndim = 3,
+                                   .real = HS_FLOAT64,
+                                   .row_stride = 3 * sizeof(double),
+                                   .column_stride = sizeof(double)};
+    hs_options           options = hs_options_default();
+    hs_pairs            *found = NULL;
+    bool                 rebuilt, untouched = true;
+    for (int e = 0; e < POINTS; e++) {
+        x[3 * e] = (double)(e / 2) * 10.0 + (double)(e % 2) * 0.5; /* one pair each */
+    }
+    options.cutoff = 1.0;
+    options.threads = 2;
+    options.want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR;
+    options.index_bytes = 4;
+    CHECK(hs_verlet_update(list, &points, NULL, &options, 0.2, false, &rebuilt, NULL) == HS_OK);
+    memset(distance, 77, sizeof distance);
+    memset(vector, 77, sizeof vector);
+    memset(i, 77, sizeof i);
+    memset(j, 77, sizeof j);
+    options.out = &arrays;
+    CHECK(hs_verlet_find(list, &options, &found, NULL) == HS_OK);
+    CHECK(hs_pairs_length(found) == PAIRS && distance[PAIRS - 1] == 0.5);
+    for (int p = PAIRS; p < ROOM; p++) {
+        untouched = untouched && memcmp(&i[p], &j[ROOM - 1], sizeof *i) == 0 &&
+                    memcmp(&j[p], &j[ROOM - 1], sizeof *j) == 0 &&
+                    memcmp(&distance[p], &distance[ROOM - 1], sizeof *distance) == 0 &&
+                    memcmp(&vector[3 * p], &vector[3 * ROOM - 3], 3 * sizeof *vector) == 0;
+    }
+    CHECK(untouched);
+    hs_pairs_free(found);
+    hs_verlet_free(list);
+}
+
 /* Lists of many slabs, with images and without: any number of threads writes the same bytes in the
  * same order, to new arrays and to the caller's, and counts the same. */
 static void
@@ -285,5 +335,6 @@ test_recheck_find(void)
     RUN(shifts_that_do_not_fit_are_named);
     RUN(any_allocation_may_be_refused);
     RUN(sorted_pairs_are_those_of_a_search);
+    RUN(nothing_is_written_behind_a_short_list);
     RUN(threads_write_the_same_bytes);
 }
