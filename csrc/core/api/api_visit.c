@@ -138,7 +138,7 @@ hs_visit_columns(const hs_among *among, const hs_options *options, const hs_visi
     hs_request request = hs_request_among(among, HS_HALF_LIST, &of_visit);
     of_visit.sorted = false;
     of_visit.out = NULL;
-    if (!visit->thread_safe) { /* other threads would only make the search ready */
+    if (!visit->thread_safe && options->threads > 1) { /* others only make the search ready */
         const int64_t n = request.sets.points == NULL ? 0 : request.sets.points->n;
         const int     n_threads = hs_call_threads((double)(n / HS_POINTS_MADE_READY), options);
         of_visit.threads = n_threads > 1 ? options->threads : 1;
