@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* sort_deal.c: two passes over the pairs. Threads count strips of them, each the pairs of every row;
- * the sums say where the pairs of each strip go, and then they are dealt out at once. */
+/* sort_deal.c: two passes over the pairs. Threads count strips of them, each strip the pairs of
+ * every row; the sums say where those of each strip go, and then they are dealt out at once. */
 #include "sort_deal.h"
 
 #include "../base/sort_numbers.h"
@@ -71,7 +71,7 @@ accumulate(const strips *doing)
     for (int strip = 0; strip < doing->n; strip++) {
         any |= doing->any[strip];
     }
-    all->n = place;
+    HS_ASSERT(place == all->n);
     all->place_bits = 64 - hs_count_bits((uint64_t)any | 1);
     all->has_j =
         all->n >> (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) == 0;
@@ -117,7 +117,12 @@ hs_deal_out(hs_sorting *all)
     const size_t  size = (size_t)all->n_points * sizeof *all->end;
     strips        doing = {.all = all, .n = choose_strips(all)};
     int64_t      *others = NULL;
-    if (doing.n > 1) {
+    all->n = all->both_ways ? 2 * n_pairs : n_pairs;
+    all->entries = hs_alloc(&call->account, HS_FOR_SORTING, all->n, sizeof *all->entries);
+    if (all->entries == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    if (doing.n > 1) { /* last: without memory for these there is one strip */
         others =
             hs_alloc(&call->account, HS_FOR_SORTING, (doing.n - 1) * all->n_points, sizeof *others);
         doing.n = others == NULL ? 1 : doing.n;
@@ -130,10 +135,7 @@ hs_deal_out(hs_sorting *all)
         hs_walk_strips(call->team, &call->options, n_pairs, doing.n, count_strip, &doing);
     if (status == HS_OK) {
         accumulate(&doing);
-        all->entries = hs_alloc(&call->account, HS_FOR_SORTING, all->n, sizeof *all->entries);
-        status = all->entries == NULL ? HS_ERR_MEMORY
-                                      : hs_walk_strips(call->team, &call->options, n_pairs, doing.n,
-                                                       deal_strip, &doing);
+        status = hs_walk_strips(call->team, &call->options, n_pairs, doing.n, deal_strip, &doing);
     }
     hs_free(&call->account, others);
     return status;

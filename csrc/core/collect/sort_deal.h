@@ -6,7 +6,8 @@
 #include "sort_entries.h"
 
 /* Sets end, n, longest, has_j, place_bits and entries, which the caller frees, also on failure: the
- * entries of each row together, in no order yet. i, j and what describes the pairs are set before. */
+ * entries of each row together, in no order yet. i, j and what describes the pairs are there
+ * already. */
 hs_status hs_deal_out(hs_sorting *all);
 
 #ifdef HS_TESTING

@@ -24,7 +24,7 @@ typedef struct hs_sorting {
     bool             has_j; /* in front of the place */
     int              place_bits;
     int64_t          n, longest; /* entries, of all rows and of one */
-    int64_t         *end;        /* n_points + 1; end[i - first_point]: where row i ends */
+    int64_t         *end;        /* n_points; end[i - first_point]: where row i ends */
     uint64_t        *entries;    /* ascending in the end */
 } hs_sorting;
 

@@ -184,7 +184,9 @@ static hs_status
 do_ranges(row_job *job)
 {
     hs_call *call = job->all->call;
-    if (call->team != NULL && job->n_ranges > 1) {
+    /* Each thread has room for the longest row: where that is much of all, one thread sorts. */
+    if (call->team != NULL && job->n_ranges > 1 &&
+        job->all->longest <= job->all->n / hs_team_size(call->team)) {
         hs_failure ignored;
         hs_crew    crew = {.call = call,
                            .job = job,
@@ -261,7 +263,7 @@ hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_points, const hs_out
 {
     hs_sorting all = {
         .call = call, .first_point = first_point, .n_points = n_points, .found = found};
-    all.end = hs_alloc(&call->account, HS_FOR_SORTING, n_points + 1, sizeof *all.end);
+    all.end = hs_alloc(&call->account, HS_FOR_SORTING, n_points, sizeof *all.end);
     const hs_status status = all.end != NULL ? sort(&all, sorted) : HS_ERR_MEMORY;
     hs_free(&call->account, all.end);
     return status;

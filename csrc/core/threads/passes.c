@@ -21,8 +21,8 @@ do_slab(void *context, int64_t slab)
     doing->status[slab] = doing->run(doing->context, (int)slab, first, first + n);
 }
 
-/* Part `round` of n_rounds nearly equal parts of strip `slab`. The products fit, as n is at
- * most 2^39, which no memory holds pairs of: with 2^17 in a round, n rounds are 2^61. */
+/* Part `round` of n_rounds nearly equal parts of strip `slab`. The products fit: n * n / 2^17 is
+ * below 2^63 up to 2^40 pairs, whose i and j take 9 TB. */
 static void
 do_strip(void *context, int64_t slab)
 {

@@ -152,7 +152,7 @@ refused_memory_leaves_nothing_behind(void)
         free_dealt(&all);
         CHECK(unit.call.account.held == held);
     }
-    CHECK(n_dealt + n_refused == 8 && n_refused > 0 && n_dealt > 0);
+    CHECK(n_refused == 2 && n_dealt == 6); /* where rows end, and the entries */
     search_unit_close(&unit);
 }
 

@@ -210,7 +210,7 @@ sort_once(void *context)
     return status;
 }
 
-/* With too little memory for strips there is one. */
+/* Any allocation may be refused. */
 static void
 threads_do_with_little_memory(void)
 {
