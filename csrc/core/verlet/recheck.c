@@ -167,7 +167,19 @@ open_alone(recheck_job *job, worker *me)
     me->options = call->options;
     me->recheck = *job->recheck;
     me->slab = hs_alloc(&call->account, HS_FOR_CANDIDATES, 1, sizeof *me->slab);
-    return me->slab != NULL ? HS_OK : HS_ERR_MEMORY;
+    if (me->recheck.writes) {
+        me->recheck.of_a = hs_alloc(&call->account, HS_FOR_CANDIDATES, 1, sizeof *me->recheck.of_a);
+    }
+    return me->slab == NULL || (me->recheck.writes && me->recheck.of_a == NULL) ? HS_ERR_MEMORY
+                                                                                : HS_OK;
+}
+
+static void
+free_scratch(worker *me)
+{
+    hs_account *account = &me->job->recheck->call->account;
+    hs_free(account, me->recheck.of_a);
+    hs_free(account, me->slab);
 }
 
 static hs_status
@@ -182,11 +194,7 @@ open_worker(void *context, void *place)
     me->committer.options = &me->options;
     me->committer.pairs = &me->found;
     own->output = &me->found;
-    own->of_a = NULL;
-    if (own->writes) {
-        own->of_a = hs_alloc(&own->call->account, HS_FOR_CANDIDATES, 1, sizeof *own->of_a);
-    }
-    return own->writes && own->of_a == NULL ? HS_ERR_MEMORY : status;
+    return status;
 }
 
 static void
@@ -196,15 +204,12 @@ close_worker(void *context, void *place)
     hs_call *call = ((recheck_job *)context)->recheck->call;
     hs_call_note(call, &me->done);
     hs_output_free(&me->found);
-    hs_free(&call->account, me->recheck.of_a);
-    hs_free(&call->account, me->slab);
+    free_scratch(me);
 }
 
 static hs_status
 run_together(recheck_job *job, hs_failure *failure)
 {
-    const int64_t bytes = HS_SIFT * hs_output_bytes_per_pair(job->recheck->output);
-    job->in_range = 1 + HS_RANGE_BYTES / (bytes + 1);
     hs_crew crew = {.call = job->recheck->call,
                     .job = job,
                     .worker_size = sizeof(worker),
@@ -229,7 +234,7 @@ run_alone(recheck_job *job, hs_failure *failure)
         failure->row = me.committer.failure.row;
     }
     hs_call_note(call, &me.done);
-    hs_free(&call->account, me.slab);
+    free_scratch(&me);
     return status;
 }
 
@@ -237,7 +242,6 @@ static void
 free_recheck(hs_recheck *recheck)
 {
     hs_account *account = &recheck->call->account;
-    hs_free(account, recheck->of_a);
     hs_free(account, recheck->few);
     hs_free(account, recheck->lagging);
     hs_free(account, recheck->lag);
@@ -255,7 +259,8 @@ hs_recheck_run(hs_recheck *recheck, hs_failure *failure)
     const bool        more = recheck->measures || (recheck->output->columns & HS_WANT_SHIFT);
     recheck_job       job = {.recheck = recheck, .n_plain = slabs_of(listing->n_plain)};
     job.n_slabs = job.n_plain + slabs_of(listing->n_pairs - listing->n_plain);
-    recheck->shared = recheck->call->team != NULL && job.n_slabs > 1;
+    job.in_range = 1 + HS_RANGE_BYTES / (1 + HS_SIFT * hs_output_bytes_per_pair(recheck->output));
+    recheck->shared = recheck->call->team != NULL && job.n_slabs > job.in_range;
     recheck->numbers = !more && hs_sift_has_numbers(recheck->d);
     hs_status status = hs_recheck_prepare(recheck);
     if (status == HS_OK && recheck->measures) {

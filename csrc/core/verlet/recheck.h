@@ -49,7 +49,7 @@ typedef struct hs_recheck {
     uint8_t          *lagging; /* owned; whether those are not all zero */
     bool              writes;  /* recheck_write.c measures. Then: */
     int32_t          *few;     /* owned; records of lags; NULL: all are zero */
-    hs_bundle_points *of_a;    /* owned; each thread has its own */
+    hs_bundle_points *of_a;    /* each thread has its own */
 } hs_recheck;
 
 /* The hits of one slab: consecutive pairs, all with or all without an image. */

@@ -80,8 +80,7 @@ hs_recheck_plan_write(hs_recheck *recheck)
     if (!recheck->writes) {
         return HS_OK;
     }
-    recheck->of_a = hs_alloc(&recheck->call->account, HS_FOR_CANDIDATES, 1, sizeof *recheck->of_a);
-    return recheck->of_a != NULL && set_few(recheck) ? HS_OK : HS_ERR_MEMORY;
+    return set_few(recheck) ? HS_OK : HS_ERR_MEMORY;
 }
 
 /* What the writer is told of the point a of each bundle. */

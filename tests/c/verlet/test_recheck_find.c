@@ -72,9 +72,9 @@ what_does_not_fit_is_told(void)
     hs_verlet_free(list);
 }
 
-/* A pair whose S passes int32 by jumps of one of its points, where numbers descend from cell to cell,
- * so that most pairs are found the other way round: its lower number is named, of a neighbour by
- * brute force. */
+/* A pair whose S passes int32 by jumps of one of its points, where numbers descend from cell to
+ * cell, so that most pairs are found the other way round: its lower number is named, of a neighbour
+ * by brute force. */
 static void
 shifts_that_do_not_fit_are_named(void)
 {
@@ -315,7 +315,10 @@ threads_write_the_same_bytes(void)
             hs_pairs_free(found);
             const size_t size = (size_t)n * sizeof(int32_t);
             CHECK((options.want & HS_WANT_BOTH) ||
-                  memcmp(i, hs_pairs_array(alone, HS_WANT_I), size) == 0);
+                  (memcmp(i, hs_pairs_array(alone, HS_WANT_I), size) == 0 &&
+                   memcmp(j, hs_pairs_array(alone, HS_WANT_J), size) == 0));
+            CHECK(!(options.want & HS_WANT_DISTANCE) ||
+                  memcmp(distance, hs_pairs_array(alone, HS_WANT_DISTANCE), 2 * size) == 0);
             CHECK(!(options.want & HS_WANT_VECTOR) ||
                   memcmp(vector, hs_pairs_array(alone, HS_WANT_VECTOR), 6 * size) == 0);
             CHECK(!(options.want & HS_WANT_SHIFT) ||
