@@ -2,8 +2,8 @@
 /* module.c: the extension module halfshell._core: method table, slots, init, and nothing else. */
 #define HS_IMPORTS_NUMPY
 #include "environment.h"
-#include "plain.h"
 #include "py_functions.h"
+#include "quick.h"
 
 #define FASTCALL(function) ((PyCFunction)(void (*)(void))(function))
 

@@ -205,9 +205,9 @@ def test_progress_and_signals_reach_small_scenes_with_many_images():
 
 @pytest.mark.parametrize("function", [len, _core.kernels, _core.cells_layout, hs.pairs, None])
 def test_only_searches_of_the_core_are_called(function):
-    with pytest.raises(TypeError, match="plain takes a function of this module"):
+    with pytest.raises(TypeError, match="a function of this module is wanted"):
         _core.plain(function, POINTS)
-    with pytest.raises(TypeError, match="plain takes a function of this module"):
+    with pytest.raises(TypeError, match="a function of this module is wanted"):
         _core.plain()
 
 
