@@ -13,7 +13,7 @@ from halfshell._convert.foreign import kind_of
 from halfshell._convert.lengths import as_cutoff
 from halfshell._convert.scene import as_own_box, as_points
 from halfshell._convert.types import BoxLike, Number, PeriodicLike, PointsLike
-from halfshell._functions.brick_pieces import Piece, joined, split
+from halfshell._functions.brick_pieces import Piece, part_of, split
 from halfshell._functions.brick_plan import Division, Summary, divide, summary
 from halfshell._functions.counts import count_pairs
 from halfshell._objects.brick import Brick
@@ -122,7 +122,7 @@ def exchange(
     for rank, one in enumerate(comm.allgather(error)):
         if one is not None:
             raise _plain(one, f"rank {rank}: ")
-    return Exchanged(*joined(division, *comm.alltoall(pieces)).in_order())
+    return Exchanged(*part_of(division, *comm.alltoall(pieces)).in_order())
 
 
 def _given(

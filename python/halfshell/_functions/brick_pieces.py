@@ -21,7 +21,10 @@ _TILE = 1 << 16  # points whose places along the axes stay in a cache
 
 
 class Piece:
-    """What one piece of the points gives to one brick; it is copied only when it is sent."""
+    """What one piece of the points gives to one brick.
+
+    Until it is sent it holds the whole piece, of which nothing is copied.
+    """
 
     def __init__(
         self, first: int, places: tuple[Array, ...], points: Array, is_whole: bool = True
@@ -86,7 +89,7 @@ def split(points: Array, division: Division, place: int) -> list[Piece]:
         owners = np.zeros(len(every), np.int64)
         needed = []
         for brick, (numbers, is_owned) in enumerate(
-            _leaves(division.cuts, places, division.axes, every, every >= 0)
+            _leaves(division.cuts, places, division.axes, every, np.ones(len(every), bool))
         ):
             owned = numbers.take(np.flatnonzero(is_owned))
             owners[owned] = brick
@@ -119,7 +122,7 @@ def _leaves(
         yield from _leaves(part, places, axes, numbers.take(near), mine)
 
 
-def joined(division: Division, *pieces: Piece) -> Part:
+def part_of(division: Division, *pieces: Piece) -> Part:
     """A brick of what all pieces give to it."""
     sizes = tuple(sum(len(piece.places[k]) for piece in pieces) for k in range(3))
     like = pieces[0].points

@@ -52,7 +52,7 @@ def summary_of(chunk: Any, ndim: int, dtype: np.dtype[Any], place: int, n_chunks
     try:
         return summary(of_chunk(chunk, ndim, dtype, place), n_chunks)
     except (ValueError, OverflowError) as error:
-        return Summary(sum(np.shape(chunk)[:1]), 0.0, np.empty((0, ndim)), 1.0, error)
+        return Summary(len(chunk) if np.ndim(chunk) else 0, 0.0, np.empty((0, ndim)), 1.0, error)
 
 
 def pieces_of(
@@ -107,14 +107,18 @@ def counts_of(part: Part, cutoff: Any, scene: Any, options: dict[str, Any]) -> A
     """Pairs of owned points, and of these with points of later bricks."""
     import halfshell as hs
 
-    return _own(part, lambda points: hs.count_pairs(points, cutoff, **scene, **options))
+    return _own(
+        part, lambda points, **more: hs.count_pairs(points, cutoff, **more, **scene, **options)
+    )
 
 
 def histogram_of(part: Part, edges: Any, scene: Any, options: dict[str, Any]) -> Any:
     """As `counts_of`, in each bin."""
     import halfshell as hs
 
-    return _own(part, lambda points: hs.pair_histogram(points, edges, **scene, **options))
+    return _own(
+        part, lambda points, **more: hs.pair_histogram(points, edges, **more, **scene, **options)
+    )
 
 
 def total(*counts: Any) -> Any:
@@ -156,18 +160,31 @@ def table_of(quantities: str, division: Division, *found: Sequence[Group]) -> Ne
     return NeighborTable((offsets, *columns), quantities, division.n_points, False)
 
 
-def _own(part: Part, count: Callable[[Array], Any]) -> Any:
-    """What is counted of owned points and those of later bricks, less that of the latter alone."""
+def _own(part: Part, count: Callable[..., Any]) -> Any:
+    """What is counted of owned points, and of these with points of later bricks.
+
+    That is what is counted of both less that of the latter alone; where these are many, it is
+    counted as it is said, which takes two walks.
+    """
     n_owned, n_later, _ = part.sizes
     points = part.points[: n_owned + n_later]
+    own, later = points[:n_owned], points[n_owned:]
+    if n_later <= n_owned:
+        with _numbered(part.numbers):
+            return count(points) - count(later)
     with _numbered(part.numbers):
-        return count(points) - count(points[n_owned:])
+        inner = count(own)
+    with _numbered(lambda: part.numbers()[n_owned:], part.numbers):
+        return inner + count(later, queries=own)
 
 
 @contextmanager
-def _numbered(numbers: Callable[[], Numbers]) -> Iterator[None]:
+def _numbered(
+    points: Callable[[], Numbers], queries: Callable[[], Numbers] | None = None
+) -> Iterator[None]:
     """Errors name points by their numbers among all points."""
     try:
         yield
     except (ValueError, OverflowError) as error:
-        raise renumbered(error, points=numbers()) from None
+        names = {"points": points} if queries is None else {"points": points, "queries": queries}
+        raise renumbered(error, **{name: find() for name, find in names.items()}) from None

@@ -14,7 +14,7 @@ from halfshell._convert.options import as_count
 from halfshell._convert.scene import MAX_DIM, as_own_box
 from halfshell._extras import needs
 from halfshell._functions import brick_tasks
-from halfshell._functions.brick_pieces import joined as join
+from halfshell._functions.brick_pieces import part_of as make_part
 from halfshell._functions.brick_plan import divide
 from halfshell._functions.counts import count_pairs
 
@@ -70,7 +70,7 @@ def divided(
         scene["periodic"] = [bool(bits >> k & 1) for k in range(ndim)]
     count_pairs(np.empty((0, ndim)), cutoff, kernel=kernel, **scene)
     flags = tuple(scene["periodic"] or [False] * ndim)
-    tasks = (brick_tasks.summary_of, divide, brick_tasks.pieces_of, join)
+    tasks = (brick_tasks.summary_of, divide, brick_tasks.pieces_of, make_part)
     summary_of, divide_by, pieces_of, part_of = (dask.delayed(one, pure=True) for one in tasks)
     each = [(chunk, ndim, dtype, place) for place, chunk in enumerate(chunks)]
     summaries = [summary_of(*one, len(each)) for one in each]

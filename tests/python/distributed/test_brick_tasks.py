@@ -12,7 +12,7 @@ from brick_scenes import LETTERS, in_order, same, scenes, serial
 from halfshell._convert.scene import as_own_box
 from halfshell._functions import brick_pieces
 from halfshell._functions import brick_tasks as tasks
-from halfshell._functions.brick_pieces import joined, split
+from halfshell._functions.brick_pieces import part_of, split
 from halfshell._functions.brick_plan import divide, summary
 
 OPTIONS = {"inclusive": True, "kernel": None, "threads": 1, "memory_limit": None}
@@ -34,7 +34,7 @@ def parts_of(points, cutoff, options, n):
     summaries = [tasks.summary_of(*one, len(each)) for one in each]
     division = pickle.loads(pickle.dumps(divide(cutoff, n, vectors, flags, *summaries)))
     pieces = [tasks.pieces_of(*one, division) for one in each]
-    parts = [joined(division, *[piece[k] for piece in pieces]) for k in range(n)]
+    parts = [part_of(division, *[piece[k] for piece in pieces]) for k in range(n)]
     return pickle.loads(pickle.dumps(parts)), division
 
 
@@ -94,11 +94,11 @@ def test_a_piece_that_is_sent_takes_only_its_points():
     points = np.arange(60.0).reshape(20, 3)
     division = divide(1.0, 4, None, (False,) * 3, summary(points, 1))
     pieces = split(points, division, 0)
-    here, sent = joined(division, pieces[0]), pickle.loads(pickle.dumps(pieces[0]))
+    here, sent = part_of(division, pieces[0]), pickle.loads(pickle.dumps(pieces[0]))
     assert len(sent.points) == sum(here.sizes) < len(points)
     assert sys.getsizeof(pieces[0]) < points.nbytes
     again = pickle.loads(pickle.dumps(sent))  # what was sent may be sent on
     for other in (sent, again):
-        there = joined(division, other)
+        there = part_of(division, other)
         assert there.sizes == here.sizes and same([there.points], [here.points])
         assert there.numbers().tolist() == here.numbers().tolist()
