@@ -267,6 +267,9 @@ hs_estimate_pairs(hs_search *search, double *pairs)
     return status == HS_STOPPED ? HS_OK : status;
 }
 
+/* The part of what is free that a result may seem to need: its density may be off by a third. */
+#define SEEMS_SMALL 0.75
+
 /* Whether to take a sample before the limit is looked up, which takes longer: the result may be too
  * large to do without, and does not seem to be. */
 static bool
@@ -274,7 +277,7 @@ samples_first(const hs_search *search, double bytes_per_pair, double bound)
 {
     const double by_density = search->grid.expected_pairs * search->pairs_per_half;
     return search->call->account.find_limit != NULL && bound > HS_LIMIT_FREE &&
-           by_density * bytes_per_pair < 0.75 * HS_LIMIT_FREE;
+           by_density * bytes_per_pair < SEEMS_SMALL * HS_LIMIT_FREE;
 }
 
 hs_status
@@ -304,6 +307,7 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double variance = fmax(0.0, taken.squares / many - mean * mean);
     const double error = taken.taken < n ? sqrt(variance / many) : 0.0;
     const double least = (mean - SURE_ERRORS * error) * (double)n;
+    /* a sample may say more than is possible */
     if (hs_account_allows(account, hs_smaller(least * bytes_per_pair, bound))) {
         return HS_OK;
     }

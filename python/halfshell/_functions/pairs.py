@@ -366,7 +366,7 @@ def pairs(
         and algorithm is AUTO
         and groups is None and exclude is None and exclude_within is None and min_distance is None
     ):
-        # Plain, but for a Box or with a capacity: else it has been answered (quick.py).
+        # `quick` has answered plain calls; here a Box has become an array, or there is a capacity.
         result: Any = _core.plain(
             _core.pairs, points, cutoff, box, periodic, inclusive, precision, kernel, memory_limit,
             progress, threads, quantities, sort, index_dtype, out, None, AUTO, None, room,

@@ -21,7 +21,7 @@ stop_after(void *context, double fraction)
 typedef struct refusal {
     int64_t n, nth; /* polls so far; the only one that says no */
     double  done;   /* as the last one said */
-    bool    twice;  /* the search counts first, or sorts at last: its fractions begin anew */
+    bool    twice;  /* the search counts first: its fractions begin anew */
 } refusal;
 
 static inline bool

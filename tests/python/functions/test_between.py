@@ -195,7 +195,8 @@ def test_atoms_bring_their_box():
         lambda: hs.pairs_between(within, crystal, 3.0), ValueError, "queries bring a box"
     )
     assert_refused(
-        lambda: hs.pairs_between(within, crystal, 3.0, box=np.eye(3)), ValueError, "box comes from"
+        lambda: hs.pairs_between(within, crystal, 3.0, box=np.eye(3)), ValueError,
+        "bring their own box",
     )
     open_space = hs.pairs_between(probe, crystal.positions, 3.0)
     assert same_arrays(open_space, hs.pairs_between(probe.positions, crystal.positions, 3.0))

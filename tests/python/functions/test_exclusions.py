@@ -25,7 +25,7 @@ def integers_of(array, unit):
 
 def square(p, q, step):
     total = 0
-    for a, b, c in zip(p, q, step):
+    for a, b, c in zip(p, q, step, strict=True):
         total += (b - a + c) ** 2
     return total
 

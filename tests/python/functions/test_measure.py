@@ -284,5 +284,5 @@ def test_points_may_bring_their_box():
         pbc = (True, False, False)
 
     assert hs.measure(Atoms(), [0], [1], quantities="S").tolist() == [[-1, 0, 0]]
-    with pytest.raises(ValueError, match="box comes from"):
+    with pytest.raises(ValueError, match="bring their own box"):
         hs.measure(Atoms(), [0], [1], box=np.eye(3))

@@ -15,8 +15,8 @@ import halfshell as hs
 OWN = {
     "_core", "_errors", "_unknown",
     "_convert", "_convert.arrays", "_convert.batch", "_convert.foreign", "_convert.given",
-    "_convert.lengths", "_convert.memory", "_convert.options", "_convert.scene", "_convert.search",
-    "_convert.shells",
+    "_convert.lengths", "_convert.memory", "_convert.options", "_convert.quick", "_convert.scene",
+    "_convert.search", "_convert.shells",
     "_functions", "_functions.between", "_functions.counts", "_functions.pairs", "_objects",
     "_objects.box",
 }  # fmt: skip
