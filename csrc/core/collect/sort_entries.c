@@ -124,3 +124,18 @@ hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
         }
     }
 }
+
+int64_t
+hs_row_from(const hs_sorting *all, int64_t entry)
+{
+    int64_t first = 0, end = all->n_points;
+    while (first < end) {
+        const int64_t middle = first + (end - first) / 2;
+        if (hs_row_begin(all, middle) < entry) {
+            first = middle + 1;
+        } else {
+            end = middle;
+        }
+    }
+    return first;
+}

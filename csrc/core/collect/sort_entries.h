@@ -71,6 +71,16 @@ hs_entry_of(const hs_sorting *all, int32_t j, int64_t place)
     return all->has_j ? (uint64_t)j << all->place_bits | (uint64_t)place : (uint64_t)place;
 }
 
+/* The entry that a row begins at. */
+HS_ALWAYS_INLINE int64_t
+hs_row_begin(const hs_sorting *all, int64_t row)
+{
+    return row > 0 ? all->end[row - 1] : 0;
+}
+
+/* The first row that begins at this entry or behind it. */
+int64_t hs_row_from(const hs_sorting *all, int64_t entry);
+
 /* Puts n entries of one row in the order of (j, S). spare: room for as many. */
 void hs_sort_row(const hs_sorting *all, uint64_t *row, int64_t n, uint64_t *spare);
 

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #define POLL_ENTRIES  (INT64_C(1) << 17) /* sorted and written between two calls of poll() */
-#define RANGE_ENTRIES 8192 /* of a range of rows: with what is written of them they fit a cache */
+#define RANGE_ENTRIES 8192 /* of a range, about: with what is written of them they fit a cache */
 #define PUT           256  /* entries that are written at a time */
 
 /* A pair of points can occur in several images, so that sorting needs to tell these apart. */
@@ -108,8 +108,7 @@ put_some(const hs_sorting *all, int64_t first, int64_t n, int64_t *row, hs_outpu
 typedef struct row_job {
     const hs_sorting *all;
     hs_output        *sorted;
-    int64_t           before;   /* pairs that it has already */
-    int64_t           in_range; /* rows */
+    int64_t           before; /* pairs that it has already */
     int64_t           n_ranges;
 } row_job;
 
@@ -123,38 +122,41 @@ typedef struct worker {
     int64_t      work;   /* since the last poll */
 } worker;
 
-static int64_t
-begin_of(const hs_sorting *all, int64_t row)
+static hs_status
+note_work(worker *me, int64_t entries)
 {
-    return row > 0 ? all->end[row - 1] : 0;
+    me->work += entries;
+    if (me->work <= POLL_ENTRIES) {
+        return HS_OK;
+    }
+    me->work = 0;
+    return hs_poll(&me->options, 1.0);
 }
 
-/* A hs_range_fn. */
+/* A hs_range_fn: the rows that begin in a range of entries, as a few rows may have most of them. */
 static hs_status
 do_range(void *context, int64_t range)
 {
     worker           *me = context;
     const hs_sorting *all = me->job->all;
-    const int64_t     first_row = range * me->job->in_range, left = all->n_points - first_row;
-    const int64_t     end_row = first_row + (left < me->job->in_range ? left : me->job->in_range);
-    const int64_t     begin = begin_of(all, first_row), end = begin_of(all, end_row);
+    const int64_t     first_row = hs_row_from(all, range * RANGE_ENTRIES);
+    const int64_t     end_row = hs_row_from(all, (range + 1) * RANGE_ENTRIES);
+    const int64_t     begin = hs_row_begin(all, first_row);
+    const int64_t     end = hs_row_begin(all, end_row);
     hs_status         status = HS_OK;
     me->sorted.n_pairs = me->job->before + begin;
     if (all->call->team != NULL) {
         hs_output_touch(&me->sorted, me->sorted.n_pairs, end - begin);
     }
-    for (int64_t row = first_row; row < end_row; row++) {
-        const int64_t first = begin_of(all, row);
-        hs_sort_row(all, all->entries + first, all->end[row] - first, me->spare);
+    for (int64_t row = first_row; row < end_row && status == HS_OK; row++) {
+        const int64_t first = hs_row_begin(all, row), n = all->end[row] - first;
+        hs_sort_row(all, all->entries + first, n, me->spare);
+        status = note_work(me, n);
     }
     for (int64_t first = begin, row = first_row; first < end && status == HS_OK; first += PUT) {
         const int64_t n = end - first < PUT ? end - first : PUT;
         put_some(all, first, n, &row, &me->sorted);
-        me->work += n;
-        if (me->work > POLL_ENTRIES) {
-            me->work = 0;
-            status = hs_poll(&me->options, 1.0);
-        }
+        status = note_work(me, n);
     }
     return status;
 }
@@ -214,13 +216,11 @@ put_all(const hs_sorting *all, hs_output *sorted)
         sorted->n_pairs = all->n; /* tells hs_pairs_conclude that they do not fit */
         return HS_OK;
     }
-    const int64_t in_range = all->n_points * RANGE_ENTRIES / (all->n + 1) + 1;
-    row_job       job = {.all = all,
-                         .sorted = sorted,
-                         .before = sorted->n_pairs,
-                         .in_range = in_range,
-                         .n_ranges = (all->n_points + in_range - 1) / in_range};
-    hs_status     status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n, 1.0);
+    row_job   job = {.all = all,
+                     .sorted = sorted,
+                     .before = sorted->n_pairs,
+                     .n_ranges = (all->n + RANGE_ENTRIES - 1) / RANGE_ENTRIES};
+    hs_status status = sorted->fixed ? HS_OK : hs_output_reserve(sorted, all->n, 1.0);
     if (status == HS_OK) {
         status = do_ranges(&job);
         sorted->n_pairs += status == HS_OK ? all->n : 0;

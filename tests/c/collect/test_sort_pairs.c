@@ -156,19 +156,21 @@ rows_have_each_pair_both_ways(void)
     search_unit_close(&unit);
 }
 
-/* Two passes over the pairs, and what is sorted and written: each is polled for, and any poll ends
- * it. */
+/* Two passes over the pairs, what is sorted, and what is written: each is polled for, however few
+ * of the points have all pairs, and any poll ends it. */
 static void
 each_pass_is_polled(void)
 {
-    enum { POLL_PAIRS = 1 << 18 };
+    enum { POLL_PAIRS = 1 << 18, MANY = 1 << 18 };
     static const struct {
-        int64_t n, polls;
-    } cases[] = {
-        {POLL_PAIRS - 1, 1 + 1 + 1}, {POLL_PAIRS, 2 + 2 + 1}, {2 * POLL_PAIRS + 5, 4 + 4 + 3}};
+        int64_t n, n_points, polls; /* what is sorted and what is written count together */
+    } cases[] = {{POLL_PAIRS - 1, POINTS, 1 + 1 + 3},
+                 {POLL_PAIRS, POINTS, 2 + 2 + 3},
+                 {2 * POLL_PAIRS + 5, POINTS, 4 + 4 + 7},
+                 {2 * POLL_PAIRS + 5, MANY, 4 + 4 + 7}};
     search_unit_points(6, POINTS, 2, 1.0, &unit);
     search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 4; c++) {
         hs_output found, sorted;
         hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J, 4, &found);
         CHECK(hs_output_reserve(&found, cases[c].n, 0.0) == HS_OK);
@@ -183,7 +185,7 @@ each_pass_is_polled(void)
             const int64_t held = unit.call.account.held;
             hs_call_set_poll(refuse_once, &once, &unit.call);
             hs_output_init(&unit.call.account, 2, HS_WANT_I | HS_WANT_J, 4, &sorted);
-            CHECK(hs_sort_pairs(&unit.call, 0, POINTS, &found, &sorted) ==
+            CHECK(hs_sort_pairs(&unit.call, 0, cases[c].n_points, &found, &sorted) ==
                   (nth > 0 ? HS_ERR_INTERRUPTED : HS_OK));
             CHECK(once.n == (nth > 0 ? nth : cases[c].polls));
             hs_output_free(&sorted);
