@@ -29,10 +29,10 @@ struct hs_hits;
  * shift * rows; there the shift is S, or the image alone.
  */
 typedef struct hs_write {
-    int              ndim;
-    bool             is_half;    /* each pair once, the lower number first: others change sign */
-    bool             is_shifted; /* some shift may not be zero; needs metric->floats_usable */
-    bool             by_S;       /* the metric's shift is S */
+    int  ndim;
+    bool is_half;    /* each pair once, the lower number first: others change sign */
+    bool is_shifted; /* some shift may not be zero; with q needs metric->floats_usable */
+    bool by_S;       /* the metric's shift is S */
     const hs_metric *metric;
     const double    *q;      /* of candidates: coordinates; last, the bits of an int64, the number;
                              * NULL: no d and no D are wanted */

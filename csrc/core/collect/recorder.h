@@ -21,7 +21,7 @@ typedef struct hs_recorder {
 #define HS_MEASURED (HS_WANT_DISTANCE | HS_WANT_VECTOR | HS_WANT_SHELL)
 
 /* Where the distances of the next hits are written: the column, or memory of the recorder's own;
- * NULL where nobody needs them. */
+ * NULL where they are not needed. */
 HS_ALWAYS_INLINE double *
 hs_recorder_distances(const hs_recorder *recorder)
 {

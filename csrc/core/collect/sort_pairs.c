@@ -145,7 +145,7 @@ do_range(void *context, int64_t range)
     const int64_t     end = hs_row_begin(all, end_row);
     hs_status         status = HS_OK;
     me->sorted.n_pairs = me->job->before + begin;
-    if (all->call->team != NULL) {
+    if (all->call->team != NULL) { /* before the ranges behind this one write to its last pages */
         hs_output_touch(&me->sorted, me->sorted.n_pairs, end - begin);
     }
     for (int64_t row = first_row; row < end_row && status == HS_OK; row++) {

@@ -211,7 +211,7 @@ look_up_given(hs_trace *trace)
 }
 
 /* Shifts over B, the metric's where it measures between X. Where the block has none, they are
- * zeroed once and left alone; nobody asks how many times the metric shifts then. */
+ * zeroed once and left alone; how many times the metric shifts is not read then. */
 static void
 look_up_images(hs_trace *trace)
 {

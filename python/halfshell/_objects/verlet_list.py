@@ -361,7 +361,7 @@ class VerletList(VerletRows):
     def margin(self) -> float:
         """How much closer pairs may still come before the list is rebuilt, rounded down.
 
-        Never negative; 0 without a list. RuntimeError before the first `update`.
+        In the unit of the points, not negative; 0 without a list. RuntimeError before any `update`.
         """
         if self._searched is not None:
             return 0.0

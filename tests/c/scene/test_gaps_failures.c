@@ -5,6 +5,7 @@
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
 #include "../support/among.h"
+#include "../support/poll_checks.h"
 
 #include "../../../csrc/halfshell.h"
 
@@ -54,19 +55,6 @@ any_allocation_may_fail(void)
 {
     check_each_allocation(1.0);
     check_each_allocation(0x1p300);
-}
-
-typedef struct refusal {
-    int64_t n, nth; /* polls so far; the only one that says no */
-} refusal;
-
-/* A hs_poll_fn. */
-static bool
-refuse_once(void *context, double fraction)
-{
-    refusal *once = context;
-    (void)fraction;
-    return ++once->n != once->nth;
 }
 
 /* So many far points that putting them in order takes a while. */

@@ -35,6 +35,31 @@ def test_same_answer_as_the_function(how):
             assert a.tobytes() == b.tobytes()
 
 
+WRONG = [
+    {"threads": -1},
+    {"threads": 1.5},
+    {"kernel": "x"},
+    {"precision": "half"},
+    {"memory_limit": -1.0},
+    {"periodic": (True, True)},
+    {"box": np.zeros(3)},
+    {"quantities": "q"},
+    {"index_dtype": np.int16},
+    {"out": (np.empty(1, np.int64), np.empty(1, np.int64))},
+]
+
+
+@pytest.mark.parametrize("how", WRONG, ids=lambda how: next(iter(how)))
+def test_same_errors_as_the_function(how):
+    for search in (hs.pairs, hs.count_pairs):
+        raised = []
+        for function in (search, search.__wrapped__):
+            with pytest.raises((TypeError, ValueError)) as caught:
+                function(POINTS, 1.5, **how)
+            raised.append((caught.type, str(caught.value)))
+        assert raised[0] == raised[1]
+
+
 def test_plain_calls_do_not_reach_the_function(monkeypatch):
     def refuse(*arguments):
         raise AssertionError("the function was called")
