@@ -235,7 +235,6 @@ scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form
         }
         set_point(scan, t, ndim, form, &v);
         const int32_t from = scan->triangular ? t + 1 : 0;
-        mask          keep = (mask)(~0u << from % LANES);
         for (int32_t c = FILLS_LINE ? from & ~(LANES - 1) : from; c < n; c += LANES) {
             lanes_near found = {0, 0};
             floats     sum = v.in;
@@ -248,9 +247,9 @@ scan_ruled(hs_scan *scan, int32_t first, const int ndim, const hs_scan_form form
                 set_limits(scan, rule, c, &v);
             }
             mask near = form == HS_SCAN_SUPPORTS ? found.near : not_greater(sum, v.out);
-            if (FILLS_LINE) {
-                near = (mask)(near & keep);
-                keep = (mask)~0u;
+            /* No mask is kept from one vector to the next, which would wait for it. */
+            if (FILLS_LINE && HS_UNLIKELY(c < from)) {
+                near = (mask)(near & (~0u << (from - c)));
             }
             if (HS_UNLIKELY(n - c < LANES)) {
                 near = (mask)(near & first_lanes(n - c));
