@@ -735,7 +735,7 @@ hs_status hs_box_wrap(const hs_box *box, const hs_points *points, double *wrappe
 /*
  * Memory of results that are gone, and a megabyte that a call has worked in, is kept for the next
  * ones, up to a limit: the one thing that outlives a call. No answer depends on it. Bytes kept at
- * most (256 MB at first; 0 keeps nothing), bytes kept now, and giving all of it back to the system.
+ * most (512 MB at first; 0 keeps nothing), bytes kept now, and giving all of it back to the system.
  */
 size_t hs_pool_limit(void);
 void   hs_pool_set_limit(size_t bytes);

@@ -41,7 +41,7 @@ class CacheInfo(NamedTuple):
     held : int
         Bytes of deleted results, and of what calls have worked in, that are kept for the next ones.
     limit : int
-        Bytes that may be kept: what `set_cache_limit` said last, 256 MB at first.
+        Bytes that may be kept: what `set_cache_limit` said last, 512 MB at first.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def set_cache_limit(limit: float) -> int:
     ----------
     limit : float
         Bytes, not negative; 0 keeps nothing. Memory kept beyond it is released at once. The
-        limit is 256 MB at first and holds for the whole process.
+        limit is 512 MB at first and holds for the whole process.
 
     Returns
     -------
