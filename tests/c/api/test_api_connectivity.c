@@ -206,15 +206,17 @@ static void
 extents_that_none_can_have_are_refused(void)
 {
     static const double bad[] = {-1.0, 0x1p-65, 0x1p65, NAN, HUGE_VAL};
-    const hs_points     points = reach_points(&set);
-    const hs_options    options = {.cutoff = HUGE_VAL,
-                                   .want = 3,
-                                   .index_bytes = 8,
-                                   .memory_limit = HUGE_VAL,
-                                   .inclusive = true};
-    hs_pairs           *pairs;
-    hs_reach            reach = supports();
-    hs_among            among = {.points = &points, .reach = &reach};
+    harness_random      random = {9};
+    reach_fill(&random, 100, 2, 4.0, 0, 0.6, &set);
+    const hs_points  points = reach_points(&set);
+    const hs_options options = {.cutoff = HUGE_VAL,
+                                .want = 3,
+                                .index_bytes = 8,
+                                .memory_limit = HUGE_VAL,
+                                .inclusive = true};
+    hs_pairs        *pairs;
+    hs_reach         reach = supports();
+    hs_among         among = {.points = &points, .reach = &reach};
     for (int k = 0; k < 5; k++) {
         reach.extent = bad[k];
         CHECK(hs_pairs_find(&among, &options, &pairs, NULL) == HS_ERR_ARGUMENT);
