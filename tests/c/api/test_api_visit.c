@@ -4,7 +4,8 @@
 #include "../support/random_scenes.h"
 #include "../support/among.h"
 
-#include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/threads/call.h"
+#include "../support/poll_checks.h"
 
 #include <fenv.h>
 
@@ -256,6 +257,52 @@ any_allocation_may_fail(void)
     free(x);
 }
 
+/* A visit by one thread, whose allocations are counted: a team is one. */
+typedef struct lone_visit {
+    hs_among among;
+    int      threads;
+} lone_visit;
+
+static hs_status
+visit_alone(void *context)
+{
+    const lone_visit *of = context;
+    seen              s = {.ndim = 3};
+    const hs_visit    visit = {.pair = see_pair, .user = &s};
+    hs_options        options = hs_options_default();
+    int64_t           n = -1;
+    options.cutoff = 0.3;
+    options.threads = of->threads;
+    const hs_status status = hs_pairs_visit(&of->among, &options, &visit, &n, NULL);
+    CHECK(n == s.n && (n > 0 || status != HS_OK));
+    return status;
+}
+
+static int
+allocations_of(hs_points points, int64_t n, int threads)
+{
+    points.n = n;
+    lone_visit of = {.among = {.points = &points}, .threads = threads};
+    return fail_each_allocation(visit_alone, &of, 1000);
+}
+
+/* Where one thread calls the function, others make the points ready, if these are many. */
+static void
+threads_are_started_where_points_are_made_ready(void)
+{
+    enum { MANY = 200 };
+    double           *x = random_points(MANY, 3);
+    const brute_scene scene = {.ndim = 3, .n = MANY, .x = x};
+    const hs_points   points = points_of(&scene);
+    lone_visit        of_none = {.threads = 2};
+    const double      worth = hs_test_worth_threads(MANY / HS_POINTS_MADE_READY);
+    CHECK(allocations_of(points, MANY - 1, 2) == allocations_of(points, MANY - 1, 1));
+    CHECK(allocations_of(points, MANY, 2) == allocations_of(points, MANY, 1) + 1);
+    CHECK(hs_test_worth_threads(worth) == MANY / HS_POINTS_MADE_READY);
+    CHECK(visit_alone(&of_none) == HS_ERR_ARGUMENT); /* among nothing */
+    free(x);
+}
+
 static void
 cells_are_visited_too(void)
 {
@@ -289,5 +336,6 @@ test_api_visit(void)
     RUN(a_function_may_search_itself);
     RUN(it_can_be_interrupted);
     RUN(any_allocation_may_fail);
+    RUN(threads_are_started_where_points_are_made_ready);
     RUN(cells_are_visited_too);
 }

@@ -3,6 +3,7 @@
  * of threads, and a caller that wants to stop is heard. */
 #include "../../../csrc/core/base/poll.h"
 #include "../../../csrc/core/collect/sort_deal.h"
+#include "../../../csrc/core/threads/passes.h"
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
 
@@ -11,23 +12,24 @@
 void test_sort_deal(void);
 
 enum { ROWS = 40, FIRST = 7, PAIRS = 2 * HS_POLL_POINTS + 9 };
+enum { STRIP = 1 << 15, MOST = (HS_SLABS + 1) * STRIP }; /* pairs that a strip has at least */
 
-static int32_t     i[PAIRS], j[PAIRS];
+static int32_t     i[MOST], j[MOST];
 static search_unit unit;
 
 static void
 make_pairs(void)
 {
     harness_random random = {17};
-    for (int p = 0; p < PAIRS; p++) {
+    for (int p = 0; p < MOST; p++) {
         i[p] = FIRST + (int32_t)(random_bits(&random) % (ROWS - 1)); /* the last row stays empty */
         j[p] = FIRST + (int32_t)(random_bits(&random) % (ROWS - 1));
     }
 }
 
-/* Deals n pairs out by this many threads; `all` gets new arrays. */
+/* Deals n pairs out to so many rows, by this many threads; `all` gets new arrays. */
 static hs_status
-deal(int64_t n, bool both_ways, int threads, hs_output *found, hs_sorting *all)
+deal_to(int64_t rows, int64_t n, bool both_ways, int threads, hs_output *found, hs_sorting *all)
 {
     *found = (hs_output){.ndim = 2, .n_pairs = n};
     *all = (hs_sorting){.call = &unit.call,
@@ -35,9 +37,9 @@ deal(int64_t n, bool both_ways, int threads, hs_output *found, hs_sorting *all)
                         .i = i,
                         .j = j,
                         .first_point = FIRST,
-                        .n_points = ROWS,
+                        .n_points = rows,
                         .both_ways = both_ways};
-    all->end = hs_alloc(&unit.call.account, HS_FOR_SORTING, ROWS + 1, sizeof *all->end);
+    all->end = hs_alloc(&unit.call.account, HS_FOR_SORTING, rows + 1, sizeof *all->end);
     if (all->end == NULL)
         return HS_ERR_MEMORY;
     unit.call.team = hs_team_create(threads);
@@ -45,6 +47,12 @@ deal(int64_t n, bool both_ways, int threads, hs_output *found, hs_sorting *all)
     hs_team_free(unit.call.team);
     unit.call.team = NULL;
     return status;
+}
+
+static hs_status
+deal(int64_t n, bool both_ways, int threads, hs_output *found, hs_sorting *all)
+{
+    return deal_to(ROWS, n, both_ways, threads, found, all);
 }
 
 static void
@@ -59,7 +67,7 @@ static bool
 rows_are_right(const hs_sorting *all)
 {
     int64_t longest = 0, place = 0;
-    for (int64_t row = 0; row < ROWS; row++) {
+    for (int64_t row = 0; row < all->n_points; row++) {
         const int64_t begin = place;
         uint64_t      last = 0;
         for (; place < all->end[row]; place++) {
@@ -104,6 +112,40 @@ rows_have_their_pairs_in_order(void)
     }
     CHECK(unit.call.account.held == held);
     search_unit_close(&unit);
+}
+
+/* How many strips count: all but one have memory of their own for it, a number for each row. */
+static int64_t
+strips_of(int64_t rows, int64_t n, int threads)
+{
+    hs_output  found;
+    hs_sorting all;
+    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+    const int64_t held = unit.call.account.held;
+    CHECK(deal_to(rows, n, false, threads, &found, &all) == HS_OK && rows_are_right(&all));
+    const int64_t further = unit.call.account.total.bytes_peak - unit.call.account.held;
+    free_dealt(&all);
+    CHECK(unit.call.account.held == held);
+    search_unit_close(&unit);
+    CHECK(further % (rows * (int64_t)sizeof(int64_t)) == 0);
+    return 1 + further / (rows * (int64_t)sizeof(int64_t));
+}
+
+/* One for each thread as long as there is room for them, each has pairs enough, and there are no
+ * more further numbers than pairs. */
+static void
+strips_are_as_many_as_are_worth_it(void)
+{
+    make_pairs();
+    search_unit_points(6, ROWS, 2, 1.0, &unit);
+    CHECK(strips_of(ROWS, MOST, 5) == 5);
+    CHECK(strips_of(ROWS, MOST, HS_SLABS) == HS_SLABS);
+    CHECK(strips_of(ROWS, MOST, HS_SLABS + 1) == HS_SLABS);
+    CHECK(strips_of(ROWS, 3 * STRIP, 4) == 3 && strips_of(ROWS, 3 * STRIP - 1, 4) == 2);
+    CHECK(strips_of(2 * STRIP, 4 * STRIP, 3) == 3);
+    CHECK(strips_of(2 * STRIP + 1, 4 * STRIP, 3) == 2);
+    CHECK(strips_of(4 * STRIP, 4 * STRIP, 3) == 2);
+    CHECK(strips_of(4 * STRIP + 1, 4 * STRIP, 3) == 1);
 }
 
 /* Two polls of each of the two passes. */
@@ -160,6 +202,7 @@ void
 test_sort_deal(void)
 {
     RUN(rows_have_their_pairs_in_order);
+    RUN(strips_are_as_many_as_are_worth_it);
     RUN(a_caller_can_stop_each_pass);
     RUN(refused_memory_leaves_nothing_behind);
 }

@@ -25,7 +25,7 @@ static void
 fill_pairs(harness_random *random, int64_t n, int most_j, bool has_shift, hs_output *found)
 {
     const unsigned columns = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE;
-    hs_output_init(&unit.call.account, 2, has_shift ? columns | HS_WANT_SHIFT : columns, 4, found);
+    hs_output_init(NULL, 2, has_shift ? columns | HS_WANT_SHIFT : columns, 4, found);
     CHECK(hs_output_reserve(found, n, 0.0) == HS_OK);
     int32_t *i = hs_output_column(found, HS_WANT_I), *j = hs_output_column(found, HS_WANT_J);
     int32_t *shift = hs_output_column(found, HS_WANT_SHIFT);
@@ -276,6 +276,50 @@ threads_sort_the_same_bytes(void)
     search_unit_close(&unit);
 }
 
+/* Sorts by this many threads; returns the most bytes that are held meanwhile, beside the pairs. */
+static int64_t
+sort_by(int threads, const hs_output *found, hs_output *sorted)
+{
+    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
+    const int64_t held = unit.call.account.held;
+    unit.call.team = hs_team_create(threads);
+    hs_output_init(NULL, 2, found->columns, 4, sorted);
+    CHECK(hs_sort_pairs(&unit.call, 0, POINTS, found, sorted) == HS_OK);
+    CHECK(unit.call.account.held == held);
+    const int64_t most = unit.call.account.total.bytes_peak - held;
+    search_unit_close(&unit);
+    return most;
+}
+
+/* Where one point has more than its part of the pairs, threads would need room for them each: then
+ * one puts them all in order, the same ones. */
+static void
+one_thread_sorts_a_crowd(void)
+{
+    enum { N = 100000, HALF = N / 2, OTHERS = 1 << 16, WORD = sizeof(int64_t) };
+    harness_random random = {368};
+    search_unit_points(6, POINTS, 2, 1.0, &unit);
+    for (int64_t crowd = HALF; crowd <= HALF + 1; crowd++) {
+        hs_output found, alone, sorted;
+        fill_pairs(&random, N, 1000, false, &found);
+        int32_t *i = hs_output_column(&found, HS_WANT_I);
+        for (int64_t p = 0; p < N; p++)
+            i[p] = p < crowd ? 3 : 4 + (int32_t)(p % (POINTS - 4));
+        CHECK(sort_by(1, &found, &alone) < (N + crowd) * WORD + OTHERS);
+        const int64_t most = sort_by(2, &found, &sorted);
+        CHECK(crowd == HALF ? most >= (N + 2 * crowd) * WORD : most < (N + crowd) * WORD + OTHERS);
+        CHECK(sorted.n_pairs == N);
+        for (unsigned column = HS_WANT_I; column <= HS_WANT_DISTANCE; column <<= 1) {
+            CHECK(!(found.columns & column) ||
+                  memcmp(hs_output_column(&alone, column), hs_output_column(&sorted, column),
+                         (size_t)N * hs_output_width(&found, column)) == 0);
+        }
+        hs_output_free(&alone);
+        hs_output_free(&sorted);
+        hs_output_free(&found);
+    }
+}
+
 void
 test_sort_pairs(void)
 {
@@ -284,4 +328,5 @@ test_sort_pairs(void)
     RUN(each_pass_is_polled);
     RUN(threads_sort_the_same_bytes);
     RUN(threads_do_with_little_memory);
+    RUN(one_thread_sorts_a_crowd);
 }

@@ -63,6 +63,36 @@ writers_are_alone(void)
     hs_gate_destroy(&of.gate);
 }
 
+static hs_thread_result HS_THREAD_CALL
+read_one(void *context)
+{
+    shared *of = context;
+    hs_gate_read(&of->gate);
+    of->differed = of->one != of->other;
+    hs_gate_read_end(&of->gate);
+    return (hs_thread_result)0;
+}
+
+/* It sleeps until the writer leaves, and sees all that was written. */
+static void
+a_reader_waits_for_a_writer(void)
+{
+    shared    of = {.differed = true};
+    hs_thread reader;
+    CHECK(hs_gate_init(&of.gate));
+    hs_gate_write(&of.gate);
+    of.one = 1;
+    CHECK(hs_thread_start(&reader, read_one, &of));
+    while (hs_atomic_load(&of.gate.waiting) == 0)
+        ;
+    CHECK(hs_atomic_load(&of.gate.state) == -1 && of.differed);
+    of.other = 1;
+    hs_gate_write_end(&of.gate);
+    hs_thread_join(reader);
+    CHECK(!of.differed && of.gate.state == 0 && of.gate.waiting == 0);
+    hs_gate_destroy(&of.gate);
+}
+
 static void
 readers_are_many(void)
 {
@@ -121,6 +151,7 @@ void
 test_gate(void)
 {
     RUN(writers_are_alone);
+    RUN(a_reader_waits_for_a_writer);
     RUN(readers_are_many);
     RUN(children_do_not_wait_for_the_parent);
     RUN(readers_of_another_process_are_forgotten);

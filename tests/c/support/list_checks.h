@@ -19,14 +19,14 @@ same_columns(const hs_pairs *one, const hs_pairs *other, unsigned want, int ndim
     return same;
 }
 
-/* Fewer columns are the same ones, which may be written in another way: all at once, or D alone. */
+/* Fewer columns are the same ones, which may be written in another way: all at once, or one alone. */
 static inline bool
 fewer_are_the_same(const hs_verlet *list, hs_options options, int ndim, const hs_pairs *found)
 {
-    static const unsigned wants[] = {WANT_ALL, HS_WANT_VECTOR};
+    static const unsigned wants[] = {WANT_ALL, HS_WANT_VECTOR, HS_WANT_I, HS_WANT_J};
     bool                  same = true;
     options.threads = 1; /* several write by parts */
-    for (int w = 0; same && w < 2; w++) {
+    for (int w = 0; same && w < 4; w++) {
         hs_pairs *fewer = NULL;
         options.want = wants[w];
         same = hs_verlet_find(list, &options, &fewer, NULL) == HS_OK &&

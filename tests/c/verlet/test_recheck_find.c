@@ -333,6 +333,53 @@ threads_write_the_same_bytes(void)
     hs_verlet_free(list);
 }
 
+/* Lists of many slabs: a thread that meets a pair whose S passes int32 names its lower number, and
+ * all threads stop. */
+static void
+threads_stop_at_shifts_that_do_not_fit(void)
+{
+    enum { POINTS = 3000 };
+    static double   x[3 * POINTS];
+    const hs_points points = rows_of(x, POINTS);
+    hs_box          box = {.ndim = 3};
+    harness_random  random = {12};
+    for (int k = 0; k < 3; k++) {
+        box.rows[k][k] = 10.0;
+        box.periodic[k] = true;
+    }
+    for (int trial = 0; trial < 8; trial++) {
+        const int  jumper = (int)(random_bits(&random) % POINTS);
+        hs_options options = hs_options_default();
+        hs_verlet *list = hs_verlet_new();
+        hs_pairs  *pairs = NULL;
+        hs_failure failure;
+        bool       rebuilt, lower[POINTS] = {false};
+        for (int e = 0; e < 3 * POINTS; e++)
+            x[e] = (double)(random_bits(&random) % 640) / 64.0; /* exact, after a jump too */
+        for (int i = 0; i < POINTS; i++) {
+            double square = 0.0;
+            for (int k = 0; k < 3; k++) {
+                const double along = fabs(x[3 * i + k] - x[3 * jumper + k]);
+                square += fmin(along, 10.0 - along) * fmin(along, 10.0 - along);
+            }
+            lower[i < jumper ? i : jumper] |= i != jumper && square <= 1.0;
+        }
+        options.cutoff = 1.0;
+        for (int step = 0; step < 2; step++) {
+            CHECK(hs_verlet_update(list, &points, &box, &options, 0.2, false, &rebuilt, NULL) ==
+                  HS_OK);
+            CHECK(rebuilt == (step == 0));
+            x[3 * jumper] += 10.0 * 0x1p33;
+        }
+        options.want = HS_WANT_SHIFT;
+        for (options.threads = 1; options.threads <= 3; options.threads++) {
+            CHECK(hs_verlet_find(list, &options, &pairs, &failure) == HS_ERR_SHIFT_RANGE);
+            CHECK(pairs == NULL && failure.row >= 0 && failure.row < POINTS && lower[failure.row]);
+        }
+        hs_verlet_free(list);
+    }
+}
+
 void
 test_recheck_find(void)
 {
@@ -342,4 +389,5 @@ test_recheck_find(void)
     RUN(sorted_pairs_are_those_of_a_search);
     RUN(nothing_is_written_behind_a_short_list);
     RUN(threads_write_the_same_bytes);
+    RUN(threads_stop_at_shifts_that_do_not_fit);
 }

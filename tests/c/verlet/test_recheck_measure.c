@@ -186,24 +186,30 @@ hits_are_measured_in_their_order(void)
     }
 }
 
+/* Along one axis, and along two, where points that lag are laid out for the writer as well. */
 static void
 any_allocation_may_be_refused(void)
 {
-    const hs_box    box = {.ndim = 1, .periodic = {true}, .rows = {{4.0}}};
-    const double    x[N] = {0.0, 5.0, 2.0, 3.0, 4.0, 1.0};
-    const hs_points points = {x, N, 1, HS_FLOAT64, 8, 8};
-    hs_status       status = HS_ERR_MEMORY;
-    hs_failure      failure;
-    int             nth;
-    for (nth = 1; status != HS_OK && nth < 20; nth++) {
-        recheck_unit_open(&points, &box, 1.0, HS_WANT_DISTANCE, &unit);
-        hs_test_fail_allocation(nth);
-        status = hs_recheck_open_scene(&unit.recheck, &failure);
-        CHECK(status == (hs_test_failure_is_due() ? HS_OK : HS_ERR_MEMORY));
-        hs_test_fail_allocation(0);
-        recheck_unit_close(&unit);
+    const double x[2 * N] = {0.0, 5.0, 2.0, 3.0, 4.0, 1.0, 9.0, 8.0, 6.0, 1.0, 7.0, 0.0};
+    for (int d = 1; d <= 2; d++) {
+        const hs_box    box = {.ndim = d, .periodic = {true, d > 1}, .rows = {{4.0}, {0.0, 4.0}}};
+        const hs_points points = {x, N, d, HS_FLOAT64, 16, 8};
+        hs_status       status = HS_ERR_MEMORY;
+        hs_failure      failure;
+        int             nth;
+        for (nth = 1; status != HS_OK && nth < 20; nth++) {
+            recheck_unit_open(&points, &box, 1.0, HS_WANT_DISTANCE, &unit);
+            const bool writes = d > 1 && unit.call.kernel->write != NULL;
+            unit.output.fixed = false;
+            hs_test_fail_allocation(nth);
+            status = hs_recheck_open_scene(&unit.recheck, &failure);
+            CHECK(status == (hs_test_failure_is_due() ? HS_OK : HS_ERR_MEMORY));
+            hs_test_fail_allocation(0);
+            CHECK(status != HS_OK || (unit.recheck.few != NULL) == writes);
+            recheck_unit_close(&unit);
+        }
+        CHECK(nth > 6 && nth < 20);
     }
-    CHECK(nth > 6 && nth < 20);
 }
 
 void
