@@ -182,6 +182,7 @@ MODULE(region)
 MODULE(chunk)
 #endif
 MODULE(pool)
+MODULE(pool_lock)
 MODULE(api_box)
 MODULE(api_plan)
 MODULE(api_dynamic)

@@ -7,6 +7,7 @@
 #include "base.h"
 
 #define HS_BRIEFLY_MS 50 /* a wait that ends on its own */
+#define HS_NAP_MS     1  /* or little more */
 
 #if defined(_WIN32)
 
@@ -51,6 +52,7 @@ hs_thread_join(hs_thread thread)
     (void)CloseHandle(thread);
 }
 
+#define hs_nap()         Sleep(HS_NAP_MS)
 #define hs_thread_self() GetCurrentThreadId()
 #define hs_thread_is(id) (GetCurrentThreadId() == (id))
 
@@ -92,6 +94,13 @@ HS_ALWAYS_INLINE void
 hs_thread_join(hs_thread thread)
 {
     (void)pthread_join(thread, NULL);
+}
+
+HS_ALWAYS_INLINE void
+hs_nap(void)
+{
+    const struct timespec nap = {.tv_nsec = HS_NAP_MS * 1000000L};
+    (void)nanosleep(&nap, NULL);
 }
 
 #define hs_thread_self() pthread_self()

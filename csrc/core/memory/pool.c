@@ -2,21 +2,15 @@
 /* pool.c: an array of chunks, oldest first. Chunks are freed after the lock is released, because
  * freeing is a system call. */
 #if !defined(_WIN32)
-#define _DEFAULT_SOURCE /* sched_yield */
+#define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif
 #include "pool.h"
 
 #include "../../halfshell.h"
+#include "../base/os_thread.h"
 #include "chunk.h"
 
 #include <string.h>
-
-#if defined(_MSC_VER)
-#include <intrin.h>
-#else
-#include <sched.h>
-#include <stdatomic.h>
-#endif
 
 static struct {
     size_t limit, held;
@@ -24,64 +18,33 @@ static struct {
     void  *data[HS_POOL_CHUNKS]; /* oldest first */
 } pool = {.limit = HS_POOL_LIMIT};
 
-#if defined(_MSC_VER)
-
-static volatile long lock;
+static volatile int64_t lock; /* 1: a thread has it */
 
 static bool
 try_lock(void)
 {
-    return _InterlockedExchange(&lock, 1) == 0;
+    return hs_atomic_swap_if(&lock, 0, 1);
 }
 
 static void
 unlock(void)
 {
-    _InterlockedExchange(&lock, 0);
+    hs_atomic_store(&lock, 0);
 }
-
-static void
-let_others_run(void)
-{
-}
-
-#else
-
-static atomic_flag lock = ATOMIC_FLAG_INIT;
-
-static bool
-try_lock(void)
-{
-    return !atomic_flag_test_and_set_explicit(&lock, memory_order_acquire);
-}
-
-static void
-unlock(void)
-{
-    atomic_flag_clear_explicit(&lock, memory_order_release);
-}
-
-static void
-let_others_run(void)
-{
-    sched_yield();
-}
-
-#endif
 
 /* For work that should not be skipped. A thread holds the lock for some hundred instructions: it is
- * free again after a few tries, or never. */
+ * free again as soon as that thread has had a processor, or never. To sleep bounds the wait, as to
+ * yield does not: among busy threads, each time may be a time slice of all of them. */
 static bool
 lock_patiently(void)
 {
-    enum { TRIES = 10000 };
-    for (int trial = 0; trial < TRIES; trial++) {
-        if (try_lock()) {
-            return true;
-        }
-        let_others_run();
+    enum { NAPS = 250 };
+    bool has_lock = try_lock();
+    for (int nap = 0; nap < NAPS && !has_lock; nap++) {
+        hs_nap();
+        has_lock = try_lock();
     }
-    return false;
+    return has_lock;
 }
 
 #ifdef HS_TESTING

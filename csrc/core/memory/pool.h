@@ -12,8 +12,8 @@
  * lock that no thread waits for: a lock that another thread holds at the moment of a fork stays
  * taken in the child for ever. A thread that finds it taken does without the pool: it takes new
  * memory, and gives old memory straight back to the system. Only the four functions of halfshell.h
- * try again for a while; where the lock never comes free they do nothing and return 0, for such a
- * pool gives and takes no more.
+ * try again for a quarter of a second; where the lock does not come free they do nothing and return
+ * 0, for such a pool gives and takes no more.
  */
 #ifndef HS_POOL_H
 #define HS_POOL_H

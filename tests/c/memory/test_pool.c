@@ -1,50 +1,14 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* test_pool.c: memory comes back, within the limit, from many threads and after fork. */
-#if !defined(_WIN32)
-#define _DEFAULT_SOURCE /* fork */
-#endif
+/* test_pool.c: memory comes back, within the limit, from many threads. */
 #include "../../../csrc/core/memory/account.h"
 #include "../../../csrc/core/memory/pages.h"
-#include "../../../csrc/core/memory/pool.h"
-#include "../../../csrc/core/memory/region.h"
-#include "../support/harness.h"
+#include "../support/pool_checks.h"
 
 #if !defined(_WIN32)
 #include <pthread.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #endif
 
 void test_pool(void);
-
-#define MB ((size_t)1 << 20)
-
-/* A result of `bytes` bytes, all of them `mark`. */
-static char *
-make_result(size_t bytes, int mark)
-{
-    hs_region region = {0};
-    CHECK(hs_region_reserve(&region, bytes));
-    memset(region.data, mark, bytes);
-    region.used = bytes;
-    return hs_region_detach(&region, bytes);
-}
-
-static bool
-is_all(const char *data, size_t bytes, int mark)
-{
-    for (size_t k = 0; k < bytes; k++)
-        if (data[k] != (char)mark)
-            return false;
-    return true;
-}
-
-static void
-reset_pool(void)
-{
-    hs_pool_clear();
-    hs_pool_set_limit(HS_POOL_LIMIT);
-}
 
 #if !HS_WATCHED_MALLOC
 
@@ -237,23 +201,6 @@ small_results_take_little(void)
     reset_pool();
 }
 
-static void
-without_the_lock(void)
-{
-    reset_pool();
-    hs_buffer_free(make_result(4 * MB, 1));
-    hs_test_pool_hold(true);
-    char *result = make_result(4 * MB, 2);
-    CHECK(is_all(result, 4 * MB, 2));
-    hs_buffer_free(result);
-    CHECK(hs_pool_held() == 0 && hs_pool_limit() == 0);
-    hs_pool_set_limit(5);
-    hs_pool_clear();
-    hs_test_pool_hold(false);
-    CHECK(hs_pool_held() == 4 * MB && hs_pool_limit() == HS_POOL_LIMIT);
-    reset_pool();
-}
-
 #endif
 
 #if !defined(_WIN32)
@@ -317,61 +264,6 @@ many_threads(void)
     reset_pool();
 }
 
-/* What a child does with the pool it inherits, and with a region that was being written. */
-static int
-work_in_child(hs_region *region)
-{
-    if (!is_all(region->data, 6 * MB, 9))
-        return 1;
-    if (!hs_region_grow(region, region->capacity + 9 * MB) || !is_all(region->data, 6 * MB, 9))
-        return 2;
-    memset(region->data, 4, region->capacity);
-    region->used = region->capacity;
-    hs_buffer_free(hs_region_detach(region, 7 * MB));
-    for (int k = 0; k < 20; k++) {
-        char *result = make_result((size_t)(k + 1) * MB, k);
-        if (!is_all(result, (size_t)(k + 1) * MB, k))
-            return 3;
-        hs_buffer_free(result);
-    }
-    hs_pool_clear();
-    return hs_pool_held() == 0 && harness_failures == 0 ? 0 : 4;
-}
-
-static void
-fork_in_the_middle(void)
-{
-    const int earlier = harness_failures;
-    reset_pool();
-    hs_buffer_free(make_result(12 * MB, 3));
-    hs_region region = {0};
-    CHECK(hs_region_reserve(&region, 7 * MB));
-    hs_buffer_free(make_result(9 * MB, 5));
-    memset(region.data, 9, 6 * MB);
-    region.used = 6 * MB;
-    for (int held = 0; held < 2; held++) {
-        int status = -1;
-        fflush(NULL);
-#if !HS_WATCHED_MALLOC
-        hs_test_pool_hold(held); /* the second child never gets the lock */
-#endif
-        const pid_t child = fork();
-        if (child == 0) {
-            harness_failures = 0;
-            _exit(work_in_child(&region));
-        }
-#if !HS_WATCHED_MALLOC
-        hs_test_pool_hold(false);
-#endif
-        CHECK(child > 0 && waitpid(child, &status, 0) == child);
-        CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0);
-    }
-    CHECK(is_all(region.data, 6 * MB, 9)); /* untouched by the children */
-    hs_region_release(&region);
-    CHECK(harness_failures == earlier);
-    reset_pool();
-}
-
 #endif
 
 void
@@ -386,10 +278,8 @@ test_pool(void)
     RUN(few_blocks_are_kept);
     RUN(the_best_fit_is_taken);
     RUN(small_results_take_little);
-    RUN(without_the_lock);
 #endif
 #if !defined(_WIN32)
     RUN(many_threads);
-    RUN(fork_in_the_middle);
 #endif
 }
