@@ -43,19 +43,19 @@ poll_for_all(void *context, double fraction)
     return hs_poll(&me->options, me->first + fraction * me->share) == HS_OK;
 }
 
-/* Adds a number to those of one column, but for -1, which is none. */
+/* Adds a number to n of one column, every `step`-th from `at` on, but for -1, which is none. */
 static void
-add_to_column(hs_output *output, unsigned bit, int64_t from, int64_t end, int step, int64_t more)
+add_to_column(hs_output *output, unsigned bit, int64_t at, int64_t n, int step, int64_t more)
 {
     if (output->index_bytes == 4) {
         int32_t *numbers = hs_output_column(output, bit);
-        for (int64_t e = from; numbers != NULL && e < end; e += step) {
-            numbers[e] += numbers[e] >= 0 ? (int32_t)more : 0;
+        for (int64_t e = 0; numbers != NULL && e < n; e++) {
+            numbers[at + e * step] += numbers[at + e * step] >= 0 ? (int32_t)more : 0;
         }
     } else {
         int64_t *numbers = hs_output_column(output, bit);
-        for (int64_t e = from; numbers != NULL && e < end; e += step) {
-            numbers[e] += numbers[e] >= 0 ? more : 0;
+        for (int64_t e = 0; numbers != NULL && e < n; e++) {
+            numbers[at + e * step] += numbers[at + e * step] >= 0 ? more : 0;
         }
     }
 }
@@ -73,10 +73,10 @@ append(worker *me, const hs_pairs *pairs)
     }
     hs_output_copy(target, at, &pairs->output, 0, n);
     target->n_pairs = end;
-    add_to_column(target, HS_WANT_I, at, end, 1, i);
-    add_to_column(target, HS_WANT_J, at, end, 1, j);
-    add_to_column(target, HS_WANT_BOTH, 2 * at, 2 * end, 2, i);
-    add_to_column(target, HS_WANT_BOTH, 2 * at + 1, 2 * end, 2, j);
+    add_to_column(target, HS_WANT_I, at, n, 1, i);
+    add_to_column(target, HS_WANT_J, at, n, 1, j);
+    add_to_column(target, HS_WANT_BOTH, 2 * at, n, 2, i);
+    add_to_column(target, HS_WANT_BOTH, 2 * at + 1, n, 2, j);
     return HS_OK;
 }
 
