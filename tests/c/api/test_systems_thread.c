@@ -4,6 +4,8 @@
 #include "../../../csrc/core/memory/account.h"
 #include "../support/harness.h"
 
+#include <math.h>
+
 void test_systems_thread(void);
 
 typedef struct polls {
@@ -103,10 +105,53 @@ pairs_that_cannot_be_sorted_are_told(void)
     CHECK(ended && n_told >= 3);
 }
 
+/* A crowd that no sample of the points meets: where its pairs do not fit, those are told that had
+ * been found until then. */
+static void
+pairs_that_do_not_fit_are_told(void)
+{
+    enum { N = 8000, CROWD = 200 };
+    static double   many[N], radii[N];
+    const int64_t   first[2] = {0, N};
+    const hs_points points = {many, N, 1, HS_FLOAT64, 8, 8};
+    const hs_reach  reach = {.radii = radii};
+    for (int e = 0; e < N; e++) {
+        many[e] = e < N - CROWD ? e : 2345.0 + 0.4 * (e - N) / CROWD;
+        radii[e] = 0.25;
+    }
+    for (int by_reach = 0; by_reach < 2; by_reach++) {
+        const hs_systems systems = {.n = 1, .first = first, .reach = by_reach ? &reach : NULL};
+        hs_options       options = hs_options_default();
+        hs_status        status = HS_ERR_MEMORY;
+        int64_t          count;
+        double           told = 0.0;
+        int              n_told = 0;
+        options.threads = 1;
+        options.sorted = true;
+        options.cutoff = by_reach ? HUGE_VAL : 0.5;
+        CHECK(hs_systems_count(&points, &systems, &options, &count, NULL) == HS_OK);
+        CHECK(count > CROWD * (CROWD - 1) / 2);
+        for (double limit = 1e5; status == HS_ERR_MEMORY; limit *= 1.02) {
+            hs_pairs  *pairs = NULL;
+            hs_failure failure;
+            options.memory_limit = limit;
+            status = hs_systems_find(&points, &systems, &options, &pairs, &failure);
+            if (status != HS_OK) {
+                CHECK(failure.expected_pairs >= told && failure.limit_bytes == limit);
+                told = failure.expected_pairs;
+                n_told += told > 0.3 * (double)count && told < (double)count;
+            }
+            hs_pairs_free(pairs);
+        }
+        CHECK(status == HS_OK && told <= (double)count && n_told > 0);
+    }
+}
+
 void
 test_systems_thread(void)
 {
     RUN(small_systems_are_polled_between_now_and_then);
     RUN(work_of_all_threads_is_added_up);
     RUN(pairs_that_cannot_be_sorted_are_told);
+    RUN(pairs_that_do_not_fit_are_told);
 }
