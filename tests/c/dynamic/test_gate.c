@@ -84,7 +84,7 @@ a_reader_waits_for_a_writer(void)
     of.one = 1;
     CHECK(hs_thread_start(&reader, read_one, &of));
     while (hs_atomic_load(&of.gate.waiting) == 0)
-        ;
+        hs_nap();
     CHECK(hs_atomic_load(&of.gate.state) == -1 && of.differed);
     of.other = 1;
     hs_gate_write_end(&of.gate);

@@ -40,7 +40,7 @@ hold_for_a_while(void *context)
 {
     hs_test_pool_hold(true);
     hs_atomic_store(context, 1);
-    for (int nap = 0; nap < 30; nap++)
+    for (int nap = 0; nap < 10; nap++)
         hs_nap();
     hs_test_pool_hold(false);
     return (hs_thread_result)0;
