@@ -107,6 +107,9 @@ keys_come_in_turn_and_copies_hold_them(void)
     hs_dynamic_clear(list);
     CHECK(hs_dynamic_shrink_to_fit(list) == HS_OK && hs_dynamic_length(list) == 0);
     CHECK(hs_dynamic_length(copy) == 20 && hs_dynamic_look(copy).n_cells == 4);
+    for (int k = 0; k < 3; k++) {
+        CHECK(hs_dynamic_look(list).cell_size[k] == options.cell_size);
+    }
     hs_dynamic_free(list);
     hs_dynamic_free(copy);
 }

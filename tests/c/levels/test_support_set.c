@@ -63,7 +63,7 @@ numbers_are_entries_and_sizes(void)
 }
 
 static void
-is_refused(hs_status status, int64_t row)
+is_refused(hs_status status, int64_t row, double value)
 {
     const hs_options options = hs_options_default();
     hs_account       account = new_account();
@@ -72,6 +72,7 @@ is_refused(hs_status status, int64_t row)
     CHECK(hs_support_set_read(&account, &options, matrices, N, 3, 1.0, &set, reaches, &failure) ==
           status);
     CHECK(failure.row == row && set.numbers == NULL && account.held == 0);
+    CHECK(failure.value == value || (isnan(failure.value) && isnan(value)));
     hs_account_close(&account);
 }
 
@@ -83,20 +84,21 @@ the_first_that_is_wrong_is_named(void)
         for (int w = 0; w < 3; w++) {
             fill(3);
             matrices[2 * 9 + e] = matrices[4 * 9] = wrong[w];
-            is_refused(HS_ERR_SUPPORTS, 2);
+            is_refused(HS_ERR_SUPPORTS, 2, wrong[w]);
         }
         fill(3);
         matrices[3 * 9 + e] += 1.0; /* not symmetric, unless on the diagonal */
-        if (e % 4 != 0)
-            is_refused(HS_ERR_SUPPORTS, 3);
+        if (e % 4 != 0) {           /* by its upper entry */
+            is_refused(HS_ERR_SUPPORTS, 3, e % 3 > e / 3 ? 3.0 : 2.0);
+        }
     }
     fill(3);
-    matrices[9 + 4] = 0.0625; /* singular, or less */
-    is_refused(HS_ERR_SUPPORTS, 1);
+    matrices[9 + 4] = 0.0625;                    /* singular, or less */
+    is_refused(HS_ERR_SUPPORTS, 1, matrices[9]); /* named by its first entry */
     fill(3);
     for (int e = 0; e < 9; e++)
         matrices[4 * 9 + e] *= 0x1p-1050;
-    is_refused(HS_ERR_SUPPORT_REACH, 4);
+    is_refused(HS_ERR_SUPPORT_REACH, 4, 1.0); /* the extent */
 }
 
 static hs_status
