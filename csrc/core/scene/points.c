@@ -154,7 +154,8 @@ join_ranges(const loading *load, int n_slabs)
             poison += found->poison;
         }
         if (cloud->n > 0) {
-            cloud->largest = fmax(cloud->largest, fmax(-cloud->lower[k], cloud->upper[k]));
+            const double largest = hs_larger(-cloud->lower[k], cloud->upper[k]);
+            cloud->largest = hs_larger(largest, cloud->largest);
         }
     }
     return poison == 0.0;

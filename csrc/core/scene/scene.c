@@ -14,15 +14,15 @@
 static bool
 allocate_beside(hs_account *account, hs_scene *scene)
 {
-    const int     m = scene->turns.known ? scene->lattice.n_periodic : 0;
-    const int     d = scene->keeps_originals ? scene->ndim : 0;
+    const int m = scene->turns.known ? scene->lattice.n_periodic : 0;
+    const int d = scene->keeps_originals ? scene->ndim : 0;
+    if (d + m == 0) {
+        return true;
+    }
     const bool    narrow = hs_fold_turns(&scene->lattice, scene->cloud.largest) < INT32_MAX;
     const int64_t pitch = hs_column_pitch(scene->n, sizeof(double)) * (int64_t)sizeof(double);
     const int64_t turns_pitch =
         narrow ? hs_column_pitch(scene->n, sizeof(int32_t)) * (int64_t)sizeof(int32_t) : pitch;
-    if (d + m == 0) {
-        return true;
-    }
     scene->beside =
         hs_alloc(account, HS_FOR_ORIGINALS, d * pitch + m * turns_pitch + HS_COLUMN_PADDING, 1);
     if (scene->beside == NULL) {
@@ -326,7 +326,10 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
                    const hs_options *options, hs_scene *scene, hs_scene *asking,
                    hs_failure *failure)
 {
+    const bool follows = sets->follows && scene->is_ordinary && scene->sought == options->cutoff &&
+                         scene->ndim == sets->points->ndim;
     start_scene(sets->points, scene);
+    scene->is_ordinary = false;
     scene->is_kept = scene->is_asked = sets->is_kept;
     scene->is_plain = sets->is_plain;
     scene->is_wide = sets->is_wide;
@@ -343,7 +346,10 @@ hs_scene_init_sets(hs_account *account, hs_team *team, const hs_sets *sets, cons
     if (status == HS_OK) {
         status = load_clouds(account, team, sets, options, scene, asking, failure);
     }
-    if (status == HS_OK) {
+    scene->is_ordinary = status == HS_OK && hs_scene_stays(sets, box, options, scene);
+    if (scene->is_ordinary) {
+        status = hs_scene_fill_ordinary(options, follows, scene, failure);
+    } else if (status == HS_OK) {
         status = scale_scene(account, team, options, box, scene, asking, failure);
     }
     if (status != HS_OK) {

@@ -29,6 +29,7 @@ typedef struct hs_scene {
     double     cutoff_low;     /* at most the true one */
     double     radius;         /* candidates are sought up to here; cutoff, or a little more */
     double less[HS_MAX_DIM];   /* so much less than the radius can t_k of a pair differ; mostly 0 */
+    bool   is_ordinary;        /* of open space, and searched as the points were given */
     bool   extreme;            /* scaling lost digits: pairs are decided on the originals */
     hs_metric metric;          /* decides on X, or on the originals if there are any */
     hs_cloud  cloud;           /* its columns are X, in the caller's order, once that is known */
@@ -64,6 +65,8 @@ typedef struct hs_sets {
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
                                 * and gaps (close_gaps.h) are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
+    bool             follows;  /* the scene is one that was filled before, with the same options but
+                                * for the cutoff, and may keep what is still right */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */
@@ -128,6 +131,13 @@ bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
  * closing gaps has brought the points and this box to units. */
 void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
                         const hs_scene *asking);
+
+/* Whether the scene is_ordinary, once its points have been read: there is no box, and nothing is
+ * scaled. Then this fills it. follows: it was so before, with this cutoff and as many axes. */
+bool      hs_scene_stays(const hs_sets *sets, const hs_box *box, const hs_options *options,
+                         const hs_scene *scene);
+hs_status hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,
+                                 hs_failure *failure);
 
 /* Steps in scene_queries.c. Both clouds get the range of both. */
 void hs_scene_join_clouds(hs_scene *scene, hs_scene *asking);

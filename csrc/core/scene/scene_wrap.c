@@ -117,25 +117,37 @@ join_slabs(const wrapping *wrap)
     return folded;
 }
 
+/* No point moves, and coordinates are those along the axes. */
+static void
+stay(hs_scene *scene)
+{
+    const hs_cloud *cloud = &scene->cloud;
+    for (int k = 0; k < scene->ndim; k++) {
+        scene->x_largest[k] = scene->n > 0 ? hs_larger(-cloud->lower[k], cloud->upper[k]) : 0.0;
+        scene->lower[k] = scene->n > 0 ? cloud->lower[k] : 0.0;
+        scene->upper[k] = scene->n > 0 ? cloud->upper[k] : 0.0;
+    }
+}
+
 hs_status
 hs_scene_wrap(hs_scene *scene, hs_team *team, const hs_options *options, double *magnitude,
               hs_failure *failure)
 {
     wrapping wrap;
+    *magnitude = 0.0;
+    if (scene->lattice.n_periodic == 0) {
+        stay(scene);
+        return HS_OK;
+    }
     wrap.scene = scene;
     wrap.few_turns = hs_fold_turns(&scene->lattice, scene->cloud.largest) <= HS_FOLD_TURNS;
     wrap.n_slabs = scene->n < HS_SLABS * HS_SLAB_POINTS
                        ? (int)((scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS)
                        : HS_SLABS;
-    hs_status status = HS_OK;
-    if (scene->lattice.n_periodic == 0) {
-        wrap.n_slabs = 0; /* no point moves, and coordinates are those along the axes */
-    } else {
-        for (int slab = 0; slab < wrap.n_slabs; slab++) {
-            wrap.folded[slab] = hs_folded_none();
-        }
-        status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
+    for (int slab = 0; slab < wrap.n_slabs; slab++) {
+        wrap.folded[slab] = hs_folded_none();
     }
+    hs_status       status = hs_walk_slabs(team, options, scene->n, wrap_slab, &wrap);
     const hs_folded folded = join_slabs(&wrap);
     if (status == HS_ERR_SHIFT_RANGE) {
         failure->row = folded.failed;

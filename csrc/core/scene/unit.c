@@ -10,6 +10,8 @@
 /* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
  * and a binary order apart. */
 #define WHOLE_EXPONENT 8
+/* Largest coordinates up to which a cutoff is not looked at more closely. */
+#define ENOUGH_CUTOFF 64.0
 /* Exponent of zero; that of infinity is its opposite. Sums with other exponents do not overflow. */
 #define NO_EXPONENT (INT32_MIN / 2)
 
@@ -83,11 +85,19 @@ hs_box_size_of(const hs_box *box)
 double
 hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cutoff)
 {
-    if (!(cutoff > 64.0 * cloud->largest) || cloud->largest == 0.0 || box->largest > 0.0) {
+    if (!(cutoff > ENOUGH_CUTOFF * cloud->largest) || cloud->largest == 0.0 || box->largest > 0.0) {
         return cutoff;
     }
     const int exponent = hs_exponent_of(cloud->largest) + WHOLE_EXPONENT;
     return exponent > 1023 ? cutoff : hs_smaller(ldexp(1.0, exponent), cutoff);
+}
+
+bool
+hs_is_ordinary(const hs_cloud *cloud, double cutoff)
+{
+    const double far = ldexp(1.0, HS_FAR_EXPONENT - 1 - ORDINARY_EXPONENT);
+    return cutoff >= ldexp(1.0, -ORDINARY_EXPONENT) && cutoff <= ldexp(1.0, ORDINARY_EXPONENT) &&
+           cutoff <= ENOUGH_CUTOFF * cloud->largest && cloud->largest <= far;
 }
 
 int

@@ -75,6 +75,10 @@ double hs_enough_cutoff(const hs_cloud *cloud, const hs_box_size *box, double cu
  * its points are. A very small number if all is 0. */
 int hs_unit_exponent(const hs_cloud *cloud, const hs_box_size *box, double cutoff);
 
+/* Whether points of open space with this cutoff are searched as they are: no gap is closed, nothing
+ * is scaled, and the cutoff is not shortened. */
+bool hs_is_ordinary(const hs_cloud *cloud, double cutoff);
+
 /* Whether all numbers are at most so many powers of two above a length of this exponent. */
 bool hs_fits_one_scale(const hs_cloud *cloud, const hs_box_size *box, int unit, int powers);
 
