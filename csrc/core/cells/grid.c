@@ -69,13 +69,12 @@ measure_drift(const hs_scene *scene, double drift_of_row[][HS_MAX_DIM])
     }
 }
 
-/* Bounds the drift over as many images as a pair can be apart, a number that depends on the
- * drift. */
+/* Bounds the drift, which is 0 so far, over as many images as a pair can be apart, a number that
+ * depends on the drift. */
 static void
 bound_drift(const hs_scene *scene, double *images, double *drift)
 {
     double drift_of_row[HS_MAX_DIM][HS_MAX_DIM];
-    memset(drift, 0, (size_t)scene->ndim * sizeof(double));
     bound_images(scene, drift, images);
     if (scene->lattice.aligned) {
         return;
@@ -310,8 +309,10 @@ is_blurred(const hs_scene *scene, const double *drift)
 static hs_status
 set_ranges(const hs_scene *scene, hs_grid *grid)
 {
-    double images[HS_MAX_DIM], drift[HS_MAX_DIM];
-    bound_drift(scene, images, drift);
+    double images[HS_MAX_DIM], drift[HS_MAX_DIM] = {0.0};
+    if (scene->lattice.n_periodic > 0) {
+        bound_drift(scene, images, drift);
+    }
     if (is_blurred(scene, drift)) {
         return HS_ERR_BOX_SKEWED;
     }
@@ -346,7 +347,6 @@ hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure 
                       ? 1.0
                       : hs_larger(scene->upper[k] - scene->lower[k], grid->range[k]);
     }
-
     *density = (double)scene->n / volume;
     grid->expected_pairs = 0.5 * (double)scene->n * *density *
                            hs_scene_volume(scene, hs_ball_volume(scene->ndim, scene->cutoff));

@@ -268,7 +268,9 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
                  const hs_grid *grid, bool is_full, hs_stencil *stencil)
 {
     const double bound = hs_stencil_bound(grid) * (is_full ? 2.0 : 1.0);
-    scope        of = {.scene = scene, .grid = grid};
+    scope        of;
+    of.scene = scene;
+    of.grid = grid;
     of.axes.usable = false; /* the own row alone needs none */
     *stencil = (hs_stencil){0};
     if (bound > 1.0 && scene->lattice.aligned) {

@@ -104,28 +104,31 @@ build_cells(hs_search *search, hs_scene *asking, hs_failure *failure)
     return status;
 }
 
-/* Those of the call for its scene. Where images are compared, S is needed of all pairs. */
-static hs_options
-options_of_scene(const hs_call *call)
+/* The call's options for its scene; `others`: room for some. Where images are compared, S is needed
+ * of all pairs. */
+static const hs_options *
+options_of_scene(const hs_call *call, hs_options *others)
 {
-    hs_options options = call->options;
-    if (call->choice != NULL && hs_choice_compares(call->choice, options.cutoff)) {
-        options.want |= HS_WANT_SHIFT;
+    if (call->choice == NULL || !hs_choice_compares(call->choice, call->options.cutoff)) {
+        return &call->options;
     }
-    return options;
+    *others = call->options;
+    others->want |= HS_WANT_SHIFT;
+    return others;
 }
 
 hs_status
 hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_failure *failure)
 {
-    const hs_options options = options_of_scene(search->call);
-    hs_scene         queries, *asking = sets->queries != NULL ? &queries : NULL;
+    hs_options others;
+    hs_scene   queries, *asking = sets->queries != NULL ? &queries : NULL;
     if (search->call->kernel == NULL) {
         return HS_ERR_KERNEL;
     }
     hs_search_set_asking(sets, search);
     hs_status status = hs_scene_init_sets(&search->call->account, search->call->team, sets, box,
-                                          &options, &search->scene, asking, failure);
+                                          options_of_scene(search->call, &others), &search->scene,
+                                          asking, failure);
     if (status == HS_OK) {
         status = hs_scene_narrow(&search->scene, sets->narrowing);
         status = status == HS_OK ? build_cells(search, asking, failure) : status;

@@ -60,6 +60,9 @@ walk(hs_team *team, const hs_options *options, pass *doing)
 hs_status
 hs_walk_slabs(hs_team *team, const hs_options *options, int64_t n, hs_slab_fn run, void *context)
 {
+    if (n > 0 && n <= HS_SLAB_POINTS) {
+        return run(context, 0, 0, n);
+    }
     pass doing = {.run = run, .context = context, .n = n};
     return walk(team, options, &doing);
 }
