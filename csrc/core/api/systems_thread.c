@@ -7,7 +7,6 @@
 
 #include "../search/choice.h"
 #include "../search/estimate.h"
-#include "../search/form.h"
 #include "../base/poll.h"
 #include "../box/lattice.h"
 #include "../collect/crew.h"
@@ -32,12 +31,14 @@
 typedef struct worker {
     hs_committer          committer;
     const hs_systems_job *job;
-    hs_call               call;   /* with this thread's poll */
-    hs_search             search; /* of one system after the other */
+    hs_call               call;      /* with this thread's poll */
+    hs_search             search;    /* of one system after the other */
+    bool                  has_scene; /* of the one before */
     hs_levels             levels; /* of the present system, where pairs have a reach of their own */
     hs_level_plan         plan;
     hs_level_search       step;
-    hs_kept_form          forms[HS_FORMS];
+    hs_walker             walker; /* of them, too */
+    hs_recorder           recorder;
     hs_choice             choice; /* the job's with the present box, where pairs are excluded */
     hs_box                box;    /* of the present system, where each has its own */
     hs_output            *target; /* the job's output, or the backlog's */
@@ -53,8 +54,10 @@ build_system(worker *me, const hs_points *points, const hs_box *box, int64_t fir
 {
     hs_failure     *failure = &me->committer.failure;
     const hs_sets   sets = {.points = points,
+                            .follows = me->has_scene,
                             .least_cutoff = hs_choice_least_length(me->call.choice, 0.0)};
     const hs_status status = hs_search_build(&sets, box, &me->search, failure);
+    me->has_scene = status == HS_OK;
     if (status == HS_OK) {
         hs_search_renumber(first, me->job->points->n, &me->search);
     } else if (status == HS_ERR_NOT_FINITE || status == HS_ERR_SHIFT_RANGE ||
@@ -67,14 +70,14 @@ build_system(worker *me, const hs_points *points, const hs_box *box, int64_t fir
 static hs_status
 count_pairs(worker *me, hs_search *search, int64_t s)
 {
-    hs_walker walker;
-    hs_status status = hs_walker_init(search, HS_BLOCK_COUNTS, NULL, NULL, &walker);
+    hs_walker *walker = &me->walker;
+    hs_status  status = hs_walker_renew(search, HS_BLOCK_COUNTS, NULL, NULL, walker);
     if (status == HS_OK) {
         const int64_t n = hs_search_asking(search)->n;
-        status = hs_walk_or_tell(&walker, 0, (int32_t)n, &me->committer.failure);
-        me->job->counts[s] += walker.scanner.n_found;
-        hs_walker_close(search, &walker);
+        status = hs_walk_or_tell(walker, 0, (int32_t)n, &me->committer.failure);
+        me->job->counts[s] += walker->scanner.n_found;
     }
+    hs_walker_rest(search, walker);
     return status;
 }
 
@@ -88,7 +91,8 @@ record_unsorted(worker *me, hs_search *search)
         hs_output_free(found);
         hs_output_init(&search->call->account, search->scene.ndim, columns, 4, found);
     }
-    const hs_status status = hs_record_alone(search, found, &me->committer.failure);
+    const hs_status status =
+        hs_record_next(search, found, &me->walker, &me->recorder, &me->committer.failure);
     if (status == HS_ERR_MEMORY) {
         me->committer.failure.expected_pairs = (double)found->n_pairs;
     }
@@ -98,15 +102,17 @@ record_unsorted(worker *me, hs_search *search)
 static hs_status
 find_pairs(worker *me, hs_search *search)
 {
-    hs_status status = hs_estimate_by_sample(search, &me->committer.failure);
+    hs_failure *failure = &me->committer.failure;
+    hs_status   status = hs_estimate_by_sample(search, failure);
     if (status != HS_OK) {
         return status;
     }
     if (me->call.options.sorted) {
         return record_unsorted(me, search);
     }
-    return me->job->is_direct ? hs_record_alone(search, me->target, &me->committer.failure)
-                              : hs_backlog_record(search, &me->backlog, &me->committer.failure);
+    return me->job->is_direct
+               ? hs_record_next(search, me->target, &me->walker, &me->recorder, failure)
+               : hs_backlog_record(search, &me->backlog, &me->walker, failure);
 }
 
 /* Pairs of an open search of system s, which may be one of several. */
@@ -302,7 +308,6 @@ open_worker(void *context, void *place)
     }
     me->call.options = *options; /* their poll counts already, for the whole call */
     hs_search_begin(&me->call, &me->search);
-    me->search.kept_forms = me->forms;
     me->committer.options = &me->call.options;
     if (job->output != NULL) {
         me->committer.pairs = &me->backlog.pairs;
@@ -320,6 +325,8 @@ close_worker(void *context, void *place)
     worker     *me = place;
     hs_account *account = &me->call.account;
     hs_backlog_free(account, &me->backlog);
+    hs_walker_close(&me->search, &me->walker);
+    hs_recorder_free(account, &me->recorder);
     hs_output_free(&me->found);
     hs_call_note(total, &me->call.done);
     for (int p = 0; p < HS_PURPOSE_END; p++) {

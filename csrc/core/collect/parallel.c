@@ -242,37 +242,75 @@ hs_backlog_free(hs_account *account, hs_backlog *backlog)
     hs_output_free(&backlog->pairs);
 }
 
-/* By one walker; `visit` writes to the output by the recorder, which is free at the end. */
+/* A recorder for this output and so many hits at a time, that before if it is one. */
 static hs_status
-record_by(hs_search *search, hs_output *output, hs_recorder *recorder, hs_visit_fn visit,
-          void *context, hs_failure *failure)
+renew_recorder(hs_account *account, hs_output *output, int32_t most_hits, hs_recorder *recorder)
 {
-    hs_walker walker;
-    hs_status status =
-        hs_walker_init(search, hs_record_use(output->columns), visit, context, &walker);
-    if (status == HS_OK) {
-        status = hs_recorder_init(&search->call->account, output, walker.scanner.block.most_hits,
-                                  recorder);
+    if (recorder->output == output && recorder->columns == output->columns &&
+        recorder->most_hits >= most_hits) {
+        return HS_OK;
     }
-    if (status == HS_OK) {
-        status = hs_walk_or_tell(&walker, 0, (int32_t)hs_search_asking(search)->n, failure);
-    }
-    hs_recorder_free(&search->call->account, recorder);
-    hs_walker_close(search, &walker);
+    hs_recorder_free(account, recorder);
+    const hs_status status = hs_recorder_init(account, output, most_hits, recorder);
+    hs_account_keep(account);
     return status;
+}
+
+static hs_status
+walk_all(const hs_search *search, hs_walker *walker, hs_failure *failure)
+{
+    return hs_walk_or_tell(walker, 0, (int32_t)hs_search_asking(search)->n, failure);
+}
+
+/* By a walker that is kept; `visit` writes to the output by the recorder. */
+static hs_status
+record_by(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *recorder,
+          hs_visit_fn visit, void *context, hs_failure *failure)
+{
+    hs_status status =
+        hs_walker_renew(search, hs_record_use(output->columns), visit, context, walker);
+    if (status == HS_OK) {
+        status = renew_recorder(&search->call->account, output, walker->scanner.block.most_hits,
+                                recorder);
+    }
+    if (status == HS_OK) {
+        status = walk_all(search, walker, failure);
+    }
+    hs_walker_rest(search, walker);
+    return status;
+}
+
+hs_status
+hs_record_next(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *recorder,
+               hs_failure *failure)
+{
+    return record_by(search, output, walker, recorder, hs_record_hits, recorder, failure);
 }
 
 hs_status
 hs_record_alone(hs_search *search, hs_output *output, hs_failure *failure)
 {
+    hs_account *account = &search->call->account;
+    hs_walker   walker;
     hs_recorder recorder = {0};
-    return record_by(search, output, &recorder, hs_record_hits, &recorder, failure);
+    hs_status   status =
+        hs_walker_init(search, hs_record_use(output->columns), hs_record_hits, &recorder, &walker);
+    if (status == HS_OK) {
+        status = hs_recorder_init(account, output, walker.scanner.block.most_hits, &recorder);
+    }
+    if (status == HS_OK) {
+        status = walk_all(search, &walker, failure);
+    }
+    hs_recorder_free(account, &recorder);
+    hs_walker_close(search, &walker);
+    return status;
 }
 
 hs_status
-hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_failure *failure)
+hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker, hs_failure *failure)
 {
-    return record_by(search, &backlog->pairs, &backlog->recorder, backlog_hits, backlog, failure);
+    return record_by(search, &backlog->pairs, walker, &backlog->recorder, backlog_hits, backlog,
+                     failure);
 }
 
 hs_status

@@ -24,6 +24,11 @@ typedef struct hs_visitors {
 /* Records all pairs by this thread, straight into an output that grows. */
 hs_status hs_record_alone(hs_search *search, hs_output *output, hs_failure *failure);
 
+/* The same with a walker and a recorder that are kept from one search to the next; all zeros before
+ * the first, and closed by the caller. */
+hs_status hs_record_next(hs_search *search, hs_output *output, hs_walker *walker,
+                         hs_recorder *recorder, hs_failure *failure);
+
 /* Records all pairs in the output, by search->call->team. HS_ERR_SHIFT_RANGE sets failure->row. */
 hs_status hs_parallel_record(hs_search *search, hs_output *output, hs_failure *failure);
 
@@ -63,7 +68,8 @@ void hs_backlog_init(const hs_output *target, hs_committer *committer, hs_backlo
 /* Its pairs and recorder; harmless twice. */
 void hs_backlog_free(hs_account *account, hs_backlog *backlog);
 
-/* hs_record_alone for a backlog. */
-hs_status hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_failure *failure);
+/* hs_record_next for a backlog. */
+hs_status hs_backlog_record(hs_search *search, hs_backlog *backlog, hs_walker *walker,
+                            hs_failure *failure);
 
 #endif

@@ -14,7 +14,7 @@ hs_recorder_init(hs_account *account, hs_output *output, int32_t most_hits, hs_r
     const int64_t  n = most_hits + HS_PADDING, in_batch = HS_BATCH + HS_PADDING;
     const unsigned columns = output->columns;
     bool           complete = true;
-    *recorder = (hs_recorder){.output = output, .columns = columns};
+    *recorder = (hs_recorder){.output = output, .columns = columns, .most_hits = most_hits};
     if (hs_record_use(columns) == HS_BLOCK_LISTS_PLACES) {
         recorder->ids = hs_alloc(account, HS_FOR_CANDIDATES, n, sizeof(int32_t));
         complete = recorder->ids != NULL;

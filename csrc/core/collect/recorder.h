@@ -10,6 +10,7 @@
 typedef struct hs_recorder {
     hs_output *output;             /* borrowed; not fixed */
     unsigned   columns;            /* HS_WANT_ bits of the output */
+    int32_t    most_hits;          /* of a visit */
     int32_t   *ids;                /* point numbers of hits that are places */
     int32_t   *ends[2];            /* i and j for HS_WANT_BOTH */
     double    *distance;           /* of a batch */

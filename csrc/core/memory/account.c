@@ -162,16 +162,20 @@ hs_account_close(hs_account *account)
     if (account->arena_was_small) {
         leave_larger_arena();
     }
-    account->arena = account->arena_next = account->arena_end = NULL;
+    account->arena = account->arena_first = account->arena_next = account->arena_end = NULL;
     account->arena_is_pooled = account->arena_was_small = false;
 }
 
 void
 hs_account_reset(hs_account *account)
 {
-    if (account->arena != NULL) {
-        account->arena_next = align(account->arena + sizeof(block_header));
-    }
+    account->arena_next = account->arena_first;
+}
+
+void
+hs_account_keep(hs_account *account)
+{
+    account->arena_first = account->arena_next;
 }
 
 /* An arena, of the pool if it has one. */
@@ -188,7 +192,7 @@ take_arena(hs_account *account)
     }
     account->arena_end =
         account->arena + (account->arena_is_pooled ? HS_POOL_SCRATCH : (size_t)HS_ARENA_BYTES);
-    account->arena_next = align(account->arena + sizeof(block_header));
+    account->arena_first = account->arena_next = align(account->arena + sizeof(block_header));
 #ifdef HS_TESTING
     live_blocks++;
 #endif

@@ -66,26 +66,6 @@ set_support_form(const hs_scanner *scanner, hs_form *form)
                                       scanner->search->filter_error);
 }
 
-/* Takes thresholds that were kept, or computes and keeps them. */
-static void
-set_kept(const hs_scanner *scanner, hs_form *form, hs_kept_form *kept)
-{
-    const hs_search *search = scanner->search;
-    if (!kept->is_set || kept->extent != form->extent || kept->cutoff != search->scene.cutoff ||
-        kept->error != search->filter_error) {
-        set_thresholds(scanner, form);
-        set_expanded(scanner, form);
-        *kept = (hs_kept_form){.is_set = true,
-                               .cutoff = search->scene.cutoff,
-                               .extent = form->extent,
-                               .error = search->filter_error,
-                               .direct = form->direct,
-                               .expanded = form->expanded};
-    }
-    form->direct = kept->direct;
-    form->expanded = kept->expanded;
-}
-
 static void
 set_form(const hs_scanner *scanner, hs_form *form)
 {
@@ -104,12 +84,7 @@ set_form(const hs_scanner *scanner, hs_form *form)
         set_single(scanner, form);
         return;
     }
-    hs_kept_form *kept = scanner->search->kept_forms;
-    if (kept != NULL && !scanner->search->scene.extreme) {
-        set_kept(scanner, form, &kept[form - scanner->forms]);
-    } else {
-        set_thresholds(scanner, form);
-    }
+    set_thresholds(scanner, form);
     if (scanner->search->limits != NULL) {
         form->limits = hs_limit_form_of(scanner->search->scene.ndim, form->extent,
                                         scanner->search->filter_error);
@@ -117,10 +92,16 @@ set_form(const hs_scanner *scanner, hs_form *form)
         form->scan = kernel->squares;
     } else if (hs_expanded_pays(scanner->search->scene.cutoff, form->extent)) {
         form->scan = counts ? kernel->count : kernel->list;
-        if (kept == NULL || scanner->search->scene.extreme) {
-            set_expanded(scanner, form);
-        }
+        set_expanded(scanner, form);
     }
+}
+
+/* Whether it was set for this extent, which NaN never is, and for all else that it follows from. */
+static bool
+is_form_of(const hs_search *search, double extent, const hs_form *form)
+{
+    return form->extent == extent && form->cutoff == search->scene.cutoff &&
+           form->error == search->filter_error && form->is_extreme == search->scene.extreme;
 }
 
 /* The form for |y_k| and |q_k| up to the float of these bits. */
@@ -130,8 +111,11 @@ form_of(hs_scanner *scanner, uint32_t bits)
     const uint32_t rounded = hs_extent_bits(bits);
     const double   extent = 2.0 * (double)hs_float_of_bits(rounded);
     hs_form       *form = &scanner->forms[(rounded >> HS_EXTENT_SHIFT) % HS_FORMS];
-    if (form->extent != extent) { /* nor for NaN, with which nothing is sure */
+    if (!is_form_of(scanner->search, extent, form)) {
         form->extent = extent;
+        form->cutoff = scanner->search->scene.cutoff;
+        form->error = scanner->search->filter_error;
+        form->is_extreme = scanner->search->scene.extreme;
         set_form(scanner, form);
     }
     return form;

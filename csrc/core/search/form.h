@@ -8,17 +8,6 @@
 
 #include "scanner.h"
 
-/*
- * What follows from an extent, kept for the next search of this thread: systems of a batch, all of
- * the same number of axes, have few different ones. HS_FORMS of them, zeros at first.
- */
-typedef struct hs_kept_form {
-    bool          is_set;
-    double        cutoff, extent, error;
-    hs_thresholds direct;
-    hs_expanded   expanded;
-} hs_kept_form;
-
 /* None is known yet. */
 void hs_forms_init(hs_scanner *scanner);
 

@@ -16,6 +16,12 @@
 
 /* Hits held at a time, as a multiple of the candidates: those of a few points at least. */
 #define HS_HITS_PER_CANDIDATE 2
+/*
+ * Hits after which a scan stops, so that they can be written out. Measured: the stores of a short
+ * burst drain to memory while the next one is scanned; with bursts of thousands the two take turns,
+ * which costs up to 0.9 ns a pair. Shorter ones cost more beside. Small blocks have room for one.
+ */
+#define HS_BURST 256
 
 /* One block of candidates at a time, and what scans say about it. The arrays have capacity +
  * HS_PADDING entries where nothing else is said. */

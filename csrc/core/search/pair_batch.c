@@ -45,12 +45,14 @@ allocate(hs_account *account, hs_trace *trace)
 }
 
 hs_status
-hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls, bool needs_given,
-              hs_trace *trace)
+hs_trace_init(const hs_search *search, const hs_block *block, const hs_options *polls,
+              bool needs_given, hs_trace *trace)
 {
     hs_account *account = &search->call->account;
     trace->search = search;
     trace->memory = NULL;
+    trace->n_rows = search->scene.lattice.n_periodic;
+    trace->as_given = search->bins.keeps_originals;
     trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
     trace->has_zeros = false;
     hs_trace_clear(trace);
@@ -62,6 +64,21 @@ hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls,
         hs_trace_free(account, trace);
     }
     return status;
+}
+
+bool
+hs_trace_renew(bool needs_given, hs_trace *trace)
+{
+    const hs_search *search = trace->search;
+    if (trace->n_rows != search->scene.lattice.n_periodic ||
+        trace->as_given != search->bins.keeps_originals ||
+        trace->of.needs_given != (needs_given || trace->as_given) ||
+        trace->of.is_narrow != hs_has_narrow_shifts(search)) {
+        return false;
+    }
+    trace->is_plain = hs_has_plain_shifts(&search->scene.lattice);
+    hs_trace_clear(trace);
+    return true;
 }
 
 void

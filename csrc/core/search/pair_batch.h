@@ -14,6 +14,8 @@ typedef struct hs_trace {
     const hs_search *search;   /* borrowed */
     void            *memory;   /* owned: of the arrays */
     hs_records       of;       /* the candidates */
+    int              n_rows;   /* of B, and ... */
+    bool             as_given; /* ... whether the metric measures between points as given */
     bool             is_plain; /* shifts over B are those over the box vectors as given */
     int32_t          n;
     int32_t         *place, *si;                    /* of the candidate, and of the asking point */
@@ -28,9 +30,13 @@ typedef struct hs_trace {
 } hs_trace;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
-hs_status hs_trace_init(hs_search *search, const hs_block *block, const hs_options *polls,
+hs_status hs_trace_init(const hs_search *search, const hs_block *block, const hs_options *polls,
                         bool needs_given, hs_trace *trace);
 void      hs_trace_free(hs_account *account, hs_trace *trace);
+
+/* Makes it ready for what its search has become, with as many axes. False if it has other arrays
+ * than that needs. */
+bool hs_trace_renew(bool needs_given, hs_trace *trace);
 
 /* Empties the batch. */
 HS_ALWAYS_INLINE void

@@ -25,9 +25,8 @@ hs_has_plain_shifts(const hs_lattice *lattice)
     return true;
 }
 
-/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
-static bool
-is_narrow(const hs_search *search)
+bool
+hs_has_narrow_shifts(const hs_search *search)
 {
     const hs_scene *scene = &search->scene;
     for (int k = 0; k < scene->ndim; k++) {
@@ -42,8 +41,8 @@ is_narrow(const hs_search *search)
 }
 
 hs_status
-hs_records_init(hs_search *search, const hs_block *block, const hs_options *polls, bool needs_given,
-                hs_records *records)
+hs_records_init(const hs_search *search, const hs_block *block, const hs_options *polls,
+                bool needs_given, hs_records *records)
 {
     hs_account   *account = &search->call->account;
     const bool    has_rows = search->scene.lattice.n_periodic > 0;
@@ -52,7 +51,7 @@ hs_records_init(hs_search *search, const hs_block *block, const hs_options *poll
     hs_parts      parts;
     *records = (hs_records){.search = search, .block = block, .polls = polls, .width = width};
     records->needs_given = needs_given || search->bins.keeps_originals;
-    records->is_narrow = is_narrow(search);
+    records->is_narrow = hs_has_narrow_shifts(search);
     hs_parts_begin(&parts);
     hs_parts_add(&parts, (void **)&records->q, n, sizeof(double));
     if (has_rows) {

@@ -29,7 +29,7 @@ typedef struct hs_records {
 } hs_records;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
-hs_status hs_records_init(hs_search *search, const hs_block *block, const hs_options *polls,
+hs_status hs_records_init(const hs_search *search, const hs_block *block, const hs_options *polls,
                           bool needs_given, hs_records *records);
 void      hs_records_free(hs_account *account, hs_records *records);
 
@@ -43,6 +43,9 @@ hs_records_reset(hs_records *records)
 /* Fills what is needed for all candidates of the block, as far as that is not done yet; `metric`:
  * also q. HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_records_load(hs_records *records, bool metric);
+
+/* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
+bool hs_has_narrow_shifts(const hs_search *search);
 
 /* Whether shifts over B are those over the box vectors as given. */
 bool hs_has_plain_shifts(const hs_lattice *lattice);

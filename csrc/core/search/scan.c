@@ -7,13 +7,11 @@
 #include "decide.h"
 #include "form.h"
 #include "limits.h"
+#include "open_scanner.h"
 #include "supports.h"
 #include "../base/outcome.h"
 #include "../base/fpenv.h"
 #include "../base/poll.h"
-
-#include <stddef.h>
-#include <string.h>
 
 /* Candidates between two calls of poll(): some milliseconds. */
 #define POLL_WORK   (INT64_C(1) << 21)
@@ -24,13 +22,6 @@
 
 /* Blocks with subnormal numbers before the filter flushes: some lie behind the last candidate. */
 #define FEW_SUBNORMAL 16
-
-/*
- * Hits after which a scan stops, so that they can be written out. Measured: the stores of a short
- * burst drain to memory while the next one is scanned; with bursts of thousands the two take turns,
- * which costs up to 0.9 ns a pair. Shorter ones cost more beside.
- */
-#define BURST 256
 
 /* The present block and group as a kernel sees them. */
 static void
@@ -63,8 +54,9 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->unsure = block->unsure;
     scan->n_unsure = 0;
     scan->most_hits = block->most_hits;
-    if (!lists_places && block->hits != NULL && block->n + BURST < scan->most_hits) {
-        scan->most_hits = block->n + BURST;
+    if (!lists_places && block->hits != NULL && scan->most_hits > 2 * HS_BURST &&
+        block->n + HS_BURST < scan->most_hits) {
+        scan->most_hits = block->n + HS_BURST;
     }
     scan->most_unsure = block->capacity;
 }
@@ -200,6 +192,17 @@ is_lone(const hs_scanner *scanner)
     return scanner->block.n == (scanner->block_is_first ? 1 : 0);
 }
 
+/* Decides the unsure hits of points [first, next) of the group. */
+static hs_status
+decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
+{
+    hs_status status = HS_OK;
+    if (scanner->trace.memory == NULL) {
+        status = hs_scanner_open_trace(scanner);
+    }
+    return status == HS_OK ? hs_decide(scanner, scan, first, next) : status;
+}
+
 hs_status
 hs_scan_block(hs_scanner *scanner)
 {
@@ -227,7 +230,7 @@ hs_scan_block(hs_scanner *scanner)
         next = run_scan(scanner, &scan, first);
         if (scan.n_unsure > 0 &&
             (scanner->options.precision != HS_SINGLE || scanner->search->limits != NULL)) {
-            status = hs_decide(scanner, &scan, first, next);
+            status = decide(scanner, &scan, first, next);
         }
         if (HS_UNLIKELY(scanner->chooses) && status == HS_OK) {
             status = hs_choose(scanner, &scan, first, next);
@@ -291,74 +294,4 @@ hs_scanner_finish(hs_scanner *scanner)
     keep_largest(scanner->of_group.candidates, &scanner->most.candidates);
     keep_largest(scanner->of_group.runs, &scanner->most.runs);
     return status;
-}
-
-/* What a choice looks at must be listed: numbers for labels, else places. */
-static hs_block_use
-use_of_scans(const hs_scanner *scanner)
-{
-    const bool lists_less = scanner->use == HS_BLOCK_COUNTS || scanner->use == HS_BLOCK_LISTS_IDS;
-    if (!scanner->chooses || !lists_less) {
-        return scanner->use;
-    }
-    return hs_choice_needs_places(scanner->search->call->choice, scanner->options.cutoff)
-               ? HS_BLOCK_LISTS_PLACES
-               : HS_BLOCK_LISTS_IDS;
-}
-
-/* Whether S of hits is looked up. */
-static bool
-needs_shifts(const hs_scanner *scanner)
-{
-    return scanner->use == HS_BLOCK_LISTS_PLACES ||
-           (scanner->chooses &&
-            hs_choice_compares(scanner->search->call->choice, scanner->options.cutoff));
-}
-
-hs_status
-hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
-                bool is_ordered, hs_scanner *scanner)
-{
-    hs_account *account = &search->call->account;
-    memset((char *)scanner + offsetof(hs_scanner, search), 0,
-           sizeof *scanner - offsetof(hs_scanner, search));
-    scanner->trace.memory = scanner->trace.of.memory = NULL; /* freed also when never set */
-    scanner->search = search;
-    scanner->options = search->call->options;
-    scanner->use = use;
-    scanner->chooses = search->call->choice != NULL && use != HS_BLOCK_SIZES;
-    scanner->scans = use_of_scans(scanner);
-    scanner->is_ordered = is_ordered;
-    hs_forms_init(scanner);
-    scanner->candidate_limit = INT64_MAX;
-    hs_status status = hs_block_init(account, search->scene.ndim, scanner->scans, capacity,
-                                     most_runs, &scanner->block);
-    if (status == HS_OK && search->limits != NULL) {
-        status = hs_block_add_radii(account, hs_limits_rows(search), &scanner->block);
-    }
-    if (status == HS_OK) {
-        status = hs_trace_init(search, &scanner->block, &scanner->options, needs_shifts(scanner),
-                               &scanner->trace);
-    }
-    if (status == HS_OK && is_ordered) {
-        status = hs_order_init(account, &scanner->block, &scanner->order);
-    }
-    return status;
-}
-
-void
-hs_scanner_close(hs_search *search, hs_scanner *scanner)
-{
-    const hs_counters walked = {.groups = scanner->n_groups,
-                                .candidates = scanner->n_candidates,
-                                .ambiguous = scanner->n_ambiguous,
-                                .by_float64 = scanner->stages.by_float64,
-                                .by_double_word = scanner->stages.by_double_word,
-                                .by_integers = scanner->stages.by_integers};
-    hs_call_note(search->call, &walked);
-    scanner->n_groups = scanner->n_candidates = scanner->n_ambiguous = 0;
-    scanner->stages = (hs_stages){0};
-    hs_order_free(&search->call->account, &scanner->block, &scanner->order);
-    hs_trace_free(&search->call->account, &scanner->trace);
-    hs_block_free(&search->call->account, &scanner->block);
 }

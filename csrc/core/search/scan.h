@@ -8,17 +8,6 @@
 
 #include "scanner.h"
 
-/*
- * A scanner for blocks of so many candidates and runs; no visitor yet. is_ordered: each point's
- * hits come in one visit, ascending by the candidate's number and then by S, for which the whole
- * neighbourhood must fit the block. On failure it may be closed.
- */
-hs_status hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
-                          bool is_ordered, hs_scanner *scanner);
-
-/* Adds what was done to that of the call and frees; harmless twice. */
-void hs_scanner_close(hs_search *search, hs_scanner *scanner);
-
 /* Points [first, last) in cell order are the group from here on, with an empty block. */
 void hs_scanner_start(hs_scanner *scanner, int32_t first, int32_t last);
 

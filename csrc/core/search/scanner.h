@@ -27,9 +27,11 @@ typedef struct hs_neighbourhood {
     int64_t candidates, runs;
 } hs_neighbourhood;
 
-/* How blocks of one extent are scanned. */
+/* How blocks of one extent are scanned, in a search of such a cutoff and error. */
 typedef struct hs_form {
     double        extent; /* a bound on |y_k| of the block plus |q_k| of the group; -1: not set */
+    double        cutoff, error;
+    bool          is_extreme;
     hs_scan_fn    scan;
     hs_thresholds direct;
     hs_expanded   expanded;

@@ -30,7 +30,6 @@ typedef struct hs_search {
     bool       is_sparse;
     const struct hs_limits *limits;      /* borrowed; NULL: the cutoff is that of all pairs */
     hs_shells               shells;      /* as the options have them */
-    struct hs_kept_form    *kept_forms;  /* borrowed, form.h; NULL: none are kept */
     int64_t                 first_point; /* number of the first point */
     int64_t n_in_all;       /* asking points, of which these may be a part: for fractions done */
     double  pairs_per_half; /* pairs to be found for each pair of the half list */

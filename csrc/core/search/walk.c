@@ -2,6 +2,7 @@
 /* walk.c: finds the links of each row once; then each group has a window of cells in each link. */
 #include "walk.h"
 
+#include "open_scanner.h"
 #include "scan.h"
 
 #include <string.h>
@@ -215,6 +216,7 @@ init_links(hs_search *search, hs_cursor *cursor)
     if (cursor->links == NULL) {
         return HS_ERR_MEMORY;
     }
+    cursor->most_links = n;
     if (search->is_sparse) {
         cursor->hints = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(int64_t));
         if (cursor->hints == NULL) {
@@ -225,14 +227,21 @@ init_links(hs_search *search, hs_cursor *cursor)
     return HS_OK;
 }
 
+/* In front of the first row. */
+static void
+set_out(const hs_search *search, bool is_ordered, hs_cursor *cursor)
+{
+    cursor->target = hs_row_target(search, is_ordered);
+    cursor->row_number = -1;
+}
+
 static hs_status
 init_walker(hs_search *search, hs_block_use use, int32_t capacity, int32_t most_runs,
             bool is_ordered, hs_walker *walker)
 {
     memset(&walker->cursor, 0, sizeof walker->cursor);
     walker->search = search;
-    walker->cursor.target = hs_row_target(search, is_ordered || use == HS_BLOCK_SIZES);
-    walker->cursor.row_number = -1;
+    set_out(search, is_ordered || use == HS_BLOCK_SIZES, &walker->cursor);
     const hs_status status =
         hs_scanner_init(search, use, capacity, most_runs, is_ordered, &walker->scanner);
     return status == HS_OK ? init_links(search, &walker->cursor) : status;
@@ -251,16 +260,56 @@ settle_walker(hs_search *search, hs_status status, hs_visit_fn visit, void *cont
     return status;
 }
 
+/* Runs that a block has room for. */
+static int32_t
+run_capacity(const hs_search *search)
+{
+    hs_neighbourhood most;
+    (void)hs_walker_bound(search, &most);
+    return most.runs < HS_BLOCK_RUNS ? (int32_t)most.runs + 1 : HS_BLOCK_RUNS;
+}
+
 hs_status
 hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                hs_walker *walker)
 {
-    hs_neighbourhood most;
-    (void)hs_walker_bound(search, &most);
-    const int32_t   runs = most.runs < HS_BLOCK_RUNS ? (int32_t)most.runs + 1 : HS_BLOCK_RUNS;
     const hs_status status =
-        init_walker(search, use, hs_walker_capacity(search), runs, false, walker);
+        init_walker(search, use, hs_walker_capacity(search), run_capacity(search), false, walker);
     return settle_walker(search, status, visit, context, walker);
+}
+
+/* Whether a walker of this search may serve another one. */
+static bool
+is_for_others(const hs_search *search)
+{
+    return search->limits == NULL && !search->is_sparse;
+}
+
+hs_status
+hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
+                hs_walker *walker)
+{
+    if (search->stencil.n_rows <= walker->cursor.most_links && is_for_others(search) &&
+        hs_scanner_renew(search, use, hs_walker_capacity(search), run_capacity(search),
+                         &walker->scanner)) {
+        set_out(search, use == HS_BLOCK_SIZES, &walker->cursor);
+        return settle_walker(search, HS_OK, visit, context, walker);
+    }
+    hs_walker_close(search, walker);
+    const hs_status status = hs_walker_init(search, use, visit, context, walker);
+    if (is_for_others(search)) {
+        hs_account_keep(&search->call->account);
+    }
+    return status;
+}
+
+void
+hs_walker_rest(hs_search *search, hs_walker *walker)
+{
+    hs_scanner_note(search, &walker->scanner);
+    if (!is_for_others(search)) {
+        hs_walker_close(search, walker);
+    }
 }
 
 hs_status

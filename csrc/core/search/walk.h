@@ -27,7 +27,7 @@ typedef struct hs_cursor {
     bool         has_next;
     hs_row_group next;
     hs_link     *links; /* owned; of the row being walked */
-    int64_t      n_links;
+    int64_t      n_links, most_links;
     int64_t     *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
 } hs_cursor;
 
@@ -54,6 +54,16 @@ bool hs_walker_fits(hs_search *search, const hs_neighbourhood *most, double *byt
  * found, for the groups of hs_walker_init_ordered. */
 hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                          hs_walker *walker);
+
+/*
+ * hs_walker_init for what the search of this walker has become, or for the first one: then the
+ * walker is all zeros. Memory that will do is kept, in the account's arena too (hs_account_keep).
+ * Between two searches hs_walker_rest tells the call what was done; a walker with limits or sparse
+ * cells ends there.
+ */
+hs_status hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
+                          hs_walker *walker);
+void      hs_walker_rest(hs_search *search, hs_walker *walker);
 
 /*
  * hs_walker_init for a full search that lists: each point's hits come in one visit, ascending by

@@ -373,6 +373,11 @@ arenas_are_used_again(void)
     hs_account_reset(&account);
     char *again = hs_alloc(&account, HS_FOR_CELLS, 100, 1);
     CHECK(!HS_HAVE_ARENA || again == first);
+    hs_account_keep(&account);
+    hs_account_reset(&account);
+    char *next = hs_alloc(&account, HS_FOR_CELLS, 100, 1);
+    CHECK(next != again && (!HS_HAVE_ARENA || next == second));
+    hs_free(&account, next);
     hs_free(&account, again);
     hs_test_use_arena(false);
     hs_account_close(&account);

@@ -91,32 +91,29 @@ what_is_surely_in_is_so_for_the_low_cutoff(void)
     close_walker(&walker);
 }
 
-/* What one walker has found out serves the next one, for the same cutoff and errors only. */
+/* What a walker has found out serves the next search, of the same cutoff and errors only. */
 static void
 thresholds_are_kept_for_the_next_search(void)
 {
-    hs_kept_form  kept[HS_FORMS] = {{.is_set = false}};
-    hs_walker     walker;
-    hs_thresholds direct = {0.0f, 0.0f};
-    hs_expanded   expanded = {0.0, 0.0};
+    hs_walker walker;
+    open_walker(8.0, 1.0, &walker);
+    hs_scene *scene = &unit.search.scene;
+    walker.scanner.group.largest = hs_bits_of_float(1.5f);
+    hs_form_set(&walker.scanner);
+    hs_form *form = &walker.scanner.forms[walker.scanner.form - walker.scanner.forms];
     for (int turn = 0; turn < 4; turn++) {
-        open_walker(8.0, turn == 3 ? 1.25 : 1.0, &walker);
-        unit.search.kept_forms = kept;
-        walker.scanner.group.largest = hs_bits_of_float(1.5f);
+        form->direct.in = 0.5f; /* it is left like that */
+        scene->cutoff = scene->cutoff_low = turn == 1 ? 1.25 : scene->cutoff;
+        unit.search.filter_error += turn == 2 ? 1e-9 : 0.0;
+        scene->extreme = turn == 3;
         hs_form_set(&walker.scanner);
-        const hs_form *form = walker.scanner.form;
-        const double   cutoff = unit.search.scene.cutoff, error = unit.search.filter_error;
-        if (turn == 0 || turn == 3) {
-            direct = hs_thresholds_of(3, cutoff, form->extent, error);
-            expanded = hs_expanded_of(3, cutoff, form->extent, error);
-        }
-        CHECK(form->direct.in == direct.in && form->direct.out == direct.out);
-        CHECK(form->expanded.in == expanded.in && form->expanded.out == expanded.out);
-        for (int f = 0; f < HS_FORMS && turn == 1; f++)
-            kept[f].direct.in = direct.in = 0.5f; /* it is taken from here */
-        unit.search.kept_forms = NULL;
-        close_walker(&walker);
+        const double        cutoff = scene->cutoff, error = unit.search.filter_error;
+        const hs_thresholds direct = hs_thresholds_of(3, cutoff, form->extent, error);
+        CHECK(walker.scanner.form == form && form->direct.out == direct.out);
+        CHECK(form->direct.in == (turn == 0 ? 0.5f : direct.in));
     }
+    scene->extreme = false;
+    close_walker(&walker);
 }
 
 /* The box is that of the points, and a candidate is near if it is within the cutoff of one. */

@@ -2,6 +2,7 @@
 /* test_scan.c: each point of a group meets each candidate once, however many blocks that takes; what
  * was done is counted and polled for, and a scan ends where it is told to. */
 #include "../../../csrc/core/base/fpenv.h"
+#include "../../../csrc/core/search/open_scanner.h"
 #include "../../../csrc/core/search/scan.h"
 #include "../support/poll_checks.h"
 #include "../support/search_unit.h"
