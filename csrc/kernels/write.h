@@ -4,9 +4,10 @@
  * them, i, j, d, D and S, in one pass over the hits.
  *
  * A writer gives the bits of hs_metric_measure (core/exact/metric.h), of hs_keep_within and of
- * hs_scale_apply, or it declines: one pair that it cannot be sure of is enough. It then has written
- * numbers that do not count, and the caller takes the pairs another way. Must be called with round
- * to nearest and without flushing.
+ * hs_scale_apply, or it declines: where points are too far from the origin, or the caller's unit
+ * is no float64. It then has written numbers that do not count, and the caller takes the pairs
+ * another way. Pairs may be beyond metric->cutoff, but that takes longer. Must be called with
+ * round to nearest and without flushing.
  */
 #ifndef HS_WRITE_H
 #define HS_WRITE_H
@@ -63,6 +64,9 @@ typedef void (*hs_point_records_fn)(const double *const *x, const int32_t *order
 /* Records of n points of one image in a box of three box vectors: image less turns. */
 typedef void (*hs_shift_records_fn)(const int32_t *image, const int32_t *const *turns, int32_t n,
                                     int32_t *to);
+
+/* Hit h: d and D by hs_metric_measure, where they are wanted. In write_measured.c. */
+void hs_write_measured(const hs_write *write, const struct hs_hits *hits, int32_t h);
 
 /* records_avx2.c: x86-64 only. */
 void hs_point_records_avx2(const double *const *x, const int32_t *order, int32_t n, double *to);

@@ -3,6 +3,8 @@
 #include "kernel.h"
 #include "target.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "../core/exact/bounds.h"

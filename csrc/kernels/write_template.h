@@ -6,29 +6,35 @@
  *   WRITE   name of the hs_write_fn (write.h)
  *
  * One loop over the hits of a point, LANES at a time. D is found by the steps of
- * core/exact/metric_float.h, so it has their bits. |D| needs neither a square root nor a division:
- * it is a rounded sum root + rest, known to within 2^-80 of itself, and where all of that interval
- * rounds to one number, that is what any other accurate way gives (docs/exactness.md). Undefines
- * WRITE at its end.
+ * core/exact/metric_float.h, so it has their bits; |D| from D in halves (write_distance.h), for a
+ * tile of hits at a time: what one of them waits for, others do meanwhile. A pair that this is not
+ * sure of is measured by itself. Undefines WRITE at its end.
  */
 #if !defined(WRITE)
 #error "define WRITE before including write_template.h"
 #endif
 
 #include "wide_doubleword.h"
+#include "write_distance.h"
 
-#define EVERY_LANE   ((1u << LANES) - 1)
-#define ROOT_ERROR   0x1p-80 /* relative, of |D|; 2^-82.8 is proven */
-#define LEAST_SQUARE 0x1p-120
+#define EVERY_LANE ((1u << LANES) - 1)
+#define MOST_TURNS 62.0 /* along all rows together, of what is added in halves */
+
+/* Of one point. */
+typedef struct asking {
+    places number;
+    reals  p[HS_WRITE_MOST_DIM];
+    halves of_p[HS_WRITE_MOST_DIM];
+} asking;
 
 /* Of LANES hits of one point. */
 typedef struct lanes {
     places number; /* of the candidate */
     places image[HS_WRITE_MOST_DIM];
     places S[HS_WRITE_MOST_DIM];
-    dwords D[HS_WRITE_MOST_DIM];
-    reals  total; /* of the magnitudes that D is a sum of; only used with shifts */
-    marks  flips; /* pairs that are listed the other way round */
+    reals  D[HS_WRITE_MOST_DIM];    /* rounded */
+    halves of_D[HS_WRITE_MOST_DIM]; /* large is exact */
+    marks  flips;                   /* pairs that are listed the other way round */
 } lanes;
 
 /* Image and S. */
@@ -71,13 +77,13 @@ find_flips(const hs_write *write, places point, lanes *of)
 
 /* q - p. */
 HS_ALWAYS_INLINE void
-find_plain(const hs_write *write, int32_t t, const record *candidates, lanes *of, const int ndim)
+find_plain(const asking *point, const record *candidates, reals grid, lanes *of, const int ndim)
 {
     for (int k = 0; k < ndim; k++) {
-        const reals q = candidates->q[k], p = broadcast(write->p[k][t]);
-        of->D[k] = two_sum(q, negative(p));
-        const reals size = add(magnitude(q), magnitude(p));
-        of->total = k == 0 ? size : add(of->total, size);
+        const halves q = halve(candidates->q[k], grid);
+        of->D[k] = subtract(candidates->q[k], point->p[k]);
+        of->of_D[k].large = subtract(q.large, point->of_p[k].large);
+        of->of_D[k].small = subtract(q.small, point->of_p[k].small);
     }
 }
 
@@ -93,97 +99,71 @@ resting(const hs_write *write, const lanes *of)
     return lanes_left;
 }
 
-/* Adds shift * rows. A row that does not move a pair adds zero, which changes nothing but the sign
- * of a zero, and that is not written. */
-HS_ALWAYS_INLINE void
-add_rows(const hs_write *write, lanes *of, const int ndim)
+/* Adds shift * rows; returns as bits the pairs for which that is sure. A row that does not move a
+ * pair adds zero, which changes nothing but the sign of a zero, and that is not written. */
+HS_ALWAYS_INLINE unsigned
+add_rows(const hs_write *write, const scales *by, const asking *point, const record *candidates,
+         lanes *of, const int ndim)
 {
     const hs_metric *metric = write->metric;
+    const places    *shift = write->by_S ? of->S : of->image;
+    const reals      grid = broadcast(by->grid);
+    reals            total = broadcast(0.0), turns = broadcast(0.0), largest = broadcast(0.0);
+    dwords           D[HS_WRITE_MOST_DIM];
+    for (int k = 0; k < ndim; k++) {
+        const reals q = candidates->q[k], p = point->p[k];
+        D[k] = two_sum(q, negative(p));
+        total = add(total, add(magnitude(q), magnitude(p)));
+    }
     for (int l = 0; l < metric->n_rows; l++) {
-        const reals times = to_reals(write->by_S ? of->S[l] : of->image[l]);
+        if (mark_bits(place_equal(shift[l], broadcast_place(0))) == EVERY_LANE) {
+            continue;
+        }
+        const reals times = to_reals(shift[l]);
+        turns = add(turns, magnitude(times));
         for (int k = 0; k < ndim; k++) {
-            const double entry = metric->rows[l][k];
-            if (entry != 0.0) {
-                const dwords product = two_product(times, broadcast(entry));
-                of->D[k] = dw_add(of->D[k], product);
-                of->total = add(of->total, magnitude(product.hi));
+            if (metric->rows[l][k] != 0.0) {
+                const reals  entry = broadcast(metric->rows[l][k]);
+                const halves parts = halve(entry, grid);
+                const dwords product = two_product(times, entry);
+                D[k] = dw_add(D[k], product);
+                of->of_D[k].large = add_product(times, parts.large, of->of_D[k].large);
+                of->of_D[k].small = add_product(times, parts.small, of->of_D[k].small);
+                total = add(total, magnitude(product.hi));
             }
         }
     }
-}
-
-/* |D|, and as bits for which lanes it is sure. */
-HS_ALWAYS_INLINE unsigned
-find_distances(const lanes *of, double least, reals *distance, const int ndim, const bool shifted)
-{
-    reals square = multiply(of->D[0].hi, of->D[0].hi);
-    reals rest = add_product(add(of->D[0].hi, of->D[0].hi), of->D[0].lo,
-                             product_error(of->D[0].hi, of->D[0].hi, square));
-    for (int k = 1; k < ndim; k++) {
-        const reals  hi = of->D[k].hi;
-        const reals  term = multiply(hi, hi);
-        const dwords sum = two_sum(square, term);
-        const reals  error = add_product(add(hi, hi), of->D[k].lo, product_error(hi, hi, term));
-        square = sum.hi;
-        rest = add(rest, add(sum.lo, error));
-    }
-    /* Two steps of Newton's method: r = r + r (1/2 - square / 2 r r). */
-    const reals half = broadcast(0.5), halved = multiply(square, half);
-    reals       r = guess_inverse_root(square);
-    for (int step = 0; step < 2; step++) {
-        r = add_product(r, subtract_product(multiply(halved, r), r, half), r);
-    }
-    const reals root = multiply(square, r);
-    const reals left = add(subtract_product(root, root, square), rest);
-    const reals correction = multiply(left, multiply(half, r));
-    const reals error = multiply(root, broadcast(ROOT_ERROR));
-    const reals above = add(root, add(correction, error));
-    const reals below = add(root, subtract(correction, error));
-    truth       sure = both(is_equal(above, below), is_at_least(square, broadcast(LEAST_SQUARE)));
-    if (shifted) {
-        sure = both(sure, is_at_least(root, multiply(of->total, broadcast(least))));
-    }
-    *distance = choose(is_equal(square, broadcast(0.0)), broadcast(0.0), above);
-    return bits(sure);
-}
-
-/* As bits, the pairs of coinciding points that no row moves: all is exact there. */
-HS_ALWAYS_INLINE unsigned
-coinciding(const hs_write *write, const lanes *of, const int ndim)
-{
-    unsigned lanes_left = resting(write, of);
     for (int k = 0; k < ndim; k++) {
-        lanes_left &= bits(is_equal(of->D[k].hi, broadcast(0.0)));
+        of->D[k] = D[k].hi;
+        largest = larger(largest, magnitude(D[k].hi));
     }
-    return lanes_left;
+    return bits(both(both(is_at_least(broadcast(by->farthest), total),
+                          is_at_least(broadcast(MOST_TURNS), turns)),
+                     is_at_least(largest, multiply(total, broadcast(by->cancelled)))));
 }
 
 HS_ALWAYS_INLINE void
-put_distances(const hs_write *write, int64_t e, reals distance)
+put_distances(const hs_write *write, int64_t e, reals unit, reals distance)
 {
-    const reals d = multiply(multiply(distance, broadcast(write->first)), broadcast(write->second));
+    const reals d = multiply(distance, unit);
     const truth below = is_below(d, broadcast(write->cutoff));
     store(write->distance + e, choose(below, d, broadcast(write->largest)));
     hs_prefetch_later(write->distance + e, LANES * sizeof(double));
 }
 
 /* Plus zero: a zero has no sign, which would tell where the search met the pair. */
-HS_ALWAYS_INLINE reals
-restored(const hs_write *write, const lanes *of, int k)
-{
-    const reals D =
-        multiply(multiply(of->D[k].hi, broadcast(write->first)), broadcast(write->second));
-    return add(write->is_half ? choose(widen_marks(of->flips), negative(D), D) : D, broadcast(0.0));
-}
-
 HS_ALWAYS_INLINE void
-put_vectors(const hs_write *write, int64_t e, const lanes *of, const int ndim)
+put_vectors(const hs_write *write, int64_t e, reals unit, const lanes *of, const int ndim)
 {
-    double *to = write->vector + e * ndim;
+    const reals zero = broadcast(0.0);
+    const reals times = write->is_half ? choose(widen_marks(of->flips), negative(unit), unit)
+                                       : unit;
+    double     *to = write->vector + e * ndim;
+    const reals x = add_product(of->D[0], times, zero), y = add_product(of->D[1], times, zero);
     if (ndim == 2) {
-        put_two_reals(to, restored(write, of, 0), restored(write, of, 1));
+        put_two_reals(to, x, y);
     } else {
-        put_three_reals(to, restored(write, of, 0), restored(write, of, 1), restored(write, of, 2));
+        put_three_reals(to, x, y, add_product(of->D[2], times, zero));
     }
     hs_prefetch_later(to, LANES * sizeof *to * (size_t)ndim);
 }
@@ -231,10 +211,11 @@ put_index(void *column, int index_bytes, int64_t e, places number)
     }
     if (index_bytes == 8) {
         put_wide_places((int64_t *)column + e, number);
+        hs_prefetch_later((int64_t *)column + e, LANES * sizeof(int64_t));
     } else {
         put_places((int32_t *)column + e, number);
+        hs_prefetch_later((int32_t *)column + e, LANES * sizeof(int32_t));
     }
-    hs_prefetch_later((char *)column + e * index_bytes, LANES * (size_t)index_bytes);
 }
 
 /* i and j; S. */
@@ -267,48 +248,92 @@ write_known(const hs_write *write, const hs_hits *hits, const int ndim)
     return true;
 }
 
+/* Whether it is not too far away to be halved. */
+HS_ALWAYS_INLINE bool
+set_asking(const hs_write *write, const hs_hits *hits, int32_t t, const scales *by, asking *point,
+           const int ndim)
+{
+    bool is_near = true;
+    point->number = broadcast_place(hits->point[t]);
+    for (int k = 0; k < ndim; k++) {
+        const double p = write->p[k][t];
+        is_near = is_near && fabs(p) <= by->farthest;
+        point->p[k] = broadcast(p);
+        point->of_p[k] = halve(point->p[k], broadcast(by->grid));
+    }
+    return is_near;
+}
+
+/* Distances of the hits from the first of the tile to `end`; d and D where they are not sure. */
+static HS_NO_INLINE void
+finish_tile(const hs_write *write, const hs_hits *hits, const scales *by, tile *of, int32_t end)
+{
+    const reals unit = broadcast(by->unit);
+    pad_tile(of, end);
+    for (int32_t e = of->first; e < end; e += LANES) {
+        reals       distance;
+        const reals square = load(of->square + (e - of->first));
+        const reals rest = load(of->rest + (e - of->first));
+        unsigned    left = end - e < LANES ? (1u << (end - e)) - 1 : EVERY_LANE;
+        left &= ~find_distances(by, square, rest, &distance);
+        if (HS_UNLIKELY(left != 0)) {
+            const truth zero = is_equal(square, broadcast(0.0));
+            left &= ~bits(zero);
+            distance = choose(zero, broadcast(0.0), distance);
+        }
+        if (write->distance != NULL) {
+            put_distances(write, e, unit, distance);
+        }
+        for (; HS_UNLIKELY(left != 0); left &= left - 1) {
+            const unsigned below = (left & (0u - left)) - 1;
+            hs_write_measured(write, hits, e + (int32_t)count(below));
+        }
+    }
+}
+
 HS_ALWAYS_INLINE bool
 write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bool shifted)
 {
-    /* An error e of D is of no matter up to a quarter of the last place of |D|. */
-    const double unit = HS_DW_ADD_ERROR * (HS_FLOAT64_UNIT * HS_FLOAT64_UNIT);
-    const double least = 0x1p58 * unit * HS_WRITE_MOST_DIM;
-    const bool   in_order = are_in_order(write, ndim);
-    unsigned     unsure = 0;
-    int32_t      h = 0;
+    const hs_write own = *write; /* columns do not overlap it */
+    const bool     in_order = are_in_order(&own, ndim);
+    int32_t        h = 0;
+    scales         by;
+    tile           squares;
+    if (!set_scales(&own, &by)) {
+        return false;
+    }
+    const reals grid = broadcast(by.grid), unit = broadcast(by.unit);
+    squares.first = 0;
     for (int32_t t = 0; t < hits->n; t++) {
-        const places  point = broadcast_place(hits->point[t]);
         const int32_t end = hits->end[t];
+        asking        point;
+        if (HS_UNLIKELY(!set_asking(&own, hits, t, &by, &point, ndim))) {
+            return false;
+        }
         for (int32_t e = h; e < end; e += LANES) {
             lanes        of;
-            reals        distance;
-            const record candidates = load_records(write->q, hits->label + e);
+            const record candidates = load_records(own.q, hits->label + e);
+            unsigned     sure = EVERY_LANE;
+            if (e + LANES - squares.first > TILE) {
+                finish_tile(&own, hits, &by, &squares, e);
+                squares.first = e;
+            }
             of.number = candidates.number;
-            find_shifts(write, t, hits->label + e, &of);
-            find_flips(write, point, &of);
-            find_plain(write, t, &candidates, &of, ndim);
-            if (shifted && resting(write, &of) != EVERY_LANE) {
-                add_rows(write, &of, ndim);
+            find_shifts(&own, t, hits->label + e, &of);
+            find_flips(&own, point.number, &of);
+            find_plain(&point, &candidates, grid, &of, ndim);
+            if (shifted && resting(&own, &of) != EVERY_LANE) {
+                sure = add_rows(&own, &by, &point, &candidates, &of, ndim);
             }
-            const unsigned present = end - e < LANES ? (1u << (end - e)) - 1 : EVERY_LANE;
-            unsigned       left = ~find_distances(&of, least, &distance, ndim, shifted) & present;
-            if (HS_UNLIKELY(left != 0)) {
-                left &= ~coinciding(write, &of, ndim);
-            }
-            unsure |= left;
-            put_known(write, e, point, in_order, &of, ndim);
-            if (write->distance != NULL) {
-                put_distances(write, e, distance);
-            }
-            if (write->vector != NULL) {
-                put_vectors(write, e, &of, ndim);
+            put_squares(of.of_D, sure, &squares, e - squares.first, ndim);
+            put_known(&own, e, point.number, in_order, &of, ndim);
+            if (own.vector != NULL) {
+                put_vectors(&own, e, unit, &of, ndim);
             }
         }
         h = end;
-        if (HS_UNLIKELY(unsure != 0)) {
-            return false;
-        }
     }
+    finish_tile(&own, hits, &by, &squares, h);
     return true;
 }
 
@@ -327,6 +352,5 @@ WRITE(const hs_write *write, const hs_hits *hits)
 }
 
 #undef EVERY_LANE
-#undef LEAST_SQUARE
-#undef ROOT_ERROR
+#undef MOST_TURNS
 #undef WRITE
