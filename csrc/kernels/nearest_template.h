@@ -40,7 +40,8 @@ relate(const hs_relate *relate, const hs_nearest_run *runs, int32_t n)
     }
 }
 
-/* Each key goes to the place that is the number of smaller ones. */
+/* Each key goes to the place that is the number of smaller ones, which are counted for two vectors
+ * of keys at once. */
 static void
 order(const float *squares, int32_t n, int32_t *keys)
 {
@@ -52,16 +53,19 @@ order(const float *squares, int32_t n, int32_t *keys)
         const integers key = merge_bits(bits_of(load(squares + e)), number, number_bits);
         store_integers(own + e, key);
     }
-    for (int32_t e = n; e % LANES != 0; e++) {
+    for (int32_t e = n; e % (2 * LANES) != 0; e++) {
         own[e] = HS_ORDER_LAST;
     }
-    for (int32_t e = 0; e < n; e += LANES) {
-        const integers key = load_integers(own + e);
-        integers       smaller_ones = broadcast_integer(0);
+    for (int32_t e = 0; e < n; e += 2 * LANES) {
+        const integers one = load_integers(own + e), other = load_integers(own + e + LANES);
+        integers       below_one = broadcast_integer(0), below_other = below_one;
         for (int32_t f = 0; f < n; f++) {
-            smaller_ones = count_greater(smaller_ones, key, broadcast_integer(own[f]));
+            const integers key = broadcast_integer(own[f]);
+            below_one = count_greater(below_one, one, key);
+            below_other = count_greater(below_other, other, key);
         }
-        store_integers(place + e, smaller_ones);
+        store_integers(place + e, below_one);
+        store_integers(place + e + LANES, below_other);
     }
     for (int32_t e = 0; e < n; e++) {
         keys[place[e]] = own[e];

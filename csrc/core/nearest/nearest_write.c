@@ -81,10 +81,10 @@ put_distances(hs_nearest_writer *writer, double *to)
     if (search->call->options.cutoff < INFINITY) {
         hs_keep_all_within(pairs->distance, pairs->n, search->call->options.cutoff, true);
     }
+    double before = pairs->n > 0 && !writer->is_first[0] ? to[writer->at[0] - 1] : 0.0;
     for (int32_t e = 0; e < pairs->n; e++) {
-        const int64_t at = writer->at[e];
-        to[at] = writer->is_first[e] ? pairs->distance[e]
-                                     : hs_larger(pairs->distance[e], to[at - 1]);
+        before = hs_larger(pairs->distance[e], writer->is_first[e] ? 0.0 : before);
+        to[writer->at[e]] = before;
     }
 }
 
