@@ -268,7 +268,7 @@ numbers_that_are_only_large_are_fine(void)
         CHECK(hs_call_threads(1, &options) == (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
         options.threads = -n;
         CHECK(hs_call_threads(1, &options) == 1);
-        CHECK(hs_call_threads(INT64_MAX, &options) == (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
+        CHECK(hs_call_threads(0x1p63, &options) == (n < HS_MOST_THREADS ? n : HS_MOST_THREADS));
     }
 }
 
