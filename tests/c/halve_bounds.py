@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Halve every error constant of csrc/core/exact/bounds.h in turn and demand that a C test fails.
 
-Usage: python3 halve_bounds.py [part of a constant's name]. Uses $CC, or cc. Prints a table; the
-exit code is 1 if a constant can be halved without a test noticing, or if the tests fail as they
-are.
+Usage: python3 halve_bounds.py [--all] [part of a constant's name]. Uses $CC, or cc. Prints a table
+of the first test that fails for each constant, or of all of them; the exit code is 1 if a constant
+can be halved without a test noticing, or if the tests fail as they are.
 """
 
+import argparse
 import os
 import re
 import shutil
@@ -14,6 +15,7 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Timer
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "csrc" / "core" / "exact"
@@ -45,55 +47,73 @@ def compile_object(source, folder, define=None):
     return target
 
 
-def uses_bounds(source):
-    """Whether a source file sees bounds.h, by the compiler's own account."""
-    command = [*COMPILER, *FLAGS, "-MM", str(source)]
-    listing = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    return "bounds.h" in listing
+def uses(source, names):
+    """Those of these constants that a source file uses: a macro that stands for itself is left by
+    the preprocessor wherever it is expanded."""
+    defines = [f"-D{name}={name}" for name in names]
+    command = [*COMPILER, *FLAGS, *defines, "-E", "-P", str(source)]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return set(names) & set(re.findall(r"\w+", text))
 
 
-def run_tests(objects, folder):
-    """Number of failed checks, and the names of the tests that they are in."""
+def run_tests(objects, folder, first=False):
+    """Number of failed checks, and the names of the tests that they are in; up to the first."""
     program = folder / "tests"
     subprocess.run([*COMPILER, *map(str, objects), "-o", str(program), "-lm"], check=True)
-    result = subprocess.run([str(program)], capture_output=True, text=True, timeout=60)
-    lines = [line for line in result.stderr.splitlines() if ": CHECK(" in line]
-    if result.returncode and not lines:
-        return 1, [f"exit code {result.returncode}"]
-    names = sorted({line.split(": ")[1] for line in lines})
-    return len(lines), names
+    names = []
+    with subprocess.Popen(
+        [program], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as running:
+        limit = Timer(60, running.kill)
+        limit.start()
+        for line in running.stderr:
+            if ": CHECK(" in line:
+                names.append(line.split(": ")[1])
+                if first:
+                    running.kill()
+                    break
+        limit.cancel()
+    if running.returncode and not names:
+        return 1, [f"exit code {running.returncode}"]
+    return len(names), sorted(set(names))
 
 
-def try_constant(name, value, fixed, dependent, scratch):
+def try_constant(name, value, objects, using, scratch, first):
+    """As run_tests: with a constant halved in the objects of the sources that use it."""
     folder = scratch / name
     folder.mkdir()
-    objects = [compile_object(source, folder, f"{name}=(({value})/2)") for source in dependent]
-    return run_tests(fixed + objects, folder)
+    objects = dict(objects)
+    for source in using:
+        objects[source] = compile_object(source, folder, f"{name}=(({value})/2)")
+    return run_tests(objects.values(), folder, first)
 
 
 def main():
-    wanted = sys.argv[1] if len(sys.argv) > 1 else ""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--all", action="store_true", help="all tests that fail, not the first")
+    parser.add_argument("wanted", nargs="?", default="", metavar="part of a constant's name")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(2) as pool:
         scratch = Path(temporary)
         shutil.copy(HERE / "main.c", scratch)
         (scratch / "modules.h").write_text("".join(f"MODULE({name})\n" for name in MODULES))
 
-        dependent = [source for source in SOURCES if uses_bounds(source)]
-        independent = [source for source in SOURCES if source not in dependent]
-        base = scratch / "unchanged"
-        base.mkdir()
-        fixed = list(
-            pool.map(
-                lambda source: compile_object(source, base), [scratch / "main.c", *independent]
-            )
-        )
-        unchanged = list(pool.map(lambda source: compile_object(source, base), dependent))
-        count, names = run_tests(fixed + unchanged, base)
+        sources = [scratch / "main.c", *SOURCES]
+        compiled = pool.map(lambda source: compile_object(source, scratch), sources)
+        objects = dict(zip(sources, compiled))
+        count, names = run_tests(objects.values(), scratch)
         if count:
             sys.exit(f"the tests fail as they are: {', '.join(names)}")
 
-        chosen = [(name, value) for name, value in constants() if wanted in name]
-        results = pool.map(lambda c: try_constant(*c, fixed, dependent, scratch), chosen)
+        every = [name for name, _ in constants()]
+        used = dict(zip(sources, pool.map(lambda source: uses(source, every), sources)))
+        chosen = [(name, value) for name, value in constants() if options.wanted in name]
+
+        def try_one(constant):
+            using = [source for source in sources if constant[0] in used[source]]
+            return try_constant(*constant, objects, using, scratch, not options.all)
+
+        results = pool.map(try_one, chosen)
         survivors = 0
         print(f"{'constant, halved':34} {'value':>9} {'failed checks':>14}  in")
         for (name, value), (count, names) in zip(chosen, results):
