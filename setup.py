@@ -65,7 +65,9 @@ else:
     if os.environ.get("HS_DEBUG"):
         compile_args += ["-O0", "-g3", "-UNDEBUG"]
     if os.environ.get("HS_SANITIZE"):
-        compile_args += ["-g", "-UNDEBUG", "-fsanitize=address,undefined,float-cast-overflow"]
+        # They find the same at -O1, which is compiled in half the time.
+        compile_args += ["-O1", "-g1", "-UNDEBUG"]
+        compile_args += ["-fsanitize=address,undefined,float-cast-overflow"]
         link_args += ["-fsanitize=address,undefined"]
 
 sources = [
