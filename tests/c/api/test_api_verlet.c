@@ -74,7 +74,7 @@ every_step_is_that_of_a_search(void)
 {
     harness_random random = {4711};
     int64_t        n_pairs = 0, n_kept = 0;
-    for (int trial = 0; trial < 240; trial++) {
+    for (int trial = 0; trial < THIRD_OF_TRIALS(240); trial++) {
         make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, 1 + random_below(&random, 60), 4.0,
                    trial % 7 == 6   ? 300
                    : trial % 7 == 5 ? -300
@@ -98,8 +98,8 @@ every_step_is_that_of_a_search(void)
         }
         hs_verlet_free(list);
     }
-    CHECK(n_pairs > 100000);
-    CHECK(n_kept > 500);
+    CHECK(n_pairs > THIRD_OF_TRIALS(100000));
+    CHECK(n_kept > THIRD_OF_TRIALS(500));
 }
 
 /* Two points on a line, moving towards each other until they come within the cutoff. */

@@ -30,6 +30,9 @@
 /* So many random trials, or results that they must have; a tenth of them where that is slow. */
 #define TRIALS(n) (IS_SLOW ? ((n) + 9) / 10 : (n))
 
+/* As many trials, of which a tenth would not be every kind of scene: a third where that is slow. */
+#define THIRD_OF_TRIALS(n) (IS_SLOW ? ((n) + 2) / 3 : (n))
+
 extern int         harness_failures; /* failed checks so far */
 extern int         harness_tests;    /* tests run so far */
 extern const char *harness_filter;   /* run only tests whose name contains this, or NULL */

@@ -55,7 +55,7 @@ every_type_and_dimension_gives_the_pairs_of_a_search(void)
     static const int exponents[] = {0, 0, 0, 0, 40, -100, 400, -1000, 900};
     harness_random   random = {1999};
     int64_t          n_pairs = 0, n_kept = 0;
-    for (int trial = 0; trial < 250; trial++) {
+    for (int trial = 0; trial < THIRD_OF_TRIALS(250); trial++) {
         const bool is_narrow = trial % 2;
         const int  d = 1 + trial / 2 % HS_MAX_DIM, exponent = exponents[random_below(&random, 9)];
         make_scene(&random, trial % SCENE_KINDS, d, 1 + random_below(&random, d > 4 ? 12 : 40), 4.0,
@@ -76,7 +76,7 @@ every_type_and_dimension_gives_the_pairs_of_a_search(void)
         }
         hs_verlet_free(list);
     }
-    CHECK(n_pairs > 50000 && n_kept > 250);
+    CHECK(n_pairs > THIRD_OF_TRIALS(50000) && n_kept > THIRD_OF_TRIALS(250));
 }
 
 /* Coordinates at both ends of the numbers: no scale keeps the digits of all. */
