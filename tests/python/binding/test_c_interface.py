@@ -17,7 +17,7 @@ from halfshell import _core
 
 DOCS = (ROOT / "docs/c-interface.md").read_text()
 EXAMPLES = ROOT / "examples" / "c"
-SANITIZE = "-std=c11 -O0 -g -fsanitize=address,undefined -fno-sanitize-recover=all"
+SANITIZE = "-std=c11 -O0 -g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 
 pytestmark = [pytest.mark.slow, needs_c]
 
