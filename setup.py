@@ -62,13 +62,13 @@ else:
     compile_args += ["-isystem", numpy.get_include()]  # no warnings of NumPy's headers
     if os.environ.get("HS_WERROR"):
         compile_args += ["-Werror"]
-    if os.environ.get("HS_DEBUG"):
-        compile_args += ["-O0", "-g3", "-UNDEBUG"]
     if os.environ.get("HS_SANITIZE"):
         # They find the same at -O1, which is compiled in half the time.
         compile_args += ["-O1", "-g1", "-UNDEBUG"]
         compile_args += ["-fsanitize=address,undefined,float-cast-overflow"]
         link_args += ["-fsanitize=address,undefined"]
+    if os.environ.get("HS_DEBUG"):
+        compile_args += ["-O0", "-g3", "-UNDEBUG"]
 
 sources = [
     source

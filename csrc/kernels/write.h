@@ -4,10 +4,10 @@
  * them, i, j, d, D and S, in one pass over the hits.
  *
  * A writer gives the bits of hs_metric_measure (core/exact/metric.h), of hs_keep_within and of
- * hs_scale_apply, or it declines: where points are too far from the origin, or the caller's unit
- * is no float64. It then has written numbers that do not count, and the caller takes the pairs
- * another way. Pairs may be beyond metric->cutoff, but that takes longer. Must be called with
- * round to nearest and without flushing.
+ * hs_scale_apply, or it declines: where points are too far from the origin, the caller's unit is no
+ * float64, or many pairs are beyond metric->cutoff or nearer than 2^-16 of it, which a writer must
+ * measure one by one. It then has written numbers that do not count, and the caller takes the pairs
+ * another way. Must be called with round to nearest and without flushing.
  */
 #ifndef HS_WRITE_H
 #define HS_WRITE_H

@@ -3,11 +3,11 @@
  * write_distance.h: |D| for write_template.h, from D in halves: include it after the vocabularies
  * (wide_<isa>.h and places_<isa>.h) of an instruction set, inside its target region.
  *
- * large is a multiple of 2^(E - 26), where cutoff <= 2^E, so that large^2 sums exactly; what is
- * added for small is about 2^-24 of that, and its roundings are of no matter. |D| needs neither a
- * square root nor a division: it is a rounded sum root + correction, known to within 2^(E - 69),
- * and where all of that interval rounds to one number, that is what any other accurate way gives
- * (docs/exactness.md).
+ * large is a multiple of 2^(E - 26), where 2^(E - 1) <= cutoff < 2^E, or E = 0 for cutoff 0, so
+ * that large^2 sums exactly; what is added for small is about 2^-24 of that, and its roundings are
+ * of no matter. |D| needs neither a square root nor a division: it is a rounded sum root +
+ * correction, known to within 2^(E - 69), and where all of that interval rounds to one number, that
+ * is what any other accurate way gives (docs/exactness.md).
  */
 #ifndef HS_WRITE_DISTANCE_H
 #define HS_WRITE_DISTANCE_H
@@ -15,13 +15,14 @@
 #define LEAST_SQUARE 0x1p-120 /* squares that a root is guessed of */
 #define MOST_SQUARE  0x1p120
 
-/* What the writer goes by: E is an exponent with cutoff <= 2^E. */
+/* What the writer goes by. */
 typedef struct scales {
     double grid;        /* sums with it are multiples of 2^(E - 26) */
     double farthest;    /* coordinates and terms up to here are split so; 2^(E + 23) */
     double least, most; /* squares that are computed well: 2^(2E - 32) to 1.5 * 2^(2E) */
     double error;       /* of a distance: 2^(E - 69) */
-    double cancelled;   /* of the magnitudes that D is a sum of: below this, D is not sure */
+    double cancelled;   /* D is sure if its largest component is at least this part of the
+                        * magnitudes that it is a sum of */
     double unit;        /* to the caller's unit: a power of two */
 } scales;
 

@@ -264,11 +264,20 @@ set_asking(const hs_write *write, const hs_hits *hits, int32_t t, const scales *
     return is_near;
 }
 
-/* Distances of the hits from the first of the tile to `end`; d and D where they are not sure. */
-static HS_NO_INLINE void
+/* Hits of a tile that are measured one by one, at most: each takes as long as some twenty others. */
+#ifdef HS_TESTING
+#define MOST_MEASURED (TILE / 4) /* so that small scenes have as many */
+#else
+#define MOST_MEASURED (TILE / 16)
+#endif
+
+/* Distances of the hits from the first of the tile to `end`; d and D where they are not sure. False
+ * if those are many. */
+static HS_NO_INLINE bool
 finish_tile(const hs_write *write, const hs_hits *hits, const scales *by, tile *of, int32_t end)
 {
     const reals unit = broadcast(by->unit);
+    unsigned    measured = 0;
     pad_tile(of, end);
     for (int32_t e = of->first; e < end; e += LANES) {
         reals       distance;
@@ -284,11 +293,16 @@ finish_tile(const hs_write *write, const hs_hits *hits, const scales *by, tile *
         if (write->distance != NULL) {
             put_distances(write, e, unit, distance);
         }
+        measured += count(left);
+        if (HS_UNLIKELY(measured > MOST_MEASURED)) {
+            return false;
+        }
         for (; HS_UNLIKELY(left != 0); left &= left - 1) {
             const unsigned below = (left & (0u - left)) - 1;
             hs_write_measured(write, hits, e + (int32_t)count(below));
         }
     }
+    return true;
 }
 
 HS_ALWAYS_INLINE bool
@@ -315,7 +329,9 @@ write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bo
             const record candidates = load_records(own.q, hits->label + e);
             unsigned     sure = EVERY_LANE;
             if (e + LANES - squares.first > TILE) {
-                finish_tile(&own, hits, &by, &squares, e);
+                if (HS_UNLIKELY(!finish_tile(&own, hits, &by, &squares, e))) {
+                    return false;
+                }
                 squares.first = e;
             }
             of.number = candidates.number;
@@ -333,8 +349,7 @@ write_pairs(const hs_write *write, const hs_hits *hits, const int ndim, const bo
         }
         h = end;
     }
-    finish_tile(&own, hits, &by, &squares, h);
-    return true;
+    return finish_tile(&own, hits, &by, &squares, h);
 }
 
 bool

@@ -15,7 +15,7 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Timer
+from threading import Event, Timer
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "csrc" / "core" / "exact"
@@ -64,7 +64,8 @@ def run_tests(objects, folder, first=False):
     with subprocess.Popen(
         [program], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as running:
-        limit = Timer(60, running.kill)
+        hung = Event()
+        limit = Timer(60, lambda: (hung.set(), running.kill()))
         limit.start()
         for line in running.stderr:
             if ": CHECK(" in line:
@@ -73,6 +74,8 @@ def run_tests(objects, folder, first=False):
                     running.kill()
                     break
         limit.cancel()
+    if hung.is_set():
+        raise TimeoutError(f"{program} takes more than a minute")
     if running.returncode and not names:
         return 1, [f"exit code {running.returncode}"]
     return len(names), sorted(set(names))

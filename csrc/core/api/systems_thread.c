@@ -33,15 +33,15 @@ typedef struct worker {
     const hs_systems_job *job;
     hs_call               call;      /* with this thread's poll */
     hs_search             search;    /* of one system after the other */
-    bool                  has_scene; /* of the one before */
+    bool                  has_scene; /* whether one was filled for a system before */
     hs_levels             levels; /* of the present system, where pairs have a reach of their own */
     hs_level_plan         plan;
     hs_level_search       step;
-    hs_walker             walker; /* of them, too */
-    hs_recorder           recorder;
-    hs_choice             choice; /* the job's with the present box, where pairs are excluded */
-    hs_box                box;    /* of the present system, where each has its own */
-    hs_output            *target; /* the job's output, or the backlog's */
+    hs_walker             walker;   /* kept from one system to the next */
+    hs_recorder           recorder; /* like the walker */
+    hs_choice             choice;   /* the job's with the present box, where pairs are excluded */
+    hs_box                box;      /* of the present system, where each has its own */
+    hs_output            *target;   /* the job's output, or the backlog's */
     hs_backlog            backlog;
     hs_output             found; /* pairs of one system before they are sorted */
     int64_t               work;  /* since the last poll */

@@ -7,7 +7,7 @@
 #include "base.h"
 
 #define HS_BRIEFLY_MS 50 /* a wait that ends on its own */
-#define HS_NAP_MS     1  /* or little more */
+#define HS_NAP_MS     1  /* or more: 16 on some Windows */
 
 #if defined(_WIN32)
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. */
+/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A thread that is
+ * alone writes straight to the output, by a walker that it may keep for the next search. */
 #include "parallel.h"
 
 #include "../base/outcome.h"
@@ -244,8 +245,9 @@ hs_backlog_free(hs_account *account, hs_backlog *backlog)
 
 /* A recorder for this output and so many hits at a time, that before if it is one. */
 static hs_status
-renew_recorder(hs_account *account, hs_output *output, int32_t most_hits, hs_recorder *recorder)
+renew_recorder(hs_search *search, hs_output *output, int32_t most_hits, hs_recorder *recorder)
 {
+    hs_account *account = &search->call->account;
     if (recorder->output == output && recorder->columns == output->columns &&
         recorder->most_hits >= most_hits) {
         return HS_OK;
@@ -270,8 +272,7 @@ record_by(hs_search *search, hs_output *output, hs_walker *walker, hs_recorder *
     hs_status status =
         hs_walker_renew(search, hs_record_use(output->columns), visit, context, walker);
     if (status == HS_OK) {
-        status = renew_recorder(&search->call->account, output, walker->scanner.block.most_hits,
-                                recorder);
+        status = renew_recorder(search, output, walker->scanner.block.most_hits, recorder);
     }
     if (status == HS_OK) {
         status = walk_all(search, walker, failure);

@@ -41,7 +41,7 @@ typedef struct hs_account {
     hs_limit_fn find_limit; /* called once, when held first passes HS_LIMIT_FREE; or NULL */
     void       *find_context;
     char       *arena;       /* owned, taken with the first small block; or NULL */
-    char       *arena_first; /* where it begins anew */
+    char       *arena_first; /* where its next block begins after hs_account_reset */
     char       *arena_next;  /* where its next block begins */
     char       *arena_end;
     bool        is_kept;         /* for long: its arena is a small one */
@@ -56,10 +56,11 @@ void hs_account_init(hs_account *account, const hs_options *options);
 /* Gives the arena back, after the last block. Harmless twice, and on an account of zeros. */
 void hs_account_close(hs_account *account);
 
-/* The arena as it was at first, when no block is in use any more that came after those to keep. */
+/* The arena hands out anew what it has handed out since hs_account_keep: none of that may be in use
+ * any more. */
 void hs_account_reset(hs_account *account);
 
-/* What the arena has handed out so far stays in use. */
+/* What the arena has handed out so far outlives hs_account_reset, also what has been freed of it. */
 void hs_account_keep(hs_account *account);
 
 /* Whether `bytes` more may be held; settles the limit if it has not been needed before. */

@@ -33,8 +33,9 @@ unlock(void)
 }
 
 /* For work that should not be skipped. A thread holds the lock for some hundred instructions: it is
- * free again as soon as that thread has had a processor, or never. To sleep bounds the wait, as to
- * yield does not: among busy threads, each time may be a time slice of all of them. */
+ * free again as soon as that thread has a processor, or never. Naps bound the wait: a quarter of a
+ * second, or up to four on Windows. Yields do not, since each may last a time slice of every busy
+ * thread. */
 static bool
 lock_patiently(void)
 {

@@ -20,7 +20,7 @@
 
 #include "../base/base.h"
 
-#define HS_POOL_LIMIT ((size_t)512 << 20) /* bytes kept, unless set: 2e7 pairs as int64 */
+#define HS_POOL_LIMIT ((size_t)512 << 20) /* bytes kept, unless set: 3e7 pairs as int64 */
 
 /* Requests up to this size are scratch: copied and given back at once. Any chunk may serve them,
  * and no chunk is made smaller, so that the second one of them finds what the first one left. */

@@ -65,8 +65,8 @@ typedef struct hs_sets {
     bool             is_plain; /* the cutoff is taken as it is, however far beyond all distances,
                                 * and gaps (close_gaps.h) are closed only if need be */
     bool             is_wide;  /* X is not made float32: it may be larger than that holds */
-    bool             follows;  /* the scene is one that was filled before, with the same options but
-                                * for the cutoff, and may keep what is still right */
+    bool             follows;  /* the scene was filled before, with the same options but for the
+                                * cutoff: lattice, scale and metric are kept if they are the same */
     const struct hs_search *built; /* NULL, or a search that has the points in cells already */
     struct hs_nearest_kept *trees; /* NULL, or what keeps a tree of the points (nearest_kept.h) */
     bool                    is_untested; /* cells are all that is wanted, no distance is computed */
@@ -132,8 +132,9 @@ bool hs_scene_may_condense(const hs_scene *scene, const hs_scene *asking,
 void hs_scene_set_scale(const hs_box *box, bool is_scaled, int unit, hs_scene *scene,
                         const hs_scene *asking);
 
-/* Whether the scene is_ordinary, once its points have been read: there is no box, and nothing is
- * scaled. Then this fills it. follows: it was so before, with this cutoff and as many axes. */
+/* Whether a scene, once its points have been read, stays as it was given: there is no box, and
+ * nothing is scaled. Then hs_scene_fill_ordinary fills it. follows: it has filled it before, with
+ * this cutoff and as many axes. In scene_ordinary.c. */
 bool      hs_scene_stays(const hs_sets *sets, const hs_box *box, const hs_options *options,
                          const hs_scene *scene);
 hs_status hs_scene_fill_ordinary(const hs_options *options, bool follows, hs_scene *scene,

@@ -10,7 +10,7 @@
 /* A cutoff that is 2^8 times the largest coordinate: two points are less than 2 sqrt(8) times that
  * and a binary order apart. */
 #define WHOLE_EXPONENT 8
-/* Largest coordinates up to which a cutoff is not looked at more closely. */
+/* Cutoffs up to so many times the largest coordinate are never shortened. */
 #define ENOUGH_CUTOFF 64.0
 /* Exponent of zero; that of infinity is its opposite. Sums with other exponents do not overflow. */
 #define NO_EXPONENT (INT32_MIN / 2)

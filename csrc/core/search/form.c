@@ -96,12 +96,14 @@ set_form(const hs_scanner *scanner, hs_form *form)
     }
 }
 
-/* Whether it was set for this extent, which NaN never is, and for all else that it follows from. */
+/* Whether it was set for this extent, which NaN never is, and for all else that differs between the
+ * searches of a walker. */
 static bool
 is_form_of(const hs_search *search, double extent, const hs_form *form)
 {
     return form->extent == extent && form->cutoff == search->scene.cutoff &&
-           form->error == search->filter_error && form->is_extreme == search->scene.extreme;
+           form->cutoff_low == search->scene.cutoff_low && form->error == search->filter_error &&
+           form->is_extreme == search->scene.extreme;
 }
 
 /* The form for |y_k| and |q_k| up to the float of these bits. */
@@ -114,6 +116,7 @@ form_of(hs_scanner *scanner, uint32_t bits)
     if (!is_form_of(scanner->search, extent, form)) {
         form->extent = extent;
         form->cutoff = scanner->search->scene.cutoff;
+        form->cutoff_low = scanner->search->scene.cutoff_low;
         form->error = scanner->search->filter_error;
         form->is_extreme = scanner->search->scene.extreme;
         set_form(scanner, form);

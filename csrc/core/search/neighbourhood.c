@@ -12,9 +12,11 @@
 int32_t
 hs_block_most_hits(int32_t capacity)
 {
-    return capacity < HS_BURST                            ? capacity + HS_BURST
-           : capacity < INT32_MAX / HS_HITS_PER_CANDIDATE ? HS_HITS_PER_CANDIDATE * capacity
-                                                          : capacity;
+    if (capacity < HS_BURST) {
+        return capacity + HS_BURST;
+    }
+    return capacity < INT32_MAX / HS_HITS_PER_CANDIDATE ? HS_HITS_PER_CANDIDATE * capacity
+                                                        : capacity;
 }
 
 hs_status

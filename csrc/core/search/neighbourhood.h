@@ -14,12 +14,13 @@
 
 #define HS_BLOCK_RUNS 1024 /* runs held at a time, at most */
 
-/* Hits held at a time, as a multiple of the candidates: those of a few points at least. */
+/* Hits held at a time, as a multiple of the candidates: those of a few points at least. Blocks of
+ * fewer candidates than a burst have room for those and a burst: they are scanned without a stop. */
 #define HS_HITS_PER_CANDIDATE 2
 /*
  * Hits after which a scan stops, so that they can be written out. Measured: the stores of a short
  * burst drain to memory while the next one is scanned; with bursts of thousands the two take turns,
- * which costs up to 0.9 ns a pair. Shorter ones cost more beside. Small blocks have room for one.
+ * which costs up to 0.9 ns a pair. Shorter ones cost more beside.
  */
 #define HS_BURST 256
 

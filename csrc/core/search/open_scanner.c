@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* open_scanner.c: takes the memory of a scanner, and keeps it for the next search where it will do.
- */
+/* open_scanner.c: the memory of a scanner is kept for the next search where that will do. */
 #include "open_scanner.h"
 
 #include "choice.h"
@@ -32,8 +31,8 @@ needs_shifts(const hs_scanner *scanner)
             hs_choice_compares(scanner->search->call->choice, scanner->options.cutoff));
 }
 
-/* Whether pairs are only looked up to decide them, by one thread: then the arrays for that are made
- * when there are some, for small searches have none. */
+/* Whether pairs are only looked up to decide them: then the arrays for that are made when there are
+ * some, for small searches have none. By one thread alone, since the account serves one. */
 static bool
 looks_up_late(const hs_scanner *scanner)
 {
@@ -89,7 +88,7 @@ hs_status
 hs_scanner_open_trace(hs_scanner *scanner)
 {
     const hs_status status = open_trace(false, scanner);
-    if (scanner->search->limits == NULL) {
+    if (hs_search_keeps_walker(scanner->search)) {
         hs_account_keep(&scanner->search->call->account);
     }
     return status;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* open_scanner.h: a scanner from its memory to its end. */
+/* open_scanner.h: opens scanners, makes them ready for another search, closes them. */
 #ifndef HS_OPEN_SCANNER_H
 #define HS_OPEN_SCANNER_H
 
@@ -25,7 +25,7 @@ void hs_scanner_note(hs_search *search, hs_scanner *scanner);
 void hs_scanner_close(hs_search *search, hs_scanner *scanner);
 
 /* The arrays for pairs to decide, where hs_scanner_init has left them for later: trace.memory is
- * NULL. They are kept (hs_account_keep) unless there are limits, which no scanner outlives. */
+ * NULL. They are kept (hs_account_keep) where the walker is. */
 hs_status hs_scanner_open_trace(hs_scanner *scanner);
 
 #endif

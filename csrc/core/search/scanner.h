@@ -30,7 +30,7 @@ typedef struct hs_neighbourhood {
 /* How blocks of one extent are scanned, in a search of such a cutoff and error. */
 typedef struct hs_form {
     double        extent; /* a bound on |y_k| of the block plus |q_k| of the group; -1: not set */
-    double        cutoff, error;
+    double        cutoff, cutoff_low, error;
     bool          is_extreme;
     hs_scan_fn    scan;
     hs_thresholds direct;

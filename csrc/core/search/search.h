@@ -50,6 +50,14 @@ hs_search_fraction(const hs_search *search, int64_t n)
     return (double)(search->first_point + n) / (double)search->n_in_all;
 }
 
+/* Whether a walker of this search may serve another one: it has no arrays for limits or hints for
+ * sparse cells. */
+HS_ALWAYS_INLINE bool
+hs_search_keeps_walker(const hs_search *search)
+{
+    return search->limits == NULL && !search->is_sparse;
+}
+
 /* The asking points, in cell order. */
 HS_ALWAYS_INLINE const hs_bins *
 hs_search_asking(const hs_search *search)

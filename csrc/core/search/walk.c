@@ -173,8 +173,9 @@ most_candidates(const hs_search *search)
 int32_t
 hs_walker_capacity(const hs_search *search)
 {
-    const double most = most_candidates(search); /* a small scene gets a small block */
-    return most < HS_BLOCK_CANDIDATES ? (int32_t)most + HS_GROUP_POINTS : HS_BLOCK_CANDIDATES;
+    /* A small scene gets a small block. No larger one than others have: where a block ends decides
+     * the order of pairs, and a walker may have been opened for another search. */
+    return (int32_t)hs_smaller(most_candidates(search) + HS_GROUP_POINTS, HS_BLOCK_CANDIDATES);
 }
 
 bool
@@ -278,18 +279,11 @@ hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit, void *con
     return settle_walker(search, status, visit, context, walker);
 }
 
-/* Whether a walker of this search may serve another one. */
-static bool
-is_for_others(const hs_search *search)
-{
-    return search->limits == NULL && !search->is_sparse;
-}
-
 hs_status
 hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                 hs_walker *walker)
 {
-    if (search->stencil.n_rows <= walker->cursor.most_links && is_for_others(search) &&
+    if (search->stencil.n_rows <= walker->cursor.most_links && hs_search_keeps_walker(search) &&
         hs_scanner_renew(search, use, hs_walker_capacity(search), run_capacity(search),
                          &walker->scanner)) {
         set_out(search, use == HS_BLOCK_SIZES, &walker->cursor);
@@ -297,7 +291,7 @@ hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *co
     }
     hs_walker_close(search, walker);
     const hs_status status = hs_walker_init(search, use, visit, context, walker);
-    if (is_for_others(search)) {
+    if (hs_search_keeps_walker(search)) {
         hs_account_keep(&search->call->account);
     }
     return status;
@@ -307,7 +301,7 @@ void
 hs_walker_rest(hs_search *search, hs_walker *walker)
 {
     hs_scanner_note(search, &walker->scanner);
-    if (!is_for_others(search)) {
+    if (!hs_search_keeps_walker(search)) {
         hs_walker_close(search, walker);
     }
 }

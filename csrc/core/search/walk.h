@@ -26,9 +26,9 @@ typedef struct hs_cursor {
     int32_t      last_first; /* first point of the last group that was taken, or -1 */
     bool         has_next;
     hs_row_group next;
-    hs_link     *links; /* owned; of the row being walked */
-    int64_t      n_links, most_links;
-    int64_t     *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
+    hs_link     *links;               /* owned; of the row being walked */
+    int64_t      n_links, most_links; /* there are, and there is room for */
+    int64_t     *hints;               /* owned; for hs_row_links, NULL unless the grid is sparse */
 } hs_cursor;
 
 /* Belongs to one thread. */
@@ -57,9 +57,10 @@ hs_status hs_walker_init(hs_search *search, hs_block_use use, hs_visit_fn visit,
 
 /*
  * hs_walker_init for what the search of this walker has become, or for the first one: then the
- * walker is all zeros. Memory that will do is kept, in the account's arena too (hs_account_keep).
- * Between two searches hs_walker_rest tells the call what was done; a walker with limits or sparse
- * cells ends there.
+ * walker is all zeros. It is the same object, of the same call, with as many axes, and with the
+ * same kernel and options but for the cutoff. Memory that will do is kept, in the account's arena
+ * too (hs_account_keep). Between two searches hs_walker_rest tells the call what was done; a walker
+ * that is not for others (hs_search_keeps_walker) ends there.
  */
 hs_status hs_walker_renew(hs_search *search, hs_block_use use, hs_visit_fn visit, void *context,
                           hs_walker *walker);

@@ -193,7 +193,7 @@ random_pairs(const hs_kernel *kernel)
         const hs_write write = write_of(trial & 16, by_S, trial & 32 ? 8 : 4);
         CHECK(are_right(kernel, &write, &taken));
     }
-    CHECK(taken == TRIALS(3000));
+    CHECK(taken > TRIALS(3000) / 10 * 9);
 }
 
 static void
@@ -303,6 +303,30 @@ what_cannot_be_halved_is_declined(void)
     with_each_writer(pairs_out_of_reach);
 }
 
+/* Up to a quarter of a tile, in these tests, are measured one by one. */
+static void
+many_unsure_pairs(const hs_kernel *kernel)
+{
+    int taken = 0;
+    for (int32_t n = 1; n <= MOST_HITS; n++) {
+        hs_write write = make_pair(0.0, 0x1p-18, 0);
+        for (int32_t h = 0; h < n; h++) {
+            it.label[h] = 7;
+        }
+        for (int32_t t = 0; t < POINTS; t++) {
+            it.end[t] = n;
+        }
+        CHECK(are_right(kernel, &write, &taken));
+        CHECK(taken == (n < 32 ? n : 32));
+    }
+}
+
+static void
+many_that_are_not_sure_are_declined(void)
+{
+    with_each_writer(many_unsure_pairs);
+}
+
 /* A distance of the cutoff, which is inclusive or not. */
 static void
 distances_at_the_cutoff(const hs_kernel *kernel)
@@ -354,6 +378,7 @@ test_write(void)
     RUN(pairs_that_are_not_measured_are_the_same);
     RUN(what_is_not_sure_is_measured_by_itself);
     RUN(what_cannot_be_halved_is_declined);
+    RUN(many_that_are_not_sure_are_declined);
     RUN(no_distance_passes_the_cutoff);
     RUN(only_wanted_columns_are_written);
 }

@@ -101,16 +101,21 @@ thresholds_are_kept_for_the_next_search(void)
     walker.scanner.group.largest = hs_bits_of_float(1.5f);
     hs_form_set(&walker.scanner);
     hs_form *form = &walker.scanner.forms[walker.scanner.form - walker.scanner.forms];
-    for (int turn = 0; turn < 4; turn++) {
+    for (int turn = 0; turn < 5; turn++) {
         form->direct.in = 0.5f; /* it is left like that */
-        scene->cutoff = scene->cutoff_low = turn == 1 ? 1.25 : scene->cutoff;
+        scene->cutoff = turn == 1 ? 1.25 : scene->cutoff;
         unit.search.filter_error += turn == 2 ? 1e-9 : 0.0;
-        scene->extreme = turn == 3;
+        scene->extreme = turn >= 3;
+        scene->cutoff_low = turn == 4 ? 1.0 : scene->cutoff; /* the same cutoff, known less well */
         hs_form_set(&walker.scanner);
         const double        cutoff = scene->cutoff, error = unit.search.filter_error;
         const hs_thresholds direct = hs_thresholds_of(3, cutoff, form->extent, error);
+        const hs_thresholds low = hs_thresholds_of(3, scene->cutoff_low, form->extent, error);
         CHECK(walker.scanner.form == form && form->direct.out == direct.out);
-        CHECK(form->direct.in == (turn == 0 ? 0.5f : direct.in));
+        CHECK(form->direct.in == (turn == 0 ? 0.5f : low.in));
+        CHECK(hs_expanded_pays(cutoff, form->extent));
+        CHECK(form->expanded.out == hs_expanded_of(3, cutoff, form->extent, error).out);
+        CHECK(form->expanded.in == hs_expanded_of(3, scene->cutoff_low, form->extent, error).in);
     }
     scene->extreme = false;
     close_walker(&walker);

@@ -288,48 +288,6 @@ walks_end_where_enough_is_tested(void)
     search_unit_close(&unit);
 }
 
-/* Scenes one after the other, some with a box: as many hits as a new walker finds, in memory that is
- * the one before where that will do. */
-static void
-walkers_are_renewed_for_other_searches(void)
-{
-    enum { TURNS = 24 };
-    static const int64_t n[] = {30, 20, 50, 50, 200, 30, 1};
-    static found         again, once;
-    static hs_walker     renewed, new;
-    const hs_box         cube = {
-                .ndim = 3, .rows = {{2.0}, {0.0, 2.0}, {0.0, 0.0, 2.0}}, .periodic = {true, true, true}};
-    const hs_sets sets = {.points = &unit.points};
-    int           n_kept = 0;
-    memset(&renewed, 0, sizeof renewed);
-    search_unit_points(1, 30, 3, 1.0, &unit);
-    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
-    for (int turn = 0; turn < TURNS; turn++) {
-        hs_failure  failure = HS_NO_FAILURE;
-        const void *memory = renewed.scanner.block.memory;
-        hs_search_close(&unit.search);
-        search_unit_points(100 + (uint64_t)turn, n[turn % 7], 3, 1.0, &unit);
-        unit.call.options.cutoff = turn % 3 == 0 ? 0.3 : 0.6;
-        CHECK(hs_search_build(&sets, turn % 4 == 3 ? &cube : NULL, &unit.search, &failure) ==
-              HS_OK);
-        memset(&again, 0, sizeof again);
-        again.ascends = true;
-        CHECK(hs_walker_renew(&unit.search, HS_BLOCK_LISTS_IDS, count_hits, &again, &renewed) ==
-              HS_OK);
-        CHECK(hs_walk(&renewed, 0, (int32_t)unit.points.n) == HS_OK);
-        hs_walker_rest(&unit.search, &renewed);
-        open_walker(&new, &once);
-        CHECK(hs_walk(&new, 0, (int32_t)unit.points.n) == HS_OK);
-        hs_walker_close(&unit.search, &new);
-        CHECK(again.n == once.n && again.ascends && renewed.scanner.n_groups == 0);
-        CHECK(memcmp(again.hits, once.hits, sizeof once.hits) == 0);
-        n_kept += memory == renewed.scanner.block.memory;
-    }
-    CHECK(n_kept >= TURNS / 4 && n_kept < TURNS - 4);
-    hs_walker_close(&unit.search, &renewed);
-    search_unit_close(&unit);
-}
-
 void
 test_walk(void)
 {
@@ -341,5 +299,4 @@ test_walk(void)
     RUN(no_distance_is_below_zero);
     RUN(neighbourhoods_are_bounded);
     RUN(ordered_walks_visit_each_group_once);
-    RUN(walkers_are_renewed_for_other_searches);
 }

@@ -61,6 +61,15 @@ def test_open_systems_of_all_sizes(rng, threads, sort):
     assert hs.count_pairs(points, 1.4, batch=batch, threads=threads).tolist() == counts
 
 
+def test_crowded_systems_keep_their_order_behind_others():
+    rng = np.random.default_rng(17)
+    points, batch = rng.random((4060 + 2 * 4200, 1)), np.repeat([0, 1, 2], [4060, 4200, 4200])
+    expected, _ = one_by_one(points, 0.3, batch)
+    for threads in (1, 2, 3):
+        found = hs.pairs(points, 0.3, batch=batch, threads=threads)
+        assert same_arrays(found, expected)
+
+
 @pytest.mark.parametrize("skew", [0.0, 0.4])
 @pytest.mark.parametrize("d", [1, 2, 3, 4])
 def test_boxes_and_cutoffs_of_each_system(rng, d, skew):
