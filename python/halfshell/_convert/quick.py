@@ -35,11 +35,9 @@ def quick(search: Callable[..., Any], *own: str) -> Callable[[Function], Functio
         usual = tuple(map(known.get, names))
         places = {name: k for k, name in enumerate(names) if name in known}
 
-        ask = _core.quick
-
         @wraps(function)
         def call(points: Any, cutoff: Any, **options: Any) -> Any:
-            result = ask(search, usual, places, points, cutoff, options)
+            result = _core.quick(search, usual, places, points, cutoff, options)
             return function(points, cutoff, **options) if result is NotImplemented else result
 
         return cast("Function", call)
