@@ -264,7 +264,7 @@ set_asking(const hs_write *write, const hs_hits *hits, int32_t t, const scales *
     return is_near;
 }
 
-/* Hits of a tile that are measured one by one, at most: each takes as long as some twenty others. */
+/* Hits of a tile that are measured one by one, at most: each takes as long as twenty others. */
 #ifdef HS_TESTING
 #define MOST_MEASURED (TILE / 4) /* so that small scenes have as many */
 #else

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A thread that is
- * alone writes straight to the output, by a walker that it may keep for the next search. */
+/* parallel.c: each worker has a walker and a backlog; ranges are committed in turn. A thread alone
+ * writes straight to the output, by a walker that it may keep for the next search. */
 #include "parallel.h"
 
 #include "../base/outcome.h"

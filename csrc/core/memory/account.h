@@ -60,7 +60,7 @@ void hs_account_close(hs_account *account);
  * any more. */
 void hs_account_reset(hs_account *account);
 
-/* What the arena has handed out so far outlives hs_account_reset, also what has been freed of it. */
+/* What the arena has handed out so far outlives hs_account_reset, what was freed of it too. */
 void hs_account_keep(hs_account *account);
 
 /* Whether `bytes` more may be held; settles the limit if it has not been needed before. */

@@ -15,7 +15,7 @@
 #define HS_BLOCK_RUNS 1024 /* runs held at a time, at most */
 
 /* Hits held at a time, as a multiple of the candidates: those of a few points at least. Blocks of
- * fewer candidates than a burst have room for those and a burst: they are scanned without a stop. */
+ * fewer candidates than a burst have room for one hit each and a burst. */
 #define HS_HITS_PER_CANDIDATE 2
 /*
  * Hits after which a scan stops, so that they can be written out. Measured: the stores of a short

@@ -123,10 +123,11 @@ def measure(
     Notes
     -----
     Use it for fixed edges, such as bonds, and for lists from other programs. For pairs found by
-    `pairs`, with their S, d and D are the same as there. The nearest image is found in a
-    short basis of the box: axis by axis if it is aligned with the coordinate axes, otherwise among
-    all images within the distance of a near one. Images that rounding cannot tell apart are
-    compared exactly.
+    `pairs`, with their S, d and D are the same as there, but for a d that rounds to the cutoff of a
+    search with ``inclusive=False``, which is the next smaller number there. The nearest image is
+    found in a short basis of the box: axis by axis if it is aligned with the coordinate axes,
+    otherwise among all images within the distance of a near one. Images that rounding cannot tell
+    apart are compared exactly.
 
     Examples
     --------
