@@ -216,6 +216,30 @@ what_is_too_far_is_refused(void)
     CHECK(measure_two(2, apart, NULL, NULL, HS_WANT_VECTOR, NULL) == HS_ERR_FAR);
 }
 
+/* Pairs are measured in parts of some thousand: the first that fails may be in a later one. */
+static void
+the_first_of_many_that_fails_is_named(void)
+{
+    enum { MANY = 20000, WRONG = 9000 };
+    static int64_t        i[MANY], j[MANY];
+    const double          x[3] = {-1.7e308, 1.0, 1.7e308};
+    const hs_points       points = {x, 3, 1, HS_FLOAT64, sizeof(double), sizeof(double)};
+    const hs_pair_numbers pairs = {.n = MANY, .i = i, .j = j};
+    hs_options            options = hs_options_default();
+    hs_pairs             *found = NULL;
+    options.want = HS_WANT_DISTANCE;
+    for (int64_t e = 0; e < MANY; e++) {
+        i[e] = 0;
+        j[e] = e == WRONG || e > 2 * WRONG ? 2 : 1;
+    }
+    for (int threads = 1; threads <= 3; threads++) {
+        hs_failure failure;
+        options.threads = threads;
+        CHECK(hs_measure(&points, NULL, &pairs, &options, &found, &failure) == HS_ERR_FAR);
+        CHECK(failure.row == WRONG && found == NULL);
+    }
+}
+
 static void
 arguments_are_checked(void)
 {
@@ -328,6 +352,7 @@ test_api_measure(void)
     RUN(boxes_that_floats_cannot_tell_are_refused);
     RUN(too_many_images_are_refused);
     RUN(what_is_too_far_is_refused);
+    RUN(the_first_of_many_that_fails_is_named);
     RUN(arguments_are_checked);
     RUN(it_can_be_stopped);
     RUN(whichever_allocation_fails_nothing_is_left);
