@@ -30,17 +30,6 @@ typedef struct call_scene {
     call           c;
 } call_scene;
 
-static inline hs_points
-call_points_of(const double *x, int64_t n)
-{
-    return (hs_points){.data = x,
-                       .n = n,
-                       .ndim = 3,
-                       .real = HS_FLOAT64,
-                       .row_stride = 3 * sizeof(double),
-                       .column_stride = sizeof(double)};
-}
-
 /* Numbers without a pattern, so that no two distances are the same. */
 static inline void
 call_fill_numbers(call_scene *s)
@@ -77,8 +66,8 @@ call_fill_scene(call_scene *s)
 {
     memset(s, 0, sizeof *s);
     call_fill_numbers(s);
-    s->points = call_points_of(s->x, N_OF_CALL);
-    s->queries = call_points_of(s->q, N_QUERIES_OF_CALL);
+    s->points = points_in_space(s->x, N_OF_CALL);
+    s->queries = points_in_space(s->q, N_QUERIES_OF_CALL);
     s->box = (hs_box){.ndim = 3,
                       .periodic = {true, true, false},
                       .rows = {{2.0, 0.1, 0.0}, {0.3, 2.0, 0.0}, {0.0, 0.0, 2.0}}};

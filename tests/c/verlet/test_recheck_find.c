@@ -204,18 +204,6 @@ sorted_pairs_are_those_of_a_search(void)
     }
 }
 
-/* n points in space, one after the other. */
-static hs_points
-rows_of(const double *x, int64_t n)
-{
-    return (hs_points){.data = x,
-                       .n = n,
-                       .ndim = 3,
-                       .real = HS_FLOAT64,
-                       .row_stride = 3 * sizeof(double),
-                       .column_stride = sizeof(double)};
-}
-
 /* A short list of many points, for which there are threads but no work for two: nothing is written
  * behind the last pair of the caller's arrays. */
 static void
@@ -231,7 +219,7 @@ nothing_is_written_behind_a_short_list(void)
                                    .distance = distance,
                                    .vector = vector};
     hs_verlet           *list = hs_verlet_new();
-    const hs_points      points = rows_of(x, POINTS);
+    const hs_points      points = points_in_space(x, POINTS);
     hs_options           options = hs_options_default();
     hs_pairs            *found = NULL;
     bool                 rebuilt, untouched = true;
@@ -283,7 +271,7 @@ threads_write_the_same_bytes(void)
     harness_random        random = {11};
     hs_box                box = {.ndim = 3};
     hs_verlet            *list = hs_verlet_new();
-    const hs_points       points = rows_of(x, POINTS);
+    const hs_points       points = points_in_space(x, POINTS);
     for (int k = 0; k < 3; k++) {
         box.rows[k][k] = 10.0;
         box.periodic[k] = true;
@@ -340,7 +328,7 @@ threads_stop_at_shifts_that_do_not_fit(void)
 {
     enum { POINTS = 3000 };
     static double   x[3 * POINTS];
-    const hs_points points = rows_of(x, POINTS);
+    const hs_points points = points_in_space(x, POINTS);
     hs_box          box = {.ndim = 3};
     harness_random  random = {12};
     for (int k = 0; k < 3; k++) {
