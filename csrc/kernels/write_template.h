@@ -367,5 +367,6 @@ WRITE(const hs_write *write, const hs_hits *hits)
 }
 
 #undef EVERY_LANE
+#undef MOST_MEASURED
 #undef MOST_TURNS
 #undef WRITE

@@ -54,8 +54,8 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->unsure = block->unsure;
     scan->n_unsure = 0;
     scan->most_hits = block->most_hits;
-    if (!lists_places && block->hits != NULL && scan->most_hits > 2 * HS_BURST &&
-        block->n + HS_BURST < scan->most_hits) {
+    if (!lists_places && block->hits != NULL && scan->most_hits > 2 * HS_BURST) {
+        HS_ASSERT(block->n + HS_BURST <= block->most_hits);
         scan->most_hits = block->n + HS_BURST;
     }
     scan->most_unsure = block->capacity;
