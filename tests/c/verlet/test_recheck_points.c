@@ -151,6 +151,21 @@ thresholds_have_room_for_images(void)
     recheck_unit_close(&unit);
 }
 
+/* Images so long that a float holds them to a few cutoffs: no threshold is a hair too narrow. */
+static void
+thresholds_have_room_for_long_images(void)
+{
+    const double row = 0x1.8p24;
+    const hs_box box = {.ndim = 1, .periodic = {true}, .rows = {{row}}};
+    const double x[N] = {0.5, -0.5, 0.25, 0.0, -0.25, 0.125};
+    hs_points    points = points_in(x, 1);
+    recheck_unit_open(&points, &box, 2.0, HS_WANT_J, &unit);
+    unit.images[1] = 1;
+    CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+    check_thresholds(0.5, row, row, 0.0);
+    recheck_unit_close(&unit);
+}
+
 /* So are counts that are taken off: of the points as they are, and of the longest entry of each box
  * vector. */
 static void
@@ -210,6 +225,7 @@ test_recheck_points(void)
     RUN(tiny_and_huge_cutoffs_are_scaled);
     RUN(jumps_are_counted_off);
     RUN(thresholds_have_room_for_images);
+    RUN(thresholds_have_room_for_long_images);
     RUN(thresholds_have_room_for_counts);
     RUN(numbers_beyond_floats_are_never_sure);
     RUN(any_allocation_may_be_refused);
