@@ -80,6 +80,7 @@ a_build_is_a_search_that_is_linked(void)
     CHECK(build(NULL) == HS_OK);
     CHECK(build(&box) == HS_OK);
     CHECK(fail_each_allocation(build, NULL, 2000) > 20);
+    check_arena(build, NULL);
     CHECK(raise_memory_limit(build, &box, &limit) > 20);
 }
 

@@ -310,6 +310,7 @@ every_entry_fails_cleanly(void)
             }
             expectation again = {entry_of((entry)which), e.answer};
             CHECK(fail_each_allocation(run_and_compare, &again, 4000) > 10);
+            check_arena(run_and_compare, &again);
             CHECK(run_and_compare(&again) == HS_OK);
         }
     }

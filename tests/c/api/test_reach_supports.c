@@ -211,6 +211,7 @@ nothing_leaks_when_memory_is_short(void)
         make(&random, HS_RULE_MAX, 3, -1);
         entry_call e = entry_of((entry)which);
         CHECK(fail_each_allocation(run_rows, &e, 400) > 10);
+        check_arena(run_rows, &e);
         CHECK(hs_test_live_blocks() == before);
     }
 }

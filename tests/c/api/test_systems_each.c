@@ -109,10 +109,13 @@ memory_may_be_short(void)
     s.queries.n = s.first_query[6];
     for (s.options.threads = 1; s.options.threads <= 2; s.options.threads++) {
         CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
+        check_arena(find_rows, NULL);
         CHECK(fail_each_allocation(find_rows, &s.queries, 2000) > 10);
+        check_arena(find_rows, &s.queries);
         CHECK(raise_memory_limit(find_rows, NULL, &s.options.memory_limit) > 3);
         s.systems.selection = &one_excluded;
         CHECK(fail_each_allocation(find_rows, NULL, 2000) > 10);
+        check_arena(find_rows, NULL);
         s.systems.selection = NULL;
     }
 }

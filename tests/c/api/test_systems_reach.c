@@ -294,12 +294,15 @@ nothing_leaks_when_memory_is_short(void)
     const hs_reach reach = reach_of(&made, HS_RULE_SUM, RADII, 0);
     hs_systems     systems = {.n = 5, .first = made.first, .reach = &reach};
     CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
+    check_arena(find_all, &systems);
     systems.box = &made.box;
     systems.rows = made.rows;
     CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
+    check_arena(find_all, &systems);
     const hs_reach of_supports = reach_of(&made, HS_RULE_MAX, SUPPORTS, 0);
     systems.reach = &of_supports;
     CHECK(fail_each_allocation(find_all, &systems, 20000) > 5);
+    check_arena(find_all, &systems);
 }
 
 static void

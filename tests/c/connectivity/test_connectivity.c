@@ -212,6 +212,7 @@ no_allocation_that_fails_leaves_anything(void)
     harness_random random = {9};
     node_scene_fill(&random, true, &scene);
     CHECK(fail_each_allocation(link_scene, NULL, 200) > 5);
+    check_arena(link_scene, NULL);
     hs_connectivity_free(NULL);
     CHECK(hs_connectivity_rows(NULL) == NULL && hs_connectivity_pairs(NULL) == NULL);
     CHECK(hs_connectivity_lists(NULL) == NULL);

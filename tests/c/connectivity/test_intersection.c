@@ -101,6 +101,7 @@ find_once(void *context)
     hs_pairs       *found = NULL;
     const hs_status status = find(false, *(bool *)context, &found, NULL);
     CHECK((found != NULL) == (status == HS_OK));
+    CHECK(status != HS_OK || hs_pairs_array(found, HS_WANT_J) != NULL);
     hs_pairs_free(found);
     return status;
 }
@@ -116,12 +117,29 @@ failures_leave_nothing(void)
         fill(&random, false);
     } while (scene.n_pairs == 0);
     CHECK(fail_each_allocation(find_once, &ghost_pairs, 200) > 8);
+    check_arena(find_once, &ghost_pairs);
     CHECK(raise_memory_limit(find_once, &ghost_pairs, &limit) > 10);
     scene.x[DIM + 1] = NAN;
     CHECK(find(false, true, &found, &failure) == HS_ERR_NOT_FINITE && found == NULL);
     CHECK(failure.row == 1 && failure.column == 1);
     scene.n_nodes[0]++;
     CHECK(find(false, true, &found, &failure) == HS_ERR_ARGUMENT);
+}
+
+/* The array that was asked for is there, be it empty. */
+static void
+no_pairs_have_no_entries(void)
+{
+    harness_random random = {9};
+    bool           ghost_pairs = true;
+    hs_pairs      *found;
+    fill(&random, false);
+    scene.n_pairs = 0;
+    CHECK(find(false, true, &found, NULL) == HS_OK);
+    CHECK(hs_pairs_length(found) == 0 && hs_pairs_rows(found) == 0);
+    CHECK(hs_pairs_offsets(found)[0] == 0);
+    hs_pairs_free(found);
+    CHECK(fail_each_allocation(find_once, &ghost_pairs, 200) > 4);
 }
 
 enum { CROWD = 200, CROWD_PAIRS = CROWD * (CROWD - 1) / 2 };
@@ -177,4 +195,5 @@ test_intersection(void)
     RUN(entries_are_those_of_the_definition);
     RUN(threads_change_nothing);
     RUN(failures_leave_nothing);
+    RUN(no_pairs_have_no_entries);
 }

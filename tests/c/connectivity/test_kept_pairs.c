@@ -157,6 +157,7 @@ failures_leave_nothing(void)
         fill(&random);
     } while (scene.n_pairs < 20);
     CHECK(fail_each_allocation(keep_once, NULL, 100) > 5);
+    check_arena(keep_once, NULL);
     CHECK(raise_memory_limit(keep_once, NULL, &limit) > 5);
     options.poll = stop_after;
     options.poll_context = &left;

@@ -394,6 +394,7 @@ failures_leave_nothing(void)
             target[p] = place[p] = p;
         }
         CHECK(fail_each_allocation(keep_once, &in_order, 100) > 5);
+        check_arena(keep_once, &in_order);
         CHECK(raise_memory_limit(keep_once, &in_order, &limit) > 5);
     }
 }

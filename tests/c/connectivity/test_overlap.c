@@ -129,6 +129,7 @@ no_allocation_that_fails_leaves_anything(void)
     fill(&random);
     hs_index_rows gather = rows_given();
     CHECK(fail_each_allocation(find, &gather, 300) > 10);
+    check_arena(find, &gather);
     CHECK(raise_memory_limit(find, &gather, &limit) > 20);
 }
 

@@ -175,6 +175,7 @@ failures_leave_nothing(void)
     const hs_node_lists of_scene = node_lists_of(&scene, false, true, true);
     CHECK(hs_connectivity_link(&half, &of_scene, &options, &linked, NULL) == HS_OK);
     CHECK(fail_each_allocation(pair_scene, linked, 100) > 5);
+    check_arena(pair_scene, linked);
     CHECK(raise_memory_limit(pair_scene, linked, &limit) > 5);
     hs_connectivity_free(linked);
     for (int64_t e = 0; e < LONG / 2; e++)

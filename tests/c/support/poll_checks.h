@@ -54,6 +54,18 @@ fail_each_allocation(hs_status (*run)(void *), void *context, int most)
     return 0;
 }
 
+/* Calls the function, which frees what it is given, with small blocks cut from an arena, where the
+ * build has one: that is given back, too. */
+static inline void
+check_arena(hs_status (*run)(void *), void *context)
+{
+    const int64_t before = hs_test_live_blocks();
+    hs_test_use_arena(true);
+    CHECK(run(context) == HS_OK);
+    hs_test_use_arena(false);
+    CHECK(hs_test_live_blocks() == before);
+}
+
 /* Calls the function, which frees what it is given and heeds *limit, under limits of memory from 0
  * bytes on until one is enough: each call before says that memory is short, and nothing is left.
  * Returns how many there were. */
