@@ -111,6 +111,11 @@ typedef struct fault {
     F(query_weights_nan, USES_HISTOGRAM, HS_ERR_WEIGHTS, s->query_weights[1] = INFINITY)          \
     F(visit_null, USES_VISIT, HS_ERR_ARGUMENT, s->c.visit = NULL)                                 \
     F(visit_none, USES_VISIT, HS_ERR_ARGUMENT, s->visit.pair = NULL)                              \
+    F(reach_no_rule, USES_REACH, HS_ERR_ARGUMENT, s->reach.rule = HS_RULE_END)                    \
+    F(reach_no_radii, USES_REACH, HS_ERR_ARGUMENT, s->reach.radii = NULL)                         \
+    F(reach_extent, USES_REACH, HS_ERR_ARGUMENT, s->reach.extent = INFINITY)                      \
+    F(radii_nan, USES_REACH, HS_ERR_RADII, s->radii[3] = NAN)                                     \
+    F(query_radii, USES_REACH | USES_QUERIES, HS_ERR_RADII, s->query_radii[4] = -1.0)             \
     F(systems_null, USES_SYSTEMS, HS_ERR_ARGUMENT, s->c.systems = NULL)                           \
     F(systems_below, USES_SYSTEMS, HS_ERR_ARGUMENT, s->systems.n = INT64_MIN)                     \
     F(systems_above, USES_SYSTEMS, HS_ERR_TOO_MANY, s->systems.n = INT64_C(1) << 31)              \

@@ -25,6 +25,7 @@ typedef struct scene_of_calls {
     int          exponent; /* everything times 2^exponent */
     int          threads;
     bool         sorted, narrow, into;
+    bool         one_radius; /* of all points: a search by reach is a single one, not several */
     bool         grows; /* many more pairs than there seem to be: what is refused is tried again */
     hs_precision precision;
 } scene_of_calls;
@@ -37,7 +38,12 @@ static const scene_of_calls kinds[] = {
      .cutoff = 0.6,
      .apart = 3e5,
      .want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE},
-    {.name = "images", .box = SCENE_TRICLINIC, .n = 20, .cutoff = 4.0, .want = ALL},
+    {.name = "images",
+     .box = SCENE_TRICLINIC,
+     .n = 20,
+     .cutoff = 4.0,
+     .one_radius = true,
+     .want = ALL},
     {.name = "float32",
      .box = SCENE_ALIGNED,
      .n = 100,
@@ -50,6 +56,7 @@ static const scene_of_calls kinds[] = {
      .n = 330,
      .cutoff = 0.7,
      .threads = 2,
+     .one_radius = true,
      .want = HS_WANT_I | HS_WANT_J | HS_WANT_SHIFT},
     {.name = "into",
      .box = SCENE_SHEARED,
@@ -93,6 +100,8 @@ static struct {
     int64_t        i[MOST_PAIRS], j[MOST_PAIRS];
     int32_t        types[SCENE_POINTS];
     double         weights[SCENE_POINTS], edges[N_EDGES];
+    double         radii[SCENE_POINTS];
+    hs_reach       reach;
     int64_t        counts[CALL_ROOM];
     double         sums[CALL_ROOM];
     hs_histogram   histogram;
@@ -138,6 +147,17 @@ make_histogram(const scene_of_calls *kind)
                                  .sums = s.sums};
 }
 
+/* The cutoff for every fifth point and an eighth of it for others, or the cutoff for all. */
+static inline void
+make_reach(const scene_of_calls *kind)
+{
+    for (int p = 0; p < SCENE_POINTS; p++) {
+        const double size = p % 5 == 0 || kind->one_radius ? 1.0 : 0.125;
+        s.radii[p] = ldexp(size * kind->cutoff, kind->exponent);
+    }
+    s.reach = (hs_reach){.rule = HS_RULE_MAX, .radii = s.radii, .query_radii = s.radii};
+}
+
 static inline void
 make_call(const scene_of_calls *kind)
 {
@@ -147,6 +167,7 @@ make_call(const scene_of_calls *kind)
     s.points = make_points(kind, &s.of, kind->n, s.x);
     s.queries = make_points(kind, &s.asking, N_QUERIES, s.q);
     make_histogram(kind);
+    make_reach(kind);
     s.options = hs_options_default();
     s.options.cutoff = ldexp(kind->cutoff, kind->exponent);
     s.options.want = kind->want;
@@ -169,6 +190,7 @@ make_call(const scene_of_calls *kind)
                  .histogram = &s.histogram,
                  .systems = &s.systems,
                  .visit = &s.visit,
+                 .reach = &s.reach,
                  .k = 5,
                  .max_pairs = 500,
                  .skin = 0.25 * s.options.cutoff,

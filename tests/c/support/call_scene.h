@@ -17,6 +17,7 @@ typedef struct call_scene {
     double         edges[N_EDGES_OF_CALL];
     int32_t        types[N_OF_CALL], query_types[N_QUERIES_OF_CALL];
     double         weights[N_OF_CALL], query_weights[N_QUERIES_OF_CALL];
+    double         radii[N_OF_CALL], query_radii[N_QUERIES_OF_CALL];
     int64_t        i[CALL_ROOM], j[CALL_ROOM], counts[CALL_ROOM];
     double         sums[CALL_ROOM];
     hs_points      points, queries;
@@ -27,6 +28,7 @@ typedef struct call_scene {
     hs_histogram   histogram;
     hs_systems     systems;
     hs_visit       visit;
+    hs_reach       reach;
     call           c;
 } call_scene;
 
@@ -42,10 +44,12 @@ call_fill_numbers(call_scene *s)
     for (int p = 0; p < N_OF_CALL; p++) {
         s->types[p] = p % 2;
         s->weights[p] = random_unit(&random);
+        s->radii[p] = p % 2 ? 1.0 : 0.25;
     }
     for (int p = 0; p < N_QUERIES_OF_CALL; p++) {
         s->query_types[p] = p % 2;
         s->query_weights[p] = random_unit(&random);
+        s->query_radii[p] = p % 2 ? 1.0 : 0.25;
     }
     for (int n = 0; n <= N_SYSTEMS_OF_CALL; n++) {
         s->first[n] = n * N_OF_CALL / N_SYSTEMS_OF_CALL;
@@ -85,6 +89,7 @@ call_fill_scene(call_scene *s)
     s->systems = (hs_systems){
         .n = N_SYSTEMS_OF_CALL, .first = s->first, .box = &s->box, .first_query = s->first_query};
     s->visit = (hs_visit){.pair = call_note_pair};
+    s->reach = (hs_reach){.rule = HS_RULE_MAX, .radii = s->radii, .query_radii = s->query_radii};
     s->c = (call){.points = &s->points,
                   .queries = &s->queries,
                   .box = &s->box,
@@ -92,6 +97,7 @@ call_fill_scene(call_scene *s)
                   .histogram = &s->histogram,
                   .systems = &s->systems,
                   .visit = &s->visit,
+                  .reach = &s->reach,
                   .k = 3,
                   .max_pairs = 4,
                   .skin = 0.25,

@@ -42,10 +42,12 @@ enum {
     USES_STREAM = 1 << 22,
     USES_K = 1 << 23,
     USES_MAX_PAIRS = 1 << 24,
+    USES_REACH = 1 << 25,
 
     /* What most searches look at. */
     OF_SEARCH = USES_OPTIONS | USES_CUTOFF | NEEDS_FINITE | USES_CELL_SIZE | USES_PRECISION |
                 USES_KERNEL | USES_COUNTERS | USES_RESULT,
+    OF_REACH = USES_REACH | (OF_SEARCH & ~NEEDS_FINITE), /* the cutoff is a further limit */
     OF_ARRAYS = USES_WANT | USES_INDEX_BYTES | USES_OUT,
     OF_SCENE = USES_POINTS | USES_BOX
 };
@@ -58,6 +60,8 @@ typedef struct call {
     const hs_histogram *histogram;
     const hs_systems   *systems;
     const hs_visit     *visit; /* of call_note_pair */
+    const hs_reach     *reach;
+    bool                by_reach; /* each pair has a reach of its own, that of `reach` */
     hs_cells           *cells;
     bool                in_cells; /* these are searched, not the points */
     hs_verlet          *list;
@@ -179,8 +183,14 @@ call_take_counts(call *c, hs_status status, const int64_t *counts, int64_t n)
 static inline hs_among
 call_among(const call *c, const hs_points *queries)
 {
-    return c->in_cells ? (hs_among){.cells = c->cells, .queries = queries}
-                       : (hs_among){.points = c->points, .box = c->box, .queries = queries};
+    hs_among among = {.queries = queries, .reach = c->by_reach ? c->reach : NULL};
+    if (c->in_cells) {
+        among.cells = c->cells;
+    } else {
+        among.points = c->points;
+        among.box = c->box;
+    }
+    return among;
 }
 
 static inline hs_status
@@ -379,42 +389,6 @@ call_systems_histogram(call *c, hs_failure *failure)
 {
     return call_take_histogram(c, hs_systems_histogram(c->points, c->queries, c->systems,
                                                        c->options, c->histogram, failure));
-}
-
-static inline hs_status
-call_plan(call *c, hs_failure *failure)
-{
-    const hs_among among = call_among(c, NULL);
-    hs_plan        plan, untouched;
-    memset(&plan, 0x5a, sizeof plan);
-    memcpy(&untouched, &plan, sizeof plan);
-    const hs_status status = hs_plan_make(&among, c->options, RESULT(plan), failure);
-    CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
-    c->answer = status == HS_OK ? call_hash(9, plan.shape, sizeof plan.shape) : c->answer;
-    return status;
-}
-
-static inline hs_status
-call_measure(call *c, hs_failure *failure)
-{
-    double          heights[HS_MAX_DIM] = {-7.0}, volume = -7.0;
-    const hs_status status = hs_box_measure(c->box, heights, &volume, failure);
-    CHECK((status == HS_OK) == (volume >= 0.0));
-    c->answer = status == HS_OK ? call_hash(2, &volume, sizeof volume) : c->answer;
-    return status;
-}
-
-static inline hs_status
-call_wrap(call *c, hs_failure *failure)
-{
-    double          wrapped[CALL_ROOM];
-    int64_t         shift[CALL_ROOM];
-    const hs_status status = hs_box_wrap(c->box, c->points, wrapped, shift, failure);
-    if (status == HS_OK) {
-        const size_t n = (size_t)(c->points->n * c->points->ndim);
-        c->answer = call_hash(call_hash(4, wrapped, n * 8), shift, n * 8);
-    }
-    return status;
 }
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* kept_calls.h: as calls.h, the functions that make or need objects that are kept: cells and Verlet
- * lists; and the table of all. */
+/* kept_calls.h: as calls.h, the functions that make or need objects that are kept, cells and Verlet
+ * lists, and those that search nothing; and the table of all. */
 #ifndef HS_KEPT_CALLS_H
 #define HS_KEPT_CALLS_H
 
@@ -81,6 +81,7 @@ call_make_objects(call *c, unsigned uses)
 {
     bool rebuilt;
     c->in_cells = uses & USES_CELLS;
+    c->by_reach = uses & USES_REACH;
     if (uses & USES_CELLS)
         CHECK(hs_cells_build(c->points, c->box, c->options, &c->cells, NULL) == HS_OK);
     if (uses & USES_STREAM)
@@ -123,6 +124,58 @@ call_clusters(call *c, hs_failure *failure)
     return status;
 }
 
+static inline hs_status
+call_plan(call *c, hs_failure *failure)
+{
+    const hs_among among = call_among(c, NULL);
+    hs_plan        plan, untouched;
+    memset(&plan, 0x5a, sizeof plan);
+    memcpy(&untouched, &plan, sizeof plan);
+    const hs_status status = hs_plan_make(&among, c->options, RESULT(plan), failure);
+    CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
+    c->answer = status == HS_OK ? call_hash(9, plan.shape, sizeof plan.shape) : c->answer;
+    return status;
+}
+
+static inline hs_status
+call_measure(call *c, hs_failure *failure)
+{
+    double          heights[HS_MAX_DIM] = {-7.0}, volume = -7.0;
+    const hs_status status = hs_box_measure(c->box, heights, &volume, failure);
+    CHECK((status == HS_OK) == (volume >= 0.0));
+    c->answer = status == HS_OK ? call_hash(2, &volume, sizeof volume) : c->answer;
+    return status;
+}
+
+static inline hs_status
+call_wrap(call *c, hs_failure *failure)
+{
+    double          wrapped[CALL_ROOM];
+    int64_t         shift[CALL_ROOM];
+    const hs_status status = hs_box_wrap(c->box, c->points, wrapped, shift, failure);
+    if (status == HS_OK) {
+        const size_t n = (size_t)(c->points->n * c->points->ndim);
+        c->answer = call_hash(call_hash(4, wrapped, n * 8), shift, n * 8);
+    }
+    return status;
+}
+
+/* Each point and the one seven behind it. */
+static inline hs_status
+call_measure_pairs(call *c, hs_failure *failure)
+{
+    int64_t   i[CALL_ROOM], j[CALL_ROOM];
+    hs_pairs *pairs = CALL_NOTHING;
+    for (int64_t e = 0; e < c->n_points; e++) {
+        i[e] = e;
+        j[e] = (e + 7) % c->n_points;
+    }
+    const hs_pair_numbers given = {.n = c->n_points, .i = i, .j = j};
+    const hs_status       status =
+        hs_measure(c->points, c->box, &given, c->options, RESULT(pairs), failure);
+    return call_take_pairs(c, status, pairs);
+}
+
 #define OF_VERLET \
     (OF_SCENE | USES_OPTIONS | USES_CUTOFF | NEEDS_FINITE | USES_KERNEL | USES_RESULT | USES_LIST)
 
@@ -143,6 +196,17 @@ static const call_kind call_kinds[] = {
     {"pairs_visit", call_visit, OF_SCENE | OF_SEARCH | USES_VISIT},
     {"clusters_find", call_clusters, OF_SCENE | OF_SEARCH},
     {"clusters_find in cells", call_clusters, USES_CELLS | OF_SEARCH},
+    {"pairs_find by reach", call_find, OF_SCENE | OF_REACH | OF_ARRAYS},
+    {"pairs_count by reach", call_count, OF_SCENE | USES_QUERIES | OF_REACH},
+    {"neighbors_find by reach", call_neighbors, OF_SCENE | USES_QUERIES | OF_REACH | OF_ARRAYS},
+    {"neighbors_count by reach", call_neighbors_count, OF_SCENE | USES_QUERIES | OF_REACH},
+    {"stream_open by reach", call_stream,
+     OF_SCENE | (OF_REACH & ~USES_COUNTERS) | USES_WANT | USES_INDEX_BYTES | USES_MAX_PAIRS},
+    {"pairs_visit by reach", call_visit, OF_SCENE | OF_REACH | USES_VISIT},
+    {"clusters_find by reach", call_clusters, OF_SCENE | OF_REACH},
+    {"plan_make by reach", call_plan, OF_SCENE | OF_REACH | OF_ARRAYS},
+    {"neighbors_count by reach in cells", call_neighbors_count,
+     USES_CELLS | USES_QUERIES | OF_REACH},
     {"cells_build", call_cells_build, OF_SCENE | OF_SEARCH | USES_INDEX_BYTES},
     {"pairs_find in cells", call_find, USES_CELLS | OF_SEARCH | OF_ARRAYS},
     {"pairs_count in cells", call_count, USES_CELLS | USES_QUERIES | OF_SEARCH},
@@ -176,6 +240,8 @@ static const call_kind call_kinds[] = {
      USES_LIST | USES_OPTIONS | USES_CELL_SIZE | OF_ARRAYS | USES_KERNEL | USES_COUNTERS |
          USES_RESULT},
     {"plan_make", call_plan, OF_SCENE | OF_SEARCH | OF_ARRAYS},
+    {"measure", call_measure_pairs,
+     OF_SCENE | USES_OPTIONS | USES_KERNEL | USES_COUNTERS | USES_RESULT},
     {"box_measure", call_measure, USES_BOX | NEEDS_BOX},
     {"box_wrap", call_wrap, OF_SCENE | NEEDS_BOX},
 };
