@@ -87,6 +87,31 @@ indices_of_a_pair_are_within_reach(void)
     CHECK(wide > 3000);
 }
 
+/* Where the range is narrow, places from 0 on would be rounded by more than cells are wider than
+ * the range. */
+static void
+places_are_counted_from_what_is_nearest_to_zero(void)
+{
+    static const double ends[][3] = {
+        {0.5, 0.5 + 0x1p-30, 0.5}, {-0.5 - 0x1p-30, -0.5, -0.5}, {-0x1p-30, 0x1p-30, 0.0}};
+    harness_random random = {1618};
+    for (int e = 0; e < 3; e++) {
+        const double extent = ends[e][1] - ends[e][0], range = 0x1p-48;
+        hs_scene     scene = {.ndim = 1};
+        hs_grid      dense = {.ndim = 1, .range = {range}}, grid;
+        scene.lattice.row_of_axis[0] = -1;
+        scene.lower[0] = ends[e][0];
+        scene.upper[0] = ends[e][1];
+        hs_sparse_grid(&scene, &dense, 1.0, &grid);
+        CHECK(grid.lower[0] == ends[e][2]);
+        for (int trial = 0; trial < 1000; trial++) {
+            const double t = ends[e][0] + (extent - range) * random_unit(&random);
+            CHECK(hs_sparse_index(&grid, 0, t + range) - hs_sparse_index(&grid, 0, t) <=
+                  grid.reach[0]);
+        }
+    }
+}
+
 static void
 cells_hold_few_numbers_however_far_out(void)
 {
@@ -137,6 +162,7 @@ void
 test_sparse_grid(void)
 {
     RUN(indices_of_a_pair_are_within_reach);
+    RUN(places_are_counted_from_what_is_nearest_to_zero);
     RUN(cells_hold_few_numbers_however_far_out);
     RUN(sparse_pays_where_points_crowd);
 }
