@@ -143,13 +143,13 @@ typedef struct hs_support_scan {
     int64_t       pitch;    /* from one row to the next */
 } hs_support_scan;
 
-/* The thresholds of a support of this size. */
+/* The thresholds of a support of this size; NaN of NaN. */
 HS_ALWAYS_INLINE hs_thresholds
 hs_support_thresholds(hs_limit_form form, float size)
 {
     const float in = size * form.in_factor - form.in_less;
     const float out = size * form.out_factor + form.out_more;
-    return (hs_thresholds){in > 0.0f ? in * in : 0.0f, out > 0.0f ? out * out : 0.0f};
+    return (hs_thresholds){in < 0.0f ? 0.0f : in * in, out < 0.0f ? 0.0f : out * out};
 }
 
 /* Points of a group against a block of candidates; all arrays borrowed. */

@@ -154,10 +154,10 @@ meet_candidates(const hs_support_scan *supports, const floats *along, int32_t c,
         entries[e] = load(supports->of_block + e * supports->pitch + c);
     }
     const floats size = load(supports->of_block + n * supports->pitch + c);
-    const floats in =
-        larger_of(multiply_add(size, broadcast(form.in_factor), broadcast(-form.in_less)), zero);
+    const floats in = /* zero first, so that a size of NaN stays one: an unsure hit */
+        larger_of(zero, multiply_add(size, broadcast(form.in_factor), broadcast(-form.in_less)));
     const floats out =
-        larger_of(multiply_add(size, broadcast(form.out_factor), broadcast(form.out_more)), zero);
+        larger_of(zero, multiply_add(size, broadcast(form.out_factor), broadcast(form.out_more)));
     const floats s = square_within(entries, along, ndim);
     const mask   near = not_greater(s, multiply(out, out));
     return (lanes_near){near, and_not_less(near, s, multiply(in, in))};

@@ -2,6 +2,7 @@
 /*
  * test_support_scans.c: the scans of every kernel of this CPU that compare |N D|, against a plain
  * loop, with small integers, which no rounding changes: the same hits, and the same unsure ones.
+ * What is not a number makes an unsure hit.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS */
 #include <math.h>
@@ -61,8 +62,8 @@ meet(const float *n, int64_t stride, const float *along, bool *near, bool *sure)
             z += n[hs_support_at(k, l) * stride] * along[l];
         s += z * z;
     }
-    const float in = size - 1.0f > 0.0f ? size - 1.0f : 0.0f;
-    const float out = size + 1.0f > 0.0f ? size + 1.0f : 0.0f;
+    const float in = size < 1.0f ? 0.0f : size - 1.0f;
+    const float out = size + 1.0f; /* NaN where a size is: no number is greater, or less */
     *near = !(s > out * out);
     *sure = s < in * in;
 }
