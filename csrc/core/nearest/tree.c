@@ -1,306 +1,313 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tree.c: splits nodes at a sampled middle, the smaller half first; bounds are filled from the
- * leaves up. */
+/*
+ * tree.c: builds the tree by all threads. The first nodes are split level by level, all of a level
+ * at once. What has few points then is a part of the tree that one thread splits to the leaves, the
+ * smaller half first, in memory of the part's own; the parts are joined at the end. The tree is the
+ * same for any number of threads.
+ */
 #include "tree.h"
 
+#include "tree_bounds.h"
+#include "tree_split.h"
 #include "../base/poll.h"
+#include "../memory/account_shared.h"
 
-#include <string.h>
-
-/* Points that say where a node is split: enough for halves of 35 to 65 of 100. */
-#define SAMPLE       15
-#define LARGE_SAMPLE 63
-#define FEW_SAMPLE   7
-/* Nodes with more points than this are worth a larger sample, with fewer a smaller one. */
-#define LARGE_NODE 4096
-#define SMALL_NODE 32
-
+/* Points of a part at most: small enough for even work, and large enough to be worth a task. */
+#define PART_POINTS 8192
+/* Parts between two polls: some milliseconds. */
+#define PARTS_AT_ONCE 64
 /* Nodes that wait: the smaller half is always split first, so they are fewer than bits of n. */
 #define MOST_WAITING 64
 
+/* Node `root` of the tree and all below it. */
+typedef struct tree_part {
+    hs_tree_node *nodes; /* of the builder's shared account; the first stands for the root */
+    int32_t       root;
+    int32_t       n_nodes, capacity;
+    hs_status     status;
+} tree_part;
+
 typedef struct tree_builder {
     hs_account       *account;
+    hs_shared        *shared; /* while parts are split and joined */
+    hs_team          *team;
     const hs_options *options;
-    const hs_bins    *bins;
+    hs_splitter       splitter;
     hs_tree          *tree;
-    int32_t          *order;
-    int32_t          *aside; /* room for n numbers */
-    int32_t           leaf_points;
-    int64_t           work; /* points that were moved since the last poll */
+    tree_part        *parts; /* owned */
+    int32_t           n_parts;
+    int32_t          *begins; /* owned: where the nodes of each part begin in the tree, and end */
+    int32_t           first;  /* node, or part, of the first task */
 } tree_builder;
 
-/* Where a node is split: what is below the pivot goes left. */
-typedef struct tree_cut {
-    int    axis;
-    double pivot;
-} tree_cut;
-
-static bool
-grow(tree_builder *builder)
+static int32_t
+points_of(const hs_tree_node *node)
 {
-    hs_tree      *tree = builder->tree;
-    const int32_t capacity = tree->capacity < INT32_MAX / 2 ? 2 * tree->capacity : INT32_MAX;
-    if (tree->capacity == INT32_MAX) {
-        return false;
+    return node->end - node->first;
+}
+
+/* ---- nodes that many threads split ---- */
+
+/* Of one node of a level: `left` becomes where the right one begins, until all are split. */
+static void
+split_large(void *context, int64_t task)
+{
+    const tree_builder *builder = context;
+    hs_tree_node       *node = &builder->tree->nodes[builder->first + task];
+    if (points_of(node) > PART_POINTS) {
+        node->left = hs_tree_split(&builder->splitter, node);
     }
-    hs_tree_node *nodes = hs_grow(builder->account, HS_FOR_CELLS, tree->nodes, tree->n_nodes,
-                                  capacity, sizeof *nodes);
-    if (nodes == NULL) {
-        return false;
-    }
-    tree->nodes = nodes;
-    tree->capacity = capacity;
-    return true;
 }
 
 static void
-sort_numbers(double *numbers, int n)
+add_children(hs_tree *tree, int32_t number)
 {
-    for (int i = 1; i < n; i++) {
-        const double number = numbers[i];
-        int          at = i;
-        for (; at > 0 && numbers[at - 1] > number; at--) {
-            numbers[at] = numbers[at - 1];
-        }
-        numbers[at] = number;
+    hs_tree_node *node = &tree->nodes[number];
+    const int32_t middle = node->left;
+    if (middle != 0) {
+        node->left = tree->n_nodes;
+        tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = node->first, .end = middle};
+        tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = middle, .end = node->end};
     }
 }
 
-/* Finds where to split, by a sample picked evenly from the node; false when it is all in
- * one place. */
-static bool
-cut_by_sample(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
-{
-    const int32_t  n = node->end - node->first;
-    const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
-    const int32_t *order = builder->order + node->first;
-    int32_t        picked[LARGE_SAMPLE];
-    double         numbers[LARGE_SAMPLE], widest = 0.0;
-    HS_ASSERT(n >= m); /* leaves hold as many as the smallest sample */
-    for (int s = 0; s < m; s++) {
-        picked[s] = order[(int64_t)n * (2 * s + 1) / (2 * m)];
-    }
-    for (int k = 0; k < builder->bins->ndim; k++) {
-        const double *x = builder->bins->x[k];
-        double        low = x[picked[0]], high = low;
-        for (int s = 1; s < m; s++) {
-            low = hs_smaller(x[picked[s]], low);
-            high = hs_larger(x[picked[s]], high);
-        }
-        if (high - low > widest) {
-            widest = high - low;
-            cut->axis = k;
-        }
-    }
-    if (widest == 0.0) {
-        return false;
-    }
-    for (int s = 0; s < m; s++) {
-        numbers[s] = builder->bins->x[cut->axis][picked[s]];
-    }
-    sort_numbers(numbers, m);
-    int middle = m / 2;
-    while (numbers[middle] == numbers[0]) { /* something must be below */
-        middle++;
-    }
-    cut->pivot = numbers[middle];
-    return true;
-}
-
-/* Finds where to split, by all points; false when they are all in one place. */
-static bool
-cut_by_range(const tree_builder *builder, const hs_tree_node *node, tree_cut *cut)
-{
-    double widest = 0.0;
-    for (int k = 0; k < builder->bins->ndim; k++) {
-        const double *x = builder->bins->x[k];
-        double        low = x[builder->order[node->first]], high = low;
-        for (int32_t at = node->first + 1; at < node->end; at++) {
-            low = hs_smaller(x[builder->order[at]], low);
-            high = hs_larger(x[builder->order[at]], high);
-        }
-        if (high - low > widest) {
-            const double middle = low + 0.5 * (high - low);
-            widest = high - low;
-            *cut = (tree_cut){k, middle > low ? middle : high};
-        }
-    }
-    return widest > 0.0;
-}
-
-/* Points whose X are equal: are they equal as given? */
-static bool
-is_spot(const tree_builder *builder, const hs_tree_node *node)
-{
-    const hs_bins *bins = builder->bins;
-    for (int k = 0; bins->keeps_originals && k < bins->ndim; k++) {
-        const double *given = bins->originals[k];
-        const double  first = given[builder->order[node->first]];
-        for (int32_t at = node->first + 1; at < node->end; at++) {
-            if (given[builder->order[at]] != first) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-/* Partitions the points of a node, keeping the order on both sides; returns where the right one
- * begins. */
-static int32_t
-part_points(tree_builder *builder, const hs_tree_node *node, const tree_cut *cut)
-{
-    const double        *x = builder->bins->x[cut->axis];
-    int32_t             *order = builder->order;
-    int32_t *HS_RESTRICT aside = builder->aside;
-    int32_t              left = node->first, right = 0;
-    for (int32_t at = node->first; at < node->end; at++) {
-        const int32_t i = order[at];
-        const int32_t below = x[i] < cut->pivot;
-        order[left] = i;
-        aside[right] = i;
-        left += below;
-        right += 1 - below;
-    }
-    memcpy(order + left, aside, (size_t)right * sizeof *order);
-    return left;
-}
-
-/* Gives the node two children; false when it stays a leaf. */
-static bool
-split(tree_builder *builder, int32_t number, hs_status *status)
+/* Room for n nodes in the tree; those that it has are kept. */
+static hs_status
+reserve(tree_builder *builder, int64_t n)
 {
     hs_tree      *tree = builder->tree;
-    hs_tree_node *node = &tree->nodes[number];
-    tree_cut      cut;
-    if (node->end - node->first <= builder->leaf_points) {
-        return false;
+    hs_tree_node *nodes = n > INT32_MAX ? NULL
+                                        : hs_grow(builder->account, HS_FOR_CELLS, tree->nodes,
+                                                  tree->n_nodes, n, sizeof *nodes);
+    if (nodes == NULL) {
+        return HS_ERR_MEMORY;
     }
-    if (!cut_by_sample(builder, node, &cut) && !cut_by_range(builder, node, &cut)) {
-        node->is_spot = is_spot(builder, node);
-        return false;
-    }
-    if (tree->n_nodes + 2 > tree->capacity && !grow(builder)) {
-        *status = HS_ERR_MEMORY;
-        return false;
-    }
-    node = &tree->nodes[number];
-    const int32_t middle = part_points(builder, node, &cut);
-    builder->work += node->end - node->first;
-    node->left = tree->n_nodes;
-    tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = node->first, .end = middle};
-    tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = middle, .end = node->end};
-    return true;
+    tree->nodes = nodes;
+    return HS_OK;
 }
 
 static hs_status
-split_all(tree_builder *builder)
+split_levels(tree_builder *builder)
 {
-    int32_t   waiting[MOST_WAITING];
-    int       n_waiting = 1;
+    hs_tree  *tree = builder->tree;
+    int64_t   work = 0;
     hs_status status = HS_OK;
-    waiting[0] = 0;
-    while (n_waiting > 0 && status == HS_OK) {
-        const int32_t number = waiting[--n_waiting];
-        if (split(builder, number, &status)) {
-            const hs_tree_node *nodes = builder->tree->nodes;
-            const int32_t       left = nodes[number].left;
-            const bool          left_is_larger = nodes[left].end - nodes[left].first >
-                                        nodes[left + 1].end - nodes[left + 1].first;
-            waiting[n_waiting++] = left_is_larger ? left : left + 1;
-            waiting[n_waiting++] = left_is_larger ? left + 1 : left;
+    for (int32_t end = 1; status == HS_OK && builder->first < end; end = tree->n_nodes) {
+        const int32_t n_level = end - builder->first;
+        hs_team_run(builder->team, n_level, split_large, builder);
+        status = reserve(builder, end + 2 * (int64_t)n_level);
+        for (int32_t number = builder->first; status == HS_OK && number < end; number++) {
+            work += tree->nodes[number].left != 0 ? points_of(&tree->nodes[number]) : 0;
+            add_children(tree, number);
         }
-        if (status == HS_OK && builder->work > HS_POLL_POINTS) {
-            builder->work = 0;
+        builder->first = end;
+        if (status == HS_OK && work > HS_POLL_POINTS) {
+            work = 0;
             status = hs_poll(builder->options, 0.0);
         }
     }
     return status;
 }
 
-/* Sets the range of a leaf from its points, which are in tree order by now; of another node, from
- * its children. */
-static void
-bound_axis(const hs_bins *bins, const hs_tree *tree, int32_t number, int k, double *range)
+/* ---- parts, each split by one thread ---- */
+
+/* A node that is the root of a part: one that may have children, and was not split yet. */
+static bool
+begins_part(const tree_builder *builder, const hs_tree_node *node)
 {
-    const hs_tree_node *node = &tree->nodes[number];
-    if (node->left != 0) {
-        const double *of = hs_tree_bounds(tree, node->left, tree->ndim) + 4 * k;
-        range[0] = hs_smaller(of[0], of[1]);
-        range[1] = hs_larger(of[2], of[3]);
+    return node->left == 0 && points_of(node) <= PART_POINTS &&
+           points_of(node) > builder->splitter.leaf_points;
+}
+
+static hs_status
+open_parts(tree_builder *builder)
+{
+    const hs_tree *tree = builder->tree;
+    int32_t        n = 0;
+    for (int32_t number = 0; number < tree->n_nodes; number++) {
+        n += begins_part(builder, &tree->nodes[number]);
+    }
+    builder->parts = hs_alloc(builder->account, HS_FOR_CELLS, n, sizeof *builder->parts);
+    builder->begins = hs_alloc(builder->account, HS_FOR_CELLS, n + 1, sizeof *builder->begins);
+    if (builder->parts == NULL || builder->begins == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    for (int32_t number = 0; number < tree->n_nodes; number++) {
+        if (begins_part(builder, &tree->nodes[number])) {
+            builder->parts[builder->n_parts++] = (tree_part){.root = number};
+        }
+    }
+    return HS_OK;
+}
+
+/* Room for half full leaves and as many other nodes at first, then for twice as many as before. */
+static bool
+grow(const tree_builder *builder, tree_part *part)
+{
+    const hs_tree_node *root = &builder->tree->nodes[part->root];
+    const int32_t       capacity = part->capacity > 0
+                                       ? 2 * part->capacity
+                                       : 4 * points_of(root) / builder->splitter.leaf_points + 4;
+    if (!hs_shared_resize(builder->shared, (void **)&part->nodes, part->n_nodes, capacity,
+                          sizeof *part->nodes)) {
+        return false;
+    }
+    part->capacity = capacity;
+    return true;
+}
+
+/* Gives a node of the part two children, for which there is room; false when it stays a leaf. */
+static bool
+split_node(const tree_builder *builder, tree_part *part, int32_t number)
+{
+    hs_tree_node *node = &part->nodes[number];
+    const int32_t middle = hs_tree_split(&builder->splitter, node);
+    if (middle == 0) {
+        return false;
+    }
+    node->left = part->n_nodes;
+    part->nodes[part->n_nodes++] = (hs_tree_node){.first = node->first, .end = middle};
+    part->nodes[part->n_nodes++] = (hs_tree_node){.first = middle, .end = node->end};
+    return true;
+}
+
+static void
+split_part(void *context, int64_t task)
+{
+    const tree_builder *builder = context;
+    tree_part          *part = &builder->parts[builder->first + task];
+    int32_t             waiting[MOST_WAITING];
+    int                 n_waiting = 1;
+    if (!grow(builder, part)) {
+        part->status = HS_ERR_MEMORY;
         return;
     }
-    const double *x = bins->x[k];
-    double        low = x[node->first], high = low;
-    for (int32_t si = node->first + 1; si < node->end; si++) {
-        low = hs_smaller(x[si], low);
-        high = hs_larger(x[si], high);
-    }
-    range[0] = low;
-    range[1] = high;
-}
-
-/* Children come after their parents, so this is done from the last node to the first. */
-static void
-bound_nodes(const hs_bins *bins, hs_tree *tree)
-{
-    const int d = tree->ndim;
-    double    range[2];
-    for (int32_t number = tree->n_nodes - 1; number > 0; number--) {
-        const int side = (number - 1) % 2;
-        double   *of = tree->bounds + (int64_t)(number - 1 - side) * 2 * d;
-        for (int k = 0; k < d; k++) {
-            bound_axis(bins, tree, number, k, range);
-            of[4 * k + side] = range[0];
-            of[4 * k + 2 + side] = range[1];
+    part->nodes[part->n_nodes++] = builder->tree->nodes[part->root];
+    waiting[0] = 0;
+    while (n_waiting > 0) {
+        const int32_t number = waiting[--n_waiting];
+        if (part->n_nodes + 2 > part->capacity && !grow(builder, part)) {
+            part->status = HS_ERR_MEMORY;
+            return;
         }
-    }
-    for (int k = 0; k < d; k++) {
-        bound_axis(bins, tree, 0, k, range);
-        tree->lower[k] = range[0];
-        tree->upper[k] = range[1];
+        if (split_node(builder, part, number)) {
+            const int32_t left = part->nodes[number].left;
+            const bool    left_is_larger = points_of(&part->nodes[left]) >
+                                        points_of(&part->nodes[left + 1]);
+            waiting[n_waiting++] = left_is_larger ? left : left + 1;
+            waiting[n_waiting++] = left_is_larger ? left + 1 : left;
+        }
     }
 }
 
-/* Steps down to each node, kept for a moment where the bounds will be. */
-static int
-measure_depth(hs_tree *tree)
+static hs_status
+split_parts(tree_builder *builder)
 {
-    double *steps = tree->bounds;
-    int     deepest = 0;
-    steps[0] = 0.0;
-    for (int32_t number = 0; number < tree->n_nodes; number++) {
-        const int32_t left = tree->nodes[number].left;
-        deepest = (int)hs_larger(steps[number], (double)deepest);
-        if (left != 0) {
-            steps[left] = steps[left + 1] = steps[number] + 1.0;
+    hs_status status = HS_OK;
+    for (builder->first = 0; status == HS_OK && builder->first < builder->n_parts;) {
+        const int32_t first = builder->first, rest = builder->n_parts - first;
+        const int32_t n = rest < PARTS_AT_ONCE ? rest : PARTS_AT_ONCE;
+        hs_team_run(builder->team, n, split_part, builder);
+        for (int32_t p = first; p < first + n && status == HS_OK; p++) {
+            status = builder->parts[p].status;
+        }
+        builder->first += n;
+        if (status == HS_OK && builder->first < builder->n_parts) {
+            status = hs_poll(builder->options, 0.0);
         }
     }
-    return deepest;
+    return status;
+}
+
+/* Node `number` of the part as a node of the tree, in which node 1 of the part is number `begin`. */
+static hs_tree_node
+in_tree(const tree_part *part, int32_t begin, int32_t number)
+{
+    hs_tree_node node = part->nodes[number];
+    node.left += node.left != 0 ? begin - 1 : 0;
+    return node;
+}
+
+/* Appends the nodes of all parts to those of the tree. */
+static hs_status
+join_parts(tree_builder *builder)
+{
+    hs_tree *tree = builder->tree;
+    int64_t  n = tree->n_nodes;
+    for (int32_t p = 0; p < builder->n_parts; p++) {
+        n += builder->parts[p].n_nodes - 1;
+    }
+    if (reserve(builder, n) != HS_OK) {
+        return HS_ERR_MEMORY;
+    }
+    for (int32_t p = 0; p < builder->n_parts; p++) {
+        const tree_part *part = &builder->parts[p];
+        const int32_t    begin = builder->begins[p] = tree->n_nodes;
+        tree->nodes[part->root] = in_tree(part, begin, 0);
+        for (int32_t number = 1; number < part->n_nodes; number++) {
+            tree->nodes[tree->n_nodes++] = in_tree(part, begin, number);
+        }
+    }
+    builder->begins[builder->n_parts] = tree->n_nodes;
+    return HS_OK;
+}
+
+/* The parts have memory while they are split, and until they are joined. */
+static hs_status
+build_parts(tree_builder *builder)
+{
+    hs_status status = open_parts(builder);
+    builder->shared = status == HS_OK ? hs_shared_new(builder->account) : NULL;
+    if (builder->shared == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    status = split_parts(builder);
+    if (status == HS_OK) {
+        status = join_parts(builder);
+    }
+    for (int32_t p = 0; p < builder->n_parts; p++) {
+        hs_shared_release(builder->shared, (void **)&builder->parts[p].nodes);
+    }
+    hs_shared_free(builder->shared);
+    return status;
 }
 
 static hs_status
 build_nodes(tree_builder *builder)
 {
     hs_tree       *tree = builder->tree;
-    const hs_bins *bins = builder->bins;
+    const hs_bins *bins = builder->splitter.bins;
     for (int64_t i = 0; i < bins->n; i++) {
         bins->order[i] = (int32_t)i;
     }
     if (bins->n == 0) {
         return HS_OK;
     }
-    /* Room for half full leaves and as many other nodes; it grows if there are more. */
-    tree->capacity = (int32_t)(4 * bins->n / builder->leaf_points < INT32_MAX / 2
-                                   ? 4 * bins->n / builder->leaf_points + 4
-                                   : INT32_MAX / 2);
-    tree->nodes = hs_alloc(builder->account, HS_FOR_CELLS, tree->capacity, sizeof *tree->nodes);
-    if (tree->nodes == NULL) {
-        return HS_ERR_MEMORY;
+    hs_status status = reserve(builder, 1);
+    if (status == HS_OK) {
+        tree->nodes[tree->n_nodes++] = (hs_tree_node){.first = 0, .end = (int32_t)bins->n};
+        status = split_levels(builder);
     }
-    tree->n_nodes = 1;
-    tree->nodes[0] = (hs_tree_node){.first = 0, .end = (int32_t)bins->n};
-    return split_all(builder);
+    return status == HS_OK ? build_parts(builder) : status;
+}
+
+static hs_status
+build_tree(tree_builder *builder, hs_scene *scene, hs_bins *bins)
+{
+    hs_tree  *tree = builder->tree;
+    hs_status status = build_nodes(builder);
+    if (status == HS_OK) {
+        status = hs_bins_arrange(builder->account, builder->team, builder->options, scene, bins);
+    }
+    if (status == HS_OK) {
+        tree->bounds = hs_alloc(builder->account, HS_FOR_CELLS,
+                                (int64_t)tree->n_nodes * 2 * tree->ndim, sizeof(double));
+        status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
+    }
+    if (status == HS_OK && tree->n_nodes > 0) {
+        hs_tree_bound(builder->team, bins, builder->begins, builder->n_parts, tree);
+    }
+    return status;
 }
 
 hs_status
@@ -308,27 +315,18 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
               int32_t leaf_points, hs_bins *bins, hs_tree *tree)
 {
     tree_builder builder = {.account = account,
+                            .team = team,
                             .options = options,
-                            .bins = bins,
-                            .tree = tree,
-                            .order = scene->cloud.order,
-                            .aside = (int32_t *)(void *)scene->cloud.spare,
-                            .leaf_points = leaf_points};
+                            .splitter = {.bins = bins,
+                                         .order = scene->cloud.order,
+                                         .aside = (int32_t *)(void *)scene->cloud.spare,
+                                         .leaf_points = leaf_points},
+                            .tree = tree};
     *tree = (hs_tree){.ndim = scene->ndim};
     hs_bins_take(scene, bins);
-    hs_status status = build_nodes(&builder);
-    if (status == HS_OK) {
-        status = hs_bins_arrange(account, team, options, scene, bins);
-    }
-    if (status == HS_OK) {
-        tree->bounds = hs_alloc(account, HS_FOR_CELLS, (int64_t)tree->n_nodes * 2 * tree->ndim,
-                                sizeof(double));
-        status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
-    }
-    if (status == HS_OK && tree->n_nodes > 0) {
-        tree->depth = measure_depth(tree);
-        bound_nodes(bins, tree);
-    }
+    const hs_status status = build_tree(&builder, scene, bins);
+    hs_free(account, builder.parts);
+    hs_free(account, builder.begins);
     return status;
 }
 

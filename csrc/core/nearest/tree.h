@@ -20,9 +20,8 @@ typedef struct hs_tree_node {
 typedef struct hs_tree {
     int           ndim;
     int32_t       n_nodes; /* the first one holds all points; 0 without points */
-    int32_t       capacity;
-    int           depth; /* most steps from the first node to a leaf */
-    hs_tree_node *nodes; /* owned; children come after their parent */
+    int           depth;   /* most steps from the first node to a leaf */
+    hs_tree_node *nodes;   /* owned; children come after their parent */
     /* Range of X: of the first node, and of each pair of children, for every axis: lowest of left
      * and right, largest of left and right. */
     double  lower[HS_MAX_DIM], upper[HS_MAX_DIM];
@@ -31,8 +30,8 @@ typedef struct hs_tree {
 
 /*
  * Sorts the points of the scene, whose arrays the bins take over, into leaves of at most
- * leaf_points; spots may be larger. In each node points are in the caller's order. bins->start
- * stays NULL. HS_ERR_MEMORY, HS_ERR_INTERRUPTED; on failure bins and tree are to be freed as well.
+ * leaf_points; spots may be larger. In each node points are in the caller's order. The tree is the
+ * same for any team. bins->start stays NULL. HS_ERR_MEMORY, HS_ERR_INTERRUPTED; on failure bins and tree are to be freed as well.
  */
 hs_status hs_tree_build(hs_account *account, hs_team *team, const hs_options *options,
                         hs_scene *scene, int32_t leaf_points, hs_bins *bins, hs_tree *tree);

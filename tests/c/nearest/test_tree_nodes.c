@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_tree_nodes.c: nodes of a tree part their points, within exact bounds, and it is not much
  * deeper than need be. */
+#include "../support/pair_checks.h"
 #include "../support/nearest_unit.h"
 
 #include <math.h>
+#include <string.h>
 
 void test_tree_nodes(void);
 
@@ -111,9 +113,51 @@ leaves_of_one_spot_say_so(void)
     nearest_unit_close(&unit);
 }
 
+static bool
+same_trees(const nearest_unit *one, const nearest_unit *other)
+{
+    const hs_tree *a = &one->near.tree, *b = &other->near.tree;
+    bool           same = a->n_nodes == b->n_nodes && a->depth == b->depth;
+    for (int32_t number = 0; same && number < a->n_nodes; number++) {
+        const hs_tree_node *p = &a->nodes[number], *q = &b->nodes[number];
+        same = p->first == q->first && p->end == q->end && p->left == q->left &&
+               p->is_spot == q->is_spot;
+    }
+    return same && memcmp(a->bounds, b->bounds, sizeof(double) * 2 * 3 * (size_t)a->n_nodes) == 0 &&
+           memcmp(one->search.bins.order, other->search.bins.order,
+                  sizeof(int32_t) * (size_t)one->search.bins.n) == 0;
+}
+
+/* Enough points for several threads, a third of them in clusters, a third on a coarse lattice. */
+static void
+any_number_of_threads_builds_the_same_tree(void)
+{
+    enum { MANY = 60000 };
+    harness_random random = {77};
+    double        *many = array_of((int64_t)3 * MANY, sizeof *many);
+    int            deepest;
+    for (int i = 0; i < 3 * MANY; i++) {
+        const double at = random_unit(&random), cluster = (double)(i / 300 % 50);
+        many[i] = i % 9 < 3 ? at : i % 9 < 6 ? floor(at * 16.0) / 16.0 : cluster + 1e-3 * at;
+    }
+    const hs_points points = {many, MANY, 3, HS_FLOAT64, 24, 8};
+    nearest_unit_open(&points, NULL, NULL, 4, HS_WANT_J, INFINITY, &unit);
+    CHECK(check_nodes(8, &deepest) == MANY && unit.near.tree.depth == deepest);
+    for (int threads = 2; threads <= 5; threads += 3) {
+        nearest_unit other;
+        nearest_unit_open_by(threads, &points, NULL, NULL, 4, HS_WANT_J, INFINITY, &other);
+        CHECK(hs_team_size(other.call.team) == threads);
+        CHECK(same_trees(&unit, &other));
+        nearest_unit_close(&other);
+    }
+    nearest_unit_close(&unit);
+    free(many);
+}
+
 void
 test_tree_nodes(void)
 {
+    RUN(any_number_of_threads_builds_the_same_tree);
     RUN(nodes_part_their_points);
     RUN(leaves_of_one_spot_say_so);
 }

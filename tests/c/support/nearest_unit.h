@@ -18,8 +18,8 @@ typedef struct nearest_unit {
 
 /* want: quantities of the rows. limit: the largest distance. */
 static inline void
-nearest_unit_open(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
-                  unsigned want, double limit, nearest_unit *unit)
+nearest_unit_open_by(int threads, const hs_points *points, const hs_points *queries,
+                     const hs_box *box, int64_t k, unsigned want, double limit, nearest_unit *unit)
 {
     const hs_sets sets = {
         .points = points, .queries = queries, .is_full = true, .is_plain = true, .is_wide = true};
@@ -27,7 +27,7 @@ nearest_unit_open(const hs_points *points, const hs_points *queries, const hs_bo
     hs_failure failure;
     options.cutoff = limit;
     options.want = want;
-    options.threads = 1;
+    options.threads = threads;
     hs_call_begin(&options, &unit->call);
     hs_search_begin(&unit->call, &unit->search);
     unit->near = (hs_nearest){.search = &unit->search,
@@ -39,6 +39,13 @@ nearest_unit_open(const hs_points *points, const hs_points *queries, const hs_bo
     CHECK(hs_nearest_prepare(&unit->near, &sets, box, limit, &failure) == HS_OK);
     unit->near.shared = hs_shared_new(&unit->call.account);
     CHECK(unit->near.shared != NULL);
+}
+
+static inline void
+nearest_unit_open(const hs_points *points, const hs_points *queries, const hs_box *box, int64_t k,
+                  unsigned want, double limit, nearest_unit *unit)
+{
+    nearest_unit_open_by(1, points, queries, box, k, want, limit, unit);
 }
 
 static inline void

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* tree_bounds.h: the last step in building a tree: how far its nodes reach. */
+#ifndef HS_TREE_BOUNDS_H
+#define HS_TREE_BOUNDS_H
+
+#include "tree.h"
+
+/*
+ * Fills depth, lower, upper and bounds, for which there is room, of a tree with nodes, whose points
+ * are in tree order by now. begins, n_parts + 1 numbers: part p of the tree is nodes begins[p] to
+ * begins[p + 1] - 1, which have no children elsewhere, and is one thread's task.
+ */
+void hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_parts,
+                   hs_tree *tree);
+
+#endif
