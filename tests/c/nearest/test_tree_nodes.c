@@ -123,7 +123,8 @@ same_trees(const nearest_unit *one, const nearest_unit *other)
         same = p->first == q->first && p->end == q->end && p->left == q->left &&
                p->is_spot == q->is_spot;
     }
-    return same && memcmp(a->bounds, b->bounds, sizeof(double) * 2 * 3 * (size_t)a->n_nodes) == 0 &&
+    return same &&
+           memcmp(a->bounds, b->bounds, sizeof(double) * 6 * (size_t)(a->n_nodes - 1)) == 0 &&
            memcmp(one->search.bins.order, other->search.bins.order,
                   sizeof(int32_t) * (size_t)one->search.bins.n) == 0;
 }
