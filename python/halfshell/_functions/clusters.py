@@ -136,5 +136,11 @@ def clusters(
         labels,
         np.bincount(labels[labels >= 0] if core is not None else labels, minlength=count),
         np.ones(n, np.bool_) if core is None else core,
-        None if bits is None else (bits[:count, None] >> np.arange(d) & 1).astype(np.bool_),
+        None if bits is None else _flags(bits[:count], d),
     )
+
+
+def _flags(bits: npt.NDArray[np.uint8], d: int) -> npt.NDArray[np.bool_]:
+    """Bit l of each number as entry l of its row."""
+    rows = np.unpackbits(bits[:, None], axis=1, count=d, bitorder="little")
+    return rows.view(np.bool_)
