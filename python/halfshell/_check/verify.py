@@ -9,7 +9,7 @@ from typing import Any, Literal, Never
 import numpy as np
 import numpy.typing as npt
 
-from halfshell import _show
+from halfshell import _core, _show
 from halfshell._convert.given import Given
 from halfshell._convert.listed import as_listed
 from halfshell._convert.options import as_flag
@@ -32,7 +32,7 @@ from halfshell._unknown import refuse_unknown
 
 IntArray = npt.NDArray[np.int64]
 _CONFIRMED = 1000  # differences of each kind that are confirmed by rational arithmetic
-
+_COPIES = 6  # of the right list, for comparing it
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -168,6 +168,7 @@ def verify(
     flags = [bool(bits >> axis & 1) for axis in range(array.shape[1])]
     how: Any = {
         "box": vectors, "periodic": flags if vectors is not None else None, "inclusive": rest[0],
+        "memory_limit": _core.available_memory() / _COPIES,
     }  # fmt: skip
     is_directed = asking is not None or rule in DIRECTED
     if isinstance(i, NeighborTable):

@@ -292,3 +292,12 @@ OF_QUERIES = hs.neighbors([[0.0], [1.0], [3.0]], 2.0, queries=[[0.0], [1.0]])
 def test_bad_tables_and_sets(how, exception, fragment):
     with pytest.raises(exception, match=fragment):
         hs.verify(**{"points": [[0.0], [1.0], [3.0]], "cutoff": 2.0, **how})
+
+
+def test_a_list_that_could_not_be_compared_is_refused_before_it_is_found(monkeypatch):
+    points = np.random.default_rng(3).random((2000, 3))
+    monkeypatch.setattr(hs._core, "available_memory", lambda: 1e7)
+    for radii in (None, np.full(2000, 1.0)):
+        with pytest.raises(MemoryError, match="would not fit"):
+            hs.verify(points, 2.0 if radii is None else None, [0], [1], radii=radii)
+    assert hs.verify(points[:3], 2.0, [0, 0, 1], [1, 2, 2]).ok
