@@ -68,8 +68,8 @@ refuse_number(const numbered *set, int64_t number, int64_t n_systems)
                      i - 1, before, name, i, got);
     } else if (number >= n_systems && n_systems < MOST_NUMBER) {
         PyErr_Format(PyExc_ValueError,
-                     "%s must be less than the number of systems that box or cutoff is given "
-                     "for, %lld, got %s[%lld] = %lld",
+                     "%s must be less than the number of systems that box, periodic or cutoff is "
+                     "given for, %lld, got %s[%lld] = %lld",
                      name, (long long)n_systems, name, i, got);
     } else {
         PyErr_Format(PyExc_ValueError, "%s must be less than 2**62, got %s[%lld] = %lld", name,

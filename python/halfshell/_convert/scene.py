@@ -189,10 +189,13 @@ def _own_scene(
     """`as_scene` of an object that brings its box."""
     array = as_points(attribute(atoms, "positions", name), name, ndim)
     ndim = array.shape[1]
-    bits = as_periodic_bits(attribute(atoms, "pbc", "periodic"), ndim, default=False)
-    if not bits:
-        return array, None, 0
-    return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
+    try:
+        bits = as_periodic_bits(attribute(atoms, "pbc", "periodic"), ndim, default=False)
+        if not bits:
+            return array, None, 0
+        return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"the box of {name}: {error}") from error
 
 
 def as_scene(

@@ -55,10 +55,14 @@ def test_points_of_an_object_that_has_positions_but_no_box():
 
 
 def test_periodic_of_atoms_is_checked_like_any_other():
+    atoms_of_points = as_if_atoms(POINTS, CUBE, True)
     for pbc in ("TTT", [0.5, 1.0, 1.0], [True], None):
         atoms = as_if_atoms(POINTS, CUBE, pbc)
         result = outcome(hs.pairs, atoms, 0.5)
         assert result.error is None if pbc is None else "periodic" in result.message
+        assert result.error is None or "of points" in result.message
+        result = outcome(hs.pairs_between, atoms, atoms_of_points, 0.5)
+        assert pbc is None or "of queries: periodic" in result.message
 
 
 def test_numbers_in_lists_are_what_they_are_and_not_what_they_say():
