@@ -135,6 +135,11 @@ def test_too_many_threads_is_a_value():
         assert "threads must be a whole number from 1 to 1024" in message
 
 
+def test_as_many_threads_as_are_allowed():
+    for threads in (1, 1024, np.int16(1024)):
+        assert len(hs.pairs(POINTS, 1.0, threads=threads)) == 2
+
+
 @pytest.mark.parametrize("name", ["quantities", "kernel", "precision"])
 def test_lone_surrogates(name):
     assert name in refusal(ValueError, hs.pairs, POINTS, 1.0, **{name: "\ud800"})

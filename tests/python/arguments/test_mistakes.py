@@ -98,6 +98,17 @@ def test_frames_of_the_users_own_code_stay():
     assert "__iter__" in names
 
 
+def test_frames_of_a_number_of_the_users_own_stay():
+    class Broken:
+        def __index__(self):
+            raise ZeroDivisionError("mine")
+
+    with pytest.raises(TypeError, match=r"threads must be .*Broken") as refused:
+        hs.pairs(POINTS, 1.0, threads=Broken())
+    cause = refused.value.__cause__
+    assert "__index__" in [frame.name for frame in traceback.extract_tb(cause.__traceback__)]
+
+
 MEANT = {"pbc": "periodic", "cell": "box", "boxsize": "box", "workers": "threads"}
 
 

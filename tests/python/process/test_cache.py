@@ -90,6 +90,17 @@ def test_parts_of_a_result_live_on_alone():
     assert j.flags.c_contiguous
 
 
+@pytest.mark.parametrize("n", [1000, 40_000])
+def test_only_small_arrays_are_copies_of_what_the_search_wrote(n):
+    """256 KB and more stay where they are; the memory behind less is free for the next search."""
+    points = np.arange(float(n))[:, None]
+    table = hs.neighbors(points, 1.0, quantities="j", index_dtype=np.int64)
+    for array in (*hs.pairs(points, 1.0), table.offsets, table.indices):
+        while array.base is not None and isinstance(array.base, np.ndarray):
+            array = array.base
+        assert array.flags.owndata == (array.nbytes < 256 << 10)
+
+
 @pytest.mark.parametrize(
     ("limit", "error"),
     [(-1, ValueError), (-0.5, ValueError), (np.nan, ValueError), ("1", TypeError),
