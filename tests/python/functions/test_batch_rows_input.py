@@ -67,6 +67,12 @@ def test_bad_input():
     assert hs.pair_histogram(points, [0.0, 1.0], batch=[0, 0, 1, 2**10]).shape == (1025, 1)
 
 
+def test_systems_before_the_first_that_has_points_are_empty():
+    points = np.array([[0.0], [0.5], [0.0], [0.5], [0.9]])
+    found = hs.pair_histogram(points, [0.0, 1.0], batch=[1, 1, 3, 3, 3])
+    assert found.tolist() == [[0], [1], [0], [3]]
+
+
 def test_nothing():
     none = np.zeros((0, 3))
     batch = np.zeros(0, int)

@@ -334,7 +334,9 @@ def test_an_iterator_keeps_its_cells():
     next(abandoned)
     del cells, abandoned
     gc.collect()
+    others = [hs.CellList(random_points(2000, seed), 1.0) for seed in range(30, 34)]
     assert_array_equal(np.concatenate(list(blocks)), expected)
+    assert len(others[0].pairs(quantities="P")) != len(expected)
     blocks.close()
 
 

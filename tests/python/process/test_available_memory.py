@@ -64,6 +64,14 @@ def test_no_control_groups_are_no_limit(tree):
     assert tree.left() == math.inf
 
 
+def test_where_no_file_tells_the_group_there_is_no_limit(tree):
+    tree.process("0::/\n")
+    tree.v2("/sys/fs/cgroup", 400 * MB, 100 * MB)
+    assert tree.left() == 300 * MB
+    (tree.root / "proc/self/cgroup").unlink()
+    assert tree.left() == math.inf
+
+
 @pytest.mark.parametrize("mounts", [V1_CPU + V1_MEMORY, None], ids=["mountinfo", "usual place"])
 def test_version_1_counts_the_group_and_those_above_it(tree, mounts):
     tree.process("9:name=systemd:/\n4:cpu,memory:/jobs/one\n1:cpuset:/other\n0::/\n", mounts)
