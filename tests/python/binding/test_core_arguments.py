@@ -70,6 +70,29 @@ def test_a_box_is_an_array_of_its_size(box):
         count(POINTS, box, 7)
 
 
+@pytest.mark.parametrize(
+    "arguments", [(), (np.eye(3),), (np.eye(3), 7, 7), (None, 7), (np.eye(3).tolist(), 7),
+                  (np.ones(3), 7), (np.ones((1, 3, 3)), 7), (np.ones(()), 7)],
+)  # fmt: skip
+def test_what_is_measured_is_a_square_box_and_bits(arguments):
+    with pytest.raises(TypeError, match=r"box_measure takes a box \(d, d\) and periodic bits"):
+        _core.box_measure(*arguments)
+
+
+@pytest.mark.parametrize("d", [0, 9])
+def test_a_box_to_be_measured_has_1_to_8_dimensions(d):
+    with pytest.raises(ValueError, match=r"box must have shape \(d, d\) with 1 <= d <= 8"):
+        _core.box_measure(np.eye(d), 1)
+
+
+@pytest.mark.parametrize("arguments", [(), (POINTS, np.eye(3)), (POINTS, np.eye(3), 7, None)])
+def test_wrapping_takes_three_arguments(arguments):
+    with pytest.raises(TypeError, match="box_wrap takes points, a box and periodic bits"):
+        _core.box_wrap(*arguments)
+    with pytest.raises(TypeError, match="box_wrap needs a box"):
+        _core.box_wrap(POINTS, None, 0)
+
+
 @pytest.mark.parametrize("periodic", [-1, 1 << 64])
 def test_periodic_is_bits(periodic):
     with pytest.raises(OverflowError):

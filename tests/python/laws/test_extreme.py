@@ -9,7 +9,7 @@ import pytest
 
 import halfshell as hs
 from halfshell._check.reference import reference_pairs
-from oracles import check, check_large
+from oracles import check, check_large, same_arrays
 
 LARGEST = 1.7e308
 SMALLEST = 5e-324
@@ -259,6 +259,16 @@ def test_a_refusal_says_what_was_expected(rng, limit, options):
 def test_a_refused_count_says_so_too(rng):
     with pytest.raises(MemoryError, match=r"pairs are expected and the search itself takes .*MB"):
         hs.count_pairs(rng.random((50_000, 3)), 0.05, memory_limit=1e4)
+
+
+def test_arrays_of_out_must_lie_apart_from_each_other(rng):
+    points = rng.random((50, 2))
+    room = np.empty(3000, np.int64)
+    for i, j in ((room, room), (room[:2000], room[1999:]), (room[1000:], room[:1001])):
+        with pytest.raises(ValueError, match="the arrays of out must not overlap"):
+            hs.pairs(points, 0.2, out=(i, j))
+    found = hs.pairs(points, 0.2, out=(room[:1500], room[1500:]))
+    assert same_arrays(found, hs.pairs(points, 0.2))
 
 
 def test_out_must_lie_apart_from_the_inputs(rng):
