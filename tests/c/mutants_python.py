@@ -55,7 +55,7 @@ FIRST = ["core_arguments", "plain", "quantities", "errors", "no_memory"]
 LEFT_OUT = ["adversarial", "benchmark", "report", "cli", "c_interface", "packaging", "docs"]
 LEFT_OUT += ["typing", "golden", "selftest", "scene", "peers", "notebooks", "site", "dask", "mpi"]
 LEFT_OUT += ["framework", "torch", "jax"]
-SECONDS = 300  # of processor time, for the tests of one file
+SECONDS = 900  # for the tests of one file
 
 
 class PythonTests(Judge):
@@ -81,16 +81,23 @@ class PythonTests(Judge):
         if errors:
             sys.exit(errors)
         self.objects = sorted(objects.glob("*.o"))
+        self.unchanged = self.work / "unchanged"
+        self.copy_package(self.unchanged)
+        self.link_in(self.unchanged, self.objects)
         for number in range(jobs):
             tree = self.work / f"job{number}"
-            copy_tree(tree)
-            package = tree / "python" / "halfshell"
-            shutil.rmtree(package, ignore_errors=True)
-            shutil.copytree(ROOT / "python" / "halfshell", package)
-            for old in package.glob("_core.*.so"):
-                old.unlink()
+            self.copy_package(tree)
             self.free.put(tree)
         self.check_unchanged()
+
+    def copy_package(self, tree):
+        """The tree, with a package that has no extension yet."""
+        copy_tree(tree)
+        package = tree / "python" / "halfshell"
+        shutil.rmtree(package, ignore_errors=True)
+        shutil.copytree(ROOT / "python" / "halfshell", package)
+        for old in package.glob("_core.*.so"):
+            old.unlink()
 
     def compile(self, tree, source, target):
         name = source.relative_to(tree)
@@ -103,13 +110,10 @@ class PythonTests(Judge):
 
     def check_unchanged(self):
         """That the package is found, and passes what comes first."""
-        tree = self.free.get()
-        self.link_in(tree, self.objects)
-        first = [path for name in FIRST for path in TESTS.rglob(f"test_{name}.py")]
-        failed = self.first_failure(tree, first)
-        self.free.put(tree)
-        if failed:
-            sys.exit(f"the tests fail as they are: {failed}")
+        for path in (path for name in FIRST for path in TESTS.rglob(f"test_{name}.py")):
+            failed = self.failure(self.unchanged, path)
+            if failed:
+                sys.exit(f"the tests fail as they are: {failed}")
 
     def near(self, name):
         """Files of tests, those of the mutant's theme first."""
@@ -126,22 +130,30 @@ class PythonTests(Judge):
 
         return sorted(files, key=rank)
 
-    def first_failure(self, tree, files):
-        """The first test that fails, or how the process ends; "" if all pass."""
-        environment = {**os.environ, "PYTHONPATH": str(tree / "python")}
-        for path in files:
-            command = [
-                sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider",
-                "-o", "addopts=", str(path),
-            ]  # fmt: skip
-            try:
-                done = run(command, cwd=TESTS, env=environment, timeout=3 * SECONDS)
-            except subprocess.TimeoutExpired:
-                return f"{path.name} hangs"
-            if done.returncode not in (0, 5):
-                lines = [line for line in done.stdout.splitlines() if line.startswith("FAILED")]
-                return lines[0].split(" ")[1] if lines else f"{path.name} crashes"
-        return ""
+    def failure(self, tree, path):
+        """The first test of a file that fails, or how the process ends; "" if all pass."""
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(tree / "python"),
+            "HYPOTHESIS_STORAGE_DIRECTORY": str(self.work / "hypothesis"),
+        }
+        command = [
+            sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider",
+            "-o", "addopts=", str(path),
+        ]  # fmt: skip
+        try:
+            done = run(command, cwd=TESTS, env=environment, timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            return f"{path.name} hangs"
+        if done.returncode in (0, 5):
+            return ""
+        lines = [line for line in done.stdout.splitlines() if line.startswith("FAILED")]
+        return lines[0].split(" ")[1] if lines else f"{path.name} crashes"
 
     def first_failure_of(self, tree, mutation, source):
-        return self.first_failure(tree, self.near(mutation.file)), ""
+        """Of those that pass without the mutant."""
+        for path in self.near(mutation.file):
+            failed = self.failure(tree, path)
+            if failed and not self.failure(self.unchanged, path):
+                return failed, ""
+        return "", ""
