@@ -9,15 +9,17 @@
 
 struct hs_shared {
     hs_account *account;
-    hs_mutex    mutex; /* guards it */
+    hs_purpose  purpose;
+    hs_mutex    mutex; /* guards the account */
 };
 
 hs_shared *
-hs_shared_new(hs_account *account)
+hs_shared_new(hs_account *account, hs_purpose purpose)
 {
-    hs_shared *shared = hs_alloc(account, HS_FOR_CANDIDATES, 1, sizeof *shared);
+    hs_shared *shared = hs_alloc(account, purpose, 1, sizeof *shared);
     if (shared != NULL) {
         shared->account = account;
+        shared->purpose = purpose;
         hs_mutex_init(&shared->mutex);
     }
     return shared;
@@ -36,7 +38,7 @@ bool
 hs_shared_resize(hs_shared *shared, void **block, int64_t held, int64_t count, size_t size)
 {
     hs_mutex_lock(&shared->mutex);
-    void *larger = hs_grow(shared->account, HS_FOR_CANDIDATES, *block, held, count, size);
+    void *larger = hs_grow(shared->account, shared->purpose, *block, held, count, size);
     if (larger != NULL) {
         *block = larger;
     }

@@ -7,9 +7,9 @@
 
 typedef struct hs_shared hs_shared;
 
-/* account: borrowed, and not to be used directly while threads share it. NULL when memory is
- * short. */
-hs_shared *hs_shared_new(hs_account *account);
+/* account: borrowed, and not to be used directly while threads share it. purpose: what it counts
+ * their memory as. NULL when memory is short. */
+hs_shared *hs_shared_new(hs_account *account, hs_purpose purpose);
 void       hs_shared_free(hs_shared *shared); /* NULL-safe */
 
 /*

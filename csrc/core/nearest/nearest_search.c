@@ -297,7 +297,7 @@ hs_nearest_search(hs_nearest *near, hs_failure *failure)
     int32_t      *stack = hs_alloc(account, HS_FOR_STENCIL, near->asking->depth + 3, sizeof *stack);
     job.parts = hs_alloc(account, HS_FOR_STENCIL, most_parts, sizeof *job.parts);
     job.ranges = hs_alloc(account, HS_FOR_STENCIL, most_parts + 1, sizeof *job.ranges);
-    near->shared = hs_shared_new(account);
+    near->shared = hs_shared_new(account, HS_FOR_CANDIDATES);
     hs_status status = HS_ERR_MEMORY;
     if (stack != NULL && job.parts != NULL && job.ranges != NULL && near->shared != NULL) {
         list_parts(&job, near->asking, stack);

@@ -59,27 +59,27 @@ bound_nodes(const hs_bins *bins, hs_tree *tree, int32_t first, int32_t last)
     }
 }
 
-typedef struct part_bounder {
+typedef struct tree_bounder {
     const hs_bins *bins;
     const int32_t *begins;
     hs_tree       *tree;
-} part_bounder;
+} tree_bounder;
 
 static void
-bound_part(void *context, int64_t task)
+bound_subtree(void *context, int64_t task)
 {
-    const part_bounder *bounder = context;
+    const tree_bounder *bounder = context;
     bound_nodes(bounder->bins, bounder->tree, bounder->begins[task], bounder->begins[task + 1]);
 }
 
 void
-hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_parts,
+hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
               hs_tree *tree)
 {
-    part_bounder bounder = {bins, begins, tree};
+    tree_bounder bounder = {bins, begins, tree};
     double       range[2];
     tree->depth = measure_depth(tree);
-    hs_team_run(team, n_parts, bound_part, &bounder);
+    hs_team_run(team, n_subtrees, bound_subtree, &bounder);
     bound_nodes(bins, tree, 1, begins[0]);
     for (int k = 0; k < tree->ndim; k++) {
         bound_axis(bins, tree, 0, k, range);

@@ -7,10 +7,11 @@
 
 /*
  * Fills depth, lower, upper and bounds, for which there is room, of a tree with nodes, whose points
- * are in tree order by now. begins, n_parts + 1 numbers: part p of the tree is nodes begins[p] to
- * begins[p + 1] - 1, which have no children elsewhere, and is one thread's task.
+ * are in tree order by now. begins, n_subtrees + 1 numbers: nodes begins[s] to begins[s + 1] - 1
+ * are those below the root of subtree s, which is one thread's task; roots and what is above them
+ * come before.
  */
-void hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_parts,
+void hs_tree_bound(hs_team *team, const hs_bins *bins, const int32_t *begins, int32_t n_subtrees,
                    hs_tree *tree);
 
 #endif

@@ -37,7 +37,7 @@ sort_numbers(double *numbers, int n)
 static bool
 cut_by_sample(const hs_splitter *splitter, const hs_tree_node *node, tree_cut *cut)
 {
-    const int32_t  n = node->end - node->first;
+    const int32_t  n = hs_tree_points(node);
     const int      m = n > LARGE_NODE ? LARGE_SAMPLE : n > SMALL_NODE ? SAMPLE : FEW_SAMPLE;
     const int32_t *order = splitter->order + node->first;
     int32_t        picked[LARGE_SAMPLE];
@@ -114,7 +114,7 @@ is_spot(const hs_splitter *splitter, const hs_tree_node *node)
 /* Partitions the points of a node, keeping the order on both sides; returns where the right one
  * begins. */
 static int32_t
-part_points(const hs_splitter *splitter, const hs_tree_node *node, const tree_cut *cut)
+partition(const hs_splitter *splitter, const hs_tree_node *node, const tree_cut *cut)
 {
     const double        *x = splitter->bins->x[cut->axis];
     int32_t             *order = splitter->order;
@@ -136,12 +136,12 @@ int32_t
 hs_tree_split(const hs_splitter *splitter, hs_tree_node *node)
 {
     tree_cut cut;
-    if (node->end - node->first <= splitter->leaf_points) {
+    if (hs_tree_points(node) <= splitter->leaf_points) {
         return 0;
     }
     if (!cut_by_sample(splitter, node, &cut) && !cut_by_range(splitter, node, &cut)) {
         node->is_spot = is_spot(splitter, node);
         return 0;
     }
-    return part_points(splitter, node, &cut);
+    return partition(splitter, node, &cut);
 }

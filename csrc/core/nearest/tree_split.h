@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* tree_split.h: one step in building a tree: the points of a node are parted between two children. */
+/* tree_split.h: one step in building a tree: the points of a node are divided between two
+ * children. */
 #ifndef HS_TREE_SPLIT_H
 #define HS_TREE_SPLIT_H
 
@@ -14,7 +15,7 @@ typedef struct hs_splitter {
 } hs_splitter;
 
 /*
- * Parts the points of a node, which keep their order on both sides; returns where those of the
+ * Divides the points of a node, which keep their order on both sides; returns where those of the
  * right child begin. 0: the node stays a leaf, and is_spot says whether that is because its points
  * are equal. Nodes that share no points can be split at the same time.
  */

@@ -24,7 +24,7 @@ blocks_keep_what_they_hold(void)
 {
     hs_account    account = new_account(4000.0);
     const int64_t before = hs_test_live_blocks();
-    hs_shared    *shared = hs_shared_new(&account);
+    hs_shared    *shared = hs_shared_new(&account, HS_FOR_CANDIDATES);
     const int64_t own = account.held;
     void         *block = NULL;
     CHECK(hs_shared_resize(shared, &block, 0, 10, 8) && account.held == own + 80);
@@ -46,7 +46,7 @@ blocks_keep_what_they_hold(void)
     hs_shared_free(NULL);
     CHECK(account.held == 0 && hs_test_live_blocks() == before);
     hs_test_fail_allocation(1);
-    CHECK(hs_shared_new(&account) == NULL);
+    CHECK(hs_shared_new(&account, HS_FOR_CANDIDATES) == NULL);
     hs_test_fail_allocation(0);
     hs_account_close(&account);
 }
@@ -71,7 +71,7 @@ static void
 threads_share_one_account(void)
 {
     hs_account account = new_account(1e9);
-    hs_shared *shared = hs_shared_new(&account);
+    hs_shared *shared = hs_shared_new(&account, HS_FOR_CANDIDATES);
     hs_team   *team = hs_team_create(4);
     int64_t    wanted = account.held;
     for (int64_t step = 0; step < STEPS; step++)

@@ -7,8 +7,11 @@
 #include "../support/nearest_checks.h"
 #include "../support/random_scenes.h"
 #include "../support/among.h"
+#include "../support/poll_checks.h"
 
 #include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/nearest/tree.h"
+#include "../../../csrc/core/search/search.h"
 
 void test_tree(void);
 
@@ -36,47 +39,46 @@ lopsided_points_need_many_nodes(void)
     CHECK(compare_rows(&scene, -1, 3, 1) > 0);
 }
 
-static void
-whichever_allocation_fails_nothing_is_left(const hs_points *points, int64_t k)
+/* One search, which frees its rows. */
+typedef struct tree_search {
+    hs_points points;
+    int       threads;
+} tree_search;
+
+static hs_status
+search_once(void *context)
 {
-    bool          ended = false;
-    int           nth = 0, n_spared = 0;
-    hs_options    options = hs_options_default();
-    const int64_t before = hs_test_live_blocks();
+    const tree_search *search = context;
+    hs_options         options = hs_options_default();
+    hs_pairs          *rows = NULL;
     options.cutoff = INFINITY;
     options.want = HS_WANT_J;
-    options.threads = 1;
-    while (!ended && nth < 200) {
-        hs_pairs *rows = NULL;
-        hs_test_fail_allocation(++nth);
-        const hs_status status = hs_nearest_find(AMONG(points, NULL), k, &options, &rows, NULL);
-        ended = hs_test_failure_is_due();
-        hs_test_fail_allocation(0);
-        CHECK(status == HS_ERR_MEMORY || status == HS_OK);
-        n_spared += status == HS_OK && !ended; /* the arena, and regions: then without a pool */
-        hs_pairs_free(rows);
-        CHECK(hs_test_live_blocks() == before);
-    }
-    CHECK(ended && nth > 10 && n_spared <= 3);
+    options.threads = search->threads;
+    const hs_status status =
+        hs_nearest_find(AMONG(&search->points, NULL), 2, &options, &rows, NULL);
+    hs_pairs_free(rows);
+    return status;
 }
 
 static void
-allocations_fail_in_a_part_that_grows(void)
+allocations_fail_in_a_subtree_that_grows(void)
 {
-    const hs_points points = {lopsided, N, 1, HS_FLOAT64, 8, 8};
-    whichever_allocation_fails_nothing_is_left(&points, 2);
+    tree_search search = {{lopsided, N, 1, HS_FLOAT64, 8, 8}, 1};
+    CHECK(fail_each_allocation(search_once, &search, 200) > 10);
 }
 
 static void
-allocations_fail_in_one_of_several_parts(void)
+allocations_fail_in_one_of_many_subtrees(void)
 {
-    enum { MANY = 10000 };
-    harness_random  random = {505};
-    double         *x = array_of(MANY, sizeof *x);
-    const hs_points points = {x, MANY, 1, HS_FLOAT64, 8, 8};
+    enum { MANY = 40000 };
+    harness_random random = {505};
+    double        *x = array_of(MANY, sizeof *x);
     for (int i = 0; i < MANY; i++)
         x[i] = random_unit(&random);
-    whichever_allocation_fails_nothing_is_left(&points, 2);
+    for (int threads = 1; threads <= 2; threads++) {
+        tree_search search = {{x, MANY, 1, HS_FLOAT64, 8, 8}, threads};
+        CHECK(fail_each_allocation(search_once, &search, 200) > 20);
+    }
     free(x);
 }
 
@@ -94,46 +96,63 @@ neighbouring_numbers_are_told_apart(void)
     }
 }
 
-static bool
-count_polls(void *context, double fraction)
+/* The steps of a search that come before the tree, then the tree alone. */
+static hs_status
+build_alone(const hs_points *points, refusal *polls)
 {
-    (void)context;
-    return fraction >= 0.0;
+    const hs_sets sets = {.points = points, .is_full = true, .is_plain = true, .is_wide = true};
+    hs_options    options = hs_options_default();
+    hs_failure    failure;
+    hs_call       call;
+    hs_search     search;
+    hs_tree       tree;
+    options.cutoff = 1.0;
+    options.threads = 1;
+    hs_call_begin(&options, &call);
+    hs_search_begin(&call, &search);
+    CHECK(hs_scene_init_sets(&call.account, NULL, &sets, NULL, &options, &search.scene, NULL,
+                             &failure) == HS_OK);
+    options.poll = refuse_once;
+    options.poll_context = polls;
+    const hs_status status =
+        hs_tree_build(&call.account, NULL, &options, &search.scene, 8, &search.bins, &tree);
+    hs_tree_free(&call.account, &tree);
+    hs_search_close(&search);
+    hs_call_dismiss(&call);
+    hs_account_close(&call.account);
+    return status;
 }
 
-/* Splitting is polled once in HS_POLL_POINTS points of all levels, not at every node. */
+/* Of 100000 points four levels are split one by one, 400000 points with a poll after each 131072 or
+ * a node more, and then 16 subtrees or so, four at a time. Sorting them takes one poll, or none. */
 static void
-splitting_is_polled_now_and_then(void)
+building_is_polled_now_and_then_and_stops(void)
 {
-    enum { MANY = 40000 };
-    double         *x = array_of(MANY, sizeof *x);
+    enum { MANY = 100000 };
     harness_random  random = {404};
-    brute_scene     scene = {.ndim = 1, .n = MANY, .x = x, .cutoff = INFINITY};
-    const double    q = 0.5;
-    const hs_points query = {&q, 1, 1, HS_FLOAT64, 8, 8};
-    hs_counters     counters;
-    hs_pairs       *rows = NULL;
+    double         *x = array_of(MANY, sizeof *x);
+    const hs_points points = {x, MANY, 1, HS_FLOAT64, 8, 8};
+    const int64_t   before = hs_test_live_blocks();
     for (int i = 0; i < MANY; i++)
         x[i] = random_unit(&random);
-    const hs_points points = points_of(&scene);
-    hs_options      options = options_of(&scene);
-    options.want = HS_WANT_J;
-    options.threads = 1;
-    options.counters = &counters;
-    options.poll = count_polls;
-    CHECK(hs_nearest_find(QUERIED(&points, &query, NULL), 1, &options, &rows, NULL) == HS_OK);
-    /* Of some twelve levels three are split one by one: 120000 points. */
-    CHECK(counters.polls >= 1 && counters.polls <= 4);
-    hs_pairs_free(rows);
+    refusal polls = {0};
+    CHECK(build_alone(&points, &polls) == HS_OK);
+    const int64_t n = polls.n;
+    CHECK(n >= 5 && n <= 9);
+    for (int64_t nth = 1; nth <= n; nth++) {
+        polls = (refusal){.nth = nth};
+        CHECK(build_alone(&points, &polls) == HS_ERR_INTERRUPTED && polls.n == nth);
+        CHECK(hs_test_live_blocks() == before);
+    }
     free(x);
 }
 
 void
 test_tree(void)
 {
-    RUN(splitting_is_polled_now_and_then);
+    RUN(building_is_polled_now_and_then_and_stops);
     RUN(lopsided_points_need_many_nodes);
-    RUN(allocations_fail_in_a_part_that_grows);
-    RUN(allocations_fail_in_one_of_several_parts);
+    RUN(allocations_fail_in_a_subtree_that_grows);
+    RUN(allocations_fail_in_one_of_many_subtrees);
     RUN(neighbouring_numbers_are_told_apart);
 }

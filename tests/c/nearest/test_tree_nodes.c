@@ -117,6 +117,7 @@ static bool
 same_trees(const nearest_unit *one, const nearest_unit *other)
 {
     const hs_tree *a = &one->near.tree, *b = &other->near.tree;
+    const size_t   d = (size_t)a->ndim;
     bool           same = a->n_nodes == b->n_nodes && a->depth == b->depth;
     for (int32_t number = 0; same && number < a->n_nodes; number++) {
         const hs_tree_node *p = &a->nodes[number], *q = &b->nodes[number];
@@ -124,7 +125,9 @@ same_trees(const nearest_unit *one, const nearest_unit *other)
                p->is_spot == q->is_spot;
     }
     return same &&
-           memcmp(a->bounds, b->bounds, sizeof(double) * 6 * (size_t)(a->n_nodes - 1)) == 0 &&
+           memcmp(a->bounds, b->bounds, 2 * d * sizeof(double) * (size_t)(a->n_nodes - 1)) == 0 &&
+           memcmp(a->lower, b->lower, d * sizeof(double)) == 0 &&
+           memcmp(a->upper, b->upper, d * sizeof(double)) == 0 &&
            memcmp(one->search.bins.order, other->search.bins.order,
                   sizeof(int32_t) * (size_t)one->search.bins.n) == 0;
 }

@@ -37,7 +37,7 @@ nearest_unit_open_by(int threads, const hs_points *points, const hs_points *quer
                               .rows = &unit->rows};
     hs_output_init(&unit->call.account, points->ndim, want, 8, &unit->rows);
     CHECK(hs_nearest_prepare(&unit->near, &sets, box, limit, &failure) == HS_OK);
-    unit->near.shared = hs_shared_new(&unit->call.account);
+    unit->near.shared = hs_shared_new(&unit->call.account, HS_FOR_CANDIDATES);
     CHECK(unit->near.shared != NULL);
 }
 
