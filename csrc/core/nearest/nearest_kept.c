@@ -6,6 +6,7 @@
 #endif
 #include "nearest_kept.h"
 
+#include "tree_build.h"
 #include "../base/os_thread.h"
 
 struct hs_nearest_kept {

@@ -4,6 +4,7 @@
 #include "nearest.h"
 
 #include "nearest_kept.h"
+#include "tree_build.h"
 #include "../base/outcome.h"
 #include "../scene/unit.h"
 

@@ -28,18 +28,6 @@ typedef struct hs_tree {
     double *bounds; /* owned */
 } hs_tree;
 
-/*
- * Sorts the points of the scene, whose arrays the bins take over, into leaves of at most
- * leaf_points; spots may be larger. In each node points are in the caller's order. The tree is the
- * same for any team. bins->start stays NULL. HS_ERR_MEMORY, HS_ERR_INTERRUPTED; on failure bins and
- * tree are to be freed as well.
- */
-hs_status hs_tree_build(hs_account *account, hs_team *team, const hs_options *options,
-                        hs_scene *scene, int32_t leaf_points, hs_bins *bins, hs_tree *tree);
-
-/* Harmless twice, and on a tree of zeros. */
-void hs_tree_free(hs_account *account, hs_tree *tree);
-
 HS_ALWAYS_INLINE int32_t
 hs_tree_points(const hs_tree_node *node)
 {

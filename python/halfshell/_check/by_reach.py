@@ -36,7 +36,7 @@ _DOUBT = 8  # units of a distance: more than its rounding and that of a reach
 class ByReach:
     """Points, queries or None, and the reach of each pair as the core takes it.
 
-    how: box, periodic and inclusive, as keywords of a search.
+    how: box, periodic, inclusive and memory_limit, as keywords of a search.
     """
 
     def __init__(

@@ -14,12 +14,12 @@ from halfshell._convert.foreign import exact_number, is_a, kind_of, shown, whole
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-_SMALL = 1 << 26  # bytes; below them the system is not asked what is left
+SMALL = 1 << 26  # bytes; below them the system is not asked what is left
 
 
 def refuse_unavailable(needed: int, what: str) -> None:
     """MemoryError before results that would make the machine swap, or fit no address space."""
-    if needed > _SMALL and needed > _core.available_memory():
+    if needed > SMALL and needed > _core.available_memory():
         raise MemoryError(f"{what} would take {gigabytes(needed)} GB, more than is available")
 
 

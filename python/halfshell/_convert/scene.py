@@ -195,7 +195,8 @@ def _own_scene(
             return array, None, 0
         return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
     except (TypeError, ValueError) as error:
-        raise type(error)(f"the box of {name}: {error}") from error
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(f"the box of {name}: {error}") from error
 
 
 def as_scene(

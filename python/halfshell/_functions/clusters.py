@@ -141,6 +141,9 @@ def clusters(
 
 
 def _flags(bits: npt.NDArray[np.uint8], d: int) -> npt.NDArray[np.bool_]:
-    """Bit l of each number as entry l of its row."""
+    """Bit l of each number as entry l of its row.
+
+    Not by shifts of a table: where memory is refused, NumPy 2.4 crashes in loops that broadcast.
+    """
     rows = np.unpackbits(bits[:, None], axis=1, count=d, bitorder="little")
     return rows.view(np.bool_)

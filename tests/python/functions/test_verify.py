@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The verdict on a list, whoever made it."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from ase import Atoms
@@ -10,6 +12,7 @@ from scipy.spatial import cKDTree
 
 import halfshell as hs
 from halfshell._check.reference import reference_pairs
+from halfshell._check.verify import _COMPARING
 from oracles import lattice, random_scene, rotation
 from scene_strategies import scenes
 
@@ -295,9 +298,24 @@ def test_bad_tables_and_sets(how, exception, fragment):
 
 
 def test_a_list_that_could_not_be_compared_is_refused_before_it_is_found(monkeypatch):
-    points = np.random.default_rng(3).random((2000, 3))
-    monkeypatch.setattr(hs._core, "available_memory", lambda: 1e7)
-    for radii in (None, np.full(2000, 1.0)):
+    points = np.random.default_rng(3).random((4000, 3))
+    monkeypatch.setattr(hs._core, "available_memory", lambda: 0.0)
+    for radii in (None, np.full(4000, 1.0)):
         with pytest.raises(MemoryError, match="would not fit"):
             hs.verify(points, 2.0 if radii is None else None, [0], [1], radii=radii)
-    assert hs.verify(points[:3], 2.0, [0, 0, 1], [1, 2, 2]).ok
+    assert hs.verify(points[:3], 2.0, [0, 0, 1], [1, 2, 2]).ok  # little is found anyway
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_comparing_takes_no_more_memory_than_is_counted_with(full):
+    points = np.random.default_rng(4).random((300, 3))
+    box = np.eye(3)
+    i, j, S = hs.pairs(points, 0.5, box=box, quantities="ijS")
+    n_bytes = i.nbytes + j.nbytes + S.nbytes
+    if full:
+        i, j, S = np.r_[i, j], np.r_[j, i], np.r_[S, -S]
+    tracemalloc.start()
+    assert hs.verify(points, 0.5, i, j, S, box=box, full=full).ok
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < _COMPARING["full" if full else "half"] * n_bytes

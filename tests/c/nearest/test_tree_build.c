@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * test_tree.c: the tree of nearest points, for points that samples do not show as they lie, so that
+ * test_tree_build.c: the tree of nearest points, for points that samples do not show as they lie, so that
  * nodes are many; and for points a last place apart.
  */
 #include "../support/harness.h"
@@ -10,10 +10,10 @@
 #include "../support/poll_checks.h"
 
 #include "../../../csrc/core/memory/account.h"
-#include "../../../csrc/core/nearest/tree.h"
+#include "../../../csrc/core/nearest/tree_build.h"
 #include "../../../csrc/core/search/search.h"
 
-void test_tree(void);
+void test_tree_build(void);
 
 /*
  * Points that samples see least of: many are 0, the others each twice as far as the last, in an
@@ -148,7 +148,7 @@ building_is_polled_now_and_then_and_stops(void)
 }
 
 void
-test_tree(void)
+test_tree_build(void)
 {
     RUN(building_is_polled_now_and_then_and_stops);
     RUN(lopsided_points_need_many_nodes);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * tree.c: builds the tree by all threads. At the top there are too few subtrees for them, so the
- * first nodes are split level by level, those of a level at once. Each subtree of few points is
+ * tree_build.c: builds the tree by all threads. At the top there are too few subtrees for them, so
+ * the first nodes are split level by level, those of a level at once. Each subtree of few points is
  * then split to its leaves by one thread, the smaller half first, in memory of its own: its points
  * fit a cache, and its nodes need no lock. The subtrees are appended at the end. The tree is the
  * same for any number of threads.
  */
-#include "tree.h"
+#include "tree_build.h"
 
 #include "tree_bounds.h"
 #include "tree_split.h"
