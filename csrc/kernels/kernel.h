@@ -143,7 +143,7 @@ typedef struct hs_support_scan {
     int64_t       pitch;    /* from one row to the next */
 } hs_support_scan;
 
-/* The thresholds of a support of this size; NaN of NaN. */
+/* The thresholds of a support of this size; NaN if the size is NaN. */
 HS_ALWAYS_INLINE hs_thresholds
 hs_support_thresholds(hs_limit_form form, float size)
 {

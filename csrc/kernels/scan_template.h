@@ -154,7 +154,8 @@ meet_candidates(const hs_support_scan *supports, const floats *along, int32_t c,
         entries[e] = load(supports->of_block + e * supports->pitch + c);
     }
     const floats size = load(supports->of_block + n * supports->pitch + c);
-    const floats in = /* zero first, so that a size of NaN stays one: an unsure hit */
+    /* Zero comes first: then a size of NaN makes thresholds of NaN, and an unsure hit. */
+    const floats in =
         larger_of(zero, multiply_add(size, broadcast(form.in_factor), broadcast(-form.in_less)));
     const floats out =
         larger_of(zero, multiply_add(size, broadcast(form.out_factor), broadcast(form.out_more)));

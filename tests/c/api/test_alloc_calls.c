@@ -84,7 +84,7 @@ every_function_fails_cleanly(void)
                 s.c.max_pairs = 2000;
                 CHECK(fail_each(&kinds[k], function) > 0);
             }
-            const bool allocates = function->run != call_measure;
+            const bool allocates = function->run != call_box_measure;
             CHECK(allocates == (n_failed > 0));
             if (s.c.queries != NULL && (function->uses & USES_QUERIES) &&
                 !(function->uses & NEEDS_QUERIES)) {

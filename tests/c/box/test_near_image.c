@@ -106,7 +106,7 @@ points_far_beside_a_row_have_two_nearest_images(void)
         const hs_box  box = {.ndim = 2, .periodic = {true}, .rows = {{a, b}}};
         const double  places[2][2] = {{0.0, 0.0}, {-b * far, a * far}};
         const double *from = places[trial & 1];
-        const int     further = trial >> 1 & 1; /* or else beside each other */
+        const int     further = trial >> 1 & 1; /* or else at the same of two places */
         const double *to = places[further ? !(trial & 1) : trial & 1];
         const double  half[2] = {to[0] + 0.5 * a, to[1] + 0.5 * b};
         hs_image_box  images;

@@ -4,7 +4,7 @@
 #ifndef HS_CALL_KINDS_H
 #define HS_CALL_KINDS_H
 
-#include "kept_calls.h"
+#include "call_table.h"
 #include "random_scenes.h"
 
 enum {
@@ -25,7 +25,7 @@ typedef struct scene_of_calls {
     int          exponent; /* everything times 2^exponent */
     int          threads;
     bool         sorted, narrow, into;
-    bool         one_radius; /* of all points: a search by reach is a single one, not several */
+    bool         one_radius; /* of all points, so that a search by reach is one search */
     bool         grows; /* many more pairs than there seem to be: what is refused is tried again */
     hs_precision precision;
 } scene_of_calls;
@@ -147,7 +147,7 @@ make_histogram(const scene_of_calls *kind)
                                  .sums = s.sums};
 }
 
-/* The cutoff for every fifth point and an eighth of it for others, or the cutoff for all. */
+/* Radii: the cutoff for each fifth point and an eighth of it for the others, or for all points. */
 static inline void
 make_reach(const scene_of_calls *kind)
 {

@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-#include "kept_calls.h"
+#include "call_table.h"
 
 enum { N_OF_CALL = 12, N_QUERIES_OF_CALL = 5, N_SYSTEMS_OF_CALL = 3, N_EDGES_OF_CALL = 3 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* poll_checks.h: polls that stop a search, a call whose allocations are refused one by one, and one
- * under limits of memory. */
+/* poll_checks.h: polls that stop a search, and calls whose memory is refused: one allocation after
+ * the other, by a limit, or what an arena should have given back. */
 #ifndef HS_POLL_CHECKS_H
 #define HS_POLL_CHECKS_H
 

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: BSD-3-Clause */
+/* other_calls.h: as calls.h, the functions that return no pairs of a search: clusters, plans, boxes,
+ * and measures of given pairs. */
+#ifndef HS_OTHER_CALLS_H
+#define HS_OTHER_CALLS_H
+
+#include "calls.h"
+
+/* Every third point is none that clusters are made of. */
+static inline hs_status
+call_clusters(call *c, hs_failure *failure)
+{
+    const hs_among among = call_among(c, NULL);
+    int64_t        labels[CALL_ROOM], n = -7;
+    uint8_t        core[CALL_ROOM], winding[CALL_ROOM];
+    for (int p = 0; p < CALL_ROOM; p++) {
+        core[p] = p % 3 != 0;
+    }
+    const hs_status status =
+        hs_clusters_find(&among, c->options, core, labels, winding, RESULT(n), failure);
+    CHECK(status == HS_OK ? n >= 0 : n == -7);
+    if (status == HS_OK) {
+        c->answer = call_hash(call_hash(2, labels, (size_t)c->n_points * 8), winding, (size_t)n);
+    }
+    return status;
+}
+
+static inline hs_status
+call_plan(call *c, hs_failure *failure)
+{
+    const hs_among among = call_among(c, NULL);
+    hs_plan        plan, untouched;
+    memset(&plan, 0x5a, sizeof plan);
+    memcpy(&untouched, &plan, sizeof plan);
+    const hs_status status = hs_plan_make(&among, c->options, RESULT(plan), failure);
+    CHECK(status == HS_OK || memcmp(&plan, &untouched, sizeof plan) == 0);
+    c->answer = status == HS_OK ? call_hash(9, plan.shape, sizeof plan.shape) : c->answer;
+    return status;
+}
+
+static inline hs_status
+call_box_measure(call *c, hs_failure *failure)
+{
+    double          heights[HS_MAX_DIM] = {-7.0}, volume = -7.0;
+    const hs_status status = hs_box_measure(c->box, heights, &volume, failure);
+    CHECK((status == HS_OK) == (volume >= 0.0));
+    c->answer = status == HS_OK ? call_hash(2, &volume, sizeof volume) : c->answer;
+    return status;
+}
+
+static inline hs_status
+call_box_wrap(call *c, hs_failure *failure)
+{
+    double          wrapped[CALL_ROOM];
+    int64_t         shift[CALL_ROOM];
+    const hs_status status = hs_box_wrap(c->box, c->points, wrapped, shift, failure);
+    if (status == HS_OK) {
+        const size_t n = (size_t)(c->points->n * c->points->ndim);
+        c->answer = call_hash(call_hash(4, wrapped, n * 8), shift, n * 8);
+    }
+    return status;
+}
+
+/* Each point and the one seven behind it. */
+static inline hs_status
+call_measure(call *c, hs_failure *failure)
+{
+    int64_t   i[CALL_ROOM], j[CALL_ROOM];
+    hs_pairs *pairs = CALL_NOTHING;
+    for (int64_t e = 0; e < c->n_points; e++) {
+        i[e] = e;
+        j[e] = (e + 7) % c->n_points;
+    }
+    const hs_pair_numbers given = {.n = c->n_points, .i = i, .j = j};
+    const hs_status       status =
+        hs_measure(c->points, c->box, &given, c->options, RESULT(pairs), failure);
+    return call_take_pairs(c, status, pairs);
+}
+
+#endif
