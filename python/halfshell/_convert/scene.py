@@ -194,8 +194,9 @@ def _own_scene(
         if not bits:
             return array, None, 0
         return array, as_box(as_array(attribute(atoms, "cell", "box"), "box"), ndim), bits
-    except (TypeError, ValueError) as error:
-        kind = TypeError if isinstance(error, TypeError) else ValueError
+    except (TypeError, ValueError, OverflowError) as error:
+        kinds = (TypeError, OverflowError, ValueError)
+        kind = next(one for one in kinds if isinstance(error, one))
         raise kind(f"the box of {name}: {error}") from error
 
 

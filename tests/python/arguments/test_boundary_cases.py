@@ -63,6 +63,9 @@ def test_periodic_of_atoms_is_checked_like_any_other():
         assert result.error is None or "of points" in result.message
         result = outcome(hs.pairs_between, atoms, atoms_of_points, 0.5)
         assert pbc is None or "of queries: periodic" in result.message
+    for cell in (10**400, "a cube", np.full((2, 2), np.nan)):
+        result = outcome(hs.nearest, POINTS, 1, queries=as_if_atoms(POINTS, cell, True))
+        assert "of queries: box" in result.message
 
 
 def test_numbers_in_lists_are_what_they_are_and_not_what_they_say():
