@@ -142,9 +142,30 @@ the_middle_of_a_cube_has_as_many_as_it_has_corners(void)
         CHECK(shift[l] == 0);
 }
 
+/* The unit is that of the longest component: squares of others do not tell whether these fit. */
+static void
+rows_may_be_long_along_any_axis(void)
+{
+    const double p[2] = {0.0, 0.0};
+    for (int k = 0; k < 2; k++) {
+        hs_box       box = {.ndim = 2, .periodic = {true, false}};
+        double       q[2];
+        hs_image_box images;
+        int64_t      shift = 99;
+        box.rows[0][k] = 0x1p1000;
+        box.rows[0][1 - k] = 1.0;
+        q[k] = 0.75 * 0x1p1000;
+        q[1 - k] = 0.75;
+        CHECK(hs_image_box_init(&box, 2, &images) == HS_OK);
+        CHECK(hs_near_image(&images, p, q, &shift) == HS_OK && shift == -1);
+        CHECK(hs_near_image(&images, q, p, &shift) == HS_OK && shift == 1);
+    }
+}
+
 void
 test_near_image(void)
 {
+    RUN(rows_may_be_long_along_any_axis);
     RUN(it_is_the_first_of_the_nearest_images);
     RUN(points_far_beside_a_row_have_two_nearest_images);
     RUN(the_middle_of_a_cube_has_as_many_as_it_has_corners);

@@ -154,6 +154,8 @@ point_is_within_its_error_bound(void)
         double  inside[HS_MAX_DIM], magnitude = 0.0;
         int64_t turns[HS_MAX_DIM];
         CHECK(hs_wrap_point(&lattice, s.x, inside, turns, &magnitude));
+        for (int k = 0; k < s.scene.ndim; k++)
+            CHECK(magnitude >= fabs(s.x[k]));
         const double terms = 2 * lattice.n_periodic + 2;
         for (int k = 0; k < s.scene.ndim; k++) {
             const double bound = 0x1p-53 * fabs(inside[k]) + terms * terms * 0x1p-104 * magnitude;
@@ -234,9 +236,29 @@ the_lowest_failure_is_told(void)
     }
 }
 
+/* The magnitude is that of all numbers that went in, also of a point that stays where it is. */
+static void
+points_that_stay_have_a_magnitude(void)
+{
+    const hs_box box = {.ndim = 2, .rows = {{4.0, 1.0}}, .periodic = {true, false}};
+    const double r[2] = {0.5, -300.0};
+    double       inside[2], magnitude = 0.0;
+    int64_t      turns;
+    hs_lattice   lattice;
+    hs_lattice_init(&box, 2, hs_scale_of(0), &lattice);
+    const double along = r[0] * 4.0 + r[1];
+    CHECK(fabs(along) > 8.5); /* so that this one moves */
+    CHECK(hs_wrap_point(&lattice, r, inside, &turns, &magnitude) && magnitude >= 300.0);
+    const double near_zero[2] = {0.5, 0.25};
+    magnitude = 0.0;
+    CHECK(hs_wrap_point(&lattice, near_zero, inside, &turns, &magnitude));
+    CHECK(turns == 0 && magnitude == 0.5);
+}
+
 void
 test_wrap(void)
 {
+    RUN(points_that_stay_have_a_magnitude);
     RUN(the_lowest_failure_is_told);
     RUN(what_does_not_settle_is_as_many_rows_away);
     RUN(axis_is_exact_up_to_the_limit);

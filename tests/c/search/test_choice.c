@@ -4,6 +4,8 @@
 #include "../support/among.h"
 #include "../support/poll_checks.h"
 
+#include <string.h>
+
 void test_choice(void);
 
 enum { CROWD = 300 };
@@ -209,9 +211,39 @@ a_bad_box_of_a_system_is_told(void)
     CHECK(failure.system == 1 && failure.row == 0);
 }
 
+/* What a stream has been given may change once it is open. */
+static void
+streams_keep_what_they_choose_by(void)
+{
+    static int64_t own[CROWD];
+    make_crowd(0.0);
+    for (int way = 0; way < 2; way++) {
+        hs_stream *stream = NULL;
+        hs_pairs  *block = NULL;
+        int64_t    n = 0;
+        memcpy(own, labels, sizeof own);
+        own[0] = 8;
+        selection = (hs_selection){.groups = way ? own : NULL, .labels = way ? NULL : own};
+        const hs_among among = {.points = &points, .selection = &selection};
+        const int64_t  counted = count(NULL);
+        CHECK(counted == (way ? PAIRS - (CROWD - 1) : CROWD - 1) && counted > 0);
+        options.want = HS_WANT_I | HS_WANT_J;
+        CHECK(hs_stream_open(&among, &options, 64, &stream, NULL) == HS_OK);
+        for (int i = 0; i < CROWD; i++)
+            own[i] = i;
+        while (hs_stream_next(stream, NULL, NULL, &block, NULL) == HS_OK && block != NULL) {
+            n += hs_pairs_length(block);
+            hs_pairs_free(block);
+        }
+        CHECK(n == counted);
+        hs_stream_free(stream);
+    }
+}
+
 void
 test_choice(void)
 {
+    RUN(streams_keep_what_they_choose_by);
     RUN(crowds_lose_their_nearest_images);
     RUN(one_point_may_have_many_partners);
     RUN(units_may_be_extreme);
