@@ -58,12 +58,15 @@ take_position(state *of, double *x)
     }
 }
 
+/* reach: images to each side that can matter. Points and centres are up to 8 apart, and balls 1.5
+ * large; rows are at least 1 or 4 long, and each step along the second row of a small box can be
+ * almost one back along the first. */
 static hs_box
 take_box(input *in, int ndim, int *reach)
 {
     hs_box    box = {.ndim = ndim};
     const int kind = take(in), small = ndim < 3 && kind & 1;
-    *reach = small ? 10 : 4;
+    *reach = !small ? 4 : kind & 2 ? 18 : 10;
     for (int l = 0; l < ndim; l++) {
         box.periodic[l] = (kind >> (2 + l) & 1) == 0;
         box.rows[l][l] = (small ? 1.0 : 4.0) + 0.125 * (take(in) % 8);
