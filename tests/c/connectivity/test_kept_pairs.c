@@ -128,6 +128,16 @@ what_are_no_pairs_is_refused(void)
     hs_connectivity_free(made);
 }
 
+/* Pairs that keep both nodes and are kept themselves. */
+static int64_t
+count_kept(void)
+{
+    int64_t n = 0;
+    for (int64_t e = 0; e < scene.n_pairs; e++)
+        n += keep[e] && target_of(scene.i[e], true) >= 0 && target_of(scene.j[e], true) >= 0;
+    return n;
+}
+
 static hs_status
 keep_once(void *context)
 {
@@ -139,6 +149,11 @@ keep_once(void *context)
     options.memory_limit = limit;
     const hs_status status = hs_node_pairs_keep(&pairs, &change, keep, &options, &made, NULL);
     CHECK((made != NULL) == (status == HS_OK));
+    if (status == HS_OK) {
+        const int64_t n = count_kept();
+        CHECK(n > 0 && n < scene.n_pairs);
+        CHECK(hs_pairs_length(hs_connectivity_pairs(made)) == n);
+    }
     hs_connectivity_free(made);
     return status;
 }

@@ -241,9 +241,30 @@ cells_of_equal_marks_are_told_apart(void)
     CHECK(met > 0);
 }
 
+/* Each growth is by half: points that march along an axis do not move all cells at each step. */
+static void
+dense_tables_grow_by_more_than_they_need(void)
+{
+    hs_cell_table table;
+    hs_entries    entries;
+    double        bytes;
+    int           n_growths = 0;
+    start(&table, &entries, true);
+    for (int64_t k = 0; k < 1000; k++) {
+        const int64_t index[2] = {k, 0}, before = table.shape[0];
+        CHECK(hs_cell_table_extend(&table, &entries, index, index, 1e6, &bytes) == HS_OK);
+        CHECK(k >= table.lowest[0] && k < table.lowest[0] + table.shape[0]);
+        n_growths += table.shape[0] > before;
+    }
+    CHECK(n_growths <= 20);
+    hs_cell_table_free(&table);
+    hs_entries_free(&entries);
+}
+
 void
 test_cell_table(void)
 {
+    RUN(dense_tables_grow_by_more_than_they_need);
     RUN(sparse_cells_are_found);
     RUN(dense_cells_are_found);
     RUN(empty_cells_are_dropped);
