@@ -314,6 +314,7 @@ def test_comparing_takes_no_more_memory_than_is_counted_with(full):
     n_bytes = i.nbytes + j.nbytes + S.nbytes
     if full:
         i, j, S = np.r_[i, j], np.r_[j, i], np.r_[S, -S]
+    assert hs.verify(points[:2], 0.5, [], [], box=box).n_given == 0  # modules are loaded by now
     tracemalloc.start()
     assert hs.verify(points, 0.5, i, j, S, box=box, full=full).ok
     peak = tracemalloc.get_traced_memory()[1]
