@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
@@ -108,6 +109,15 @@ def as_periodic_bits(values: Any, ndim: int, default: bool) -> int:
     if array.shape == ():
         return (1 << ndim) - 1 if array else 0
     return sum(1 << axis for axis in range(ndim) if array[axis])
+
+
+def flags_of(bits: npt.NDArray[np.uint8], ndim: int) -> npt.NDArray[np.bool_]:
+    """Bit l of each number as entry l of its row.
+
+    Not by shifts of a table: where memory is refused, NumPy 2.4 crashes in loops that broadcast.
+    """
+    rows = np.unpackbits(bits[:, None], axis=1, count=ndim, bitorder="little")
+    return rows.view(np.bool_)
 
 
 def periodic_of(box: Any, periodic: Any, ndim: int) -> Any:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from halfshell import _core
 from halfshell._convert.given import Given
 from halfshell._convert.options import as_count, as_flag
+from halfshell._convert.scene import flags_of
 from halfshell._convert.search import as_rest, as_search_of_each
 from halfshell._convert.types import (
     Algorithm,
@@ -136,14 +137,5 @@ def clusters(
         labels,
         np.bincount(labels[labels >= 0] if core is not None else labels, minlength=count),
         np.ones(n, np.bool_) if core is None else core,
-        None if bits is None else _flags(bits[:count], d),
+        None if bits is None else flags_of(bits[:count], d),
     )
-
-
-def _flags(bits: npt.NDArray[np.uint8], d: int) -> npt.NDArray[np.bool_]:
-    """Bit l of each number as entry l of its row.
-
-    Not by shifts of a table: where memory is refused, NumPy 2.4 crashes in loops that broadcast.
-    """
-    rows = np.unpackbits(bits[:, None], axis=1, count=d, bitorder="little")
-    return rows.view(np.bool_)

@@ -11,6 +11,7 @@ from halfshell import _core
 from halfshell._convert.batch import as_systems
 from halfshell._convert.given import Given
 from halfshell._convert.options import AUTO, as_index_bytes
+from halfshell._convert.scene import flags_of
 from halfshell._functions.by_type import (
     counted,
     is_one_cutoff,
@@ -54,7 +55,7 @@ def rows_of_systems(
         numbers, _, boxes, of_queries, axes = kept[1]
         if axes is not None and vectors is not None:
             rows = np.broadcast_to(vectors, (len(axes), *vectors.shape)) if boxes is None else boxes
-            boxes = rows * (axes[:, None] >> np.arange(vectors.shape[0]) & 1)[:, :, None]
+            boxes = rows * flags_of(axes, vectors.shape[0])[:, :, None]
         if boxes is None:
             origin = Origin(points, asking, vectors, bits, find)
         else:

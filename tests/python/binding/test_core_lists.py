@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from halfshell import _core
+from refused_calls import arrays_among
 
 
 def ints(*values):
@@ -43,12 +44,7 @@ CALLS = {
     "rows_without": ROWS | GONE | {"n_lists": 2, "ascend": True},
     "keep_pairs": COLUMNS | SHIFTS | TARGET | {"keep": np.ones(2, bool)},
 }  # fmt: skip
-ARRAYS = [
-    (name, argument)
-    for name, usual in CALLS.items()
-    for argument, value in usual.items()
-    if isinstance(value, np.ndarray)
-]
+ARRAYS = arrays_among(CALLS)
 # Arrays of any length: their values say what they must go with, and the core looks at these.
 ANY_LENGTH = {"indices", "gone indices", "source"}
 REFUSED = "^(expected arrays of|shifts must be|offsets must have|target must have)"

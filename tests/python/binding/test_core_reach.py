@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from halfshell import _core
+from refused_calls import arrays_among
 
 POINTS = np.random.default_rng(3).uniform(0.0, 3.0, (12, 3))
 QUERIES = POINTS[:4].copy()
@@ -27,12 +28,7 @@ SELECTION = {
     "query_labels": np.arange(4), "query_numbers": np.arange(4), "within": 1,
     "excluded": np.array([[0, 1], [2, 3]]), "min_distance": 0.0,
 }  # fmt: skip
-ARRAYS = [
-    (kind, name)
-    for kind, given in REACHES.items()
-    for name, value in given.items()
-    if isinstance(value, np.ndarray)
-]
+ARRAYS = arrays_among(REACHES)
 REFUSED = r"^(radii and types|the table of cutoffs|supports) must be"
 LABELS = ["groups", "query_groups", "labels", "query_labels", "query_numbers"]
 

@@ -30,3 +30,13 @@ def assert_refused(call, exceptions, *fragments):
     for fragment in fragments:
         assert re.search(fragment, message), f"{fragment!r} is not in: {message}"
     assert elapsed < LIMIT, f"refused after {elapsed:.2f} s"
+
+
+def arrays_among(arguments):
+    """(call, name) of each array of {call: {name: argument}}."""
+    return [
+        (call, name)
+        for call, given in arguments.items()
+        for name, value in given.items()
+        if isinstance(value, np.ndarray)
+    ]
