@@ -6,13 +6,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from halfshell._convert.arrays import as_array, as_real_array, in_order
 from halfshell._convert.foreign import attribute, is_a, kind_of, shown
 from halfshell._errors import shorten
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from halfshell._convert.types import FloatArray, PointArray
 
     OwnBox = tuple[FloatArray | None, int]  # and the bits of the axes that repeat
