@@ -85,14 +85,16 @@ add_bundle(hs_part *part, int32_t point, int m)
     return bundle;
 }
 
+/* Of the first entry that is not zero. */
 static bool
 is_negative(const int32_t *shift, int m)
 {
-    int r = 0;
-    while (r < m - 1 && shift[r] == 0) {
-        r++;
+    for (int r = 0; r < m; r++) {
+        if (shift[r] != 0) {
+            return shift[r] < 0;
+        }
     }
-    return shift[r] < 0;
+    return false;
 }
 
 /* Finds the shifts of the runs of a block, once. */
