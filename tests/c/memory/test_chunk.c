@@ -7,6 +7,7 @@
 
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/chunk.h"
+#include "../../../csrc/core/memory/pages.h"
 #include "../../../csrc/core/memory/pool.h"
 
 void test_chunk(void);
@@ -61,6 +62,32 @@ little_is_not_cut_off(void)
     CHECK(hs_chunk_of(data)->capacity == MB);
     data = hs_chunk_cut(data, least - 1, NULL);
     CHECK(hs_chunk_of(data)->capacity == least - 1);
+    hs_chunk_free(data);
+}
+
+/* Of pages that are to be huge the last one counts whole, of the small ones behind them only what
+ * is used. */
+static void
+a_huge_page_is_touched_as_a_whole(void)
+{
+    char     *data = hs_chunk_new(16 * MB);
+    hs_chunk *chunk = hs_chunk_of(data);
+    CHECK(data != NULL);
+    if (chunk->length > 0) { /* pages, that is */
+        hs_chunk_expect(data, 8 * MB);
+        CHECK(chunk->huge > 4 * MB && chunk->huge <= 8 * MB);
+        hs_chunk_touch(data, 0);
+        CHECK(chunk->touched == 0);
+        hs_chunk_touch(data, 1);
+        CHECK(chunk->touched > 1 && chunk->touched <= HS_PAGES_FROM);
+        CHECK(((uintptr_t)data + chunk->touched) % HS_PAGES_FROM == 0);
+        hs_chunk_touch(data, chunk->huge);
+        CHECK(chunk->touched == chunk->huge);
+        hs_chunk_touch(data, chunk->huge + 1);
+        CHECK(chunk->touched == chunk->huge + 1);
+        hs_chunk_touch(data, 1);
+        CHECK(chunk->touched == chunk->huge + 1);
+    }
     hs_chunk_free(data);
 }
 
@@ -144,6 +171,7 @@ void
 test_chunk(void)
 {
     RUN(little_is_not_cut_off);
+    RUN(a_huge_page_is_touched_as_a_whole);
     RUN(a_limit_may_be_heard_of_while_it_is_passed);
 #if !HS_WATCHED_MALLOC
     RUN(the_pool_wastes_no_more_than_half_of_a_chunk);
