@@ -161,6 +161,82 @@ far_cells_are_one(void)
     CHECK(hs_axis_image(&axes.axis[0], -7) == 0);
 }
 
+/* By how much a move along B, times that of an image, differs from whole periods along axis k. */
+static long double
+miss_of(const hs_lattice *lattice, int j, int k)
+{
+    const int   r = lattice->row_of_axis[j];
+    long double along = j == k ? -(long double)lattice->period[k] : 0.0L;
+    for (int c = 0; r >= 0 && c < lattice->ndim; c++) {
+        long double entry = 0.0L;
+        for (int l = 0; l < lattice->n_periodic; l++)
+            entry += (long double)lattice->U[r][l] * lattice->scaled[l][c];
+        along += lattice->normal[k][c] * entry;
+    }
+    return fabsl(along);
+}
+
+/* Of rows of very different lengths, some of them open. */
+static void
+fill_skewed_box(harness_random *random, int trial, hs_box *box)
+{
+    for (int l = 0; l < box->ndim; l++) {
+        const double length = ldexp(1.0 + random_unit(random), (int)(random_bits(random) % 3) * 10);
+        box->periodic[l] = trial % 7 != 0 || l > 0;
+        box->rows[l][l] = length;
+        for (int c = 0; trial % 5 != 0 && c < l; c++)
+            box->rows[l][c] = length * 9.0 * (random_unit(random) - 0.5);
+    }
+}
+
+/* The images are those that a ball of the radius meets, and one more on either side. */
+static void
+leaks_are_bounds_of_what_images_miss_periods_by(void)
+{
+    harness_random random = {10};
+    int            n_aligned = 0, n_open = 0;
+    for (int trial = 0; trial < TRIALS(4000); trial++) {
+        const int    d = 2 + trial % 3;
+        const double radius = ldexp(1.0 + random_unit(&random), trial / 12 % 12 - 4);
+        hs_box       box = {.ndim = d};
+        hs_lattice   lattice;
+        hs_axes      axes;
+        fill_skewed_box(&random, trial, &box);
+        hs_lattice_init(&box, d, hs_scale_of(0), &lattice);
+        hs_axes_init(&axes, &lattice, 0.5, trial % 2 == 0, radius);
+        for (int k = 0; k < d; k++) {
+            long double least = 0.0L, most = 0.0L;
+            for (int j = 0; j < d; j++) {
+                const bool        is_open = lattice.row_of_axis[j] < 0;
+                const long double n_images = is_open ? 0.0L : ceill(radius / lattice.period[j]) + 1;
+                least += n_images * miss_of(&lattice, j, k);
+                most += n_images * 0x1p-12L;
+            }
+            CHECK(axes.axis[k].leak >= least && axes.axis[k].leak <= most);
+            CHECK(axes.axis[k].leak == 0.0 || !lattice.aligned);
+            n_open += lattice.row_of_axis[k] < 0;
+        }
+        n_aligned += lattice.aligned;
+    }
+    CHECK(n_aligned > TRIALS(500) && n_open > TRIALS(200));
+}
+
+static void
+leaks_are_scaled_with_the_lengths(void)
+{
+    hs_box     box = {.ndim = 2, .periodic = {true, true}, .rows = {{3.0}, {1.0, 2.0}}};
+    hs_lattice lattice, scaled;
+    hs_axes    axes, of_scaled;
+    hs_lattice_init(&box, 2, hs_scale_of(0), &lattice);
+    hs_axes_init(&axes, &lattice, 0.5, false, 7.0);
+    hs_lattice_init(&box, 2, hs_scale_of(200), &scaled);
+    hs_axes_init(&of_scaled, &scaled, ldexp(0.5, -200), false, ldexp(7.0, -200));
+    for (int k = 0; k < 2; k++) {
+        CHECK(axes.axis[k].leak > 0.0 && axes.axis[k].n == of_scaled.axis[k].n);
+        CHECK(of_scaled.axis[k].leak == ldexp(axes.axis[k].leak, -200));
+    }
+}
+
 void
 test_cell_axes(void)
 {
@@ -169,6 +245,8 @@ test_cell_axes(void)
     RUN(periodic_balls_hold_what_is_within);
     RUN(balls_meet_no_more_images_than_they_must);
     RUN(ends_in_far_images_are_held);
+    RUN(leaks_are_bounds_of_what_images_miss_periods_by);
+    RUN(leaks_are_scaled_with_the_lengths);
     RUN(cells_divide_the_period);
     RUN(far_cells_are_one);
     hs_fpenv_leave(env);
