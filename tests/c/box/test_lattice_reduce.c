@@ -233,6 +233,16 @@ sharp_angles_are_opened(void)
     }
 }
 
+/* Independent by no more than the rounding of their entries: what the first leaves of the second is
+ * zero for float64, in the course of the reduction. */
+static void
+nearly_parallel_rows_are_opened(void)
+{
+    matrix a = {{0x1.999c2fd441ccp-1, 0x1.6185046a604p-4},
+                {0x1.0e230f2d44573p-1, 0x1.d24a701dcb5e9p-5}};
+    reduce_well(2, 2, a);
+}
+
 static void
 random_cells_are_reduced(void)
 {
@@ -398,6 +408,7 @@ test_lattice_reduce(void)
     RUN(sheared_boxes_are_straightened);
     RUN(whole_shears_come_back_exactly);
     RUN(sharp_angles_are_opened);
+    RUN(nearly_parallel_rows_are_opened);
     RUN(random_cells_are_reduced);
     RUN(three_rows_are_minkowski_reduced);
     RUN(scaling_changes_nothing);
