@@ -53,7 +53,7 @@ refused_memory_leaves_nothing_behind(void)
 static hs_status
 copy_once(void *context)
 {
-    hs_dynamic     *copy = NULL;
+    hs_dynamic     *copy = context; /* is set to NULL where there is none */
     const hs_status status = hs_dynamic_copy(context, &copy);
     CHECK((status == HS_OK) == (copy != NULL));
     CHECK(copy == NULL || hs_dynamic_length(copy) == 40);
