@@ -312,6 +312,35 @@ the_largest_boxes_are_measured_and_wrapped_into(void)
     }
 }
 
+/* Integers times a power of two: sums of them are exact, also where they are subnormal. */
+static void
+the_smallest_boxes_are_measured_and_wrapped_into(void)
+{
+    const double whole[3][2] = {{-3.0, 7.0}, {8.0, -1.0}, {2.0, 1.0}};
+    hs_box       box = {.ndim = 2, .periodic = {true, true}, .rows = {{4, 0}, {2, 4}}};
+    double       heights[2], wrapped[6], of_whole[6];
+    int64_t      shift[6], shift_of_whole[6];
+    hs_points    points = {whole, 3, 2, HS_FLOAT64, 16, 8};
+    CHECK(hs_box_wrap(&box, &points, of_whole, shift_of_whole, NULL) == HS_OK);
+    for (int exponent = -1000; exponent >= -1074; exponent -= 37) {
+        double scaled[3][2];
+        for (int e = 0; e < 6; e++) {
+            scaled[e / 2][e % 2] = ldexp(whole[e / 2][e % 2], exponent);
+        }
+        points.data = scaled;
+        box.rows[0][0] = box.rows[1][1] = ldexp(4.0, exponent);
+        box.rows[1][0] = ldexp(2.0, exponent);
+        CHECK(hs_box_measure(&box, heights, NULL, NULL) == HS_OK);
+        const double expected = ldexp(16.0 / sqrt(20.0), exponent);
+        CHECK(fabs(heights[0] - expected) <= fmax(1e-15 * expected, 0x1p-1074));
+        CHECK(heights[1] == ldexp(4.0, exponent));
+        CHECK(hs_box_wrap(&box, &points, wrapped, shift, NULL) == HS_OK);
+        for (int e = 0; e < 6; e++) {
+            CHECK(wrapped[e] == ldexp(of_whole[e], exponent) && shift[e] == shift_of_whole[e]);
+        }
+    }
+}
+
 /* Few heights, but many widths. */
 static void
 turns_of_a_sheared_box_may_be_too_many(void)
@@ -344,5 +373,6 @@ test_api_box(void)
     RUN(shifts_too_wide_name_their_point);
     RUN(no_points_are_no_pairs_whatever_the_cutoff);
     RUN(the_largest_boxes_are_measured_and_wrapped_into);
+    RUN(the_smallest_boxes_are_measured_and_wrapped_into);
     RUN(turns_of_a_sheared_box_may_be_too_many);
 }
