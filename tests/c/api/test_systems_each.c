@@ -69,6 +69,28 @@ polls_tell_how_far_it_is(void)
     }
 }
 
+/* None of the points asks: nothing is found, and the fraction is a number even so. */
+static void
+systems_without_queries_are_polled(void)
+{
+    for (int has_queries = 0; has_queries <= 1; has_queries++) {
+        polls   noted = {0, 0.0};
+        int64_t none[N_SYSTEMS + 1] = {0};
+        make_scene();
+        s.options.poll = note_poll;
+        s.options.poll_context = &noted;
+        s.queries.n = 0;
+        s.systems.first_query = none;
+        if (!has_queries) {
+            s.points.n = 0;
+            s.systems.first = none;
+        }
+        CHECK(hs_systems_coordination(&s.points, has_queries ? &s.queries : NULL, &s.systems,
+                                      &s.options, s.counts, NULL) == HS_OK);
+        CHECK(noted.n >= 1);
+    }
+}
+
 static hs_status
 find_rows(void *context)
 {
@@ -297,6 +319,7 @@ void
 test_systems_each(void)
 {
     RUN(polls_tell_how_far_it_is);
+    RUN(systems_without_queries_are_polled);
     RUN(a_poll_may_stop_it);
     RUN(memory_may_be_short);
     RUN(failures_name_the_row_among_all);
