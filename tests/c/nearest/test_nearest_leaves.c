@@ -58,6 +58,16 @@ distance_to(const hs_nearest_group *group, const hs_tree_node *leaf)
     return sqrt(square);
 }
 
+/* Whether the leaf is among the first n hits. */
+static bool
+is_listed(const hs_tree_node *leaf, int32_t n)
+{
+    int32_t h = 0;
+    while (h < n && leaves.runs[leaves.hits[h]].si != leaf->first)
+        h++;
+    return h < n && leaves.runs[leaves.hits[h]].n == leaf->end - leaf->first;
+}
+
 /* Each leaf within the radius is listed, in ascending order, and few others. */
 static void
 lists_hold_what_is_within_the_radius(void)
@@ -86,12 +96,8 @@ lists_hold_what_is_within_the_radius(void)
                 }
                 for (int32_t node = 0; node < unit.near.tree.n_nodes; node++) {
                     const hs_tree_node *leaf = &unit.near.tree.nodes[node];
-                    int32_t             h = 0;
-                    if (leaf->left != 0 || distance_to(&groups[g], leaf) > groups[g].radius)
-                        continue;
-                    while (h < n && leaves.runs[leaves.hits[h]].si != leaf->first)
-                        h++;
-                    CHECK(h < n && leaves.runs[leaves.hits[h]].n == leaf->end - leaf->first);
+                    if (leaf->left == 0 && distance_to(&groups[g], leaf) <= groups[g].radius)
+                        CHECK(is_listed(leaf, n));
                 }
                 n_listed += n;
             }
@@ -99,6 +105,34 @@ lists_hold_what_is_within_the_radius(void)
         CHECK(n_near > 100 && n_listed < n_near + n_near / 50 + 10);
         close_points();
     }
+}
+
+/* Where the groups are so far apart that floats are coarse, against the radius. */
+static void
+a_leaf_at_the_radius_is_listed(void)
+{
+    int n_tried = 0;
+    for (int d = 1; d <= 3; d++) {
+        open_points(2000, d, 100.0, NULL, 4);
+        hs_nearest_group groups[2] = {group_from(0, GROUP, 1.0),
+                                      group_from(2000 - GROUP, GROUP, 1.0)};
+        hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+        CHECK(leaves.radius == 1.0 && leaves.extent > 20.0);
+        for (int g = 0; g < 2; g++) {
+            for (int32_t node = 0; node < unit.near.tree.n_nodes; node++) {
+                const hs_tree_node *leaf = &unit.near.tree.nodes[node];
+                const double        radius = distance_to(&groups[g], leaf);
+                if (leaf->left != 0 || radius > leaves.radius)
+                    continue;
+                const int32_t n =
+                    hs_nearest_leaves_list(&unit.near, &groups[g], radius, &leaves);
+                CHECK(is_listed(leaf, n));
+                n_tried += radius > 0.0;
+            }
+        }
+        close_points();
+    }
+    CHECK(n_tried > 5);
 }
 
 /* Images that hold nothing are left out, and leaves say which of the others they lie in. */
@@ -217,6 +251,7 @@ void
 test_nearest_leaves(void)
 {
     RUN(lists_hold_what_is_within_the_radius);
+    RUN(a_leaf_at_the_radius_is_listed);
     RUN(leaves_lie_in_images);
     RUN(groups_that_look_far_are_left_out);
     RUN(where_nothing_is_saved_there_is_no_list);
