@@ -72,23 +72,30 @@ find_nearest(const hs_box *box, int m, const double *p, const double *q, int64_t
     }
 }
 
+/* Of lengths of any size: numbers of the box and of the points times a power of two. */
 static void
 it_is_the_first_of_the_nearest_images(void)
 {
     harness_random random = {51};
     for (int trial = 0; trial < TRIALS(600); trial++) {
         const int    d = trial % 20 ? 1 + trial % 2 : SPACE;
+        const double size = ldexp(1.0, 700 * (trial % 3 - 1));
         const hs_box box = random_whole_box(&random, d);
+        hs_box       sized = box;
+        double       p[SPACE], q[SPACE], sized_p[SPACE], sized_q[SPACE];
+        int64_t      shift[SPACE] = {99, 99, 99}, expected[SPACE];
         hs_image_box images;
-        CHECK(hs_image_box_init(&box, d, &images) == HS_OK);
-        const int m = images.lattice.n_periodic;
-        double    p[SPACE], q[SPACE];
-        int64_t   shift[SPACE] = {99, 99, 99}, expected[SPACE];
         for (int k = 0; k < d; k++) {
             p[k] = random_whole(&random, d < SPACE ? 2 : 1);
             q[k] = random_whole(&random, d < SPACE ? 2 : 1);
+            sized_p[k] = p[k] * size;
+            sized_q[k] = q[k] * size;
+            for (int l = 0; l < d; l++)
+                sized.rows[l][k] = box.rows[l][k] * size;
         }
-        CHECK(hs_near_image(&images, p, q, shift) == HS_OK);
+        CHECK(hs_image_box_init(&sized, d, &images) == HS_OK);
+        const int m = images.lattice.n_periodic;
+        CHECK(hs_near_image(&images, sized_p, sized_q, shift) == HS_OK);
         find_nearest(&box, m, p, q, expected);
         CHECK(memcmp(shift, expected, (size_t)m * sizeof *shift) == 0);
     }
