@@ -183,6 +183,63 @@ balls_reach_as_far_as_errors_may(void)
     hs_list_free(list);
 }
 
+/* Lengths times a power of two, and squares times its square. */
+static void
+thresholds_are_scaled_with_the_lengths(void)
+{
+    double errors[2], ends[2][4];
+    for (int s = 0; s < 2; s++) {
+        const double       unit = s == 0 ? 1.0 : 0x1p-100;
+        const double       centre[2] = {0.5 * unit, -unit};
+        const hs_box       box = {.ndim = 2,
+                                  .periodic = {true, true},
+                                  .rows = {{3.0 * unit, 0.25 * unit}, {unit, 4.0 * unit}}};
+        hs_dynamic_options options = hs_dynamic_options_default();
+        hs_dynamic        *list = NULL;
+        hs_failure         failure;
+        hs_ball            ball;
+        hs_ball_image      turned;
+        options.ndim = 2;
+        options.box = &box;
+        options.cell_size = options.max_radius = 2.0 * unit;
+        CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+        CHECK(hs_ball_init(&ball, list, centre, 1.5 * unit, &failure) == HS_OK);
+        hs_ball_turn(&ball, (const int64_t[]){1, -2}, &turned);
+        errors[s] = ball.error / unit;
+        const double found[4] = {ball.home.in, ball.home.out, turned.in, turned.out};
+        for (int e = 0; e < 4; e++)
+            ends[s][e] = found[e] / unit / unit;
+        hs_list_free(list);
+    }
+    CHECK(errors[0] > 0.0 && errors[0] == errors[1] && ends[0][0] > 2.0);
+    CHECK(memcmp(ends[0], ends[1], sizeof ends[0]) == 0);
+}
+
+/* Errors are those of the points that there are, and not of those that there were. */
+static void
+emptied_lists_are_as_exact_as_new_ones(void)
+{
+    const hs_box       box = {.ndim = 2, .periodic = {true}, .rows = {{3.0, 1.0}}};
+    const double       centre[2] = {0.5, 0.5}, far[2] = {-1e12, 1e12};
+    hs_dynamic_options options = hs_dynamic_options_default();
+    hs_dynamic        *list = NULL;
+    hs_failure         failure;
+    hs_placed          placed;
+    hs_ball            at_first, with_far, emptied;
+    options.ndim = 2;
+    options.box = &box;
+    CHECK(hs_list_new(&options, &list, &failure) == HS_OK);
+    CHECK(hs_ball_init(&at_first, list, centre, 1.0, &failure) == HS_OK);
+    CHECK(hs_dynamic_place(list, far, &placed, &failure) == HS_OK);
+    CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
+    CHECK(hs_ball_init(&with_far, list, centre, 1.0, &failure) == HS_OK);
+    CHECK(with_far.error > at_first.error && list->magnitude > 0.0);
+    hs_list_clear(list);
+    CHECK(hs_ball_init(&emptied, list, centre, 1.0, &failure) == HS_OK);
+    CHECK(emptied.error == at_first.error && list->magnitude == 0.0);
+    hs_list_free(list);
+}
+
 void
 test_ball(void)
 {
@@ -190,6 +247,8 @@ test_ball(void)
     RUN(thresholds_are_never_wrong);
     RUN(extreme_radii_are_left_to_the_exact_stages);
     RUN(nothing_is_surely_within_less_than_the_error);
+    RUN(thresholds_are_scaled_with_the_lengths);
+    RUN(emptied_lists_are_as_exact_as_new_ones);
     RUN(balls_reach_as_far_as_errors_may);
     hs_fpenv_leave(env);
 }

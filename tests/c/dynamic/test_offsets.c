@@ -49,6 +49,20 @@ offsets_come_nearest_first(void)
     }
 }
 
+/* Where all space is one cell, there is no other to look at. */
+static void
+one_cell_has_no_neighbours(void)
+{
+    hs_lattice lattice;
+    hs_axes    axes;
+    hs_offsets offsets;
+    hs_lattice_init(NULL, 3, hs_scale_of(0), &lattice);
+    hs_axes_init(&axes, &lattice, 0.25, true, 1.0);
+    CHECK(hs_offsets_init(&offsets, &axes, &lattice, 1.0));
+    CHECK(offsets.reach == 0 && offsets.list[0].n == 1);
+    hs_offsets_free(&offsets);
+}
+
 static void
 refused_memory_is_told(void)
 {
@@ -68,5 +82,6 @@ void
 test_offsets(void)
 {
     RUN(offsets_come_nearest_first);
+    RUN(one_cell_has_no_neighbours);
     RUN(refused_memory_is_told);
 }
