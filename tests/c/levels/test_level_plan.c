@@ -176,7 +176,7 @@ sums_above_an_exact_one_are_not_it(void)
 }
 
 /* All types are searched at once where two by two they would test nearly as many candidates: as the
- * products of their numbers and the lengths of their cutoffs say. */
+ * products of their numbers and the lengths of their cutoffs, in any unit, say. */
 static void
 types_are_searched_at_once_where_that_costs_as_little(void)
 {
@@ -193,13 +193,16 @@ types_are_searched_at_once_where_that_costs_as_little(void)
     };
     harness_random random = {79};
     reach_fill(&random, 90, 1, 1.0, 0, 1.0, &points);
-    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
-        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = cases[c].table};
+    for (size_t c = 0; c < 2 * (sizeof cases / sizeof *cases); c++) {
+        double         sized[4];
+        const hs_reach reach = {.n_types = 2, .types = points.types, .cutoffs = sized};
         planned        made;
+        for (int e = 0; e < 4; e++)
+            sized[e] = cases[c / 2].table[e] * (c % 2 ? 0x1p-20 : 1.0);
         for (int i = 0; i < 90; i++)
-            points.types[i] = i >= cases[c].n_first;
+            points.types[i] = i >= cases[c / 2].n_first;
         make_plan(&reach, false, HUGE_VAL, &made);
-        CHECK((made.plan.n == 1 && made.plan.steps[0].by_table) == cases[c].at_once);
+        CHECK((made.plan.n == 1 && made.plan.steps[0].by_table) == cases[c / 2].at_once);
         free_plan(&made);
     }
 }
