@@ -161,7 +161,7 @@ large_extents_have_no_table(void)
         const hs_edges edges = edges_of(9, true);
         hs_edge_table  table = {0};
         const float    squares[] = {0.0f, (float)random_unit(&random), FLT_MAX, INFINITY};
-        int32_t        slots[4], low, high;
+        int32_t        slots[4], low = -1, high = -1;
         CHECK(hs_edge_table_build(&edges, extents[e], &table) == HS_OK);
         CHECK(hs_edge_slots(&table, squares, 4, slots));
         for (int s = 0; s < 4; s++) {
