@@ -273,6 +273,24 @@ of_bound(double h, hs_dw d, bool wide)
     return fabs(big_to_double(&off, 1600 - 2148)) / error;
 }
 
+/* Also where a span was used before. */
+static void
+the_size_of_D_is_that_of_its_components(void)
+{
+    static const double p[3] = {1.0, 2.0, 3.0}, q[3] = {1.5, 2.0, -1.0};
+    static const double rows[3][8] = {{16.0}, {1.0, 16.0}, {0.0, 0.0, 16.0}};
+    hs_metric           metric;
+    hs_support_span     of;
+    memset(&of, 0x11, sizeof of);
+    hs_metric_init(&metric, 3, 3, rows, 1.0, true);
+    for (int pass = 0; pass < 2; pass++) {
+        hs_support_span_of(&metric, &(hs_span){p, q, NULL}, &of);
+        CHECK(of.usable && of.size == 0.5 + 4.0);
+        hs_support_span_of(&metric, &(hs_span){p, q, (const int64_t[]){1, -1, 0}}, &of);
+        CHECK(of.usable && of.size == 15.5 + 16.0 + 4.0);
+    }
+}
+
 static void
 bounds_hold_and_are_nearly_reached(void)
 {
@@ -357,6 +375,7 @@ test_metric_support(void)
     RUN(random_ones_are_decided_as_integers_say);
     RUN(extremes_are_decided_too);
     RUN(what_floats_do_not_hold_is_left_to_integers);
+    RUN(the_size_of_D_is_that_of_its_components);
     RUN(bounds_hold_and_are_nearly_reached);
     RUN(rounded_formulas_are_fixed);
 }
