@@ -89,6 +89,7 @@ condense_random(harness_random *random, column_case *test)
         CHECK(test->after[i] >= cloud.lower[0] && test->after[i] <= cloud.upper[0]);
         CHECK(fabs(test->after[i]) <= cloud.largest);
     }
+    CHECK(status != HS_OK || cloud.largest == fmax(-cloud.lower[0], cloud.upper[0]));
     test->length_after = test->periodic ? fabs(test->condensed.box->rows[0][0]) : 0.0;
     if (test->periodic)
         CHECK(signbit(test->condensed.box->rows[0][0]) == signbit(box.rows[0][0]));
