@@ -151,6 +151,35 @@ thresholds_have_room_for_images(void)
     recheck_unit_close(&unit);
 }
 
+/* The same for lengths of any size: coordinates are scaled, with what is counted off. */
+static void
+thresholds_do_not_depend_on_the_unit(void)
+{
+    hs_thresholds plain[2], shifted[2];
+    for (int s = 0; s < 2; s++) {
+        const double unit_length = s == 0 ? 1.0 : 0x1p-300;
+        hs_box       box = {.ndim = 2, .periodic = {true, true}};
+        double       x[2 * N];
+        box.rows[0][0] = 4.0 * unit_length;
+        box.rows[1][0] = unit_length;
+        box.rows[1][1] = 8.0 * unit_length;
+        for (int e = 0; e < 2 * N; e++)
+            x[e] = 0.25 * e * unit_length;
+        hs_points points = points_in(x, 2);
+        recheck_unit_open(&points, &box, unit_length, HS_WANT_J, &unit);
+        unit.list.listing.counts = unit.counts;
+        unit.counts[0] = 3;
+        unit.images[2] = 1;
+        CHECK(hs_recheck_prepare(&unit.recheck) == HS_OK);
+        plain[s] = unit.recheck.plain;
+        shifted[s] = unit.recheck.shifted;
+        recheck_unit_close(&unit);
+    }
+    CHECK(plain[0].in > 0.5f && shifted[0].in > 0.5f);
+    CHECK(memcmp(&plain[0], &plain[1], sizeof plain[0]) == 0);
+    CHECK(memcmp(&shifted[0], &shifted[1], sizeof shifted[0]) == 0);
+}
+
 /* Images so long that a float holds them to a few cutoffs: no threshold is a hair too narrow. */
 static void
 thresholds_have_room_for_long_images(void)
@@ -225,6 +254,7 @@ test_recheck_points(void)
     RUN(tiny_and_huge_cutoffs_are_scaled);
     RUN(jumps_are_counted_off);
     RUN(thresholds_have_room_for_images);
+    RUN(thresholds_do_not_depend_on_the_unit);
     RUN(thresholds_have_room_for_long_images);
     RUN(thresholds_have_room_for_counts);
     RUN(numbers_beyond_floats_are_never_sure);
