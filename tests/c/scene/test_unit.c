@@ -163,6 +163,8 @@ ordinary_cutoffs_are_not_scaled(void)
     CHECK(hs_choose_exponent(&cloud, &none, 1.0, 0, 56, &extreme) == 1 && !extreme);
     cloud = cloud_of(1, 0.0, 0x1p950, x);
     CHECK(hs_choose_exponent(&cloud, &none, 1.0, 0, 900, &extreme) == 50 && !extreme);
+    cloud = cloud_of(1, -0x1p-1000, 0x1p-1000, x);
+    CHECK(hs_choose_exponent(&cloud, &none, 0x1p-1001, -1001, 56, &extreme) == -1001);
 }
 
 /* Points are 2^52 box vectors away at most, by the time they are scaled; along open axes
