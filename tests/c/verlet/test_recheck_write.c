@@ -54,11 +54,12 @@ can_write(void)
     return recheck->writes;
 }
 
-enum { ORDINARY, SHARED, EXTREME, ORIGINALS, NO_FLOATS, FIXED, BOTH, OWN_IMAGES, ODDITIES };
+enum { ORDINARY, SHARED, EXTREME, ORIGINALS, NO_FLOATS, FIXED, BOTH, OWN_IMAGES, SHORT, ODDITIES };
 
 static void
 only_what_is_ordinary_is_written(void)
 {
+    static const double short_rows[3][HS_MAX_DIM] = {{0.5}, {0.0, 0.5}, {0.0, 0.0, 0.5}};
     for (int d = 1; d <= 3; d++) {
         for (int oddity = 0; oddity < ODDITIES; oddity++) {
             open_unit(d);
@@ -71,6 +72,8 @@ only_what_is_ordinary_is_written(void)
             unit.output.columns |= oddity == BOTH ? HS_WANT_BOTH : 0;
             if (oddity == OWN_IMAGES)
                 scene->metric.cutoff = 4.0;
+            if (oddity == SHORT)
+                hs_metric_init(&scene->metric, d, d, short_rows, 0.75, true);
             CHECK(can_write() == (has_writer() && oddity <= SHARED && d > 1));
             recheck_unit_close(&unit);
         }
