@@ -51,6 +51,7 @@ find_margin(two_steps *s, double radius, double cutoff, const hs_options *option
     const hs_motion  motion = {&s->built, &s->now, radius, cutoff};
     s->radius = radius;
     s->cutoff = cutoff;
+    s->jumped = true; /* is set in any case */
     s->status = hs_motion_margin(&motion, options != NULL ? options : &plain, &s->margin,
                                  &s->jumped, &s->jumps);
 }
