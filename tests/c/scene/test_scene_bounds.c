@@ -35,6 +35,32 @@ the_formula_of_double_errs_with_the_box_vectors(void)
     }
 }
 
+/* The error is one of lengths: it has their unit, also where nothing is scaled. */
+static void
+the_error_of_the_formula_has_the_unit_of_the_cutoff(void)
+{
+    double errors[2];
+    for (int s = 0; s < 2; s++) {
+        const double    length = s == 0 ? 1.0 : 0x1p-15;
+        const double    x[4] = {0.25 * length, 0.5 * length, 0.75 * length, 0.5 * length};
+        const hs_box    box = {.ndim = 2,
+                               .periodic = {true, true},
+                               .rows = {{length, 0.0}, {8.25 * length, length}}};
+        const hs_points points = {x, 2, 2, HS_FLOAT64, 16, 8};
+        hs_options      options = hs_options_default();
+        hs_scene        scene;
+        hs_failure      failure;
+        options.cutoff = length;
+        options.precision = HS_DOUBLE;
+        hs_account_init(&account, &options);
+        CHECK(hs_scene_init(&account, NULL, &points, &box, &options, &scene, &failure) == HS_OK);
+        CHECK(scene.cutoff == length);
+        errors[s] = scene.formula_error / length;
+        hs_scene_free(&account, &scene);
+    }
+    CHECK(errors[0] > 0.0 && errors[0] == errors[1]);
+}
+
 /* Two dimensions, the first of them periodic with a period of 4. */
 static void
 put_scene(hs_scene *scene)
@@ -265,6 +291,7 @@ void
 test_scene_bounds(void)
 {
     RUN(the_formula_of_double_errs_with_the_box_vectors);
+    RUN(the_error_of_the_formula_has_the_unit_of_the_cutoff);
     RUN(ranges_become_periods);
     RUN(aligned_scenes_do_not_err);
     RUN(skewed_scenes_err_component_by_component);
