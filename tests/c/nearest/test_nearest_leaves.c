@@ -124,8 +124,7 @@ a_leaf_at_the_radius_is_listed(void)
                 const double        radius = distance_to(&groups[g], leaf);
                 if (leaf->left != 0 || radius > leaves.radius)
                     continue;
-                const int32_t n =
-                    hs_nearest_leaves_list(&unit.near, &groups[g], radius, &leaves);
+                const int32_t n = hs_nearest_leaves_list(&unit.near, &groups[g], radius, &leaves);
                 CHECK(is_listed(leaf, n));
                 n_tried += radius > 0.0;
             }

@@ -45,12 +45,12 @@ scenes_are_scaled_by_what_is_small(void)
                  {0x1p-800, 0.0, 0x1p-801, -801},
                  {0x1p-800, 0.0, 0.0, 0}};
     for (int trial = 0; trial < 16; trial++) {
-        const int       c = trial / 2, is_first = trial % 2; /* the short row of the box */
-        const double    period = cases[c].period;
-        const hs_box    box = {.ndim = 2,
-                               .periodic = {true, true},
-                               .rows = {{is_first ? period : 4.0 * period},
-                                        {0.0, is_first ? 4.0 * period : period}}};
+        const int    c = trial / 2, is_first = trial % 2; /* the short row of the box */
+        const double period = cases[c].period;
+        const hs_box box = {
+            .ndim = 2,
+            .periodic = {true, true},
+            .rows = {{is_first ? period : 4.0 * period}, {0.0, is_first ? 4.0 * period : period}}};
         const hs_points points = points_in(x, N);
         fill(5, cases[c].side, x);
         nearest_unit_open(&points, NULL, period > 0.0 ? &box : NULL, 1, HS_WANT_J, cases[c].limit,

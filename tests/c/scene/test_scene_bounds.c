@@ -41,11 +41,10 @@ the_error_of_the_formula_has_the_unit_of_the_cutoff(void)
 {
     double errors[2];
     for (int s = 0; s < 2; s++) {
-        const double    length = s == 0 ? 1.0 : 0x1p-15;
-        const double    x[4] = {0.25 * length, 0.5 * length, 0.75 * length, 0.5 * length};
-        const hs_box    box = {.ndim = 2,
-                               .periodic = {true, true},
-                               .rows = {{length, 0.0}, {8.25 * length, length}}};
+        const double length = s == 0 ? 1.0 : 0x1p-15;
+        const double x[4] = {0.25 * length, 0.5 * length, 0.75 * length, 0.5 * length};
+        const hs_box box = {
+            .ndim = 2, .periodic = {true, true}, .rows = {{length, 0.0}, {8.25 * length, length}}};
         const hs_points points = {x, 2, 2, HS_FLOAT64, 16, 8};
         hs_options      options = hs_options_default();
         hs_scene        scene;
