@@ -158,6 +158,64 @@ leaves_lie_in_images(void)
     close_points();
 }
 
+/* Distance between the group and a leaf of the list in its image. */
+static double
+distance_in_image(const hs_nearest_group *group, int32_t l)
+{
+    const hs_nearest_run run = leaves.runs[l];
+    const hs_tree_node   leaf = {.first = run.si, .end = run.si + run.n};
+    hs_nearest_group     moved = *group;
+    for (int k = 0; k < 2; k++) {
+        moved.lower[k] -= leaves.images[run.image].moved[k];
+        moved.upper[k] -= leaves.images[run.image].moved[k];
+    }
+    return distance_to(&moved, &leaf);
+}
+
+/* On both sides of a face of boxes that are so wide that images are wrong by nearly as much as
+ * floats that are shared may be. */
+static void
+a_leaf_at_the_radius_in_an_image_is_found(void)
+{
+    int n_tried = 0;
+    for (int exponent = 30; exponent < 36; exponent++) {
+        const double length = ldexp(1.0, exponent);
+        const hs_box box = {.ndim = 2, .periodic = {true, true}, .rows = {{length}, {0.5, length}}};
+        harness_random random = {516};
+        enum { N = 64 };
+        for (int i = 0; i < N; i++) {
+            x[2 * i] = (i % 2 ? 0.5 : -0.5) * length - (i % 2 ? 4.0 : -4.0) * random_unit(&random);
+            x[2 * i + 1] = 4.0 * random_unit(&random);
+        }
+        const hs_points points = {x, N, 2, HS_FLOAT64, 16, 8};
+        nearest_unit_open(&points, NULL, &box, 4, HS_WANT_J, INFINITY, &unit);
+        CHECK(hs_nearest_leaves_init(&unit.near, &leaves) == HS_OK);
+        for (int32_t first = 0; first < N; first += GROUP) {
+            hs_nearest_group groups[2] = {group_from(first, GROUP, 8.0),
+                                          group_from(first, GROUP, 8.0)};
+            double           radii[N];
+            hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+            const int32_t n = leaves.radius > 0.0 ? leaves.n : 0;
+            CHECK(n <= N);
+            for (int32_t l = 0; l < n; l++)
+                radii[l] = distance_in_image(&groups[0], l);
+            for (int32_t l = 0; l < n; l++) {
+                bool is_found = false;
+                if (radii[l] == 0.0)
+                    continue;
+                groups[0].radius = groups[1].radius = radii[l];
+                hs_nearest_leaves_find(&unit.near, groups, 2, &leaves);
+                for (int32_t m = 0; m < leaves.n; m++)
+                    is_found = is_found || distance_in_image(&groups[0], m) == radii[l];
+                CHECK(leaves.radius == 0.0 || is_found);
+                n_tried += leaves.radius > 0.0;
+            }
+        }
+        close_points();
+    }
+    CHECK(n_tried > 10);
+}
+
 /* Those that look more than twice as far as the others walk by themselves. */
 static void
 groups_that_look_far_are_left_out(void)
@@ -252,6 +310,7 @@ test_nearest_leaves(void)
     RUN(lists_hold_what_is_within_the_radius);
     RUN(a_leaf_at_the_radius_is_listed);
     RUN(leaves_lie_in_images);
+    RUN(a_leaf_at_the_radius_in_an_image_is_found);
     RUN(groups_that_look_far_are_left_out);
     RUN(where_nothing_is_saved_there_is_no_list);
     RUN(any_allocation_may_be_refused);
