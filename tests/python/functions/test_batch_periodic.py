@@ -36,7 +36,7 @@ class Scene:
 @pytest.mark.parametrize("threads", [1, 2])
 def test_axes_of_each_system(d, has_boxes, threads):
     scene = Scene(d, has_boxes)
-    cutoff = 1.5 + 0.5 * d
+    cutoff = min(1.5 + 0.5 * d, 4.0)
     periodic = scene.periodic if threads == 1 else scene.periodic.astype(int).tolist()
     how = {"box": scene.box, "batch": scene.batch, "threads": threads, "periodic": periodic}
     found = hs.pairs(scene.points, cutoff, quantities="ijdS", sort=True, **how)
