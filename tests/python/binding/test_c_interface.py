@@ -17,7 +17,8 @@ from halfshell import _core
 
 DOCS = (ROOT / "docs/c-interface.md").read_text()
 EXAMPLES = ROOT / "examples" / "c"
-SANITIZE = "-std=c11 -O0 -g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+PLAIN = "-std=c11 -O0 -g1"
+SANITIZE = f"{PLAIN} -fsanitize=address,undefined -fno-sanitize-recover=all"
 
 pytestmark = [pytest.mark.slow, needs_c]
 
@@ -48,8 +49,8 @@ def plain(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """A folder with the library and the examples, by their Makefile, with sanitizers: errors and
-    leaks end a program."""
+    """A folder with the library and the examples, by their Makefile. The examples have sanitizers,
+    so that errors and leaks end a program; the core has tests of its own under them."""
     folder = tmp_path_factory.mktemp("built")
     source = folder / "empty.c"
     source.write_text("int main(void) { return 0; }\n")
@@ -57,9 +58,12 @@ def built(tmp_path_factory):
     tried = subprocess.run([C_COMPILER, *flags, source, "-o", folder / "empty"])
     if tried.returncode != 0 or shutil.which("make") is None:
         pytest.skip("there is no make, or a compiler without sanitizers")
-    command = ["make", "-s", "-j2", "-C", EXAMPLES, f"BUILD={folder}", f"CFLAGS={SANITIZE}"]
-    done = subprocess.run([*command, f"CC={C_COMPILER}"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    command = ["make", "-s", "-j2", "-C", EXAMPLES, f"BUILD={folder}", f"CC={C_COMPILER}"]
+    for flags, target in ((PLAIN, folder / "libhalfshell.a"), (SANITIZE, "all")):
+        done = subprocess.run(
+            [*command, f"CFLAGS={flags}", target], capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
     return folder
 
 
