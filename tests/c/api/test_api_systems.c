@@ -252,7 +252,7 @@ nothing_is_lost_when_memory_is_short(void)
     for (int kind = 0; kind < 4; kind++) {
         int64_t expected = -1;
         bool    ended = false;
-        for (int64_t nth = 0; !ended && nth < 100000; nth += nth < 200 ? 1 : 37) {
+        for (int64_t nth = 0; !ended && nth < 100000; nth += nth < TRIALS(200) ? 1 : 37) {
             hs_options options = hs_options_default();
             hs_pairs  *pairs = NULL;
             hs_failure failure;

@@ -42,7 +42,7 @@ every_shape_of_columns_has_the_same_rows(void)
     static const unsigned wants[] = {HS_WANT_I | HS_WANT_J | HS_WANT_BOTH, WANT_ALL | HS_WANT_BOTH};
     harness_random        random = {606};
     int64_t               n_entries = 0;
-    for (int trial = 0; trial < 200; trial++) {
+    for (int trial = 0; trial < THIRD_OF_TRIALS(200); trial++) {
         make_scene(&random, trial % SCENE_KINDS, 1 + trial % 4, random_below(&random, 80), 4.0, 0,
                    &shared);
         const hs_points points = points_of(&shared.scene);
@@ -75,7 +75,7 @@ every_shape_of_columns_has_the_same_rows(void)
             n_entries += n;
         }
     }
-    CHECK(n_entries > 100000);
+    CHECK(n_entries > THIRD_OF_TRIALS(100000));
 }
 
 /* Entries of 24 bytes and more that the density does not foresee: too many to be kept. */
