@@ -168,7 +168,7 @@ count_down(void *context, double fraction)
 static void
 interrupted_calls_can_be_made_again(void)
 {
-    const int         n = 4000;
+    const int         n = IS_SLOW ? 3200 : 4000;
     double           *x = random_points(n, 2, 1.0);
     const brute_scene scene = {.ndim = 2, .n = n, .x = x, .inclusive = true, .cutoff = 2.0};
     const hs_points   points = points_of(&scene);

@@ -231,7 +231,7 @@ limits_of_memory_are_kept(void)
             continue;
         }
         e.options.cutoff = 1.0;
-        const double enough = try_limits(&e, 1e4, IS_SLOW ? 4.0 : 1.2);
+        const double enough = try_limits(&e, 1e4, IS_SLOW ? 16.0 : 1.2);
         CHECK(enough > 1e5 && enough < 1e9);
     }
 }

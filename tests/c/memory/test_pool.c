@@ -205,7 +205,7 @@ small_results_take_little(void)
 
 #if !defined(_WIN32)
 
-enum { THREADS = 6, ROUNDS = 200 };
+enum { THREADS = 6, ROUNDS = THIRD_OF_TRIALS(200) };
 
 /* Each result is written, checked later, and kept for a few rounds. */
 static void *
