@@ -15,15 +15,6 @@
 #define UNIT                0x1p-53
 #define SLACK               HS_GRID_SLACK
 #define MOST_CELLS_PER_AXIS HS_GRID_CELLS_PER_AXIS
-/* Cells of a grid: their ids are uint32. */
-#define MOST_CELLS 4294967295.0
-/* Points that a cell along the first axis should hold, if that makes it a quarter of the range or
- * more; walks put cells together where these are fewer. */
-#define POINTS_PER_CELL 12.0
-/* Where cells are wider than need be, rows of few cells hold so many points at least: there is
- * nothing to put together along them. */
-#define FEW_CELLS      4.0
-#define POINTS_PER_ROW 8.0
 /* Cost of sorting a point into its cell, in candidates. */
 #define SORTING_COST 40.0
 
@@ -126,67 +117,6 @@ hs_ball_volume(int ndim, double radius)
     return volume;
 }
 
-/* Cells along each axis for a pitch of radius / finer, and for about POINTS_PER_CELL along the
- * first. parts: cells that shall reach as far as the range. */
-static void
-choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density, double *counts,
-              double *parts)
-{
-    double area = 1.0; /* of one row's cross-section */
-    for (int k = scene->ndim - 1; k >= 0; k--) {
-        const double extent = scene->upper[k] - scene->lower[k];
-        parts[k] = finer;
-        if (k == 0 && scene->ndim > 1) {
-            /* A whole fraction of the range: otherwise windows are longer than need be. */
-            const double points = density * area * grid->range[0];
-            parts[k] = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
-        }
-        const double pitch = grid->range[k] * (1.0 + 0x1p-20) / parts[k];
-        counts[k] = 1.0;
-        if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
-            counts[k] = floor(fmin(extent / pitch, MOST_CELLS_PER_AXIS));
-        }
-        area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
-    }
-}
-
-/* The number of cells is in proportion to the points. */
-static double
-most_cells(const hs_scene *scene)
-{
-    return fmin(2.0 * (double)scene->n + HS_GRID_SPARE_CELLS, MOST_CELLS);
-}
-
-/* Fewer cells, evenly over the axes, until there are no more than `cap`. Returns whether it had
- * to. */
-static bool
-cap_counts(int ndim, double cap, double *counts)
-{
-    for (bool capped = false;;) {
-        double product = 1.0;
-        int    divided = 0;
-        for (int k = 0; k < ndim; k++) {
-            product *= counts[k];
-            divided += counts[k] > 1.0;
-        }
-        if (product <= cap) {
-            return capped;
-        }
-        capped = true;
-        const double factor = pow(cap / product, 1.0 / divided);
-        for (int k = 0; k < ndim; k++) {
-            /* Always at least one less, so that this ends. */
-            counts[k] = fmax(1.0, floor(fmin(counts[k] * factor, counts[k] - 1.0)));
-        }
-    }
-}
-
-bool
-hs_grid_cap_counts(const hs_scene *scene, double *counts)
-{
-    return cap_counts(scene->ndim, most_cells(scene), counts);
-}
-
 hs_status
 hs_grid_set_axis(const hs_scene *scene, int k, double count, hs_grid *grid)
 {
@@ -268,15 +198,11 @@ choose_shape(const hs_scene *scene, hs_grid_kind kind, double density, double ne
     /* Narrower rows cost more rows to visit, and leave out candidates that else are gathered first
      * (form.h). */
     const int finer = neighbours < 600.0 ? 1 : neighbours < 3000.0 ? 2 : 3;
-    choose_counts(scene, grid, finer, density, counts, parts);
-    const bool capped = hs_grid_cap_counts(scene, counts);
-    if (capped && counts[0] < FEW_CELLS) {
-        const double rows = fmax((double)scene->n / POINTS_PER_ROW, 1.0);
-        (void)cap_counts(scene->ndim, counts[0] * rows, counts);
-    }
-    hs_status status = hs_grid_set_shape(scene, counts, grid);
+    hs_grid_choose_counts(scene, grid, finer, density, counts, parts);
+    const bool capped = hs_grid_fit_counts(scene, grid, counts);
+    hs_status  status = hs_grid_set_shape(scene, counts, grid);
     if (status == HS_OK && scene->lattice.aligned && !capped && !scene->is_asked) {
-        hs_grid_cut_by_faces(scene, parts, most_cells(scene), grid);
+        hs_grid_cut_by_faces(scene, parts, hs_grid_most_cells(scene), grid);
     }
     /* Axes with several cells reach a few of them, the others as far as in the single one. */
     HS_ASSERT(status == HS_OK || single_cost == INFINITY);

@@ -50,9 +50,19 @@ hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, 
  * *density: points in a unit of the volume that they are in. */
 hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
 
-/* Fewer cells, evenly over the axes, until their number is in proportion to the points. Returns
- * whether it had to. */
-bool hs_grid_cap_counts(const hs_scene *scene, double *counts);
+/*
+ * How many cells along each axis, in grid_counts.c. hs_grid_choose_counts: as many as searches are
+ * quickest with, `finer` of them within the range, and parts[k] along axis k; the cells of a row
+ * hold some ten points each, of `density`. hs_grid_cap_counts: fewer, evenly over the axes, until
+ * there are no more than hs_grid_most_cells, which is in proportion to the points;
+ * hs_grid_fit_counts: the same, and then in a shape that searches are quick with. Both return
+ * whether they had to.
+ */
+void   hs_grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
+                             double *counts, double *parts);
+double hs_grid_most_cells(const hs_scene *scene);
+bool   hs_grid_cap_counts(const hs_scene *scene, double *counts);
+bool   hs_grid_fit_counts(const hs_scene *scene, const hs_grid *grid, double *counts);
 
 /* So many cells along each axis. HS_ERR_MEMORY when a reach passes its integers. */
 hs_status hs_grid_set_shape(const hs_scene *scene, const double *counts, hs_grid *grid);

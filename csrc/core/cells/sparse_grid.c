@@ -94,14 +94,14 @@ hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_gri
 /* How much larger than wanted a dense cell must be before anything is counted. */
 #define WORTH_A_LOOK 4.0
 /* Other points in a point's dense cell, below which nothing better is looked for. */
-#define CROWDED 600.0
-/* Tests that take as long as gathering one neighbourhood, and as sorting one point sparsely rather
- * than densely: a test takes about 0.3 ns, the others some 300 and 40. */
-#define TESTS_PER_GROUP 1000.0
-#define TESTS_PER_POINT 130.0
-/* In cells so much larger than the cutoff float32 does not tell neighbours from others, and pairs
- * are decided one by one: some 12 ns each. */
-#define FILTER_FAILS       0x1p18
+#define CROWDED 800.0
+/* Tests that take as long as gathering one neighbourhood, and as finding a row of cells for it: a
+ * test takes 0.2 to 0.4 ns. */
+#define TESTS_PER_GROUP 600.0
+#define TESTS_PER_ROW   300.0
+/* In cells so much wider than the cutoff float32 does not tell neighbours from others where a group
+ * has points of several clusters, and pairs are decided one by one: some 12 ns each. */
+#define FILTER_FAILS       0x1p20
 #define TESTS_PER_DECISION 40.0
 #define WIDEST             256.0 /* ranges */
 #define MOST_SAMPLES       4096  /* 32 kB of stack */
@@ -155,7 +155,8 @@ static double
 cost_of(double company, int ndim)
 {
     /* Of the 3^d neighbours half are visited, and points in clumps have fewer full ones. */
-    return ldexp(company, ndim) + TESTS_PER_GROUP / (1.0 + company);
+    const double rows = 0.5 * pow(3.0, ndim - 1);
+    return ldexp(company, ndim) + (TESTS_PER_GROUP + TESTS_PER_ROW * rows) / (1.0 + company);
 }
 
 /* The cheapest width of cells; *cost: what it costs. */
@@ -189,7 +190,7 @@ hs_sparse_width(const hs_scene *scene, const hs_grid *dense)
 double
 hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
 {
-    double larger = 1.0, cost;
+    double larger = 1.0, widest = 1.0, cost;
     if ((double)scene->n < CROWDED) {
         return 0.0;
     }
@@ -197,7 +198,9 @@ hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
         /* Along the first axis grid.c makes cells of up to four ranges, where points are few. */
         const double wanted = (k == 0 ? 4.0 : 1.0) * dense->range[k];
         if (dense->cell_size[k] > wanted) {
-            larger *= fmin(dense->cell_size[k] / wanted, 0x1p100);
+            const double wider = fmin(dense->cell_size[k] / wanted, 0x1p100);
+            larger *= wider;
+            widest = fmax(widest, wider);
         }
     }
     if (!(larger > WORTH_A_LOOK)) {
@@ -205,12 +208,12 @@ hs_sparse_choose(const hs_scene *scene, const hs_grid *dense)
     }
     /* At least half of a point's company is tested, whatever its neighbours hold. */
     double crowd = mean_company(scene, dense, false);
-    if (larger > FILTER_FAILS) {
+    if (widest > FILTER_FAILS) {
         crowd *= TESTS_PER_DECISION;
     }
     if (!(crowd > CROWDED)) {
         return 0.0;
     }
     const double width = choose_width(scene, dense, &cost);
-    return 0.5 * crowd > cost + TESTS_PER_POINT ? width : 0.0;
+    return 0.5 * crowd > cost ? width : 0.0;
 }

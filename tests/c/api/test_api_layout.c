@@ -8,7 +8,7 @@
 
 void test_api_layout(void);
 
-enum { N = 600, MOST_CELLS = 4 * N + 64 };
+enum { N = 2400, MOST_CELLS = 4 * N + 64 };
 
 static double  x[3 * N];
 static int64_t cell[3 * N + 1], indices[3 * MOST_CELLS + 1];
@@ -100,7 +100,7 @@ dense_cells_are_numbered_by_their_indices(void)
         CHECK(!layout.occupied_only);
         for (int k = 0; k < d; k++) {
             product *= layout.shape[k];
-            CHECK(layout.shape[k] > 2 && layout.cell_size[k] >= 0.25);
+            CHECK(layout.shape[k] > 2 && layout.cell_size[k] >= 0.125);
         }
         CHECK(product == layout.n_cells);
         write_indices(cells, &layout);

@@ -53,12 +53,13 @@ plans_describe_the_search(void)
 static void
 plans_are_in_the_callers_unit(void)
 {
-    static double   x[2 * 1000];
+    enum { N = 8000 };
+    static double   x[2 * N];
     harness_random  random = {21};
     hs_options      options = hs_options_default();
     hs_plan         plan;
-    const hs_points points = {x, 1000, 2, HS_FLOAT64, 16, 8};
-    for (int e = 0; e < 2 * 1000; e++)
+    const hs_points points = {x, N, 2, HS_FLOAT64, 16, 8};
+    for (int e = 0; e < 2 * N; e++)
         x[e] = 0x1p40 * random_unit(&random);
     options.cutoff = 0x1p36;
     options.threads = 1;
@@ -66,7 +67,7 @@ plans_are_in_the_callers_unit(void)
     CHECK(!plan.sparse && plan.threads == 1 && plan.ndim == 2 && plan.expected_pairs > 1000.0);
     CHECK(plan.cell_size[1] * (double)plan.shape[1] > 0.95 * 0x1p40);
     CHECK(plan.cell_size[1] * (double)plan.shape[1] < 1.05 * 0x1p40);
-    for (int i = 0; i < 1000; i++) {
+    for (int i = 0; i < N; i++) {
         x[2 * i] = random_unit(&random) + (i % 2 ? 1e6 : 0.0);
         x[2 * i + 1] = random_unit(&random);
     }

@@ -174,10 +174,10 @@ static void
 lonely_points_get_narrow_cells(void)
 {
     for (int i = 0; i < N; i++) {
-        x[2 * i] = 1000.0 * (i % 60);
-        x[2 * i + 1] = 1000.0 * (i / 60);
+        x[2 * i] = 1000.0 * i;
+        x[2 * i + 1] = 0.0;
     }
-    x[0] = 1e9;
+    x[0] = 1e12;
     open_scene(N, NULL, 1.0);
     CHECK(hs_sparse_choose(&scene, &grid) == 1.0);
     close_scene();

@@ -9,7 +9,7 @@
 
 void test_search_build(void);
 
-enum { N = 1000 };
+enum { N = 1000, CROWD = 2000 };
 
 static search_unit unit;
 
@@ -40,18 +40,18 @@ crowds_are_in_occupied_cells_only(void)
 {
     hs_options options = options_for(0.01);
     hs_failure failure;
-    search_unit_points(81, N, 3, 1.0, &unit);
+    search_unit_points(81, CROWD, 3, 1.0, &unit);
     CHECK(build(NULL, NULL, &options, &failure) == HS_OK && !unit.search.is_sparse);
     CHECK(unit.search.grid.n_cells > 1 && unit.search.stencil.n_rows > 0);
     CHECK(unit.search.filter_error == unit.search.scene.x_error + unit.search.grid.shift_error);
     search_unit_close(&unit);
-    for (int i = 0; i < N; i++) {
+    for (int i = 0; i < CROWD; i++) {
         for (int k = 0; k < 3; k++)
             unit.x[3 * i + k] = 0.1 * unit.x[3 * i + k] + (i % 2 ? 1e4 : 0.0);
     }
     const hs_sets sets = {.points = &unit.points};
     CHECK(build(NULL, NULL, &options, &failure) == HS_OK && unit.search.is_sparse);
-    CHECK(unit.search.grid.n_cells <= N);
+    CHECK(unit.search.grid.n_cells <= CROWD);
     hs_search_close(&unit.search);
     unit.search.is_sparse = true; /* as another system left it */
     unit.call.options.cell_size = 2000.0;
