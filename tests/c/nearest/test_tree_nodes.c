@@ -158,10 +158,35 @@ any_number_of_threads_builds_the_same_tree(void)
     free(many);
 }
 
+/* More points on one spot than a subtree has: they are one leaf, whoever splits the rest. */
+static void
+a_crowded_spot_is_one_leaf(void)
+{
+    enum { MANY = 30000, CROWD = 20000 };
+    harness_random random = {78};
+    double        *many = array_of(2 * MANY, sizeof *many);
+    int            deepest;
+    int64_t        largest = 0;
+    for (int e = 0; e < 2 * MANY; e++)
+        many[e] = e < 2 * CROWD ? 0.3 : random_unit(&random);
+    const hs_points points = {many, MANY, 2, HS_FLOAT64, 16, 8};
+    nearest_unit_open_by(2, &points, NULL, NULL, 4, HS_WANT_J, INFINITY, &unit);
+    CHECK(check_nodes(8, &deepest) == MANY && unit.near.tree.depth == deepest);
+    for (int32_t number = 0; number < unit.near.tree.n_nodes; number++) {
+        const hs_tree_node *node = &unit.near.tree.nodes[number];
+        if (node->is_spot)
+            largest = node->end - node->first > largest ? node->end - node->first : largest;
+    }
+    CHECK(largest == CROWD);
+    nearest_unit_close(&unit);
+    free(many);
+}
+
 void
 test_tree_nodes(void)
 {
     RUN(any_number_of_threads_builds_the_same_tree);
     RUN(nodes_part_their_points);
     RUN(leaves_of_one_spot_say_so);
+    RUN(a_crowded_spot_is_one_leaf);
 }
