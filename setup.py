@@ -66,6 +66,7 @@ else:
         # They find the same at -O1, which is compiled in half the time.
         compile_args += ["-O1", "-g1", "-UNDEBUG"]
         compile_args += ["-fsanitize=address,undefined,float-cast-overflow"]
+        compile_args += ["-fno-sanitize-recover=all"]  # whatever they find ends the process
         link_args += ["-fsanitize=address,undefined"]
     if os.environ.get("HS_DEBUG"):
         compile_args += ["-O0", "-g3", "-UNDEBUG"]

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /*
- * grid.c: how far apart the coordinates of a pair can be, then as many cells as make a search
- * cheapest.
+ * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
+ * a search cheaper; grid_counts.c says how many.
  *
  * Why no pair is lost: rounding is monotone, so cell indices are a monotone function of t; `range`
  * bounds how far apart the computed coordinates of a pair can be, every rounding and the whole

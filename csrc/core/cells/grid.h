@@ -51,12 +51,12 @@ hs_status hs_grid_init_wide(const hs_scene *scene, double width, hs_grid *grid, 
 hs_status hs_grid_begin(const hs_scene *scene, double *density, hs_grid *grid, hs_failure *failure);
 
 /*
- * How many cells along each axis, in grid_counts.c. hs_grid_choose_counts: as many as searches are
- * quickest with, `finer` of them within the range, and parts[k] along axis k; the cells of a row
- * hold some ten points each, of `density`. hs_grid_cap_counts: fewer, evenly over the axes, until
- * there are no more than hs_grid_most_cells, which is in proportion to the points;
- * hs_grid_fit_counts: the same, and then in a shape that searches are quick with. Both return
- * whether they had to.
+ * How many cells along each axis, in grid_counts.c. hs_grid_choose_counts: those that make a search
+ * quickest, `finer` of them to a range; along the first axis so many that a cell holds some twelve
+ * points of this density. Fills parts[k], the cells to a range along axis k. hs_grid_cap_counts:
+ * fewer, evenly over the axes, until there are no more than hs_grid_most_cells, which is in
+ * proportion to the points. hs_grid_fit_counts: the same, then fewer rows of shorter cells, or of
+ * more points. Both return whether they had to.
  */
 void   hs_grid_choose_counts(const hs_scene *scene, const hs_grid *grid, int finer, double density,
                              double *counts, double *parts);

@@ -232,27 +232,10 @@ images_err_with_their_rows(void)
     close_scene();
 }
 
-/* One factor for all axes, to whole numbers below; what is one cell stays one. */
-static void
-too_many_cells_are_lowered_by_one_factor(void)
-{
-    const double most = 2.0 * 40 + HS_GRID_SPARE_CELLS; /* 144 */
-    double       few[2] = {12.0, 12.0}, many[2] = {240.0, 60.0}, flat[2] = {1.0, 1000.0};
-    fill_square(1.0);
-    open_scene(40, NULL, 0.01);
-    CHECK(!hs_grid_cap_counts(&scene, few) && few[0] == 12.0 && few[1] == 12.0);
-    few[0] = 13.0;
-    CHECK(hs_grid_cap_counts(&scene, few) && few[0] == 12.0 && few[1] == 11.0);
-    CHECK(hs_grid_cap_counts(&scene, many) && many[0] == 24.0 && many[1] == 6.0);
-    CHECK(hs_grid_cap_counts(&scene, flat) && flat[0] == 1.0 && flat[1] == most);
-    close_scene();
-}
-
 void
 test_grid_ranges(void)
 {
     RUN(images_err_with_their_rows);
-    RUN(too_many_cells_are_lowered_by_one_factor);
     RUN(cells_without_a_range_can_be_counted);
     RUN(endless_ranges_are_refused);
     RUN(ranges_have_room_for_roundings);

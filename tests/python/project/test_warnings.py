@@ -18,9 +18,14 @@ def warn_in(module, category):
 
 @pytest.mark.parametrize("category", [DeprecationWarning, FutureWarning, UserWarning])
 def test_our_warnings_are_errors(category):
+    shown = []
     for module in ("halfshell", "halfshell._report.page", *OURS):
-        with pytest.raises(category, match="a change"):
+        try:
             warn_in(module, category)
+            shown.append(module)
+        except category as error:
+            assert str(error) == "a change is coming"
+    assert shown == []
 
 
 @pytest.mark.parametrize("category", [DeprecationWarning, FutureWarning, UserWarning])

@@ -418,9 +418,9 @@ def leaks(allocator, call, n):
     return allocator.n_blocks() - before >= n
 
 
-# Further refusals behind the first: more than a call asks for until it ends. CPython 3.11 may ask
-# until there are no more, where it unwinds to a handler. None where the interpreter's objects are
-# from malloc as well, for then it has no memory to end them.
+# Further refusals behind the first: more than a call asks for until it ends. CPython 3.11 may go on
+# asking until the refusals are used up, where it unwinds to a handler. None where the interpreter's
+# objects are from malloc as well, for then it has no memory to end them.
 FROM_MALLOC = os.environ.get("PYTHONMALLOC") == "malloc"
 REFUSALS = (0,) if FROM_MALLOC else (0, 10**4)
 MOST = 100_000  # allocations that a call may have
