@@ -245,6 +245,24 @@ def test_a_scene_is_measured_with_its_limits_and_single_calls(
     assert (rows, correct) == ([], True)
 
 
+def test_a_library_without_memory_is_left_out(
+    bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Greedy(bench.contestant.Halfshell):
+        name = "cKDTree"
+
+        def prepare(self, scene: Any) -> Any:
+            raise MemoryError
+
+    scene = bench.scenes.load("molecule-30")
+    patience = bench.runner.Patience(repeats=1, seconds=0.01, quick=True)
+    rows, correct = bench.runner.measure_scene(
+        scene, bench.contestant.Halfshell(), [Greedy()], patience
+    )
+    assert correct and "cKDTree" not in {row.contestant for row in rows}
+    assert "without cKDTree: it asked for more memory" in capsys.readouterr().out
+
+
 def test_single_calls_give_median_and_percentile(bench: SimpleNamespace) -> None:
     made: list[int] = []
     single = bench.turns.single_calls({"a": lambda: made.append(1), "b": list}, samples=50)
