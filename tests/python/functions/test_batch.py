@@ -62,6 +62,7 @@ def test_open_systems_of_all_sizes(rng, threads, sort):
     assert hs.count_pairs(points, 1.4, batch=batch, threads=threads).tolist() == counts
 
 
+@pytest.mark.slow
 def test_crowded_systems_keep_their_order_behind_others():
     rng = np.random.default_rng(17)
     points, batch = rng.random((4060 + 2 * 4200, 1)), np.repeat([0, 1, 2], [4060, 4200, 4200])

@@ -24,6 +24,7 @@ def test_a_hundred_thousand_points(dtype, rng):
     assert 450_000 < len(rows) < 550_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_crowded_cells(dtype, rng, kernel):
     # Hundreds of neighbours, in one spot and everywhere.
@@ -35,6 +36,7 @@ def test_crowded_cells(dtype, rng, kernel):
     check_large(spots.astype(dtype), 0.008, [2.0, 2.0, 2.0], kernel=kernel)
 
 
+@pytest.mark.slow
 def test_many_images(rng, kernel):
     for kind in BOX_KINDS:
         box = random_box(rng, kind)

@@ -50,6 +50,7 @@ def adjacent_boxes(counts, d, seed=0):
     return lists
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("counts", "d"), [((1000, 2500, 500), 1), ((1000, 2500, 1500), 3)])
 def test_three_lists_in_adjacent_boxes(counts, d):
     lists = adjacent_boxes(counts, d)
@@ -70,6 +71,7 @@ def rotated(lists, seed):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("counts", "d"), [((1000, 2500, 500), 1), ((1000, 2500, 500), 2), ((600, 1500, 900), 3)]
 )
@@ -168,6 +170,7 @@ def test_a_support_ends_where_the_real_product_does(extent):
     assert 400 <= len(want) <= 800
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-140, 1.0, 1e140])
 def test_sizes_of_a_ratio_of_a_million_and_any_scale(scale):
     rng = np.random.default_rng(5)

@@ -608,6 +608,7 @@ def test_points_that_move_fast_are_searched():
     assert sum(count for skin, count in runs if skin is not None) < 60
 
 
+@pytest.mark.slow
 def test_pairs_without_a_list_are_those_of_a_search(rng):
     """The same arrays, the same refusals, and the points of the step whatever happens to them."""
     points = rng.random((20_000, 3))
