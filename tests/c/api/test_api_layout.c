@@ -96,11 +96,11 @@ dense_cells_are_numbered_by_their_indices(void)
         double    beyond[6];
         int64_t   product = 1;
         hs_layout layout;
-        hs_cells *cells = cells_of(d, d == 1 ? 40.0 : 4.0, 0.0, NULL, &layout);
+        hs_cells *cells = cells_of(d, d == 1 ? 160.0 : 8.0, 0.0, NULL, &layout);
         CHECK(!layout.occupied_only);
         for (int k = 0; k < d; k++) {
             product *= layout.shape[k];
-            CHECK(layout.shape[k] > 2 && layout.cell_size[k] >= 0.125);
+            CHECK(layout.shape[k] > 2 && layout.cell_size[k] >= 0.25);
         }
         CHECK(product == layout.n_cells);
         write_indices(cells, &layout);

@@ -174,8 +174,8 @@ static void
 lonely_points_get_narrow_cells(void)
 {
     for (int i = 0; i < N; i++) {
-        x[2 * i] = 1000.0 * i;
-        x[2 * i + 1] = 0.0;
+        x[2 * i] = 1000.0 * (i % 60);
+        x[2 * i + 1] = 1000.0 * (i / 60);
     }
     x[0] = 1e12;
     open_scene(N, NULL, 1.0);
