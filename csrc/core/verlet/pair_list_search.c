@@ -85,7 +85,7 @@ add_bundle(hs_part *part, int32_t point, int m)
     return bundle;
 }
 
-/* Of the first entry that is not zero. */
+/* Whether the first entry that is not zero is negative. */
 static bool
 is_negative(const int32_t *shift, int m)
 {

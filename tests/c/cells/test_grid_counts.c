@@ -25,14 +25,14 @@ too_many_cells_are_lowered_by_one_factor(void)
     close_scene();
 }
 
-/* A scene of n points in [0, side)^2, of which cells are `range` wide or more. */
+/* A scene of n points in the unit square, with cells that are `range` wide or more. */
 static void
-open_capped(int n, double side, double range)
+open_capped(int n, double range)
 {
-    fill_square(side);
+    fill_square(1.0);
     open_scene(n, NULL, range);
     scene.lower[0] = scene.lower[1] = 0.0;
-    scene.upper[0] = scene.upper[1] = side;
+    scene.upper[0] = scene.upper[1] = 1.0;
     grid.range[0] = grid.range[1] = range;
 }
 
@@ -53,7 +53,7 @@ capped_cells_are_shorter_in_fewer_rows(void)
     };
     for (int c = 0; c < 5; c++) {
         double counts[2] = {1e6, 1e6};
-        open_capped(cases[c].n, 1.0, cases[c].range);
+        open_capped(cases[c].n, cases[c].range);
         CHECK(hs_grid_fit_counts(&scene, &grid, counts));
         CHECK(counts[0] * counts[1] <= hs_grid_most_cells(&scene));
         CHECK(counts[0] * counts[1] >= 0.9 * hs_grid_most_cells(&scene));
@@ -68,7 +68,7 @@ static void
 other_cells_are_left_alone(void)
 {
     double wanted[2] = {77.0, 77.0}, alone[2] = {1e6, 1.0};
-    open_capped(3000, 1.0, 1e-2);
+    open_capped(3000, 1e-2);
     CHECK(!hs_grid_fit_counts(&scene, &grid, wanted) && wanted[0] == 77.0 && wanted[1] == 77.0);
     CHECK(hs_grid_fit_counts(&scene, &grid, alone) && alone[1] == 1.0);
     CHECK(alone[0] == hs_grid_most_cells(&scene));
