@@ -112,7 +112,7 @@ def test_any_object_as_one_argument(name, argument):
             assert boundary.names(result.message, argument), result.message
             assert len(result.message) < 1000
 
-    fuzz(anything(), check, 25, shares=1)
+    fuzz(anything(), check, 15, shares=1)
     hs.set_cache_limit(2**28)
 
 

@@ -314,7 +314,7 @@ def interrupt():
     sent.append(time.perf_counter())
     signal.raise_signal(signal.SIGINT)
 
-timer = threading.Timer(0.4, interrupt)
+timer = threading.Timer(0.2, interrupt)
 timer.start()
 try:
     while True:

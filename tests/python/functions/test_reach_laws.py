@@ -40,7 +40,7 @@ def rows(scene, **how):
 
 
 @given(reaching(), st.integers(0, 10))
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_small_scenes_equal_the_definition(scene, q):
     check(scene)
     check(scene.but(n_queries=min(q, len(scene.points))))

@@ -185,7 +185,7 @@ LARGE = {
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("kind", ["open", "triclinic"])
 def test_large_scenes_are_right(name, rule, kind, rng):
-    n = 1500
+    n = 1000
     points, scene = boxed(rng, kind, 3, n)
     radii = LARGE[name](n, rng) * 0.04 * (1 if rule == "sum" else 2)
     how = {"radii": radii, "rule": rule, **scene}
@@ -195,12 +195,12 @@ def test_large_scenes_are_right(name, rule, kind, rng):
     if rule in SYMMETRIC:
         found = hs.pairs(points, None, quantities="ijS", **how)
         assert hs.verify(points, None, *found, **how)
-    queries = {"queries": points[:450], "query_radii": radii[:450], "radii": radii[450:]}
+    queries = {"queries": points[:300], "query_radii": radii[:300], "radii": radii[300:]}
     if rule in ("gather", "scatter"):
         del queries["radii" if rule == "gather" else "query_radii"]
     how = scene | {"rule": rule} | queries
-    table = hs.neighbors(points[450:], None, quantities="jS", **how)
-    assert hs.verify(points[450:], None, table, **how)
+    table = hs.neighbors(points[300:], None, quantities="jS", **how)
+    assert hs.verify(points[300:], None, table, **how)
 
 
 def test_many_types_in_a_large_scene(rng):

@@ -226,7 +226,7 @@ def test_the_supports_of_each_list_may_be_of_a_size_of_their_own():
     """In Spheral a list whose extent is smaller may lose pairs: here there is one for all."""
     rng = np.random.default_rng(8)
     lists = [
-        hs.NodeList(f"{h}", rng.random((40, 2)), np.full(40, h), n_ghost=8)
+        hs.NodeList(f"{h}", rng.random((25, 2)), np.full(25, h), n_ghost=5)
         for h in (1e-9, 0.3, 0.01, 0.0)
     ]
     for extent in (2.0, 0.5):

@@ -132,7 +132,8 @@ class Scene:
             assert cells.any_within(at, r, skip=key) == bool(others)
 
 
-@pytest.mark.parametrize("seed", range(30))
+# Seed 28 has cells far and wide, and stores them all: it takes seconds.
+@pytest.mark.parametrize("seed", [*range(28), pytest.param(28, marks=pytest.mark.slow), 29])
 def test_any_box_any_scale_any_history(seed):
     scene = Scene(seed)
     for step in range(30):

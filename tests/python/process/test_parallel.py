@@ -16,7 +16,7 @@ import halfshell as hs
 
 RNG = np.random.RandomState(7)
 CLOUD = RNG.rand(3000, 3) * 20.0
-CLUSTERS = np.concatenate([RNG.normal(0.0, 0.1, (1500, 3)), RNG.normal(9.0, 2.0, (1500, 3))])
+CLUSTERS = np.concatenate([RNG.normal(0.0, 0.1, (600, 3)), RNG.normal(9.0, 2.0, (2400, 3))])
 TRICLINIC = np.array([[20.0, 0.0, 0.0], [7.0, 18.0, 0.0], [-4.0, 3.0, 19.0]])
 SCENES = {
     "open": (CLOUD, 2.0, None),
