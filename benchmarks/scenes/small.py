@@ -58,7 +58,7 @@ def batch_30(name: str) -> Scene:
     """Make 2000 molecules of 30 points in one call."""
     return Scene(
         name, "2000 systems of 30 points in one call, open", uniform(20260128, 60_000, 3) * 6.7,
-        5.0, want=15.0, peers=_PEERS, batch=np.repeat(np.arange(2000), 30),
+        5.0, want=8.0, peers=_PEERS, batch=np.repeat(np.arange(2000), 30),
     )  # fmt: skip
 
 
