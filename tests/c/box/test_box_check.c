@@ -242,6 +242,19 @@ huge_spreads_are_decided(void)
     }
 }
 
+/* Their exponents differ from entry to entry and from row to row. */
+static void
+sums_of_far_magnitudes_are_dependent(void)
+{
+    for (int exponent = 0; exponent < 1000; exponent++) {
+        const double one = ldexp(1.0, exponent), other = ldexp(256.0, exponent);
+        matrix       a = {{1.0, other, 1.0}, {1.0, one, 3.0}, {2.0, one + other, 4.0}};
+        CHECK(!independent(3, 3, a));
+        a[2][1] = nextafter(a[2][1], INFINITY);
+        CHECK(independent(3, 3, a));
+    }
+}
+
 /* Rows in a subspace, mixed by integers, in every shape. */
 static void
 dimension_counts(void)
@@ -332,5 +345,6 @@ test_box_check(void)
     RUN(determinants_that_floats_get_wrong);
     RUN(multiples_of_primes_are_not_zero);
     RUN(huge_spreads_are_decided);
+    RUN(sums_of_far_magnitudes_are_dependent);
     RUN(dimension_counts);
 }

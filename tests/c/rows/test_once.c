@@ -67,6 +67,26 @@ one_walk_finds_the_same_table(void)
     search_unit_close(&unit);
 }
 
+/* No neighbourhood is looked at where no distance is below the cutoff. */
+static void
+rows_are_empty_where_nothing_is_near(void)
+{
+    hs_output  entries;
+    hs_table   table;
+    hs_failure failure = HS_NO_FAILURE;
+    search_unit_points(517, N, 2, 1.0, &unit);
+    search_unit_open(NULL, 0.0, true, HS_WANT_I | HS_WANT_J, &unit);
+    unit.call.options.inclusive = false;
+    memset(offsets, 1, sizeof offsets);
+    memset(expected, 0, sizeof expected);
+    open_table(8, offsets, &entries, &table);
+    CHECK(hs_once_find(&table, &failure) == HS_OK);
+    CHECK(entries.n_pairs == 0 && memcmp(offsets, expected, sizeof offsets) == 0);
+    hs_table_free(&table);
+    hs_output_free(&entries);
+    search_unit_close(&unit);
+}
+
 /* Two walks can do with less. */
 static void
 without_memory_there_is_no_table(void)
@@ -99,5 +119,6 @@ void
 test_once(void)
 {
     RUN(one_walk_finds_the_same_table);
+    RUN(rows_are_empty_where_nothing_is_near);
     RUN(without_memory_there_is_no_table);
 }

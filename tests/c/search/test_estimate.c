@@ -236,9 +236,21 @@ many_images_are_known_by_the_box(void)
     }
 }
 
+static void
+no_points_have_no_pairs(void)
+{
+    static search_unit unit;
+    double             pairs = -1.0;
+    search_unit_points(23, 0, 3, 1.0, &unit);
+    search_unit_open(NULL, 0.5, false, HS_WANT_DISTANCE, &unit);
+    CHECK(hs_estimate_pairs(&unit.search, &pairs) == HS_OK && pairs == 0.0);
+    search_unit_close(&unit);
+}
+
 void
 test_estimate(void)
 {
+    RUN(no_points_have_no_pairs);
     RUN(samples_of_a_crystal_are_sure);
     RUN(many_images_are_known_by_the_box);
     RUN(small_scenes_are_known_exactly);
