@@ -261,6 +261,9 @@ groups_are_whole_rows_in_short_pieces(void)
                 CHECK(group.x_last - group.x_first < HS_SPARSE_SPLIT);
                 CHECK(point_is_in_place(&s, row, group.cell, group.last - 1));
                 CHECK(s.sparse.cell_x[group.cell] == group.x_last);
+                /* Full, or the row ends, or its next cell is too far on. */
+                CHECK(group.last - next == most || group.cell + 1 == s.sparse.row_cell[row + 1] ||
+                      s.sparse.cell_x[group.cell + 1] >= group.x_first + HS_SPARSE_SPLIT);
                 next = group.last;
             }
             CHECK(next == s.sparse.cell_start[s.sparse.row_cell[row + 1]]);
