@@ -74,12 +74,24 @@ append_lanes(const hs_gather *gather, int32_t at, const gathered *these, mask m,
     return append(gather->number + at, these->number, m);
 }
 
+/* Largest magnitude of the first n lanes of candidates, all of them if n is larger. */
+HS_ALWAYS_INLINE integers
+largest_gathered(const gathered *these, int32_t n, integers largest, const int ndim)
+{
+    for (int k = 0; k < ndim; k++) {
+        const integers sizes = magnitudes(these->y[k]);
+        largest = larger(largest, n < LANES ? keep_lanes(sizes, n) : sizes);
+    }
+    return largest;
+}
+
 HS_ALWAYS_INLINE void
 gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, const bool prunes)
 {
     const hs_gather own = *gather; /* arrays do not overlap it */
     const int32_t   first = own.n;
     int32_t         at = first, from = runs[0].at;
+    integers        largest = broadcast_integer((int32_t)own.largest);
     for (int32_t r = 0; r < n_runs; r++) {
         const hs_run *run = &runs[r];
         const int32_t n = runs[r + 1].at - from;
@@ -89,6 +101,7 @@ gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, con
             const gathered these = gather_lanes(&own, run, (int64_t)run->si + c, ndim);
             if (!prunes) {
                 store_lanes(&own, at + c, &these, ndim);
+                largest = largest_gathered(&these, n - c, largest, ndim);
                 continue;
             }
             mask near = near_lanes(&these, &own.near, ndim);
@@ -99,8 +112,7 @@ gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, con
         }
         at += prunes ? 0 : n;
     }
-    integers largest = broadcast_integer((int32_t)own.largest);
-    for (int k = 0; k < ndim; k++) {
+    for (int k = 0; k < ndim && prunes; k++) {
         largest = largest_of(own.y[k] + first, at - first, largest);
     }
     gather->largest = (uint32_t)largest_lane(largest);
