@@ -181,18 +181,16 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
 static hs_status
 trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
 {
-    hs_trace *trace = &scanner->trace;
+    hs_trace     *trace = &scanner->trace;
+    const int32_t left = scan->n_unsure - u, n = left < HS_BATCH ? left : HS_BATCH;
     hs_trace_clear(trace);
-    while (u < scan->n_unsure && trace->n < HS_BATCH) {
-        int32_t       places[HS_BATCH], n = 0;
-        const int32_t t = scan->unsure[u].t, si = scanner->group.first + t;
-        for (; u + n < scan->n_unsure && n < HS_BATCH && scan->unsure[u + n].t == t; n++) {
-            const int32_t place = scan->unsure[u + n].place;
-            places[n] = scanner->is_ordered ? scanner->block.origin[place] : place;
-        }
-        u += hs_trace_add(trace, si, places, n);
+    for (int32_t e = 0; e < n; e++) {
+        const hs_unsure unsure = scan->unsure[u + e];
+        trace->place[e] = scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place;
+        trace->si[e] = scanner->group.first + unsure.t;
     }
-    *next = u;
+    trace->n = n;
+    *next = u + n;
     return hs_trace_look_up(trace, true, &scanner->failed_point);
 }
 

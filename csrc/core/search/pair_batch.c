@@ -136,8 +136,9 @@ look_up_few(hs_trace *trace)
             trace->q[k][e] = bins->x[k][block->number[trace->place[e]]];
         }
     }
-    int32_t any = 0;
-    for (int32_t e = 0; bins->n_periodic > 0 && e < trace->n; e++) {
+    int32_t    any = 0;
+    const bool moved = hs_records_find_images(&trace->of);
+    for (int32_t e = 0; moved && e < trace->n; e++) {
         const hs_run *run = run_of(block, trace->place[e]);
         for (int r = 0; r < bins->n_periodic; r++) {
             trace->image[r][e] = run->image[r];

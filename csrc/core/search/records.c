@@ -200,17 +200,21 @@ load_images(hs_records *records, const hs_run *run, int32_t n)
     }
 }
 
-/* Whether some candidate of the block is in another image. */
-static bool
-has_images(const hs_records *records)
+bool
+hs_records_find_images(hs_records *records)
 {
     int32_t any = 0;
+    if (records->knows_images) {
+        return records->has_images;
+    }
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         for (int r = 0; r < records->search->bins.n_periodic; r++) {
             any |= run->image[r];
         }
     }
-    return any != 0;
+    records->knows_images = true;
+    records->has_images = any != 0;
+    return records->has_images;
 }
 
 /* Writes down all candidates of the block, as far as that is not done yet. */
@@ -223,8 +227,7 @@ hs_records_load(hs_records *records, bool metric)
     if (!given && !metric) {
         return HS_OK;
     }
-    records->has_images = has_images(records);
-    const bool images = records->has_images;
+    const bool images = hs_records_find_images(records);
     given = given && (records->search->bins.turns.known || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;

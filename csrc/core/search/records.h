@@ -25,7 +25,7 @@ typedef struct hs_records {
     bool              needs_given; /* turned or few are set */
     bool              is_narrow;   /* all S of the scene are few */
     bool has_metric, has_given;    /* arrays are the block's: q and image; turned or few */
-    bool has_images;               /* some candidate is in another image */
+    bool has_images, knows_images; /* some candidate is in another image; whether that is known */
 } hs_records;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
@@ -37,12 +37,15 @@ void      hs_records_free(hs_account *account, hs_records *records);
 HS_ALWAYS_INLINE void
 hs_records_reset(hs_records *records)
 {
-    records->has_metric = records->has_given = false;
+    records->has_metric = records->has_given = records->knows_images = false;
 }
 
 /* Fills what is needed for all candidates of the block, as far as that is not done yet; `metric`:
  * also q. HS_OK or HS_ERR_INTERRUPTED. */
 hs_status hs_records_load(hs_records *records, bool metric);
+
+/* Whether some candidate of the block is in another image; looks at its runs once. */
+bool hs_records_find_images(hs_records *records);
 
 /* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
 bool hs_has_narrow_shifts(const hs_search *search);
