@@ -6,6 +6,8 @@ undefined-behaviour sanitizers, HS_WERROR=1 turns warnings into errors.
 """
 
 import os
+import shlex
+import subprocess
 import sys
 import sysconfig
 from glob import glob
@@ -30,10 +32,28 @@ smaller = [
 ]
 
 
+# Structs are cleared and copied by stores of their own: the instructions that GCC takes for that
+# on x86, rep stos and rep movs, start slowly. Calls with few points take 0.95 of the time, 1e5
+# points 0.97.
+stores = [
+    "-mmemset-strategy=unrolled_loop:512:noalign,libcall:-1:noalign",
+    "-mmemcpy-strategy=unrolled_loop:512:noalign,libcall:-1:noalign",
+]
+compiler = os.environ.get("CC") or sysconfig.get_config_var("CC") or ""
+
+
 def is_for_gcc():
     """Whether the compiler is GCC on Linux; others have no such options."""
-    compiler = os.environ.get("CC") or sysconfig.get_config_var("CC") or ""
     return sys.platform.startswith("linux") and "clang" not in compiler
+
+
+def accepts(flags):
+    """Whether the compiler knows flags that others refuse."""
+    command = [*shlex.split(compiler), *flags, "-fsyntax-only", "-x", "c", os.devnull]
+    try:
+        return subprocess.run(command, capture_output=True).returncode == 0
+    except OSError:
+        return False  # there is no such compiler: setuptools says so
 
 
 if sys.platform == "win32":
@@ -45,6 +65,7 @@ else:
         "-std=c11",
         "-O3",
         *(smaller if is_for_gcc() else []),
+        *(stores if is_for_gcc() and accepts(stores) else []),
         "-g0",
         "-ffp-contract=off",
         "-fvisibility=hidden",
