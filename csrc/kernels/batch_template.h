@@ -17,6 +17,8 @@
 
 #include "wide_doubleword.h"
 
+_Static_assert(HS_BATCH_PADDING % LANES == 0, "arrays have room for whole vectors");
+
 #define SAFE_LARGE ldexp(1.0, HS_SAFE_EXPONENT) /* compilers see constants */
 #define SAFE_SMALL ldexp(1.0, -HS_SAFE_EXPONENT)
 

@@ -74,7 +74,7 @@ append_lanes(const hs_gather *gather, int32_t at, const gathered *these, mask m,
     return append(gather->number + at, these->number, m);
 }
 
-/* Largest magnitude of the first n lanes of candidates, all of them if n is larger. */
+/* The larger of `largest` and the magnitudes of the first n lanes, or of all if n is no less. */
 HS_ALWAYS_INLINE integers
 largest_gathered(const gathered *these, int32_t n, integers largest, const int ndim)
 {
@@ -112,7 +112,8 @@ gather_runs(hs_gather *gather, hs_run *runs, int32_t n_runs, const int ndim, con
         }
         at += prunes ? 0 : n;
     }
-    for (int k = 0; k < ndim && prunes; k++) {
+    /* What was left out does not count, so that what was kept is read again. */
+    for (int k = 0; prunes && k < ndim; k++) {
         largest = largest_of(own.y[k] + first, at - first, largest);
     }
     gather->largest = (uint32_t)largest_lane(largest);

@@ -32,7 +32,7 @@ trace_at(const open_pairs *open, int32_t edge, int32_t *of)
         const open_pair *pair = &open->pair[u];
         if (pair->low == edge) {
             of[trace->n] = u;
-            (void)hs_trace_add(trace, pair->si, open->places + pair->hit, 1);
+            hs_trace_put(trace, pair->si, open->places[pair->hit]);
         }
     }
     return hs_trace_look_up(trace, true, &open->scanner->failed_point);

@@ -247,13 +247,8 @@ trace_waiting(hs_tally *tally, hs_scanner *scanner, int32_t u, int32_t *next)
     hs_trace *trace = &scanner->trace;
     hs_trace_clear(trace);
     while (u >= 0 && trace->n < HS_BATCH) {
-        const int32_t si = tally->open[u].si;
-        int32_t       places[HS_BATCH], n = 0;
-        for (; u >= 0 && n < HS_BATCH - trace->n && tally->open[u].si == si;
-             u = tally->open[u].next) {
-            places[n++] = tally->open[u].place;
-        }
-        (void)hs_trace_add(trace, si, places, n); /* there is room for them */
+        hs_trace_put(trace, tally->open[u].si, tally->open[u].place);
+        u = tally->open[u].next;
     }
     *next = u;
     return hs_trace_look_up(trace, true, &scanner->failed_point);

@@ -186,10 +186,9 @@ trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
     hs_trace_clear(trace);
     for (int32_t e = 0; e < n; e++) {
         const hs_unsure unsure = scan->unsure[u + e];
-        trace->place[e] = scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place;
-        trace->si[e] = scanner->group.first + unsure.t;
+        hs_trace_put(trace, scanner->group.first + unsure.t,
+                     scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place);
     }
-    trace->n = n;
     *next = u + n;
     return hs_trace_look_up(trace, true, &scanner->failed_point);
 }

@@ -124,7 +124,8 @@ run_of(const hs_block *block, int32_t place)
     return run;
 }
 
-/* What the metric measures between, and its shifts, without records: they are of X, over B. */
+/* What the metric measures between, and its shifts, without records: they are of X, over B. Where
+ * the block has no image, `image` and `times` are left alone: nobody reads them then. */
 static void
 look_up_few(hs_trace *trace)
 {
@@ -137,8 +138,8 @@ look_up_few(hs_trace *trace)
         }
     }
     int32_t    any = 0;
-    const bool moved = hs_records_find_images(&trace->of);
-    for (int32_t e = 0; moved && e < trace->n; e++) {
+    const bool images = hs_records_has_images(&trace->of);
+    for (int32_t e = 0; images && e < trace->n; e++) {
         const hs_run *run = run_of(block, trace->place[e]);
         for (int r = 0; r < bins->n_periodic; r++) {
             trace->image[r][e] = run->image[r];

@@ -46,6 +46,15 @@ hs_trace_clear(hs_trace *trace)
     trace->is_shifted = trace->is_wide = false;
 }
 
+/* Adds the pair of point si with the candidate at a place; there must be room. */
+HS_ALWAYS_INLINE void
+hs_trace_put(hs_trace *trace, int32_t si, int32_t place)
+{
+    trace->si[trace->n] = si;
+    trace->place[trace->n] = place;
+    trace->n++;
+}
+
 /* Adds the pairs of point si with the candidates at n places, as far as there is room; returns how
  * many. They are looked up together, because one point has few hits. */
 int32_t hs_trace_add(hs_trace *trace, int32_t si, const int32_t *places, int32_t n);

@@ -201,12 +201,12 @@ load_images(hs_records *records, const hs_run *run, int32_t n)
 }
 
 bool
-hs_records_find_images(hs_records *records)
+hs_records_has_images(hs_records *records)
 {
-    int32_t any = 0;
     if (records->knows_images) {
         return records->has_images;
     }
+    int32_t any = 0;
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         for (int r = 0; r < records->search->bins.n_periodic; r++) {
             any |= run->image[r];
@@ -227,7 +227,7 @@ hs_records_load(hs_records *records, bool metric)
     if (!given && !metric) {
         return HS_OK;
     }
-    const bool images = hs_records_find_images(records);
+    const bool images = hs_records_has_images(records);
     given = given && (records->search->bins.turns.known || !records->is_narrow);
     for (const hs_run *run = records->block->runs; run->at < records->block->n; run++) {
         const int32_t n = run[1].at - run->at;

@@ -25,7 +25,7 @@ typedef struct hs_records {
     bool              needs_given; /* turned or few are set */
     bool              is_narrow;   /* all S of the scene are few */
     bool has_metric, has_given;    /* arrays are the block's: q and image; turned or few */
-    bool has_images, knows_images; /* some candidate is in another image; whether that is known */
+    bool has_images, knows_images; /* some candidate is in another image; valid if knows_images */
 } hs_records;
 
 /* needs_given: whether S is wanted, or else only what the metric needs. */
@@ -45,7 +45,7 @@ hs_records_reset(hs_records *records)
 hs_status hs_records_load(hs_records *records, bool metric);
 
 /* Whether some candidate of the block is in another image; looks at its runs once. */
-bool hs_records_find_images(hs_records *records);
+bool hs_records_has_images(hs_records *records);
 
 /* Whether every S of the scene is the sum of an image and of turns that are known to be few. */
 bool hs_has_narrow_shifts(const hs_search *search);

@@ -242,7 +242,7 @@ huge_spreads_are_decided(void)
     }
 }
 
-/* Their exponents differ from entry to entry and from row to row. */
+/* The last row is the sum of the others, and entries of a row differ by up to 2^1007. */
 static void
 sums_of_far_magnitudes_are_dependent(void)
 {

@@ -9,7 +9,7 @@
 
 void test_batch(void);
 
-enum { ROOM = 80, MOST_KERNELS = 16 };
+enum { ROOM = 10 * HS_BATCH_PADDING, MOST_KERNELS = 16 };
 
 /* What the numbers of a scene are like. */
 typedef enum kind { EVERYDAY, DYADIC, DECIMAL, MEDIUM, EVERY_EXPONENT, EXTREME, SUBNORMAL } kind;

@@ -67,7 +67,7 @@ one_walk_finds_the_same_table(void)
     search_unit_close(&unit);
 }
 
-/* No neighbourhood is looked at where no distance is below the cutoff. */
+/* No distance is below the cutoff. */
 static void
 rows_are_empty_where_nothing_is_near(void)
 {
