@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from benchmark_modules import bench, only_in_a_checkout  # noqa: F401
+from checkout import BENCHMARKS
 
 pytestmark = [pytest.mark.slow, only_in_a_checkout]
 
@@ -98,8 +100,22 @@ def test_groups_hold_every_scene_and_have_titles(bench: SimpleNamespace) -> None
     assert all(scenes.GROUPS.values())
     assert {name for names in scenes.GROUPS.values() for name in names} == set(scenes.SCENES)
     assert set(scenes.QUICK) <= set(scenes.SCENES)
-    readme = (bench.fill_docs._PAGE.parents[1] / "benchmarks" / "README.md").read_text()
+    readme = (BENCHMARKS / "README.md").read_text()
     assert [group for group in scenes.GROUPS if f"`{group}`" not in readme] == []
+
+
+def test_the_guide_says_what_is_wanted(bench: SimpleNamespace) -> None:
+    """A second name of a row is what the first ends with, or what follows it."""
+    scenes = bench.scenes
+    readme = (BENCHMARKS / "README.md").read_text()
+    rows = re.findall(r"^\| (`.*) \|.*\| ([\d, ]+) \|$", readme, re.MULTILINE)
+    for cell, wanted in rows:
+        first, *endings = re.findall("`(.*?)`", cell)
+        others = [first.rpartition("-")[0] + ending for ending in endings]
+        names = [first, *(one if one in scenes.SCENES else first + ending
+                          for one, ending in zip(others, endings, strict=True))]  # fmt: skip
+        assert [scenes.load(name).want for name in names] == [float(x) for x in wanted.split(",")]
+    assert len(rows) > 10
 
 
 @pytest.mark.parametrize(

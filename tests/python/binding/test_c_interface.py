@@ -37,7 +37,7 @@ def is_gcc():
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """rdf, by the command of the documentation, but without optimising, which takes half a minute."""
+    """rdf, by the command of the documentation, but at -O0: at -O2 it takes half a minute."""
     program = tmp_path_factory.mktemp("plain") / "rdf"
     command = re.search(r"^cc .*$", DOCS, re.MULTILINE)[0]
     assert command.endswith(" -o rdf")

@@ -132,7 +132,7 @@ class Scene:
             assert cells.any_within(at, r, skip=key) == bool(others)
 
 
-# Seed 28 has cells far and wide, and stores them all: it takes seconds.
+# The cells of seed 28 cover a large space and are all stored, which takes seconds.
 @pytest.mark.parametrize("seed", [*range(28), pytest.param(28, marks=pytest.mark.slow), 29])
 def test_any_box_any_scale_any_history(seed):
     scene = Scene(seed)

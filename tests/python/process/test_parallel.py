@@ -15,16 +15,17 @@ import pytest
 import halfshell as hs
 
 RNG = np.random.RandomState(7)
-CLOUD = RNG.rand(3000, 3) * 20.0
-CLUSTERS = np.concatenate([RNG.normal(0.0, 0.1, (600, 3)), RNG.normal(9.0, 2.0, (2400, 3))])
-TRICLINIC = np.array([[20.0, 0.0, 0.0], [7.0, 18.0, 0.0], [-4.0, 3.0, 19.0]])
+CLOUD = RNG.rand(10500, 3) * 30.0
+CLUSTERS = np.concatenate([RNG.normal(0.0, 0.1, (600, 3)), RNG.normal(9.0, 2.0, (9900, 3))])
+TRICLINIC = np.array([[30.0, 0.0, 0.0], [10.0, 27.0, 0.0], [-6.0, 5.0, 28.0]])
+#: As much work as more than one thread is taken for.
 SCENES = {
     "open": (CLOUD, 2.0, None),
-    "periodic": (CLOUD, 2.0, np.array([20.0, 20.0, 20.0])),
+    "periodic": (CLOUD, 2.0, np.array([30.0, 30.0, 30.0])),
     "triclinic": (CLOUD * 3.0, 2.0, TRICLINIC),
-    "images": (CLOUD[:150], 12.0, np.array([8.0, 9.0, 10.0])),
+    "images": (CLOUD[:320], 12.0, np.array([8.0, 9.0, 10.0])),
     "clusters": (CLUSTERS, 0.3, None),
-    "plane": (CLOUD[:, :2], 0.8, np.array([20.0, 20.0])),
+    "plane": (CLOUD[:, :2], 0.8, np.array([30.0, 30.0])),
     "one spot": (np.zeros((700, 3)), 1.0, None),
     "nobody": (np.zeros((0, 3)), 1.0, None),
 }
@@ -32,6 +33,12 @@ SCENES = {
 
 def run(code):
     subprocess.run([sys.executable, "-c", textwrap.dedent(code)], check=True, timeout=120)
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "nobody"])
+def test_the_scenes_are_searched_by_several_threads(name):
+    points, cutoff, box = SCENES[name]
+    assert hs.explain(points, cutoff, box=box, threads=2).threads == 2
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -68,8 +75,8 @@ def test_the_callers_arrays_are_filled_in_the_same_order(threads):
 
 
 def test_small_scenes_use_one_thread_and_large_ones_what_is_allowed(monkeypatch):
-    assert hs.explain(CLOUD, 2.0).threads == 1
-    assert hs.explain(CLOUD, 2.0, threads=3).threads == 1
+    assert hs.explain(CLOUD[:3000], 2.0).threads == 1
+    assert hs.explain(CLOUD[:3000], 2.0, threads=3).threads == 1
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     large = RNG.rand(30000, 3) * 40.0
     assert hs.explain(large, 1.0).threads == 3
