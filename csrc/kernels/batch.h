@@ -14,8 +14,8 @@
 #include "../core/exact/metric.h"
 
 /* Arrays of a batch, also those that are written to, have room for n entries rounded up to a
- * multiple of this, the lanes of the widest vectors. Past n they hold any finite numbers; zeros will
- * do. */
+ * multiple of this, the lanes of the widest vectors. Past n they hold any finite numbers; zeros
+ * will do. */
 #define HS_BATCH_PADDING 8
 
 /* A good number of pairs: the arrays of so many in 3-D take 27 kB, so they stay in the first-level
