@@ -181,15 +181,14 @@ decide_by_supports(hs_scanner *scanner, uint8_t *within)
 static hs_status
 trace_unsure(hs_scanner *scanner, const hs_scan *scan, int32_t u, int32_t *next)
 {
-    hs_trace     *trace = &scanner->trace;
-    const int32_t left = scan->n_unsure - u, n = left < HS_BATCH ? left : HS_BATCH;
+    hs_trace *trace = &scanner->trace;
     hs_trace_clear(trace);
-    for (int32_t e = 0; e < n; e++) {
-        const hs_unsure unsure = scan->unsure[u + e];
+    for (; u < scan->n_unsure && trace->n < HS_BATCH; u++) {
+        const hs_unsure unsure = scan->unsure[u];
         hs_trace_put(trace, scanner->group.first + unsure.t,
                      scanner->is_ordered ? scanner->block.origin[unsure.place] : unsure.place);
     }
-    *next = u + n;
+    *next = u;
     return hs_trace_look_up(trace, true, &scanner->failed_point);
 }
 

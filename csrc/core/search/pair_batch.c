@@ -125,7 +125,7 @@ run_of(const hs_block *block, int32_t place)
 }
 
 /* What the metric measures between, and its shifts, without records: they are of X, over B. Where
- * the block has no image, `image` and `times` are left alone: nobody reads them then. */
+ * the block has no image, `image` and `times` are left alone, and not read later. */
 static void
 look_up_few(hs_trace *trace)
 {
