@@ -43,9 +43,9 @@ compiler = os.environ.get("CC") or sysconfig.get_config_var("CC") or ""
 
 def accepted(flags):
     """The flags, or none if the compiler does not take them, as others than GCC on Linux."""
-    command = [*shlex.split(compiler), *flags, "-Werror", "-fsyntax-only", "-x", "c", os.devnull]
     if not sys.platform.startswith("linux"):
         return []
+    command = [*shlex.split(compiler), *flags, "-Werror", "-fsyntax-only", "-x", "c", os.devnull]
     try:
         tried = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True)
     except OSError:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``halfshell neighbors``, ``coordination``, ``nearest`` and ``rdf``: full lists, counts, g(r).
 
-Each finds its columns, says in a few lines what they are, and writes them where that is asked for.
+Each finds its columns, says in a few lines what they are, and writes them where that is wanted.
 """
 
 from __future__ import annotations
