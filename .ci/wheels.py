@@ -95,9 +95,9 @@ def build(python, archive, folder):
 def check_contents(wheel):
     with zipfile.ZipFile(wheel) as files:
         names = [Path(name) for name in files.namelist() if not name.endswith("/")]
-    package = [name for name in names if name.parts[0] == "halfshell"]
+    package = [name for name in names if name.parts[0] in ("halfshell", "halfshell_report")]
     described = [name for name in names if ".dist-info" in name.parts[0]]
-    assert len(package) + len(described) == len(names), "more than the package"
+    assert len(package) + len(described) == len(names), "more than the packages"
     odd = {name.suffix for name in package} - SUFFIXES
     assert not odd, f"files with {odd}"
     headers = {name.name for name in package if name.suffix == ".h"}

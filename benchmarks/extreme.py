@@ -3,7 +3,7 @@
 
     python benchmarks/extreme.py [NAME ...] [--size quick] [--output CSV]
 
-Every scene of `halfshell.scenes` has a twin: as many points, uniform in a cube of as many
+Every scene of `halfshell_report.scenes` has a twin: as many points, uniform in a cube of as many
 dimensions, periodic if the scene is, with a cutoff at which it has about as many pairs. The two
 take turns. Figures are medians; the ratio is given of the fastest turns too, which other
 programs disturb less. A ratio of 1 means that what is hard about the scene costs nothing.
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 import halfshell as hs
-from halfshell import scenes as extreme
+from halfshell_report import scenes as extreme
 from measure.machine import facts, pin_to_cores, usable_cores
 from measure.turns import Timing, Turn, plan_turn, take_turns
 from scenes.make import uniform

@@ -15,9 +15,9 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from halfshell._report.page.rows import ReportRow, read_csv
-from halfshell._report.page.table import SUMMARY, method_label, summary_cells
-from halfshell._report.page.words import duration, findings, methods_of, number, ratios
+from halfshell_report.page.rows import ReportRow, read_csv
+from halfshell_report.page.table import SUMMARY, method_label, summary_cells
+from halfshell_report.page.words import duration, findings, methods_of, number, ratios
 from pages.marks import Lines, fill, table
 
 __all__ = ["SECTIONS", "fill_page", "main"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is written down about `halfshell.scenes`: `tests/scenes.json` and `docs/scenes.md`.
+"""What is written down about `halfshell_report.scenes`: `tests/scenes.json` and `docs/scenes.md`.
 
     python tests/scene_files.py            compare
     python tests/scene_files.py --write    after scenes were added or changed on purpose
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import halfshell as hs
-from halfshell import scenes
+from halfshell_report import scenes
 
 FILE = Path(__file__).with_name("scenes.json")
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scenes.md"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What every measured library is to the runner, and our own search as one of them.
 
-How a library is called is said in `halfshell._peers`; here is what the runner needs besides:
+How a library is called is said in `halfshell_report.peers`; here is what the runner needs besides:
 keys to compare answers by, counts, batches, and how far rounding may lead it astray.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from halfshell._peers import Call, Library
+from halfshell_report.peers import Call, Library
 from libraries.agreement import Keys, half_keys
 from scenes import Scene
 

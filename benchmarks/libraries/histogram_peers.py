@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from halfshell._peers.adapters import columns
-from halfshell._peers.library import Floats
+from halfshell_report.peers.adapters import columns
+from halfshell_report.peers.library import Floats
 from libraries.contestant import Call, Contestant, Halfshell
 from libraries.peers import CKDTree, Corrfunc, Freud
 from scenes import Scene

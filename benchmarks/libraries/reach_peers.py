@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell._peers import in_space
+from halfshell_report.peers import in_space
 from libraries.contestant import Call, Contestant, Halfshell
 from libraries.peers import Ase, CKDTree, MatscipyNeighbours, PySPH
 from scenes import Scene

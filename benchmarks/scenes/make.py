@@ -3,7 +3,7 @@
 
 They come from the frozen stream of ``RandomState`` by additions, multiplications, divisions
 and square roots alone, in a fixed order; those are rounded the same everywhere. What can be
-made so from any stream is shared with `halfshell.scenes`.
+made so from any stream is shared with `halfshell_report.scenes`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell.scenes import _make
-from halfshell.scenes._make import FCC, cell_order, exponential, wrapped
+from halfshell_report.scenes import _make
+from halfshell_report.scenes._make import FCC, cell_order, exponential, wrapped
 from scenes.scene import Floats
 
 __all__ = [

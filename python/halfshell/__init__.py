@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from halfshell._functions.neighbors import neighbors
     from halfshell._functions.plot_pairs import plot_pairs
     from halfshell._functions.rdf import rdf
-    from halfshell._functions.report import report
     from halfshell._functions.stream import for_each_pair, iter_pairs
     from halfshell._functions.trajectory import trajectory_pairs
     from halfshell._include import get_include
@@ -84,7 +83,6 @@ __all__ = [
     "pairs_between",
     "plot_pairs",
     "rdf",
-    "report",
     "set_cache_limit",
     "trajectory_pairs",
     "verify",
@@ -121,7 +119,6 @@ _LATER = {
     "pair_histogram": "_functions.histogram",
     "plot_pairs": "_functions.plot_pairs",
     "rdf": "_functions.rdf",
-    "report": "_functions.report",
     "trajectory_pairs": "_functions.trajectory",
     "verify": "_check.verify",
 }

@@ -29,7 +29,8 @@ def pytest_configure(config):
     count as the caller's), of floating-point arithmetic inside NumPy, and of pytest.
     """
     files = [path for folder in (TESTS, BENCHMARKS) for path in folder.rglob("*.py")]
-    ours = "|".join(sorted({"halfshell", "__main__", *(path.stem for path in files)}))
+    ours = {"halfshell", "halfshell_report", "__main__", *(path.stem for path in files)}
+    ours = "|".join(sorted(ours))
     for line in (
         rf"default:::(?!({ours})(\.|$))",
         "error::RuntimeWarning:numpy",

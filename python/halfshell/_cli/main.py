@@ -14,7 +14,7 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -67,13 +67,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 class _Parser(argparse.ArgumentParser):
     """An argument parser whose complaints are one line, and which guesses no option.
 
-    It names the option or command that is spelled most like one that there is not.
+    It names the option or command that is spelled most like one that there is not. Options of
+    `halfshell_report` are added by `fill` when they are to be parsed, so that other commands do
+    not import it.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, fill: Callable[[Any], None] | None = None, **options: Any) -> None:
         super().__init__(**options, allow_abbrev=False)
+        self._fill = fill
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        if self._fill is not None:
+            fill, self._fill = self._fill, None
+            fill(self)
         found, rest = super().parse_known_args(args, namespace)
         if rest:  # here, where the options of the command are known
             self.error(f"unrecognized arguments: {' '.join(rest)}{self._hint(rest)}")
@@ -286,24 +292,32 @@ def _add_verify(commands: Any) -> None:
 
 
 def _add_bench(commands: Any) -> None:
-    from halfshell._cli.report import add_peers
-
     command = commands.add_parser(
-        "bench", help="run times on a file, ours and other libraries', whose answers come first"
-    )
-    _add_scene_options(command, has_kernel=False)
-    add_peers(command)
+        "bench", help="run times on a file, ours and other libraries', whose answers come first",
+        fill=_fill_bench,
+    )  # fmt: skip
     command.set_defaults(run=_run_bench)
 
 
-def _add_report(commands: Any) -> None:
-    from halfshell._cli.report import add_options
+def _fill_bench(command: argparse.ArgumentParser) -> None:
+    from halfshell_report.cli import add_peers
 
+    _add_scene_options(command, has_kernel=False)
+    add_peers(command)
+
+
+def _add_report(commands: Any) -> None:
     command = commands.add_parser(
-        "report", help="error against run time, of halfshell and other libraries, on hard scenes"
-    )
-    add_options(command)
+        "report", help="error against run time, of halfshell and other libraries, on hard scenes",
+        fill=_fill_report,
+    )  # fmt: skip
     command.set_defaults(run=_run_report)
+
+
+def _fill_report(command: argparse.ArgumentParser) -> None:
+    from halfshell_report.cli import add_options
+
+    add_options(command)
 
 
 # Commands ----------------------------------------------------------------------------------
@@ -334,13 +348,13 @@ def _run_verify(args: argparse.Namespace) -> int:
 
 
 def _run_bench(args: argparse.Namespace) -> int:
-    from halfshell._cli.bench import run
+    from halfshell_report.bench import run
 
     return run(args)
 
 
 def _run_report(args: argparse.Namespace) -> int:
-    from halfshell._cli.report import run
+    from halfshell_report.cli import run
 
     return run(args)
 

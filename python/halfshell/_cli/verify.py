@@ -19,17 +19,47 @@ from halfshell._check.reference import exact_square, reference_pairs
 from halfshell._check.verify import LIST, compare
 from halfshell._cli.errors import InputError, one_line
 from halfshell._cli.files import Scene
-from halfshell._cli.peers import PairList, ask_peer, find_peer
 from halfshell._cli.progress import progress_bar
 from halfshell._cli.scene import load_scene, unit_suffix
 from halfshell._terminal import printable
 
-__all__ = ["Check", "check_by_integers", "check_by_search", "run", "sample_points"]
+__all__ = ["Check", "PairList", "check_by_integers", "check_by_search", "run", "sample_points"]
 
 BLOCKS = 4  # neighbourhoods that a sample is made of
 EXAMPLES = 5  # wrong pairs that are shown
 POINTS_BY_INTEGERS = 400  # some 80,000 pairs of points: a few seconds in Python
 SEARCH_ROWS = 2_000_000  # rows that are compared with the search: some seconds
+
+
+@dataclass(frozen=True)
+class PairList:
+    """A list of pairs, of whatever author.
+
+    Attributes
+    ----------
+    i, j : ndarray of int64, shape (m,)
+    S : ndarray of int64, shape (m, d)
+    inclusive : bool
+        The rule of its author: ``d <= cutoff``, or ``d < cutoff``.
+    full : bool
+        Whether it has both directions of every pair.
+    """
+
+    i: NDArray[np.int64]
+    j: NDArray[np.int64]
+    S: NDArray[np.int64]
+    inclusive: bool
+    full: bool
+
+    def among(self, rows: NDArray[np.intp] | None, n: int) -> PairList:
+        """Return the pairs among some of n points, numbered by their place among these."""
+        if rows is None:
+            return self
+        place = np.full(n, -1, dtype=np.int64)
+        place[rows] = np.arange(len(rows))
+        i, j = place[self.i], place[self.j]
+        kept = (i >= 0) & (j >= 0)
+        return PairList(i[kept], j[kept], self.S[kept], self.inclusive, self.full)
 
 
 # Two checks --------------------------------------------------------------------------------
@@ -154,7 +184,11 @@ def run(args: Namespace) -> int:
     """Carry out ``halfshell verify``: 0 when the list is right, 1 when it is not."""
     if args.against and (args.strict or args.kernel):
         raise InputError("--strict and --kernel are for our own list, not with --against")
-    peer = find_peer(args.against) if args.against else None
+    peer = None
+    if args.against:
+        from halfshell_report.against import ask_peer, find_peer
+
+        peer = find_peer(args.against)
     scene, cutoff, _ = load_scene(args)
     checks = []
     try:
@@ -163,7 +197,7 @@ def run(args: Namespace) -> int:
             pairs = _own_list(scene, cutoff, args)
         else:
             author = peer.name_and_version()
-            pairs = ask_peer(peer, scene, cutoff)
+            pairs = PairList(*ask_peer(peer, scene, cutoff))
             checks.append(check_by_search(pairs, scene, cutoff))
         with progress_bar(args.progress and not args.json, "checking by integers") as advance:
             checks.append(check_by_integers(pairs, scene, cutoff, args.sample, advance))

@@ -12,7 +12,7 @@ import pytest
 
 import halfshell as hs
 from benchmark_modules import bench, only_in_a_checkout  # noqa: F401
-from halfshell import scenes
+from halfshell_report import scenes
 
 pytestmark = [pytest.mark.slow, only_in_a_checkout]
 

@@ -17,13 +17,13 @@ import pytest
 import halfshell as hs
 from halfshell import cli, selftest
 from halfshell._check.reference import reference_pairs
-from halfshell._cli import peers as cli_peers
 from halfshell._cli import scene as cli_scene
 from halfshell._cli import verify as cli_verify
 from halfshell._cli.errors import InputError
 from halfshell._cli.files import Scene, read_scene, replacing
 from halfshell._cli.output import write_csv
 from halfshell._convert import progress as bar
+from halfshell_report import against as cli_peers
 
 POINTS = np.random.default_rng(5).random((60, 3)) * 8
 BOX = np.array([[8.0, 0.0, 0.0], [1.0, 7.5, 0.0], [-0.5, 2.0, 9.0]])
@@ -618,7 +618,7 @@ def test_wrong_rows_are_found_both_ways(monkeypatch, command, npz):
         wrong_i = np.r_[i[1:], i[5], 3]  # the first missed, one twice, one invented
         wrong_j = np.r_[j[1:], j[5], 3]
         shifts = np.r_[S[1:], S[5:6], [[9, 9, 9]]]
-        return cli_peers.PairList(wrong_i, wrong_j, shifts, inclusive=True, full=False)
+        return wrong_i, wrong_j, shifts, True, False
 
     peer = cli_peers.Peer((), "oracle", ask)
     monkeypatch.setitem(cli_peers.PEERS, "oracle", peer)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import scenes
+from halfshell_report import scenes
 
 distances = pytest.importorskip("MDAnalysis.lib.distances", reason="MDAnalysis is not installed")
 from halfshell.compat import mdanalysis as ours  # noqa: E402

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import scenes
+from halfshell_report import scenes
 from oracles import same_arrays
 from reach_scenes import SYMMETRIC
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import _show, scenes, structures
+from halfshell import _show, structures
+from halfshell_report import report, scenes
 
 POINTS = np.random.default_rng(5).random((40, 3))
 BOX = np.ones(3)
@@ -36,7 +37,7 @@ def _stale():
 
 NODES = hs.NodeList("<script>&", POINTS, np.full(len(POINTS), 10.0))
 LINKS = hs.Connectivity([NODES])
-ROWS = hs.report(["near-ties"], methods=["exact"], size="small")
+ROWS = report(["near-ties"], methods=["exact"], size="small")
 SCENE = scenes.load("disks-touching", size="small")
 TABLE = hs.neighbors(POINTS, 0.3, box=BOX, quantities="jdDS")
 CELLS = hs.CellList(POINTS, 0.2, box=BOX)

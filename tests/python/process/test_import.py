@@ -41,6 +41,7 @@ print(json.dumps(sorted(set(sys.modules) - before)))
     loaded = fresh(script)
     own = {name.partition(".")[2] for name in loaded if name.startswith("halfshell.")}
     assert own <= OWN
+    assert not [name for name in loaded if name.startswith("halfshell_report")]
     others = {name.partition(".")[0] for name in loaded} - {"halfshell"}
     assert others <= {"__future__", "cython_runtime"} | set(sys.builtin_module_names)
     # Known to be slow, wherever they come from.

@@ -12,10 +12,15 @@ import numpy as np
 import pytest
 
 import halfshell as hs
+import halfshell_report
 from checkout import ROOT
 
 MODULES = ["halfshell", *(m.name for m in pkgutil.walk_packages(hs.__path__, "halfshell."))]
 ELSEWHERE = ["torch", "jax", "dask", "_functions.dask_scene"]  # frameworks/ and distributed/
+MODULES += [
+    "halfshell_report",
+    *(m.name for m in pkgutil.walk_packages(halfshell_report.__path__, "halfshell_report.")),
+]
 MODULES = [m for m in MODULES if m not in [f"halfshell.{name}" for name in ELSEWHERE]]
 OWNERS = {
     "halfshell.compat.ase": "ase",

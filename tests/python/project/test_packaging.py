@@ -68,7 +68,9 @@ def test_a_wheel_has_the_headers_and_nothing_else_of_the_core(copy, tmp_path):
     package = tmp_path / "wheel" / "halfshell"
     assert sorted(path.name for path in (package / "include").iterdir()) == HEADERS
     assert not list(package.rglob("*.c"))
-    assert (package / "py.typed").exists() and (package / "scenes" / "__init__.py").exists()
+    for folder in (package, package.parent / "halfshell_report"):
+        assert (folder / "py.typed").exists() and (folder / "__init__.py").exists()
+    assert (package.parent / "halfshell_report" / "scenes" / "__init__.py").exists()
 
 
 def test_a_source_distribution_has_the_whole_checkout(copy, tmp_path):

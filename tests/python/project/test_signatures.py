@@ -7,7 +7,9 @@ import re
 import pytest
 
 import halfshell as hs
-from halfshell import scenes, selftest, structures
+import halfshell_report
+from halfshell import selftest, structures
+from halfshell_report import scenes
 
 CLASSES = [value for name in hs.__all__ if inspect.isclass(value := getattr(hs, name))]
 FUNCTIONS = {
@@ -15,7 +17,7 @@ FUNCTIONS = {
 }
 OF_MODULES = {
     f"{module.__name__}.{name}": value
-    for module in (scenes, selftest, structures)
+    for module in (halfshell_report, scenes, selftest, structures)
     for name in module.__all__
     if inspect.isfunction(value := getattr(module, name))
 }

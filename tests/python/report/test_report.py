@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import scenes
 from halfshell._check.reference import exact_square, reach_by_radii, reference_pairs
-from halfshell._report.measure.facts import machine_facts
-from halfshell._report.measure.run import SCENES
-from halfshell._report.measure.timing import Patience, take_turns
-from halfshell._report.page.html import page
-from halfshell._report.page.rows import STATUSES, ReportRow, read_csv, write_csv
-from halfshell._report.truth.pairs import true_pairs
-from halfshell._report.truth.reach import Balls, Ellipsoids, reach_of
+from halfshell_report import report, scenes
+from halfshell_report.measure.facts import machine_facts
+from halfshell_report.measure.run import SCENES
+from halfshell_report.measure.timing import Patience, take_turns
+from halfshell_report.page.html import page
+from halfshell_report.page.rows import STATUSES, ReportRow, read_csv, write_csv
+from halfshell_report.truth.pairs import true_pairs
+from halfshell_report.truth.reach import Balls, Ellipsoids, reach_of
 from needle_scenes import is_reached, needle_pairs
 from oracles import remembered
 
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def rows():
     """Two scenes, one of which moves, by every method of ours and SciPy's tree."""
-    return hs.report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
+    return report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
 
 
 # ---- the truth and our own search on every scene -------------------------------------------
@@ -133,7 +133,7 @@ def test_a_support_that_is_too_thin_for_the_truth_is_named():
 
 
 def test_rounded_sums_are_told_from_real_ones():
-    rows = hs.report(["balls-rounded", "balls-equal"], peers=["cKDTree", "vesin"], size="small")
+    rows = report(["balls-rounded", "balls-equal"], peers=["cKDTree", "vesin"], size="small")
     at = {(row.scene, row.method): row for row in rows}
     rounded = at["balls-rounded", "exact"]
     assert rounded.wrong == 0 and rounded.ties > 0 and rounded.force_error is None
@@ -150,7 +150,7 @@ def test_rounded_sums_are_told_from_real_ones():
 
 
 def test_needles_are_decided_wrongly_in_float64():
-    rows = hs.report(["needles", "needles-strict"], peers=["cKDTree", "NumPy", "vesin"],
+    rows = report(["needles", "needles-strict"], peers=["cKDTree", "NumPy", "vesin"],
                      size="small")  # fmt: skip
     at = {(row.scene, row.method): row for row in rows}
     for name in ("needles", "needles-strict"):
@@ -165,7 +165,7 @@ def test_needles_are_decided_wrongly_in_float64():
 
 
 def test_exact_is_right_on_every_scene_and_rounding_is_not():
-    rows = hs.report(methods=["exact", "double", "single"], size="small")
+    rows = report(methods=["exact", "double", "single"], size="small")
     assert list(dict.fromkeys(row.scene for row in rows)) == list(SCENES)
     assert {row.status for row in rows} == {"ok"}
     wrong = {method: {row.scene for row in rows if row.method == method and row.wrong}
@@ -209,24 +209,24 @@ def test_kept_lists_have_rows_of_their_own(rows):
 
 
 def test_scenes_in_float32_are_not_rounded_again():
-    (row,) = hs.report(["float32-ulp"], methods=["float32"], size="small")
+    (row,) = report(["float32-ulp"], methods=["float32"], size="small")
     assert (row.status, row.wrong) == ("not offered", None)
     assert "float32 as they are" in row.note
 
 
 def test_names_are_checked():
     with pytest.raises(ValueError, match=r"there is no scene 'near-tie'; choose from near-ties"):
-        hs.report(["near-tie"])
+        report(["near-tie"])
     with pytest.raises(ValueError, match="there is no method 'exakt'; choose from exact"):
-        hs.report(["uniform"], methods=["exakt"])
+        report(["uniform"], methods=["exakt"])
     with pytest.raises(ValueError, match="there is no peer 'vesn'; choose from vesin"):
-        hs.report(["uniform"], peers=["vesn"])
+        report(["uniform"], peers=["vesn"])
     with pytest.raises(ValueError, match="size must be one of"):
-        hs.report(["uniform"], size="big")
+        report(["uniform"], size="big")
     with pytest.raises(ValueError, match="patience must be"):
-        hs.report(["uniform"], patience=-1.0)
+        report(["uniform"], patience=-1.0)
     with pytest.raises(TypeError, match="a sequence of names"):
-        hs.report("uniform")
+        report("uniform")
 
 
 def test_csv_is_read_back_as_it_was(rows):

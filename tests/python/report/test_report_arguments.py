@@ -6,7 +6,8 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
-from halfshell._report.measure import run
+from halfshell_report import report
+from halfshell_report.measure import run
 
 
 class Gone:
@@ -26,7 +27,7 @@ class Gone:
 def test_what_is_no_sequence_of_names(name, value):
     options = {"scenes": [], name: value}
     with pytest.raises(TypeError, match=rf"^{name} must be a sequence of names") as refused:
-        hs.report(**options)
+        report(**options)
     assert "\n" not in str(refused.value) and len(str(refused.value)) < 300
     if isinstance(value, Gone):
         assert isinstance(refused.value.__cause__, KeyError)
@@ -34,25 +35,25 @@ def test_what_is_no_sequence_of_names(name, value):
 
 def test_unknown_names_are_plain_strings():
     with pytest.raises(ValueError, match=r"^there is no scene 'x'; choose from"):
-        hs.report(np.array(["x"]))
+        report(np.array(["x"]))
 
 
 @pytest.mark.parametrize("value", ["x", [1], np.zeros((2, 2)), 1j, object()])
 def test_patience_that_is_no_number(value):
     with pytest.raises(TypeError, match=r"^patience must be a positive number of seconds, got"):
-        hs.report([], patience=value)
+        report([], patience=value)
 
 
 @pytest.mark.parametrize("value", [0.0, -1, float("nan"), float("inf")])
 def test_patience_that_is_not_positive(value):
     with pytest.raises(ValueError, match=r"^patience must be a positive number of seconds, got"):
-        hs.report([], patience=value)
+        report([], patience=value)
 
 
 @pytest.mark.parametrize("value", [5, None, [1], np.zeros((2, 2))])
 def test_sizes_are_strings(value):
     with pytest.raises(TypeError, match=r"^size must be a string"):
-        hs.report([], size=value)
+        report([], size=value)
 
 
 def test_an_unknown_kernel_is_refused_before_any_scene(monkeypatch, capsys, tmp_path):
@@ -64,15 +65,15 @@ def test_an_unknown_kernel_is_refused_before_any_scene(monkeypatch, capsys, tmp_
     assert err.startswith("halfshell: error: HALFSHELL_KERNEL=nonsense: is not a kernel")
     assert err.count("\n") == 1
     with pytest.raises(ValueError, match=r"^HALFSHELL_KERNEL=nonsense: is not a kernel"):
-        hs.report(["slab"], methods=["exact"], size="small")
+        report(["slab"], methods=["exact"], size="small")
 
 
 @pytest.mark.slow
 def test_libraries_are_all_or_none():
     options = {"scenes": ["near-ties"], "methods": ["exact"], "size": "small"}
-    (alone,) = hs.report(peers="none", **options)
+    (alone,) = report(peers="none", **options)
     assert alone.method == "exact"
     with pytest.raises(TypeError, match="peers must be a sequence of names, got the string 'ase'"):
-        hs.report(peers="ase", **options)
-    every = hs.report(peers="all", patience=1.0, **options)
+        report(peers="ase", **options)
+    every = report(peers="all", patience=1.0, **options)
     assert {row.method for row in every} == {"exact", *run.PEERS}

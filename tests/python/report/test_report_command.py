@@ -8,12 +8,12 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
-from halfshell._cli import report
-from halfshell._peers import LIBRARIES
-from halfshell._report.measure import run
-from halfshell._report.measure.peers import PeerProcess
-from halfshell._report.measure.run import SCENES
-from halfshell._report.page.rows import read_csv
+from halfshell_report import cli as report_cli
+from halfshell_report.measure import run
+from halfshell_report.measure.peers import PeerProcess
+from halfshell_report.measure.run import SCENES
+from halfshell_report.page.rows import read_csv
+from halfshell_report.peers import LIBRARIES
 from report_helpers import fake, parse, row
 
 pytestmark = pytest.mark.slow
@@ -133,6 +133,6 @@ def test_all_missing_extras_are_named_at_once(command, monkeypatch):
 
 
 def test_quick_is_a_choice_of_scenes_that_there_are():
-    assert set(report.QUICK) <= set(SCENES)
-    assert any(name.startswith("balls-") for name in report.QUICK)
-    assert {"head-on", "stiff-chain"} <= set(report.QUICK)
+    assert set(report_cli.QUICK) <= set(SCENES)
+    assert any(name.startswith("balls-") for name in report_cli.QUICK)
+    assert {"head-on", "stiff-chain"} <= set(report_cli.QUICK)

@@ -7,13 +7,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from halfshell import scenes
 from halfshell._check.reference import exact_square, exact_vector
-from halfshell._report.physics.dynamics import EveryStep, Stale, Verlet, run_nve
-from halfshell._report.physics.forces import force_errors, reference_forces, why_no_forces
-from halfshell._report.truth.accuracy import Sample, pair_errors, quantity_errors, sample_of
-from halfshell._report.truth.answer import Answer, row_keys
-from halfshell._report.truth.pairs import exact_vectors, true_pairs
+from halfshell_report import scenes
+from halfshell_report.physics.dynamics import EveryStep, Stale, Verlet, run_nve
+from halfshell_report.physics.forces import force_errors, reference_forces, why_no_forces
+from halfshell_report.truth.accuracy import Sample, pair_errors, quantity_errors, sample_of
+from halfshell_report.truth.answer import Answer, row_keys
+from halfshell_report.truth.pairs import exact_vectors, true_pairs
 from oracles import lattice, random_scene
 
 

@@ -9,19 +9,19 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
-import halfshell as hs
 from checkout import ROOT
-from halfshell._peers import LIBRARIES
-from halfshell._report.measure.facts import machine_facts
-from halfshell._report.page import figures, html, looks, overview, standing, table, words
-from halfshell._report.page.rows import read_csv
+from halfshell_report import report
+from halfshell_report.measure.facts import machine_facts
+from halfshell_report.page import figures, html, looks, overview, standing, table, words
+from halfshell_report.page.rows import read_csv
+from halfshell_report.peers import LIBRARIES
 from report_helpers import bare, parse, row
 
 
 @pytest.fixture(scope="module")
 def rows():
     """Two scenes, one of which moves, by every method of ours and SciPy's tree."""
-    return hs.report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
+    return report(["near-ties", "head-on"], peers=["cKDTree"], size="small")
 
 
 def test_words_say_what_the_rows_say():

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell._peers import LIBRARIES, Library, Question, wrapped
-from halfshell._report.measure.peers import PeerProcess
+from halfshell_report import report
+from halfshell_report.measure.peers import PeerProcess
+from halfshell_report.peers import LIBRARIES, Library, Question, wrapped
 from report_helpers import fake, question
 
 pytestmark = pytest.mark.slow
@@ -73,7 +74,7 @@ def test_rows_of_missing_libraries_say_so(monkeypatch):
     start = PeerProcess.__init__
     monkeypatch.setattr(PeerProcess, "__init__", lambda self, name, *rest: start(
         self, name, *rest, command=missing))  # fmt: skip
-    rows = hs.report(["uniform"], methods=["exact"], peers=["vesin"], size="small")
+    rows = report(["uniform"], methods=["exact"], peers=["vesin"], size="small")
     (row,) = [row for row in rows if row.kind == "peer"]
     assert (row.method, row.status, row.note) == ("vesin", "not installed", "pip install vesin")
     assert row.wrong is None and row.seconds is None
@@ -114,7 +115,7 @@ def test_installed_libraries_are_right_where_nothing_is_hard(name):
         pytest.skip(f"{name} is not installed")
     if name == "NumPy":  # for supports alone: see below
         return
-    rows = hs.report(["uniform", "offset-1e3"], methods=[], peers=[name], size="small")
+    rows = report(["uniform", "offset-1e3"], methods=[], peers=[name], size="small")
     assert {row.status for row in rows} <= {"ok", "not offered"}
     done = [row for row in rows if row.status == "ok"]
     assert done

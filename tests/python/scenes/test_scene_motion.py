@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import halfshell as hs
-from halfshell import scenes
+from halfshell_report import scenes
 
 MOVING = [name for name in scenes.names() if scenes.load(name, "small").motion is not None]
 

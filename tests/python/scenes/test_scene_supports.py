@@ -8,7 +8,7 @@ import pytest
 
 import halfshell as hs
 from checkout import TESTS
-from halfshell import scenes
+from halfshell_report import scenes
 from needle_scenes import needle_pairs
 
 SPEC = importlib.util.spec_from_file_location("scene_files", TESTS / "scene_files.py")

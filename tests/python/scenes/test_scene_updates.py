@@ -9,7 +9,7 @@ import pytest
 import dynamic_model
 import halfshell as hs
 from checkout import TESTS
-from halfshell import scenes
+from halfshell_report import scenes
 
 SPEC = importlib.util.spec_from_file_location("scene_files", TESTS / "scene_files.py")
 scene_files = importlib.util.module_from_spec(SPEC)

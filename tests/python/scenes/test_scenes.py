@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The scenes of `halfshell.scenes`: exact answers, the same bits everywhere, said what for."""
+"""`halfshell_report.scenes`: exact answers, the same bits everywhere, said what for."""
 
 import dataclasses
 import importlib.util
@@ -12,7 +12,7 @@ import pytest
 
 import halfshell as hs
 from checkout import TESTS
-from halfshell import scenes
+from halfshell_report import scenes
 from oracles import check, same_arrays
 
 SOURCE = TESTS / "scene_files.py"
@@ -157,7 +157,7 @@ def test_names_and_sizes_are_strings(name, size):
 
 
 def test_two_scenes_of_one_name_are_refused():
-    add = importlib.import_module("halfshell.scenes._catalogue").add
+    add = importlib.import_module("halfshell_report.scenes._catalogue").add
     with pytest.raises(ValueError, match="two scenes 'uniform'"):
         add({"uniform": ("again",)})(lambda size: None)
 
@@ -165,6 +165,6 @@ def test_two_scenes_of_one_name_are_refused():
 def test_examples_of_the_scenes_run():
     doctest = importlib.import_module("doctest")
     for part in ("_scene", "_catalogue"):
-        module = importlib.import_module(f"halfshell.scenes.{part}")
+        module = importlib.import_module(f"halfshell_report.scenes.{part}")
         failures, count = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
         assert (failures, count > 2) == (0, True)

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from halfshell._report.measure.timing import Patience
-from halfshell._report.page.rows import ReportRow
+from halfshell_report.measure.timing import Patience
+from halfshell_report.page.rows import ReportRow
 
 
 def row(method, kind="halfshell", **other):
@@ -40,8 +40,8 @@ def fake(prepare, module="json"):
     code = f"""
         import importlib, os, time
         import numpy as np
-        from halfshell._peers import LIBRARIES, Library
-        from halfshell._report.measure.worker import main
+        from halfshell_report.peers import LIBRARIES, Library
+        from halfshell_report.measure.worker import main
 
         class Fake(Library):
             name = "fake"

@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One adapter for each library.
+
+The first line of each class tells the method, whether its lists are half or full, and its rule
+at exactly the cutoff (strict: such a pair is left out). pykdtree has no adapter: it finds
+nearest neighbours only.
+"""
+
+from __future__ import annotations
+
+import importlib
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from halfshell_report.peers.float64 import all_reached, reached
+from halfshell_report.peers.library import Call, Floats, Library, in_space
+
+__all__ = ["LIBRARIES"]
+
+
+class Vesin(Library):
+    """vesin: cell list, half lists; strict."""
+
+    name = distribution = module = "vesin"
+    quantities = "ijdDS"
+    flat = True
+
+    def prepare(self, question: Any) -> Call:
+        """Keep one calculator, as its documentation advises."""
+        vesin = importlib.import_module("vesin")
+        points, rows, periodic = in_space(question)
+        rows = np.zeros((3, 3)) if rows is None else rows
+        search = vesin.NeighborList(cutoff=question.cutoff, full_list=False, n_threads=1)
+        wanted = "i" if question.task == "count" else question.quantities
+        call = partial(search.compute, points, rows, periodic, wanted)
+        return call if question.task == "pairs" else lambda: len(call()[0])
+
+
+class CKDTree(Library):
+    """SciPy: k-d tree, half lists; inclusive; points inside the box, one image of a pair."""
+
+    name = "cKDTree"
+    distribution = "scipy"
+    module = "scipy.spatial"
+    inclusive = True
+    dims = tuple(range(1, 9))
+    triclinic = False
+    images = False
+    inside = True
+    radii = True
+    remark_on_radii = (
+        "all pairs within the largest reach, then distances in float64 against rounded sums"
+    )
+    supports = True
+    remark_on_supports = "all pairs within the largest reach, then |H D| in float64"
+
+    def prepare(self, question: Any) -> Call:
+        """Build the cheaper, unbalanced tree and query it."""
+        tree = importlib.import_module("scipy.spatial").cKDTree
+        lengths = None
+        if question.rows is not None:
+            lengths = np.where(question.periodic, np.diag(question.rows), 0.0)
+        build = partial(
+            tree, question.points, boxsize=lengths, balanced_tree=False, compact_nodes=False
+        )
+        if question.task == "count":
+
+            def count() -> int:
+                built = build()
+                return int(built.count_neighbors(built, question.cutoff) - question.n) // 2
+
+            return count
+        if question.radii is None and question.supports is None:
+            return lambda: build().query_pairs(question.cutoff, output_type="ndarray")
+        return lambda: reached(
+            question, build().query_pairs(question.cutoff, output_type="ndarray")
+        )
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return the columns of its (m, 2) array."""
+        return result[:, 0], result[:, 1]
+
+
+class NeighborlistRs(Library):
+    """neighborlist-rs: cells, half lists with shifts; strict; box vectors are columns."""
+
+    name = "neighborlist-rs"
+    distribution = "neighborlist-rs"
+    module = "neighborlist_rs"
+    quantities = "ijS"
+    own_images_twice = True
+    remark = "a point's own images come in both directions, other pairs once"
+
+    def prepare(self, question: Any) -> Call:
+        """Make its box beforehand; without threads."""
+        library = importlib.import_module("neighborlist_rs")
+        library.set_num_threads(1)
+        cell = None
+        if question.rows is not None:
+            cell = library.PyCell(question.rows.T.tolist(), [bool(x) for x in question.periodic])
+        call = partial(
+            library.build_neighborlists, cell, question.points, question.cutoff, parallel=False
+        )
+        return call if question.task == "pairs" else lambda: call()["edge_index"].shape[1]
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return the rows of its (2, m) array."""
+        return tuple(result["edge_index"])
+
+    def shifts(self, result: Any) -> Any:
+        """Return its shifts."""
+        return result["shift"]
+
+
+class MatscipyNeighbours(Library):
+    """matscipy-neighbours: cells, full lists of int32; strict."""
+
+    name = distribution = "matscipy-neighbours"
+    module = "matscipy_neighbours"
+    full = True
+    quantities = "ijdDS"
+    flat = True
+    radii = True
+
+    def prepare(self, question: Any) -> Call:
+        """Return its call on explicit arrays."""
+        library = importlib.import_module(self.module)
+        points, rows, periodic = in_space(question)
+        return partial(
+            library.neighbour_list, question.quantities, positions=points, cell=rows,
+            pbc=periodic, cutoff=question.cutoff if question.radii is None else question.radii,
+        )  # fmt: skip
+
+
+class Matscipy(MatscipyNeighbours):
+    """matscipy: the same call, from the older package; full lists of int32; strict."""
+
+    name = distribution = "matscipy"
+    module = "matscipy.neighbours"
+
+
+class Ase(Library):
+    """ASE: cells in NumPy, full lists; strict."""
+
+    name = distribution = module = "ase"
+    full = True
+    quantities = "ijdDS"
+    flat = True
+    radii = True
+
+    def prepare(self, question: Any) -> Call:
+        """Return its call on explicit arrays, without an Atoms object."""
+        library = importlib.import_module("ase.neighborlist")
+        points, rows, periodic = in_space(question)
+        rows = np.zeros((3, 3)) if rows is None else rows
+        return partial(
+            library.primitive_neighbor_list, question.quantities, periodic, rows, points,
+            question.cutoff if question.radii is None else question.radii,
+        )  # fmt: skip
+
+
+class MDAnalysis(Library):
+    """MDAnalysis: grid or tree, half lists; float32 coordinates; inclusive; one image."""
+
+    name = distribution = module = "MDAnalysis"
+    inclusive = True
+    images = False
+    some_axes = False
+    float_bits = 24
+    quantities = "ijd"
+    remark = "takes float32 coordinates and a box of lengths and angles"
+
+    def refuses(self, question: Any) -> str | None:
+        """Refuse a box that its six numbers cannot express too."""
+        rows = question.rows
+        reason = super().refuses(question)
+        if reason is None and rows is not None and rows.ndim == 2 and (
+            np.any(np.triu(rows, 1)) or np.any(np.diag(rows) <= 0.0)
+        ):  # fmt: skip
+            return "box not lower triangular"
+        return reason
+
+    def prepare(self, question: Any) -> Call:
+        """Give it float32 points and its six box numbers."""
+        library = importlib.import_module("MDAnalysis.lib.distances")
+        points, rows, _ = in_space(question)
+        box = None
+        if rows is not None:
+            box = importlib.import_module("MDAnalysis.lib.mdamath").triclinic_box(*rows)
+        return partial(
+            library.self_capped_distance, points.astype(np.float32), question.cutoff, box=box,
+            return_distances="d" in question.quantities,
+        )  # fmt: skip
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return the columns of its (m, 2) array."""
+        pairs = result[0] if isinstance(result, tuple) else result
+        return pairs[:, 0], pairs[:, 1]
+
+    def distances(self, result: Any) -> Any:
+        """Return what stands beside its array."""
+        return result[1]
+
+
+class Freud(Library):
+    """freud: tree of boxes, full lists; float32; strict; one image of a pair."""
+
+    name = "freud"
+    distribution = "freud-analysis"
+    module = "freud"
+    full = True
+    dims = (2, 3)
+    images = False
+    inside = True
+    float_bits = 24
+    quantities = "ijdD"
+    remark = "computes in float32; without a box its points are centred in one beforehand"
+
+    def prepare(self, question: Any) -> Call:
+        """Use its tree, faster than its cell list; open space is a wide box round the origin."""
+        freud = importlib.import_module("freud")
+        freud.parallel.set_num_threads(1)
+        given, rows = question.points, question.rows
+        if rows is None:
+            low, high = given.min(axis=0), given.max(axis=0)
+            given = given - (low + 0.5 * (high - low))
+            length = (high - low).max() + 3.0 * question.cutoff
+            box = {2: freud.box.Box.square, 3: freud.box.Box.cube}[question.dim](length)
+        else:
+            box = freud.box.Box.from_matrix(columns(rows))
+        points = np.zeros((question.n, 3), dtype=np.float32)
+        points[:, : question.dim] = given
+        if rows is not None and not all(question.periodic):
+            box.periodic = [*question.periodic, *[False] * (3 - question.dim)]
+        arguments = {"r_max": question.cutoff, "exclude_ii": True}
+        tree = freud.locality.AABBQuery
+        return lambda: tree(box, points).query(points, arguments).toNeighborList()
+
+    def refuses(self, question: Any) -> str | None:
+        """Refuse a box that is not in its lower-triangular form too."""
+        reason = super().refuses(question)
+        if reason is None and question.rows is not None and np.any(np.triu(question.rows, 1)):
+            return "box not lower triangular"
+        return reason
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return the columns of its (m, 2) array."""
+        return result[:][:, 0], result[:][:, 1]
+
+    def distances(self, result: Any) -> Any:
+        """Return its distances, which are float32."""
+        return result.distances
+
+    def vectors(self, result: Any) -> Any:
+        """Return its vectors, which are float32 and always have three components."""
+        return result.vectors
+
+
+def columns(rows: Floats) -> Floats:
+    """Box vectors as the columns of a 3 by 3 matrix, with a height of 0 for a plane."""
+    matrix = np.zeros((3, 3))
+    matrix[: len(rows), : len(rows)] = rows.T
+    return matrix
+
+
+class Pymatgen(Library):
+    """pymatgen: cells, full lists with each point itself; a tolerance at the cutoff."""
+
+    name = distribution = module = "pymatgen"
+    inclusive = True
+    full = True
+    quantities = "ijdS"
+    open_space = False
+    tolerance = 1e-8
+    remark = "keeps pairs up to 1e-8 beyond the cutoff on purpose; they count as spurious"
+
+    def prepare(self, question: Any) -> Call:
+        """Call the compiled function beneath its structures."""
+        search = importlib.import_module("pymatgen.optimization.neighbors")
+        points, rows, periodic = in_space(question)
+        return partial(
+            search.find_points_in_spheres, points, points, question.cutoff,
+            np.array(periodic, dtype=np.int64), np.ascontiguousarray(rows),
+        )  # fmt: skip
+
+    def _others(self, result: Any) -> NDArray[np.bool_]:
+        """Mark what is left without each point itself."""
+        others: NDArray[np.bool_] = result[0] != result[1]
+        others |= (result[2] != 0.0).any(axis=1)
+        return others
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return both indices without each point itself."""
+        others = self._others(result)
+        return result[0][others], result[1][others]
+
+    def shifts(self, result: Any) -> Any:
+        """Return its shifts, which are floats, without each point itself."""
+        return np.rint(result[2][self._others(result)])
+
+    def distances(self, result: Any) -> Any:
+        """Return its distances without each point itself."""
+        return result[3][self._others(result)]
+
+
+class NumPy(Library):
+    """NumPy: |H D| of all pairs in float64, where points have supports; inclusive; one image."""
+
+    name = "NumPy"
+    distribution = module = "numpy"
+    inclusive = True
+    dims = (1, 2, 3)
+    triclinic = False
+    images = False
+    radii = True
+    supports = True
+    remark_on_supports = "|H D| of all pairs in float64"
+    most_points = 10_000
+
+    def refuses(self, question: Any) -> str | None:
+        """Refuse what cKDTree does with the same arithmetic, and what would take minutes."""
+        if question.supports is None:
+            return "distances, for which cKDTree stands"
+        if question.n > self.most_points:
+            return f"more than {self.most_points:,} points, of which it looks at all pairs"
+        return super().refuses(question)
+
+    def prepare(self, question: Any) -> Call:
+        """Return what looks at the points row by row."""
+        found = partial(all_reached, question)
+        return found if question.task == "pairs" else lambda: len(found())
+
+    def indices(self, result: Any) -> tuple[Any, Any]:
+        """Return the columns of its (m, 2) array."""
+        return result[:, 0], result[:, 1]
+
+
+LIBRARIES: dict[str, Library] = {
+    library.name: library
+    for library in (
+        Vesin(),
+        CKDTree(),
+        NeighborlistRs(),
+        MatscipyNeighbours(),
+        Matscipy(),
+        MDAnalysis(),
+        Freud(),
+        Pymatgen(),
+        Ase(),
+        NumPy(),
+    )
+}
