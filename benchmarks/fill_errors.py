@@ -15,9 +15,17 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from halfshell_report.page.rows import ReportRow, read_csv
-from halfshell_report.page.table import SUMMARY, method_label, summary_cells
-from halfshell_report.page.words import duration, findings, methods_of, number, ratios
+from halfshell_report.findings import (
+    SUMMARY,
+    duration,
+    findings,
+    method_label,
+    methods_of,
+    number,
+    ratios,
+    summary_cells,
+)
+from halfshell_report.rows import ReportRow, read_csv
 from pages.marks import Lines, fill, table
 
 __all__ = ["SECTIONS", "fill_page", "main"]

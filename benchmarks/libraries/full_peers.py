@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell_report.peers import in_space
-from halfshell_report.peers.adapters import columns
+from halfshell_report.peers import columns, in_space
 from libraries import histogram_peers, nearest_peers, reach_peers
 from libraries.contestant import Call, Contestant, Halfshell
 from libraries.peers import Ase, CKDTree, Freud, MatscipyNeighbours, MDAnalysis, Vesin

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell_report.peers.adapters import columns
-from halfshell_report.peers.library import Floats
+from halfshell_report.peers import Floats, columns
 from libraries.contestant import Call, Contestant, Halfshell
 from libraries.peers import CKDTree, Corrfunc, Freud
 from scenes import Scene

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell_report.peers.adapters import columns
+from halfshell_report.peers import columns
 from libraries.contestant import Call, Contestant, Halfshell
 from libraries.peers import CKDTree, Freud, PyKDTree
 from scenes import Scene

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The libraries that ours is measured against, as contestants.
 
-How each is called stands in `halfshell_report.peers.adapters`; here is what only measuring needs:
+How each is called stands in `halfshell_report.peers`; here is what only measuring needs:
 how many pairs a slow one can list in reasonable time, batches, and a library that counts.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from halfshell_report.peers import adapters
+from halfshell_report import peers as adapters
 from libraries.contestant import Call, Contestant
 from scenes import Scene
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from halfshell._convert.foreign import is_a, kind_of, shown, told
 from halfshell._convert.lengths import as_number
 from halfshell._machine import unknown_kernel
-from halfshell_report.page.rows import ReportRow
+from halfshell_report.rows import ReportRow
 
 __all__ = ["ReportRow", "report"]
 
@@ -88,7 +88,7 @@ def report(
     >>> [(row.method, row.wrong > 0) for row in rows]
     [('exact', False), ('single', True)]
     """
-    from halfshell_report.measure.run import plan_of, run
+    from halfshell_report.run import plan_of, run
 
     plan = plan_of(
         _names(scenes, "scenes"),

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``halfshell report``: error against run time, in the terminal, as CSV and as a page."""
+"""``halfshell report`` and ``halfshell bench``: in the terminal, as CSV, as a page, as JSON."""
 
 from __future__ import annotations
 
 import io
+import json
 import math
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
@@ -14,14 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.files import replacing
-from halfshell._machine import unknown_kernel
+from halfshell._cli.scene import load_scene, unit_suffix
+from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
 if TYPE_CHECKING:
-    from halfshell_report.measure.run import Plan
-    from halfshell_report.page.rows import ReportRow
+    from halfshell_report.rows import ReportRow
+    from halfshell_report.run import Plan
 
-__all__ = ["add_options", "add_peers", "run"]
+__all__ = ["add_options", "add_peers", "run", "run_bench"]
 
 #: What ``--quick`` runs unless scenes are named: one of each kind, under a minute in all.
 QUICK = (
@@ -88,7 +90,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 def run(args: Namespace) -> int:
     """Carry out ``halfshell report``: 0, or 1 if an exact method was wrong."""
-    _require()
+    _require("report", "scipy.spatial", "matplotlib.figure", "rich.console")
     if args.list:
         return _list()
     plan = _plan(args)
@@ -100,7 +102,7 @@ def run(args: Namespace) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: {one_line(error)}") from None
-    from halfshell_report.measure.run import run as run_report
+    from halfshell_report.run import run as run_report
 
     if plan.size == "full":
         print(_forecast(plan), file=sys.stderr)
@@ -113,23 +115,22 @@ def run(args: Namespace) -> int:
     return int(any(row.wrong for row in rows if row.method in ("exact", "verlet")))
 
 
-def _require() -> None:
-    """Import what the report needs, before any work is done for it."""
+def _require(command: str, *modules: str) -> None:
+    """Import what a command needs, before any work is done for it."""
     missing = []
-    for module, package in (("scipy.spatial", "scipy"), ("matplotlib.figure", "matplotlib"),
-                            ("rich.console", "rich")):  # fmt: skip
+    for module in modules:
         try:
             __import__(module)
         except ImportError:
-            missing.append(package)
+            missing.append(module.partition(".")[0])
     if missing:
-        raise missing_extra("report", *missing)
+        raise missing_extra(command, *missing)
 
 
 def _list() -> int:
     from halfshell_report import scenes
-    from halfshell_report.measure.methods import METHODS
-    from halfshell_report.measure.run import PEERS, SCENES
+    from halfshell_report.measure import METHODS
+    from halfshell_report.run import PEERS, SCENES
 
     print("scenes")
     for name in SCENES:
@@ -140,7 +141,7 @@ def _list() -> int:
 
 
 def _plan(args: Namespace) -> Plan:
-    from halfshell_report.measure.run import plan_of
+    from halfshell_report.run import plan_of
 
     scenes: Sequence[str] | None = args.scenes
     if scenes is None and args.quick:
@@ -168,9 +169,9 @@ def _forecast(plan: Plan) -> str:
 
 def _write(folder: Path, rows: Sequence[ReportRow]) -> None:
     """Write both files, each only when it is complete."""
-    from halfshell_report.measure.facts import machine_facts
-    from halfshell_report.page.html import page
-    from halfshell_report.page.rows import write_csv
+    from halfshell_report.measure import machine_facts
+    from halfshell_report.page import page
+    from halfshell_report.rows import write_csv
 
     facts = machine_facts()
     table = io.StringIO()
@@ -183,8 +184,7 @@ def _write(folder: Path, rows: Sequence[ReportRow]) -> None:
 def _print(rows: Sequence[ReportRow], details: bool, folder: Path) -> None:
     from rich.console import Console
 
-    from halfshell_report.page.table import scene_table, summary_table
-    from halfshell_report.page.words import findings
+    from halfshell_report.findings import findings, scene_table, summary_table
 
     console = Console(highlight=False)
     if details:
@@ -216,3 +216,82 @@ def _progress_bar(wanted: bool) -> Iterator[Callable[[int, int, str], None]]:
             bar.update(task, completed=done, total=total, description=text)
 
         yield advance
+
+
+MOST_POINTS = 300_000  # of bench: answers are compared with one that takes time and memory
+
+
+def run_bench(args: Namespace) -> int:
+    """Carry out ``halfshell bench``: 0, or 1 if our own list was wrong."""
+    _require("bench", "scipy", "rich")
+    unknown = unknown_kernel()
+    if unknown is not None:
+        raise InputError(unknown)
+    if args.peers == ():
+        raise InputError("--peers names nothing")
+    scene, cutoff, reason = load_scene(args)
+    if len(scene.points) > MOST_POINTS:
+        raise InputError(
+            f"{scene.source}: has {len(scene.points):,} points; bench compares answers up to "
+            f"{MOST_POINTS:,}"
+        )
+    from halfshell_report import scenes
+    from halfshell_report.run import plan_of
+    from halfshell_report.run import run as run_report
+
+    peers = "all" if args.peers is None else args.peers
+    if args.peers in (("all",), ("none",)):
+        peers = args.peers[0]
+    try:
+        plan = plan_of((), ("exact",), peers, "quick", args.patience)
+    except ValueError as error:
+        raise InputError(f"{error} (halfshell report --list names them)") from None
+    given = scenes.Scene(
+        scene.points, cutoff, scene.box, scene.periodic, not args.strict,
+        name=printable(scene.source), title=f"cutoff {cutoff:.6g}{unit_suffix(scene)}",
+    )  # fmt: skip
+    rows = run_report(plan, scene=given)
+    if rows[0].status == "no truth":
+        raise InputError(f"{scene.source}: {rows[0].note}")
+    if args.peers is None:
+        rows = [row for row in rows if row.status != "not installed"]
+    if args.json:
+        print(json.dumps(_bench_facts(rows, args), indent=2))
+    else:
+        _print_bench(rows, reason)
+    return int(bool(rows[0].wrong))
+
+
+def _bench_facts(rows: Sequence[ReportRow], args: Namespace) -> dict[str, Any]:
+    names = (
+        "method", "version", "status", "note", "rule", "seconds", "seconds_with_d", "rows_given",
+        "missed", "spurious", "duplicate",
+    )  # fmt: skip
+    first = rows[0]
+    return {
+        "file": first.scene, "points": first.points, "cutoff": first.cutoff,
+        "cutoff_chosen": args.cutoff is None, "cpu": cpu_name(), "cpus_usable": usable_cpus(),
+        "methods": [{name: getattr(row, name) for name in names} for row in rows],
+    }  # fmt: skip
+
+
+def _print_bench(rows: Sequence[ReportRow], reason: str) -> None:
+    from rich.console import Console
+
+    from halfshell_report.findings import scene_table
+
+    console = Console(highlight=False)
+    console.print(scene_table(rows))
+    ours, *others = rows
+    right = [row for row in others if row.status == "ok" and row.seconds and not row.wrong]
+    lines = []
+    if ours.seconds and right:
+        best = min(right, key=lambda row: row.seconds or 0.0)
+        ratio = (best.seconds or 0.0) / ours.seconds
+        lines.append(f"the fastest other library with a right list: {best.method}, {ratio:.3g} "
+                     "times our time")  # fmt: skip
+    if reason:
+        lines.append(f"the cutoff was chosen: {reason}; --cutoff sets it")
+    lines.append(f"medians, one thread for each, on {cpu_name()}")
+    for line in lines:
+        console.print(f"* {printable(line)}", markup=False, soft_wrap=True)

@@ -348,9 +348,9 @@ def _run_verify(args: argparse.Namespace) -> int:
 
 
 def _run_bench(args: argparse.Namespace) -> int:
-    from halfshell_report.bench import run
+    from halfshell_report.cli import run_bench
 
-    return run(args)
+    return run_bench(args)
 
 
 def _run_report(args: argparse.Namespace) -> int:

@@ -21,19 +21,13 @@ Examples
 
 # In this order they are listed and run.
 from halfshell_report.scenes import (  # noqa: F401, I001
-    _uniform,
-    _crystals,
-    _ties,
-    _coordinates,
+    _basic,
+    _numbers,
     _boxes,
-    _reach,
     _density,
-    _steps,
-    _balls,
-    _needles,
-    _updates,
+    _bodies,
+    _motion,
 )
-from halfshell_report.scenes._catalogue import load, names
-from halfshell_report.scenes._scene import SIZES, Motion, Scene, Size, Updates
+from halfshell_report.scenes._catalogue import SIZES, Motion, Scene, Size, Updates, load, names
 
 __all__ = ["SIZES", "Motion", "Scene", "Size", "Updates", "load", "names"]

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from halfshell_report.scenes._catalogue import add
+from halfshell_report.scenes._catalogue import Floats, Scene, Size, add, pick
 from halfshell_report.scenes._make import (
     CUBE,
     combine,
@@ -19,7 +19,6 @@ from halfshell_report.scenes._make import (
     square,
     stream,
 )
-from halfshell_report.scenes._scene import Floats, Scene, Size, pick
 
 
 def _n(size: Size) -> int:

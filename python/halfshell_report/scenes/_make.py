@@ -14,25 +14,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell_report.scenes._scene import Floats, Size, pick
+from halfshell_report.scenes._catalogue import Floats, Size, pick
 
 __all__ = [
-    "CUBE",
-    "FCC",
-    "ROTATION",
-    "Draw",
-    "cell_order",
-    "combine",
-    "cube",
-    "directions",
-    "exponential",
-    "integers",
-    "normal",
-    "sites",
-    "square",
-    "stream",
-    "wrapped",
-]
+    "CUBE", "FCC", "ROTATION", "Draw", "cell_order", "combine", "cube", "directions",
+    "exponential", "integers", "normal", "sites", "square", "stream", "wrapped",
+]  # fmt: skip
 
 Draw = Callable[[tuple[int, ...]], Floats]
 

@@ -78,7 +78,7 @@ def test_what_is_refused(run, options, words):
 
 
 def test_too_many_points_are_refused(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("halfshell_report.bench.MOST_POINTS", 10)
+    monkeypatch.setattr("halfshell_report.cli.MOST_POINTS", 10)
     np.save(tmp_path / "points.npy", np.arange(33.0).reshape(11, 3))
     status, _, err = run(tmp_path / "points.npy", "--cutoff", 1)
     assert status == 2 and "has 11 points; bench compares answers up to 10" in err

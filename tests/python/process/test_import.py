@@ -48,6 +48,22 @@ print(json.dumps(sorted(set(sys.modules) - before)))
     assert not {"argparse", "ctypes", "dataclasses", "inspect", "re"} & set(loaded)
 
 
+def test_commands_import_the_report_only_when_it_is_wanted():
+    script = """
+import contextlib, io, json, sys
+from halfshell import cli
+from halfshell._cli import verify
+loaded = []
+for command in sys.argv[1:]:
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        cli.main(command.split())
+    loaded.append("halfshell_report" in sys.modules)
+print(json.dumps(loaded))
+"""
+    commands = ["info", "pairs --help", "pairs --cutoff 2", "verify --cutoff 2", "report --help"]
+    assert fresh(script, *commands) == [False, False, False, False, True]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(hs.__all__)))
 def test_every_name_is_there_when_it_is_first_used(name):

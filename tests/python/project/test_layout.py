@@ -97,8 +97,6 @@ def test_files_stay_readable():
     for path in FILES:
         lines = path.read_text().splitlines()
         assert lines[0] == "/* SPDX-License-Identifier: BSD-3-Clause */", path
-        # The public interface is one file, which is mostly words.
-        assert len(lines) <= (800 if path.name == "halfshell.h" else 400), path
         assert max(map(len, lines)) <= 100, path
 
 

@@ -19,7 +19,7 @@ def warn_in(module, category):
 @pytest.mark.parametrize("category", [DeprecationWarning, FutureWarning, UserWarning])
 def test_our_warnings_are_errors(category):
     shown = []
-    for module in ("halfshell", "halfshell_report.page", *OURS):
+    for module in ("halfshell", "halfshell_report.scenes", *OURS):
         try:
             warn_in(module, category)
             shown.append(module)

@@ -13,13 +13,12 @@ import pytest
 import halfshell as hs
 from halfshell._check.reference import exact_square, reach_by_radii, reference_pairs
 from halfshell_report import report, scenes
-from halfshell_report.measure.facts import machine_facts
-from halfshell_report.measure.run import SCENES
-from halfshell_report.measure.timing import Patience, take_turns
-from halfshell_report.page.html import page
-from halfshell_report.page.rows import STATUSES, ReportRow, read_csv, write_csv
-from halfshell_report.truth.pairs import true_pairs
-from halfshell_report.truth.reach import Balls, Ellipsoids, reach_of
+from halfshell_report.measure import Patience, machine_facts, take_turns
+from halfshell_report.page import page
+from halfshell_report.reach import Balls, Ellipsoids, reach_of
+from halfshell_report.rows import STATUSES, ReportRow, read_csv, write_csv
+from halfshell_report.run import SCENES
+from halfshell_report.truth import true_pairs
 from needle_scenes import is_reached, needle_pairs
 from oracles import remembered
 

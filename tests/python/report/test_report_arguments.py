@@ -6,8 +6,7 @@ import pytest
 
 import halfshell as hs
 from halfshell import cli
-from halfshell_report import report
-from halfshell_report.measure import run
+from halfshell_report import report, run
 
 
 class Gone:

@@ -9,11 +9,11 @@ import pytest
 import halfshell as hs
 from halfshell import cli
 from halfshell_report import cli as report_cli
-from halfshell_report.measure import run
-from halfshell_report.measure.peers import PeerProcess
-from halfshell_report.measure.run import SCENES
-from halfshell_report.page.rows import read_csv
+from halfshell_report import run
+from halfshell_report.measure import PeerProcess
 from halfshell_report.peers import LIBRARIES
+from halfshell_report.rows import read_csv
+from halfshell_report.run import SCENES
 from report_helpers import fake, parse, row
 
 pytestmark = pytest.mark.slow

@@ -9,8 +9,8 @@ import pytest
 
 from benchmark_modules import bench, only_in_a_checkout  # noqa: F401
 from checkout import BENCHMARKS
-from halfshell_report.measure.run import SCENES
-from halfshell_report.page.rows import ReportRow, read_csv, write_csv
+from halfshell_report.rows import ReportRow, read_csv, write_csv
+from halfshell_report.run import SCENES
 
 pytestmark = only_in_a_checkout
 DOCS = BENCHMARKS.parent / "docs"

@@ -9,11 +9,24 @@ import pytest
 
 from halfshell._check.reference import exact_square, exact_vector
 from halfshell_report import scenes
-from halfshell_report.physics.dynamics import EveryStep, Stale, Verlet, run_nve
-from halfshell_report.physics.forces import force_errors, reference_forces, why_no_forces
-from halfshell_report.truth.accuracy import Sample, pair_errors, quantity_errors, sample_of
-from halfshell_report.truth.answer import Answer, row_keys
-from halfshell_report.truth.pairs import exact_vectors, true_pairs
+from halfshell_report.accuracy import (
+    Answer,
+    Sample,
+    pair_errors,
+    quantity_errors,
+    row_keys,
+    sample_of,
+)
+from halfshell_report.physics import (
+    EveryStep,
+    Stale,
+    Verlet,
+    force_errors,
+    reference_forces,
+    run_nve,
+    why_no_forces,
+)
+from halfshell_report.truth import exact_vectors, true_pairs
 from oracles import lattice, random_scene
 
 

@@ -10,11 +10,11 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 
 from checkout import ROOT
-from halfshell_report import report
-from halfshell_report.measure.facts import machine_facts
-from halfshell_report.page import figures, html, looks, overview, standing, table, words
-from halfshell_report.page.rows import read_csv
+from halfshell_report import figures, findings, report
+from halfshell_report import page as html
+from halfshell_report.measure import machine_facts
 from halfshell_report.peers import LIBRARIES
+from halfshell_report.rows import read_csv
 from report_helpers import bare, parse, row
 
 
@@ -25,7 +25,7 @@ def rows():
 
 
 def test_words_say_what_the_rows_say():
-    said = words.findings([
+    said = findings.findings([
         row("exact", d_max_ulp=0.0), row("double", missed=3, seconds_least=0.5, d_max_ulp=1.0),
         row("other", "peer", spurious=1, version="2"), bare("gone", "not installed"),
     ])  # fmt: skip
@@ -39,7 +39,7 @@ def test_words_say_what_the_rows_say():
 
 
 def test_words_on_a_scene_tell_right_from_wrong():
-    said = words.scene_words([
+    said = findings.scene_words([
         row("exact"), row("single", missed=1, spurious=2),
         bare("other", "crashed", note="ended by SIGABRT"), bare("more", "not offered", note="2-D"),
     ])  # fmt: skip
@@ -55,11 +55,11 @@ def test_words_on_a_scene_tell_right_from_wrong():
      (math.inf, "inf"), (3e-17, "3e-17"), (99.9, "100"), (9.96, "10"), (580.4, "580")],
 )  # fmt: skip
 def test_numbers_are_short(value, text):
-    assert words.number(value) == text
+    assert findings.number(value) == text
 
 
 def test_durations_have_units():
-    assert [words.duration(x) for x in (2.0, 3e-3, 4e-6, None)] == ["2 s", "3 ms", "4 µs", ""]
+    assert [findings.duration(x) for x in (2.0, 3e-3, 4e-6, None)] == ["2 s", "3 ms", "4 µs", ""]
 
 
 def test_tables_have_a_line_a_method(rows):
@@ -67,10 +67,10 @@ def test_tables_have_a_line_a_method(rows):
 
     stream = io.StringIO()
     console = Console(file=stream, width=80)
-    console.print(table.summary_table(rows))
+    console.print(findings.summary_table(rows))
     for name in ("near-ties", "head-on"):
-        console.print(table.scene_table([row for row in rows if row.scene == name]))
-    console.print(table.scene_table([bare("other", "crashed", note="by SIGABRT")]))
+        console.print(findings.scene_table([row for row in rows if row.scene == name]))
+    console.print(findings.scene_table([bare("other", "crashed", note="by SIGABRT")]))
     text = stream.getvalue()
     assert max(map(len, text.splitlines())) <= 80
     assert re.search(r"exact +2 +0 +0 +0 +0 +0 +0", text)
@@ -109,7 +109,7 @@ def test_what_a_library_says_cannot_break_the_page(rows):
 
 
 def test_methods_are_ranked_by_what_a_reader_cares_about():
-    found = standing.standings([
+    found = findings.standings([
         row("exact", seconds=1.0), row("tree", "peer", missed=2, seconds=0.5),
         bare("slow", "timed out"), bare("slow", "not offered", scene="t"),
         row("quick", "peer", seconds=3.0), bare("quick", "crashed", scene="t"),
@@ -124,14 +124,14 @@ def test_methods_are_ranked_by_what_a_reader_cares_about():
 
 def test_the_headline_names_the_best_other_library():
     ours = [row("exact", seconds=1.0)]
-    assert standing.headline([]) == ""
-    assert standing.headline(ours) == "Precision 'exact' was right on the one scene."
+    assert findings.headline([]) == ""
+    assert findings.headline(ours) == "Precision 'exact' was right on the one scene."
     one = [*ours, row("tree", "peer", missed=1, seconds=2.0)]
-    assert standing.headline(one).endswith(
+    assert findings.headline(one).endswith(
         "tree, the other library, was right on 0 of 1, and took 2 times as long in the median."
     )
     two = [*one, row("other", "peer", seconds=5.0)]
-    assert standing.headline(two).endswith(
+    assert findings.headline(two).endswith(
         "Of 2 other libraries the best one, other, was right on 1 of 1, and took 5 times as long "
         "in the median."
     )
@@ -140,20 +140,20 @@ def test_the_headline_names_the_best_other_library():
 def test_labels_of_the_overview_do_not_cover_each_other():
     Text = pytest.importorskip("matplotlib.text").Text
     many = [row(name, "halfshell" if name in ("exact", "double", "single", "float32") else "peer",
-                seconds=1.0 + 0.01 * k) for k, name in enumerate(looks.LOOKS)]  # fmt: skip
-    figure = overview.overview_figure(many)
+                seconds=1.0 + 0.01 * k) for k, name in enumerate(figures.LOOKS)]  # fmt: skip
+    figure = figures.overview_figure(many)
     assert outside(figure) <= 0.0
     extents = [Text.get_window_extent(text) for text in figure.axes[0].texts]  # without lines
-    assert len(extents) == len(looks.LOOKS)
+    assert len(extents) == len(figures.LOOKS)
     for k, one in enumerate(extents):
         assert not any(one.overlaps(other) for other in extents[:k])
-    assert overview.overview_figure([bare("vesin", "crashed")]) is None
+    assert figures.overview_figure([bare("vesin", "crashed")]) is None
 
 
 def test_zero_and_infinity_have_a_place_in_the_figures(rows):
     odd = [row("exact", d_max_ulp=0.0, force_error=0.0),
            row("single", missed=5, d_max_ulp=math.inf, force_error=math.inf)]  # fmt: skip
-    svg = looks.to_svg(figures.scene_figure(odd)).decode()
+    svg = figures.to_svg(figures.scene_figure(odd)).decode()
     assert ">0<" in svg and ">∞<" in svg
     assert figures.scene_figure([bare("vesin", "crashed")]) is None
     assert figures.cost_figure([row("exact")]) is None
@@ -162,26 +162,26 @@ def test_zero_and_infinity_have_a_place_in_the_figures(rows):
 
 def test_figures_are_the_same_bytes_each_time(rows):
     for make in (
-        overview.overview_figure, overview.map_figure, figures.cost_figure, figures.drift_figure
+        figures.overview_figure, figures.map_figure, figures.cost_figure, figures.drift_figure
     ):  # fmt: skip
-        assert looks.to_svg(make(rows)) == looks.to_svg(make(rows))
+        assert figures.to_svg(make(rows)) == figures.to_svg(make(rows))
 
 
 def test_labels_keep_their_digits():
-    figure = looks.new_figure(2.0, 2.0)
+    figure = figures.new_figure(2.0, 2.0)
     figure.text(0.123456, 0.5, "skin 0.0312")
-    svg = looks.to_svg(figure)
+    svg = figures.to_svg(figure)
     assert b"skin 0.0312" in svg and b"23456" not in svg
 
 
 def test_the_map_says_why_there_is_no_list(rows):
     more = [*rows, bare("freud", "timed out"), bare("ase", "crashed")]
-    svg = looks.to_svg(overview.map_figure(more)).decode()
+    svg = figures.to_svg(figures.map_figure(more)).decode()
     assert ">timed out<" in svg and ">crashed<" in svg
 
 
 def test_every_method_has_a_mark():
-    assert set(looks.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
+    assert set(figures.LOOKS) == {"exact", "double", "single", "float32", *LIBRARIES}
 
 
 # Geometry ----------------------------------------------------------------------------------
@@ -190,7 +190,7 @@ def test_every_method_has_a_mark():
 def outside(figure):
     """How far what is drawn reaches beyond the picture, in inches."""
     agg = pytest.importorskip("matplotlib.backends.backend_agg")
-    with looks.rules():
+    with figures.rules():
         canvas = agg.FigureCanvasAgg(figure)
         canvas.draw()
         drawn, page = figure.get_tightbbox(canvas.get_renderer()), figure.bbox_inches
@@ -200,20 +200,20 @@ def outside(figure):
 @pytest.mark.parametrize(
     "n",
     [
-        pytest.param(n, marks=[] if n in (1, 6, len(looks.LOOKS)) else pytest.mark.slow)
-        for n in range(1, len(looks.LOOKS) + 1)
+        pytest.param(n, marks=[] if n in (1, 6, len(figures.LOOKS)) else pytest.mark.slow)
+        for n in range(1, len(figures.LOOKS) + 1)
     ],
 )
 def test_every_method_has_its_name_beside_the_diagrams(n):
     ours = {"exact", "double", "single", "float32"}
-    for names in (list(looks.LOOKS)[:n], list(looks.LOOKS)[-n:]):
+    for names in (list(figures.LOOKS)[:n], list(figures.LOOKS)[-n:]):
         shown = [
             row(name, "halfshell" if name in ours else "peer", d_max_ulp=1.0) for name in names
         ]
         figure = figures.scene_figure(shown)
         (legend,) = figure.legends
         assert [text.get_text() for text in legend.get_texts()] == [
-            looks.called(name) for name in reversed(looks.LOOKS) if name in names
+            figures.called(name) for name in reversed(figures.LOOKS) if name in names
         ]
         assert outside(figure) <= 0.0
         left = legend.get_window_extent().x0
@@ -224,7 +224,7 @@ def test_every_method_has_its_name_beside_the_diagrams(n):
 def test_no_figure_of_the_committed_report_is_cut():
     with (ROOT / "docs" / "report" / "report.csv").open(newline="", encoding="utf-8") as stream:
         rows = read_csv(stream)[1]
-    made = [overview.overview_figure(rows), overview.map_figure(rows), figures.cost_figure(rows),
+    made = [figures.overview_figure(rows), figures.map_figure(rows), figures.cost_figure(rows),
             figures.drift_figure(rows)]  # fmt: skip
     for name in list(dict.fromkeys(one.scene for one in rows))[::8]:
         made.append(figures.scene_figure([one for one in rows if one.scene == name]))

@@ -8,7 +8,7 @@ import pytest
 
 import halfshell as hs
 from halfshell_report import report
-from halfshell_report.measure.peers import PeerProcess
+from halfshell_report.measure import PeerProcess
 from halfshell_report.peers import LIBRARIES, Library, Question, wrapped
 from report_helpers import fake, question
 

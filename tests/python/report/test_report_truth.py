@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from halfshell._check.reference import reference_pairs
-from halfshell_report.truth.integers import (
+from halfshell_report.integers import (
     as_integers,
     common_unit,
     nearest_float,
     nearest_root,
+    short_basis,
 )
-from halfshell_report.truth.lattice import short_basis
-from halfshell_report.truth.pairs import exact_vectors, true_pairs
+from halfshell_report.truth import exact_vectors, true_pairs
 from oracles import BOX_KINDS, lattice, random_scene, rotation
 
 pytestmark = pytest.mark.slow

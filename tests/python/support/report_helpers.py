@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from halfshell_report.measure.timing import Patience
-from halfshell_report.page.rows import ReportRow
+from halfshell_report.measure import Patience
+from halfshell_report.rows import ReportRow
 
 
 def row(method, kind="halfshell", **other):
@@ -41,7 +41,7 @@ def fake(prepare, module="json"):
         import importlib, os, time
         import numpy as np
         from halfshell_report.peers import LIBRARIES, Library
-        from halfshell_report.measure.worker import main
+        from halfshell_report.measure import serve
 
         class Fake(Library):
             name = "fake"
@@ -52,6 +52,6 @@ def fake(prepare, module="json"):
                 {prepare}
 
         LIBRARIES["fake"] = Fake()
-        raise SystemExit(main("fake"))
+        raise SystemExit(serve("fake"))
     """
     return [sys.executable, "-c", textwrap.dedent(code)]

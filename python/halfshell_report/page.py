@@ -11,13 +11,26 @@ from collections.abc import Mapping, Sequence
 from html import escape as _escape
 from typing import Any
 
-from halfshell_report.page.figures import cost_figure, drift_figure, scene_figure
-from halfshell_report.page.looks import to_svg
-from halfshell_report.page.overview import map_figure, overview_figure
-from halfshell_report.page.rows import ReportRow
-from halfshell_report.page.standing import headline
-from halfshell_report.page.table import SUMMARY, method_label, summary_cells
-from halfshell_report.page.words import duration, findings, in_short, number, scene_words
+from halfshell_report.figures import (
+    cost_figure,
+    drift_figure,
+    map_figure,
+    overview_figure,
+    scene_figure,
+    to_svg,
+)
+from halfshell_report.findings import (
+    SUMMARY,
+    duration,
+    findings,
+    headline,
+    in_short,
+    method_label,
+    number,
+    scene_words,
+    summary_cells,
+)
+from halfshell_report.rows import ReportRow
 from halfshell_report.scenes import names
 
 __all__ = ["page"]

@@ -18,17 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell_report.truth.integers import Objects, signs
-from halfshell_report.truth.reach import Reach
-from halfshell_report.truth.replicas import (
-    Copies,
-    Scene,
-    Space,
-    copies_near,
-    fold,
-    narrow,
-    scene_of,
-)
+from halfshell_report.integers import Objects, signs
+from halfshell_report.reach import Reach
+from halfshell_report.replicas import Copies, Scene, Space, copies_near, fold, narrow, scene_of
 
 __all__ = ["Pairs", "Truth", "exact_vectors", "true_pairs"]
 

@@ -2,7 +2,7 @@
 """Points folded into one cell of the lattice, and the copies of them that lie near it.
 
 Everything that decides is exact: coordinates are Python integers of one unit (`integers`), the
-lattice has a short basis B (`lattice`), and folding, ``Y = X - w @ B`` with whole w, loses
+lattice has a short basis B (`short_basis`), and folding, ``Y = X - w @ B`` with whole w, loses
 nothing. Rounding enters where the integers become float64 coordinates for the k-d tree. How
 much is bounded here (`Space.margin`), with v = 2**-53:
 
@@ -32,8 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell_report.truth.integers import Objects, as_integers, common_unit, nearest_float
-from halfshell_report.truth.lattice import short_basis
+from halfshell_report.integers import Objects, as_integers, common_unit, nearest_float, short_basis
 
 __all__ = ["Copies", "Scene", "Space", "copies_near", "fold", "narrow", "scene_of"]
 

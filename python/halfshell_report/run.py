@@ -13,26 +13,17 @@ from typing import Any
 import numpy as np
 
 from halfshell._terminal import printable
+from halfshell_report import measure, physics
 from halfshell_report import scenes as catalogue
-from halfshell_report.measure import methods
-from halfshell_report.measure.peers import PeerProcess
-from halfshell_report.measure.timing import Patience, Timing, take_turns
-from halfshell_report.page.rows import ReportRow
+from halfshell_report.accuracy import Answer, Sample, pair_errors, quantity_errors, sample_of
+from halfshell_report.measure import Patience, PeerProcess, Timing, take_turns
 from halfshell_report.peers import LIBRARIES, Library
-from halfshell_report.physics import dynamics
-from halfshell_report.physics.forces import (
-    Forces,
-    force_errors,
-    reference_forces,
-    sigma_of,
-    why_no_forces,
-)
-from halfshell_report.truth.accuracy import Sample, pair_errors, quantity_errors, sample_of
-from halfshell_report.truth.answer import Answer
-from halfshell_report.truth.pairs import Truth, true_pairs
-from halfshell_report.truth.reach import reach_of
+from halfshell_report.physics import Forces, force_errors, reference_forces, sigma_of, why_no_forces
+from halfshell_report.reach import reach_of
+from halfshell_report.rows import ReportRow
+from halfshell_report.truth import Truth, true_pairs
 
-__all__ = ["PEERS", "SCENES", "Plan", "Progress", "plan_of", "run"]
+__all__ = ["PEERS", "SCENES", "Plan", "plan_of", "run"]
 
 #: Scenes by name, those with a radius or a support for each point after those with one cutoff.
 SCENES = (*catalogue.names(), *catalogue.names(radii=True, supports=True))
@@ -107,7 +98,7 @@ def plan_of(
         raise ValueError(f"size must be one of {', '.join(catalogue.SIZES)}, got {size!r}")
     return Plan(
         _named("scene", scenes, SCENES),
-        _named("method", chosen, methods.METHODS),
+        _named("method", chosen, measure.METHODS),
         _named("peer", libraries, PEERS),
         size,
         patience,
@@ -206,13 +197,13 @@ class _Stage:
         answered: dict[str, ReportRow] = {}
         calls: dict[str, Callable[[], Any]] = {}
         for method in self.plan.methods:
-            if method in methods.REUSE:
+            if method in measure.REUSE:
                 continue
             one = replace(blank, method=method)
             try:
-                options = methods.options_of(method, self.scene)
-                answered[method] = self._judged(one, methods.answer_of(options))
-                for what, call in methods.calls_of(options).items():
+                options = measure.options_of(method, self.scene)
+                answered[method] = self._judged(one, measure.answer_of(options))
+                for what, call in measure.calls_of(options).items():
                     calls[f"{method} {what}"] = call
             except ValueError as error:
                 answered[method] = replace(one, status="not offered", note=str(error))
@@ -327,7 +318,7 @@ def _reuse_rows(name: str, plan: Plan, effort: Effort) -> Iterator[ReportRow]:
     """Run the motion of a scene with lists that are kept, and with new ones for comparison."""
     import halfshell as hs
 
-    if not set(methods.REUSE) & set(plan.methods):
+    if not set(measure.REUSE) & set(plan.methods):
         return
     scene: Any = catalogue.load(name, effort.motion)
     blank = ReportRow(
@@ -336,7 +327,7 @@ def _reuse_rows(name: str, plan: Plan, effort: Effort) -> Iterator[ReportRow]:
         rule="<=" if scene.inclusive else "<", compared_by="i j S",
     )  # fmt: skip
     for method, skin, every, lists in _ways(scene, plan):
-        found = dynamics.run_nve(scene, lists)
+        found = physics.run_nve(scene, lists)
         yield replace(
             blank, method=method, skin=skin, rebuild_every=every, steps=found.steps,
             builds=found.builds, seconds=found.seconds, drift_kinetic=found.drift,
@@ -348,16 +339,16 @@ def _reuse_rows(name: str, plan: Plan, effort: Effort) -> Iterator[ReportRow]:
 
 def _ways(
     scene: Any, plan: Plan
-) -> Iterator[tuple[str, float | None, int | None, dynamics.Lists]]:
+) -> Iterator[tuple[str, float | None, int | None, physics.Lists]]:
     """Yield method, skin, interval and lists."""
-    for precision in methods.PRECISIONS:
+    for precision in measure.PRECISIONS:
         if precision in plan.methods:
-            yield f"{precision}, every step", None, 1, dynamics.EveryStep(scene, precision)
+            yield f"{precision}, every step", None, 1, physics.EveryStep(scene, precision)
     skins = [share * scene.motion.skin for share in _SKINS]
     if "verlet" in plan.methods:
         for skin in skins:
-            yield "verlet", skin, None, dynamics.Verlet(scene, skin)
+            yield "verlet", skin, None, physics.Verlet(scene, skin)
     if "stale" in plan.methods:
         for skin in skins:
             for every in _INTERVALS[plan.size]:
-                yield "by the clock", skin, every, dynamics.Stale(scene, skin, every)
+                yield "by the clock", skin, every, physics.Stale(scene, skin, every)

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: BSD-3-Clause
-"""Rows of figures as CSV, tables, pictures, sentences and a page."""
