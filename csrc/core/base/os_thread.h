@@ -52,9 +52,10 @@ hs_thread_join(hs_thread thread)
     (void)CloseHandle(thread);
 }
 
-#define hs_nap()         Sleep(HS_NAP_MS)
-#define hs_thread_self() GetCurrentThreadId()
-#define hs_thread_is(id) (GetCurrentThreadId() == (id))
+#define hs_nap()           Sleep(HS_NAP_MS)
+#define hs_thread_self()   GetCurrentThreadId()
+#define hs_thread_is(id)   (GetCurrentThreadId() == (id))
+#define HS_THREAD_NUMBER() ((int64_t)GetCurrentThreadId()) /* not 0 */
 
 /* Windows has no signals to block. */
 typedef int hs_signals;
@@ -103,8 +104,9 @@ hs_nap(void)
     (void)nanosleep(&nap, NULL);
 }
 
-#define hs_thread_self() pthread_self()
-#define hs_thread_is(id) (pthread_equal(pthread_self(), (id)) != 0)
+#define hs_thread_self()   pthread_self()
+#define hs_thread_is(id)   (pthread_equal(pthread_self(), (id)) != 0)
+#define HS_THREAD_NUMBER() ((int64_t)(uintptr_t)pthread_self()) /* an address: not 0 */
 
 HS_ALWAYS_INLINE void
 hs_condition_wait_briefly(hs_condition *condition, hs_mutex *mutex)

@@ -23,7 +23,9 @@ typedef struct hs_queue {
 bool
 hs_gate_init(hs_gate *gate)
 {
-    gate->state = gate->waiting = 0;
+    gate->state = gate->waiting = gate->holder = 0;
+    gate->pause = NULL;
+    gate->resume = NULL;
     gate->process = CURRENT_PROCESS();
     gate->queue = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *gate->queue);
     if (gate->queue != NULL) {
@@ -62,24 +64,41 @@ forget_the_parent(hs_gate *gate)
     const int64_t process = CURRENT_PROCESS();
     if (gate->process != process) {
         gate->process = process;
-        gate->state = gate->waiting = 0;
+        gate->state = gate->waiting = gate->holder = 0;
         hs_mutex_init(&gate->queue->mutex);
         hs_condition_init(&gate->queue->changed);
     }
 }
 
-/* A wait ends on its own after a while, so that a wake-up that came too early costs time only. */
-static HS_NO_INLINE void
-wait_for(hs_gate *gate, bool (*try_enter)(hs_gate *))
+/* Asleep until the gate may be free. A wait ends on its own after a while, so that a wake-up that
+ * came too early costs time only. */
+static void
+sleep_once(hs_gate *gate, bool writes)
 {
-    forget_the_parent(gate);
     hs_mutex_lock(&gate->queue->mutex);
-    (void)hs_atomic_add(&gate->waiting, 1);
-    while (!try_enter(gate)) {
+    const int64_t state = hs_atomic_load(&gate->state);
+    if (writes ? state != 0 : state < 0) {
         hs_condition_wait_briefly(&gate->queue->changed, &gate->queue->mutex);
     }
-    (void)hs_atomic_add(&gate->waiting, -1);
     hs_mutex_unlock(&gate->queue->mutex);
+}
+
+/* A writer that waits gives up what readers may need to get out, and takes it back before it goes
+ * in: never the other way round. */
+static HS_NO_INLINE void
+wait_for(hs_gate *gate, bool writes)
+{
+    forget_the_parent(gate);
+    (void)hs_atomic_add(&gate->waiting, 1);
+    while (!(writes ? try_write(gate) : try_read(gate))) {
+        const bool  pauses = writes && gate->pause != NULL;
+        void *const paused = pauses ? gate->pause() : NULL;
+        sleep_once(gate, writes);
+        if (pauses) {
+            gate->resume(paused);
+        }
+    }
+    (void)hs_atomic_add(&gate->waiting, -1);
 }
 
 static void
@@ -92,12 +111,23 @@ wake(hs_gate *gate)
     }
 }
 
-void
+bool
+hs_gate_is_mine(hs_gate *gate)
+{
+    const int64_t holder = hs_atomic_load(&gate->holder);
+    return holder != 0 && holder == HS_THREAD_NUMBER();
+}
+
+bool
 hs_gate_read(hs_gate *gate)
 {
-    if (!try_read(gate) && !try_read(gate)) {
-        wait_for(gate, try_read);
+    if (hs_gate_is_mine(gate)) {
+        return false;
     }
+    if (!try_read(gate) && !try_read(gate)) {
+        wait_for(gate, false);
+    }
+    return true;
 }
 
 void
@@ -108,12 +138,16 @@ hs_gate_read_end(hs_gate *gate)
     }
 }
 
-void
+bool
 hs_gate_write(hs_gate *gate)
 {
-    if (!try_write(gate)) {
-        wait_for(gate, try_write);
+    if (hs_gate_is_mine(gate)) {
+        return false;
     }
+    if (!try_write(gate)) {
+        wait_for(gate, true);
+    }
+    return true;
 }
 
 void
@@ -121,4 +155,21 @@ hs_gate_write_end(hs_gate *gate)
 {
     hs_atomic_store(&gate->state, 0);
     wake(gate);
+}
+
+bool
+hs_gate_hold(hs_gate *gate)
+{
+    const bool went_in = hs_gate_write(gate);
+    if (went_in) {
+        hs_atomic_store(&gate->holder, HS_THREAD_NUMBER());
+    }
+    return went_in;
+}
+
+void
+hs_gate_release(hs_gate *gate)
+{
+    hs_atomic_store(&gate->holder, 0);
+    hs_gate_write_end(gate);
 }

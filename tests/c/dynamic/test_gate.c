@@ -147,9 +147,91 @@ readers_of_another_process_are_forgotten(void)
     hs_gate_destroy(&gate);
 }
 
+/* Threads that try to go in while another one holds the gate. */
+static hs_thread_result HS_THREAD_CALL
+write_one(void *context)
+{
+    shared *of = context;
+    CHECK(!hs_gate_is_mine(&of->gate) && hs_gate_write(&of->gate));
+    of->one = of->other;
+    hs_gate_write_end(&of->gate);
+    return (hs_thread_result)0;
+}
+
+static void
+who_holds_the_gate_is_inside_and_others_wait(void)
+{
+    shared    of = {.one = 1, .other = 2};
+    hs_thread reader, writer;
+    CHECK(hs_gate_init(&of.gate));
+    CHECK(!hs_gate_is_mine(&of.gate) && hs_gate_hold(&of.gate) && hs_gate_is_mine(&of.gate));
+    CHECK(!hs_gate_hold(&of.gate) && !hs_gate_read(&of.gate) && !hs_gate_write(&of.gate));
+    CHECK(hs_thread_start(&writer, write_one, &of));
+    CHECK(hs_thread_start(&reader, read_one, &of));
+    while (hs_atomic_load(&of.gate.waiting) < 2)
+        hs_nap();
+    CHECK(of.one == 1 && !of.differed);
+    of.other = 1;
+    hs_gate_release(&of.gate);
+    hs_thread_join(writer);
+    hs_thread_join(reader);
+    CHECK(of.one == 1 && !of.differed && of.gate.state == 0 && of.gate.waiting == 0);
+    CHECK(!hs_gate_is_mine(&of.gate));
+    hs_gate_destroy(&of.gate);
+}
+
+static volatile int64_t n_pauses, n_resumes;
+static int              token;
+
+static void *
+count_pause(void)
+{
+    (void)hs_fetch_increment(&n_pauses);
+    return &token;
+}
+
+static void
+count_resume(void *paused)
+{
+    CHECK(paused == &token);
+    (void)hs_fetch_increment(&n_resumes);
+}
+
+/* Around each wait, and not when it goes in. */
+static void
+writers_that_wait_pause(void)
+{
+    shared    of = {.one = 1, .other = 1};
+    hs_thread thread;
+    CHECK(hs_gate_init(&of.gate));
+    of.gate.pause = count_pause;
+    of.gate.resume = count_resume;
+    hs_gate_write(&of.gate);
+    hs_gate_write_end(&of.gate);
+    CHECK(hs_atomic_load(&n_pauses) == 0);
+    hs_gate_read(&of.gate);
+    CHECK(hs_thread_start(&thread, write_one, &of));
+    while (hs_atomic_load(&n_pauses) == 0)
+        hs_nap();
+    hs_gate_read_end(&of.gate);
+    hs_thread_join(thread);
+    CHECK(hs_atomic_load(&n_pauses) == hs_atomic_load(&n_resumes));
+    hs_gate_write(&of.gate);
+    const int64_t before = hs_atomic_load(&n_pauses);
+    CHECK(hs_thread_start(&thread, read_one, &of)); /* readers do not */
+    while (hs_atomic_load(&of.gate.waiting) == 0)
+        hs_nap();
+    hs_gate_write_end(&of.gate);
+    hs_thread_join(thread);
+    CHECK(hs_atomic_load(&n_pauses) == before);
+    hs_gate_destroy(&of.gate);
+}
+
 void
 test_gate(void)
 {
+    RUN(who_holds_the_gate_is_inside_and_others_wait);
+    RUN(writers_that_wait_pause);
     RUN(writers_are_alone);
     RUN(a_reader_waits_for_a_writer);
     RUN(readers_are_many);
