@@ -212,10 +212,16 @@ hs_raise_capacity(int64_t capacity, int64_t needed)
     Py_XDECREF(message);
 }
 
+int64_t
+hs_pairs_needed(const hs_failure *failure)
+{
+    return failure->expected_pairs < 0x1p63 ? (int64_t)failure->expected_pairs : INT64_MAX;
+}
+
 static PyObject *
 raise_capacity(const hs_failure *failure)
 {
-    hs_raise_capacity(0, (int64_t)failure->expected_pairs);
+    hs_raise_capacity(0, hs_pairs_needed(failure));
     return NULL;
 }
 
