@@ -212,12 +212,6 @@ hs_raise_capacity(int64_t capacity, int64_t needed)
     Py_XDECREF(message);
 }
 
-int64_t
-hs_pairs_needed(const hs_failure *failure)
-{
-    return failure->expected_pairs < 0x1p63 ? (int64_t)failure->expected_pairs : INT64_MAX;
-}
-
 static PyObject *
 raise_capacity(const hs_failure *failure)
 {
