@@ -63,10 +63,9 @@ coordinate_error(const hs_ball *ball)
 static double
 axis_error(const hs_ball *ball, int k)
 {
-    const hs_lattice *lattice = &ball->list->lattice;
-    const double      terms = 2.0 * hs_axis_terms(lattice, ball->centre.x, k);
-    return hs_axis_rounding(lattice->ndim) * (terms + HS_MAX_DIM * ball->radius) +
-           wrapping_error(ball) + ball->list->axes.axis[k].leak;
+    const double size = 2.0 * ball->centre.terms[k] + HS_MAX_DIM * ball->radius;
+    return hs_axis_rounding(ball->list->lattice.ndim) * size + wrapping_error(ball) +
+           ball->list->axes.axis[k].leak;
 }
 
 HS_ALWAYS_INLINE hs_status

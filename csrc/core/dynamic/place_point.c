@@ -42,7 +42,8 @@ hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
         known = placed->magnitude <= list->most_terms;
     }
     for (int k = 0; k < lattice->ndim; k++) {
-        known = known && hs_axis_terms(lattice, placed->x, k) < list->axes.axis[k].farthest;
+        placed->terms[k] = hs_axis_terms(lattice, placed->x, k);
+        known = known && placed->terms[k] < list->axes.axis[k].farthest;
     }
     return known;
 }

@@ -11,6 +11,7 @@ struct hs_placed {
     const double *given;             /* borrowed; ndim finite numbers */
     double        x[HS_MAX_DIM];     /* X, in the middle period; not rounded in aligned boxes */
     double        t[HS_MAX_DIM];     /* coordinates along the grid axes */
+    double        terms[HS_MAX_DIM]; /* sums of absolute products in them; not in aligned boxes */
     int64_t       turns[HS_MAX_DIM]; /* over the rows of B */
     int64_t       index[HS_MAX_DIM]; /* of the cell */
     double        magnitude; /* as hs_wrap_point raises it, of the coordinates that the box moves;
@@ -51,7 +52,7 @@ hs_dynamic_wrap(const hs_dynamic *list, const double *given, double *wrapped, in
 }
 
 /* In general boxes: whether X and its coordinates are known to within a few periods, so that a ball
- * meets few images. Sets the magnitude. */
+ * meets few images. Sets the magnitude and the terms. */
 bool hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed);
 
 /* HS_OK, HS_ERR_NOT_FINITE with column and value, HS_ERR_SHIFT_RANGE. ndim: that of the list, for
