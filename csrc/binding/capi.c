@@ -97,6 +97,7 @@ static const hs_capi table = {
     .dynamic_count = hs_dynamic_count,
     .clusters_find = hs_clusters_find,
     .measure = hs_measure,
+    .box_places = hs_box_places,
 };
 
 int
