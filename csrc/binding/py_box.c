@@ -134,8 +134,8 @@ places_in_parts(const hs_box *box, const hs_points *points, double cutoff, doubl
         part.n = points->n - first < POINTS_PER_CALL ? points->n - first : POINTS_PER_CALL;
         part.data = (const char *)points->data + first * points->row_stride;
         Py_BEGIN_ALLOW_THREADS
-        status = hs_box_places(box, &part, cutoff, largest, places + first * points->ndim, axes,
-                               &failure);
+        status =
+            hs_box_places(box, &part, cutoff, largest, places + first, points->n, axes, &failure);
         Py_END_ALLOW_THREADS
         if (status != HS_OK) {
             const hs_options options = {.cutoff = cutoff};
@@ -173,7 +173,7 @@ hs_py_box_places(PyObject *module, PyObject *const *arguments, Py_ssize_t n_argu
         !hs_box_of(arguments[1], repeats, points.ndim, &box, &given)) {
         return NULL;
     }
-    npy_intp  shape[2] = {(npy_intp)points.n, points.ndim};
+    npy_intp  shape[2] = {points.ndim, (npy_intp)points.n};
     PyObject *places = PyArray_SimpleNew(2, shape, NPY_DOUBLE);
     if (places == NULL || !places_in_parts(given ? &box : NULL, &points, cutoff, largest,
                                            PyArray_DATA((PyArrayObject *)places), &axes)) {

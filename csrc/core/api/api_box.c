@@ -294,25 +294,30 @@ set_place_axes(const hs_lattice *lattice, int box_exponent, int unit, double cut
     }
 }
 
-static double
-place_along(const place_axes *axes, const hs_cloud *cloud, int64_t i, int k)
+/* The places of all points along axis k. */
+static void
+set_places(const place_axes *axes, const hs_cloud *cloud, int k, double *places)
 {
     const hs_lattice *lattice = axes->lattice;
     const bool        repeats = lattice->row_of_axis[k] >= 0;
-    double            place = 0.0;
-    if (repeats && lattice->aligned) {
-        place = fmod(cloud->x[k][i], axes->length[k]) / axes->length[k];
-    } else {
-        for (int c = 0; c < lattice->ndim; c++) {
-            place += axes->along[k][c] * hs_scale_apply(axes->scale[k], cloud->x[c][i]);
+    const double      length = axes->length[k];
+    for (int64_t i = 0; i < cloud->n; i++) {
+        double place = 0.0;
+        if (repeats && lattice->aligned) {
+            const double x = cloud->x[k][i];
+            place = (fabs(x) < length ? x : fmod(x, length)) / length;
+        } else {
+            for (int c = 0; c < lattice->ndim; c++) {
+                place += axes->along[k][c] * hs_scale_apply(axes->scale[k], cloud->x[c][i]);
+            }
         }
+        places[i] = repeats && !(place >= 0.0 && place < 1.0) ? place - floor(place) : place;
     }
-    return repeats ? place - floor(place) : place;
 }
 
 hs_status
 hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double largest,
-              double *places, hs_box_axes *found, hs_failure *failure)
+              double *places, int64_t stride, hs_box_axes *found, hs_failure *failure)
 {
     hs_options options = hs_options_default();
     hs_entry   entry;
@@ -324,6 +329,10 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
     hs_status status = found != NULL && largest >= 0.0 && isfinite(largest)
                            ? hs_check_arguments(points, NULL, box, &options, failure)
                            : HS_ERR_ARGUMENT;
+    if (status == HS_OK && !(cutoff >= 0.0 && isfinite(cutoff))) {
+        failure->value = cutoff;
+        status = HS_ERR_CUTOFF;
+    }
     if (status == HS_OK) {
         status = hs_box_check(box, failure);
     }
@@ -345,9 +354,10 @@ hs_box_places(const hs_box *box, const hs_points *points, double cutoff, double 
         set_place_axes(&lattice, exponent, unit, cutoff, largest, &axes, found);
         for (int k = 0; k < points->ndim; k++) {
             found->reach[k] = is_lost ? INFINITY : found->reach[k];
-            for (int64_t i = 0; places != NULL && i < cloud.n; i++) {
-                places[i * points->ndim + k] =
-                    isfinite(found->reach[k]) ? place_along(&axes, &cloud, i, k) : 0.0;
+            if (places != NULL && isfinite(found->reach[k])) {
+                set_places(&axes, &cloud, k, places + k * stride);
+            } else if (places != NULL) {
+                memset(places + k * stride, 0, (size_t)cloud.n * sizeof *places);
             }
         }
         hs_cloud_free(NULL, &cloud);

@@ -23,7 +23,7 @@ class Axes(NamedTuple):
 
     def places(self, points: npt.NDArray[Any]) -> FloatArray:
         """Places of shape (d, n), 0 along axes where the reach is infinite."""
-        return np.ascontiguousarray(_core.box_places(points, *self.scene)[0].T)
+        return _core.box_places(points, *self.scene)[0]
 
 
 def axes_of(

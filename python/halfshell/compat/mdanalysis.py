@@ -27,6 +27,7 @@ from halfshell._objects.box import Box
 __all__ = ["capped_distance", "self_capped_distance"]
 
 _METHODS = {"bruteforce", "nsgrid", "pkdtree"}
+_ROUNDING = 2.0**-30  # far more than that of a height
 Entries = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 _KEPT = {"enforce_copy": False, "reduce_result_if_single": False, "allow_atomgroup": True}
 
@@ -52,7 +53,10 @@ def _nearest_images(
 ) -> Entries:
     """Each pair once, with its least distance, where some have several images."""
     both, d = entries
-    if vectors is None or 2.0 * cutoff < Box.from_matrix(vectors).perpendicular_heights.min():
+    if vectors is None:
+        return both, d
+    least = Box.from_matrix(vectors).perpendicular_heights.min() * (1.0 - _ROUNDING)
+    if 2.0 * cutoff < least:
         return both, d
     order = np.lexsort((d, both[:, 1], both[:, 0]))
     both, d = both[order], d[order]

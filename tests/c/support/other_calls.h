@@ -49,6 +49,19 @@ call_box_measure(call *c, hs_failure *failure)
 }
 
 static inline hs_status
+call_box_places(call *c, hs_failure *failure)
+{
+    double          places[CALL_ROOM] = {0.0};
+    hs_box_axes     axes = {.reach = {-7.0}};
+    const double    cutoff = c->options != NULL ? c->options->cutoff : 1.0;
+    const hs_status status = hs_box_places(c->box, c->points, cutoff, 0x1p1000, places,
+                                           CALL_ROOM / HS_MAX_DIM, &axes, failure);
+    CHECK((status == HS_OK) == (axes.reach[0] >= 0.0));
+    c->answer = status == HS_OK ? call_hash(4, places, sizeof places) : c->answer;
+    return status;
+}
+
+static inline hs_status
 call_box_wrap(call *c, hs_failure *failure)
 {
     double          wrapped[CALL_ROOM];
