@@ -93,9 +93,11 @@ def bricks(
         refuse_unknown(bricks, unknown)
     array, vectors, bits = as_scene(points, box, periodic)
     largest, n_bricks = as_cutoff(cutoff), as_brick_count(n)
-    # Refuses what a search would refuse, at the price of a search with the cutoff 0.
-    _core.count_pairs(array, 0.0 if math.isfinite(largest) and largest >= 0.0 else largest,
-                      vectors, bits, False, "exact", None, None, None, 1, None, "auto")  # fmt: skip
+    rest = (vectors, bits, False, "exact", None, None, None, 1, None, "auto")
+    try:  # refuses what a search would refuse, at the price of a search with the cutoff 0
+        _core.count_pairs(array, 0.0, *rest)
+    except ValueError:  # which needs more of a box than a larger cutoff
+        _core.count_pairs(array, largest, *rest)
     n_points, ndim = array.shape
     flags = tuple(bool(bits >> k & 1) for k in range(ndim))
     largest_of_all = max(array.max(initial=0.0), -array.min(initial=0.0))
