@@ -191,8 +191,8 @@ hs_box_wrap(const hs_box *box, const hs_points *points, double *wrapped, int64_t
 /* Widths only say which side is longer. */
 #define LARGEST_WIDTH 0x1p900
 
-/* Along grid axis k a point is at the fractional part of `along[k]` . point, or, on an open axis, at
- * that product itself. An aligned lattice divides, which loses nothing far from the box. */
+/* Along grid axis k a point is at the fractional part of `along[k]` . point, or, on an open axis,
+ * at that product itself. An aligned lattice divides, which loses nothing far from the box. */
 typedef struct place_axes {
     const hs_lattice *lattice;
     hs_scale          scale[HS_MAX_DIM]; /* of points, for each axis */

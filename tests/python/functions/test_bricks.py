@@ -80,6 +80,18 @@ def test_images_whose_shifts_no_column_holds():
     assert parts.overhead < 2.0
 
 
+def test_a_box_that_no_cutoff_of_0_can_be_searched_in():
+    rng = np.random.default_rng(2)
+    box = np.array([[900.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, -0.1, 0.6]])
+    points = (rng.random((17, 3)) * 2.0 - 1.0) @ box * 2.0 ** rng.integers(36, 47)
+    scene = {"box": box, "periodic": [False, False, True]}
+    with pytest.raises(ValueError, match="too skewed"):
+        hs.bricks(points, 0.0, 3, **scene)
+    parts = hs.bricks(points, 4.0, 3, **scene)
+    assert sum(part.count_pairs(points) for part in parts) == 102
+    assert hs.count_pairs(points, 4.0, **scene) == 102
+
+
 @pytest.mark.parametrize("inclusive", [False, True])
 def test_rules_and_quantities(inclusive):
     points, cutoff, options = SCENES["on the cuts"]
