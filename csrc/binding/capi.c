@@ -98,6 +98,7 @@ static const hs_capi table = {
     .clusters_find = hs_clusters_find,
     .measure = hs_measure,
     .dynamic_hook = hs_dynamic_hook,
+    .box_places = hs_box_places,
 };
 
 int

@@ -25,6 +25,7 @@ RAISE = "raise"
 
 # Blocks are counted by int64, and two of them must be.
 _MOST_PAIRS = 2**62
+_MOST_BRICKS = 2**20
 
 
 def kernels() -> list[str]:
@@ -62,6 +63,14 @@ def as_count(value: Any, name: str) -> int:
     number = as_whole(value, name)
     if number < 1:
         raise ValueError(f"{name} must be 1 or more, got {shown(number)}")
+    return number
+
+
+def as_brick_count(n: Any) -> int:
+    """A number of bricks; each costs time and memory, even if it owns no points."""
+    number = as_count(n, "n")
+    if number > _MOST_BRICKS:
+        raise ValueError(f"n must be at most {_MOST_BRICKS:,} bricks, got {shown(number)}")
     return number
 
 

@@ -81,8 +81,8 @@ def divide(
     samples = [one.sample for one in summaries if len(one.sample)]
     places = axes.places(np.concatenate(samples)) if samples else np.empty((len(flags), 0))
     weights = np.repeat([one.weight for one in summaries], [len(one.sample) for one in summaries])
-    low = np.where(flags, 0.0, -np.inf)
-    high = np.where(flags, 1.0, np.inf)
+    low = np.where(axes.repeats, 0.0, -np.inf)
+    high = np.where(axes.repeats, 1.0, np.inf)
     bricks = iter(range(n_bricks))
     cuts = _cut(places, weights, n_bricks, (low, high), axes.widths, bricks)
     return Division(cuts, n_bricks, axes, tuple(ends[:-1]), ends[-1], cutoff, (vectors, flags))
