@@ -333,13 +333,13 @@ def test_streams():
     first = rows(next(waiting))
 
     def check():
-        assert sorted(sum(map(rows, waiting), first)) == answer
+        assert sorted([*first, *(row for block in waiting for row in rows(block))]) == answer
         for stream in streams[-1:]:
             try:
                 next(stream, None)
             except ValueError as error:
                 assert "already looking for the next block" in str(error)
-        assert sorted(sum(map(rows, blocks()), [])) == answer
+        assert sorted(row for block in blocks() for row in rows(block)) == answer
 
     in_children(inside, check)
 
