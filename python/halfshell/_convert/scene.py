@@ -50,6 +50,8 @@ def _hint_of_shape(values: Any, shape: tuple[int, ...], name: str) -> str:
     """What may be meant by points of this shape, if it is clear."""
     if type(values) in (list, tuple) and values and brings_its_box(values[0], name):
         return ": several systems are one array of points, with batch"
+    if brings_its_box(values, name):
+        return f": a {kind_of(values)} brings a box, for which there is no place here: give arrays"
     if len(shape) == 2 and 1 <= shape[0] <= MAX_DIM < shape[1]:
         return f": one row for each point, as in {name}.T"
     if len(shape) == 1:
