@@ -151,8 +151,9 @@ hs_signals_restore(const hs_signals *saved)
  */
 extern volatile int64_t hs_n_forks;
 
-/* Sleeps until try_enter(lock) has succeeded, which is tried whenever a thread says that it has left
- * one, and now and then: a wake-up that comes too early costs time only. All locks share a queue. */
+/* Sleeps until try_enter(lock) has succeeded, which is tried whenever a thread says that it has
+ * left one, and now and then: a wake-up that comes too early costs time only. All locks share a
+ * queue. */
 void hs_wait_for(bool (*try_enter)(void *lock), void *lock);
 void hs_wake_waiting(void);
 
