@@ -12,7 +12,7 @@
  * lock that no thread waits for. A thread that finds it taken does without the pool: it takes new
  * memory, and gives old memory straight back to the system. Only the four functions of halfshell.h
  * try again for a quarter of a second; where the lock does not come free they do nothing and return
- * 0. Where another thread had the lock at the moment of a fork, the child begins with an empty pool.
+ * 0. Where another thread had the lock at the moment of a fork, the child's pool is empty at first.
  */
 #ifndef HS_POOL_H
 #define HS_POOL_H
