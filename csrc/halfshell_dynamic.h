@@ -5,7 +5,8 @@
  * hold; docs/dynamic.md explains the rest.
  *
  * Threads: any number of calls that take a `const hs_dynamic *` may run at once; one that changes
- * the list waits for them, and they for it, as all do for the thread that holds it.
+ * the list waits for them, and they for it, as all do for the thread that holds it. A child process
+ * goes on with its copy, unless another thread was changing the list when it was forked off.
  */
 #ifndef HALFSHELL_DYNAMIC_H
 #define HALFSHELL_DYNAMIC_H

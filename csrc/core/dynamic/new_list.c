@@ -117,13 +117,11 @@ hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *fa
     if (status == HS_OK) {
         hs_axes_init(&made->axes, &made->lattice, made->cell_size, one_cell, made->max_radius);
         measure_box(made);
+        hs_gate_init(&made->gate);
         if (!(count_images(&made->axes, made->max_radius) <= MOST_IMAGES)) {
             status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
-        } else if (!hs_gate_init(&made->gate)) {
-            status = HS_ERR_MEMORY;
         } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
                                     made->max_radius)) {
-            hs_gate_destroy(&made->gate);
             status = HS_ERR_MEMORY;
         }
     }
@@ -150,7 +148,6 @@ hs_list_free(hs_dynamic *list)
 {
     free_points(list);
     hs_offsets_free(&list->offsets);
-    hs_gate_destroy(&list->gate);
     hs_free(NULL, list);
 }
 

@@ -19,7 +19,7 @@ ALLOWED = {
     "_peers": {""},
     "_report": {"", "_peers", "scenes"},
     "_cli": {"", "_convert", "_functions", "_check", "_peers", "_report", "scenes"},
-    "scenes": {""},
+    "scenes": {"", "_convert"},
     "compat": {"", "_convert", "_functions", "_objects"},
 }
 
