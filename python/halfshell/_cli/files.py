@@ -3,9 +3,9 @@
 
 What reads a file is decided by one rule. Each reader that may know the format is tried, and the
 first that yields sensible points wins: at least one point, finite coordinates, a box of the same
-dimensions. A box that is a placeholder is left out, and elements that a residue cannot have are told
-from the names of its atoms instead. The summary names the reader, and what it took for coordinates
-or left out. If no reader wins, the error says what each of them said.
+dimensions. A box that is a placeholder is left out, and elements that a residue cannot have are
+told from the names of its atoms instead. The summary names the reader, and what it took for
+coordinates or left out. If no reader wins, the error says what each of them said.
 
 =========================================  ====================================================
 file                                       readers, in this order
@@ -13,8 +13,9 @@ file                                       readers, in this order
 NumPy's, by name or content                NumPy
 .csv, .tsv, .pts, or with --columns        text, by columns
 .ply; .pcd; .vtk, .vtp, .vtu ...           plyfile, pyvista; pypcd4; pyvista
-.txt, .dat                                 text, ASE, MDAnalysis
+.txt, .dat, or a name without a suffix     text, ASE, MDAnalysis
 any other; --format is for these two       ASE, MDAnalysis, then text if neither knows the format
+                                           (or if it is .xyz, as clouds are named too)
 =========================================  ====================================================
 
 What stands in a header is compared with the size of the file before any of them demands memory.
@@ -30,6 +31,7 @@ import os
 import re
 import secrets
 import shutil
+import struct
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -58,8 +60,10 @@ from halfshell._terminal import printable
 
 __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 
-_TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat")
+_TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
+
+_LAST = "text without a known format"
 
 Frames = int | slice | None
 _Reader = Callable[[str], list[Structure]]  # the frames of a file
@@ -188,9 +192,12 @@ def _read(
 ) -> list[Scene]:
     """The frames that the first reader yields of which all are sensible."""
     with _as_path(file, file_format) as (path, source):
+        claimed = _refuse_claims(path, source)
         said: dict[str, str] = {}
         unknown: list[str] = []
         for name, read in _readers(path, file_format, frames, columns):
+            if name == _LAST and said and kind_of_file(path) != ".xyz":
+                continue
             try:
                 found = read(path)
                 if not found:
@@ -202,7 +209,7 @@ def _read(
                 ]  # fmt: skip
                 for scene in scenes:
                     _check(scene)
-                return scenes
+                return [_with_claim(scene, claimed) for scene in scenes]
             except UnknownFormat:
                 unknown.append(name)
             except MemoryError as error:
@@ -214,7 +221,17 @@ def _read(
                 said[name] = f"cannot be read: {one_line(error)}"
             except (Exception, SystemExit) as error:  # a reader may fail in any way
                 said[name] = f"cannot be read: {type(error).__name__}: {one_line(error)}"
+    if kind_of_file(path) == "" and len(said) > 1:
+        del said["text"]  # which other formats are as well
     raise InputError(f"{source}: {_refusal(said, unknown, file_format)}".replace(path, source))
+
+
+def _with_claim(scene: Scene, claimed: int) -> Scene:
+    """The scene with a remark if it has fewer points than the header of its file says."""
+    if len(scene.points) >= claimed:
+        return scene
+    remark = f"its header says {claimed:,} points, {len(scene.points):,} were read"
+    return replace(scene, remarks=(*scene.remarks, remark))
 
 
 def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) -> str:
@@ -243,7 +260,6 @@ def _as_path(file: str, file_format: str | None) -> Iterator[tuple[str, str]]:
         raise InputError(f"{file}: is a folder")
     source = "standard input" if is_input else file
     if not is_input and (os.path.isfile(file) or os.path.isdir(file) or is_numpy(file)):
-        _refuse_claims(file, source)
         yield file, source
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -257,7 +273,6 @@ def _as_path(file: str, file_format: str | None) -> Iterator[tuple[str, str]]:
                         shutil.copyfileobj(stream, copy)
         except OSError as error:
             raise InputError(f"{source}: cannot be read: {one_line(error)}") from None
-        _refuse_claims(path, source)
         yield path, source
 
 
@@ -266,7 +281,8 @@ def _readers(
 ) -> list[tuple[str, _Reader]]:
     """The readers that may know a file, by name, in the order in which they are tried."""
     suffix = kind_of_file(path)
-    text = ("text", partial(_by_text, columns=columns or (), is_pts=suffix == ".pts"))
+    by_text = partial(_by_text, columns=columns or (), is_pts=suffix == ".pts")
+    text = ("text", by_text)
     structures: list[tuple[str, _Reader]] = [
         ("ASE", partial(by_ase, file_format=file_format, frames=frames)),
         ("MDAnalysis", partial(by_mdanalysis, file_format=file_format, frames=frames)),
@@ -284,7 +300,7 @@ def _readers(
     elif suffix in _TEXT_FIRST:
         return [text, *structures]
     else:
-        return [*structures, text]
+        return [*structures, (_LAST, partial(by_text, least=2))]
     if frames is not None:
         raise InputError(f"{path}: --index is for formats with several frames")
     return readers
@@ -318,9 +334,11 @@ def _by_numpy(path: str) -> list[Structure]:
     return [Structure(points, box, tuple(bool(flag) for flag in flags), reader=reader)]
 
 
-def _by_text(path: str, columns: Sequence[str], is_pts: bool) -> list[Structure]:
+def _by_text(
+    path: str, columns: Sequence[str], is_pts: bool, least: int = 1
+) -> list[Structure]:
     try:
-        points, what = read_points(path, columns, is_pts)
+        points, what = read_points(path, columns, is_pts, least)
     except UnicodeDecodeError:
         raise InputError("is not text") from None
     return [Structure(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
@@ -331,8 +349,8 @@ def _by_cloud(path: str, reader: Any) -> list[Structure]:
     return [Structure(points, reader=name)]
 
 
-# What headers say of the number of points, the least number of bytes for each of them, and the names
-# of files in which the number could otherwise be a point or a title.
+# What headers say of the number of points, the least number of bytes for each of them, and the
+# suffixes of the format where others may have a number in this place.
 _CLAIMS = (
     (re.compile(rb"\s*(\d+)\s"), 2, (".xyz", ".extxyz", ".txyz", ".arc", ".pts")),
     (re.compile(rb"[^\n]*\n\s*(\d+)\s"), 2, (".gro",)),
@@ -345,10 +363,10 @@ _CLAIMS = (
 )
 
 
-def _refuse_claims(path: str, source: str) -> None:
-    """InputError for a file that is empty, or whose header says more points than it can hold."""
+def _refuse_claims(path: str, source: str) -> int:
+    """How many points a header says, or 0; InputError if a file is empty, or cannot hold these."""
     if not os.path.isfile(path):
-        return
+        return 0
     size = os.path.getsize(path)
     if size == 0:
         raise InputError(f"{source}: is empty")
@@ -364,22 +382,24 @@ def _refuse_claims(path: str, source: str) -> None:
                 if not kinds or kind in kinds
             )  # fmt: skip
             claimed, least = next(((int(m[1]), least) for m, least in found if m), (0, 1))
-    except (OSError, ValueError):
-        return  # which its reader will say
+    except (OSError, ValueError, struct.error):
+        return 0  # which its reader will say
     if claimed > size // least:
         raise InputError(
             f"{source}: says that it holds {claimed:,} points, more than its {size:,} bytes can"
         )
+    return claimed
 
 
 def _claim_of_dcd(head: bytes) -> int:
     """The number of atoms in the third record of a DCD file, of either order and width."""
     width = 4 if head[4:8] == b"CORD" else 8
-    order = "little" if head[0] == 84 else "big"
+    order = "<" if head[0] == 84 else ">"
     at = 0
     for _ in range(2):
-        at += int.from_bytes(head[at : at + width], order) + 2 * width
-    return int.from_bytes(head[at + width : at + width + 4], order)
+        at += struct.unpack_from(f"{order}i", head, at if order == "<" else at + width - 4)[0]
+        at += 2 * width
+    return int(struct.unpack_from(f"{order}i", head, at + width)[0])
 
 
 def _check(scene: Scene) -> None:
