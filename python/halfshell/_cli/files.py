@@ -63,7 +63,7 @@ __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 _TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
 
-_LAST = "text without a known format"
+_LAST = "as text"
 
 Frames = int | slice | None
 _Reader = Callable[[str], list[Structure]]  # the frames of a file
@@ -244,9 +244,9 @@ def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) 
         return "; ".join(told)
     form = "the format" if file_format is None else f"the format {file_format!r}"
     many = f"{' and '.join(unknown)} {'do' if len(unknown) > 1 else 'does'} not know {form}"
-    if "ASE" in unknown:
-        return "; ".join(["unknown format: " + many + " (see `ase info --formats`; force one "
-                          "with --format)", *told])  # fmt: skip
+    if set(said) <= {"text", _LAST}:
+        many = f"unknown format: {many} (see `ase info --formats`; force one with --format)"
+        return "; ".join([many, *told])
     return "; ".join([*told, many])
 
 

@@ -254,6 +254,9 @@ _NAMES_OF_MDANALYSIS = {
 }  # fmt: skip
 
 
+_NOT_OF_POINTS = re.compile(r"[Mm]ass|atom types|guess types|dt information|[Ee]lement")
+
+
 def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[Structure]:
     """Frames as MDAnalysis reads them, where it is installed; see `by_ase`."""
     try:
@@ -265,22 +268,8 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
     parsers, readers = (getattr(MDAnalysis, part, {}) for part in ("_PARSERS", "_READERS"))
     if kind not in parsers and kind not in readers:
         raise UnknownFormat
-    formats = {"topology_format": kind} if kind in parsers else {}
-    formats |= {"format": kind} if kind in readers else {}
     with _warnings() as remarks:
-        for guesses in (("elements",), ()):
-            try:
-                universe = MDAnalysis.Universe(file, to_guess=guesses, **formats)
-                break
-            except (ValueError, TypeError, NotImplementedError) as error:
-                if guesses:
-                    continue  # there may be no names to guess elements by
-                if "deduce the number of atoms" in str(error):
-                    raise InputError(
-                        "holds coordinates alone, which are read with a topology: give that as "
-                        "FILE, and this with --trajectory"
-                    ) from None
-                raise
+        universe = (_of_topology if kind in parsers else _of_coordinates)(file, kind, readers)
         try:
             trajectory = universe.trajectory
         except AttributeError:
@@ -296,7 +285,35 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
         species, how = _elements_of(universe.atoms)
         reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
         found = [_of_frame(trajectory[k], species, reader) for k in chosen]
-    return [one._replace(remarks=tuple(remarks)) for one in found]
+    told = tuple(remark for remark in remarks if not _NOT_OF_POINTS.search(remark))
+    return [one._replace(remarks=told) for one in found]
+
+
+def _of_topology(file: str, kind: str, readers: Any) -> Any:
+    """The universe of a file that says which atoms there are."""
+    from MDAnalysis import Universe
+
+    formats = {"topology_format": kind, **({"format": kind} if kind in readers else {})}
+    try:
+        return Universe(file, to_guess=("elements",), **formats)
+    except (ValueError, TypeError, NotImplementedError):  # there may be no names to guess by
+        return Universe(file, to_guess=(), **formats)
+
+
+def _of_coordinates(file: str, kind: str, readers: Any) -> Any:
+    """The universe of a file that has nothing but coordinates."""
+    from MDAnalysis import Universe
+
+    try:
+        n_atoms = readers[kind].parse_n_atoms(file)
+    except NotImplementedError:
+        raise InputError(
+            "holds coordinates alone, which are read with a topology: give that as FILE, and this "
+            "with --trajectory"
+        ) from None
+    universe = Universe.empty(n_atoms)
+    universe.load_new(file, format=kind)
+    return universe
 
 
 def _elements_of(atoms: Any) -> tuple[NDArray[np.str_] | None, str]:

@@ -62,11 +62,13 @@ def as_frame(frame: Any, box: Any, periodic: Any) -> Frame:
     if one is not None:
         if len(one[0]) != 1:
             raise ValueError(f"a {kind_of(frame)} in frames must be one frame, got {len(one[0])}")
-        return _with(one[0][0], one[1][0], box, periodic, kind_of(frame))
+        own = without_placeholder(one[1][0], "frames")
+        return _with(one[0][0], own, box, periodic, kind_of(frame))
     vectors = attribute(frame, "triclinic_dimensions", "frames", _MISSING)
     if vectors is not _MISSING:
         points = attribute(frame, "positions", "frames")
-        return _with(points, vectors, box, periodic, kind_of(frame))
+        own = without_placeholder(vectors, "frames")
+        return _with(points, own, box, periodic, kind_of(frame))
     return Frame(frame, box, periodic)
 
 
@@ -82,7 +84,6 @@ def _of_mdtraj(values: Any) -> tuple[Any, Any] | None:
 def _with(points: Any, own: Any, box: Any, periodic: Any, whose: str) -> Frame:
     if own is not None and box is not None:
         raise ValueError(f"box is given twice: {whose} bring their own")
-    own = without_placeholder(own, whose)
     return Frame(points, box if own is None else own, periodic)
 
 

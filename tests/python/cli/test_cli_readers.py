@@ -225,8 +225,10 @@ def test_mmcif(scene, refused, tmp_path):
     assert len(read_frames(str(tmp_path / "a.cif"), slice(None))) == 2
     packed = scene("b.cif.gz", gzip.compress(MMCIF.format("1.000").encode()))
     assert packed.box is None and "placeholder" in packed.no_box
-    assert scene("c.cif", MMCIF.format("0.0")).no_box and scene("d.cif", MMCIF.format("?")).box is None
-    assert "an atom has 7 values, not 8" in refused("e.cif", MMCIF.format("?").replace("CA 0.0", "CA"))
+    assert scene("c.cif", MMCIF.format("0.0")).no_box
+    assert scene("d.cif", MMCIF.format("?")).box is None
+    short = MMCIF.format("?").replace("CA 0.0", "CA")
+    assert "an atom has 7 values, not 8" in refused("e.cif", short)
 
 
 @pytest.mark.parametrize(("title", "species"), [("Si O", ["Si", "Si", "O", "O"]), ("what", None)])
@@ -338,8 +340,8 @@ def test_what_mdanalysis_writes_is_read(tmp_path, form):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         universe = MDAnalysis.Universe.empty(4, trajectory=True)
-        for name, values in (("names", ["OW", "HW1", "HW2", "NA"]), ("resnames", ["SOL"]),
-                             ("resids", [1]), ("charges", [0.0] * 4), ("radii", [1.0] * 4)):  # fmt: skip
+        named = {"names": ["OW", "HW1", "HW2", "NA"], "resnames": ["SOL"], "resids": [1]}
+        for name, values in (*named.items(), ("charges", [0.0] * 4), ("radii", [1.0] * 4)):
             universe.add_TopologyAttr(name, values)
         universe.atoms.positions = POINTS
         universe.dimensions = [10, 11, 12, 90, 90, 90]
@@ -361,7 +363,7 @@ PCD = (
 VTK = "# vtk DataFile Version 3.0\ncloud\nASCII\nDATASET POLYDATA\nPOINTS {} float\n"
 ROWS = "".join(f"{x} {y} {z}\n" for x, y, z in POINTS)
 CLOUDS = {
-    "a.ply": ("plyfile", PLY.format(4, OF_PLY) + "".join(f"7 {row}\n" for row in ROWS.splitlines())),
+    "a.ply": ("plyfile", PLY.format(4, OF_PLY) + "7 " + ROWS.strip().replace("\n", "\n7 ") + "\n"),
     "a.pcd": ("pypcd4", PCD.format(4) + ROWS),
     "a.vtk": ("pyvista", VTK.format(4) + ROWS),
 }
@@ -380,7 +382,8 @@ def test_point_clouds(scene, name):
 def test_point_clouds_without_their_library(monkeypatch, refused, name):
     for library in ("plyfile", "pypcd4", "pyvista"):
         monkeypatch.setitem(sys.modules, library, None)
-    assert f"needs {CLOUDS[name][0]}: pip install {CLOUDS[name][0]}" in refused(name, CLOUDS[name][1])
+    library, text = CLOUDS[name]
+    assert f"needs {library}: pip install {library}" in refused(name, text)
     assert set(cloud_files.CLOUDS) >= {".ply", ".pcd", ".vtk", ".vtp", ".vtu"}
 
 
@@ -401,9 +404,10 @@ HUGE = 10**14
     ("name", "content"),
     [
         ("a.xyz", f"{HUGE}\n\nH 0 0 0\n"), ("a.gro", f"title\n{HUGE}\n    1SOL     OW    1\n"),
-        ("a.crd", f"* title\n*\n{HUGE} EXT\n"), ("a.data", f"LAMMPS\n\n{HUGE} atoms\n\nAtoms\n\n1 1"),
+        ("a.crd", f"* title\n*\n{HUGE} EXT\n"), ("a.vtk", VTK.format(HUGE)),
+        ("a.data", f"LAMMPS\n\n{HUGE} atoms\n\nAtoms\n\n1 1"),
         ("a.lammpstrj", f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{HUGE}\nITEM: BOX BOUNDS\n"),
-        ("a.ply", PLY.format(HUGE, OF_PLY)), ("a.pcd", PCD.format(HUGE)), ("a.vtk", VTK.format(HUGE)),
+        ("a.ply", PLY.format(HUGE, OF_PLY)), ("a.pcd", PCD.format(HUGE)),
         ("a.pts", f"{HUGE}\n0 0 0\n"), ("a.dcd", dcd("NAMD", n_atoms=2**31 - 1)),
         ("a.dcd", dcd("NAMD", ">", n_atoms=10**9)), ("a.xyz", "1000000\n\nH 0 0 0\n"),
     ],
