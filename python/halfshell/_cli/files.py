@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell._cli.errors import InputError, one_line
 from halfshell._cli.numpy_files import Unreadable, read_arrays
+from halfshell._cli.pair_files import refuse_list
 from halfshell._cli.structure_files import read_structures
 from halfshell._cli.text_files import BadLine, read_points
 from halfshell._terminal import printable
@@ -116,6 +117,7 @@ def read_scene(
         raise InputError(f"{file}: is empty")
     else:
         suffix = Path(file).suffix.lower()
+        refuse_list(file)
         try:
             if file_format is None and suffix in _NUMPY:
                 scene = _read_numpy(file, index)
