@@ -22,6 +22,8 @@ from halfshell._cli.files import Scene, read_scene
 from halfshell._cli.output import check_size, open_output, write_columns
 from halfshell._cli.scene import (
     describe_box,
+    describe_points,
+    describe_source,
     load_frames,
     load_scene,
     read_points,
@@ -248,14 +250,15 @@ def _print(
     if args.output == "-":
         return
     if args.json:
-        first: dict[str, Any] = {"file": scene.source, "points": len(scene.points)}
+        first = describe_source(scene) | ({"no_box": scene.no_box} if scene.no_box else {})
         if getattr(args, "queries", None) is not None:
             first["queries"] = args.queries
         print(json.dumps({**first, **facts, "seconds": took, "output": args.output}, indent=2))
         return
-    shown = [("points", f"{len(scene.points):,}"), ("box", describe_box(scene)), *lines]
+    shown = describe_points(scene)
     if getattr(args, "queries", None) is not None:
-        shown.insert(1, ("queries", args.queries))
+        shown.append(("queries", args.queries))
+    shown += [("box", describe_box(scene)), *lines]
     shown.append(("time", f"{took:.3g} s" if took >= 1 else f"{took * 1e3:.3g} ms"))
     if args.output:
         shown.append(("written to", args.output))

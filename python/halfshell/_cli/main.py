@@ -135,8 +135,8 @@ def _add_scene_options(
         "file",
         nargs="?",
         metavar="FILE",
-        help=".npy, .npz, text with one point per line, or anything that ase.io.read reads; "
-        "default: alpha-quartz",
+        help=".npy, .npz, text with one point per line, point clouds, or anything that ASE or "
+        "MDAnalysis reads; - for standard input; default: alpha-quartz",
     )
     if has_cutoff:
         command.add_argument(
@@ -158,7 +158,13 @@ def _add_scene_options(
         metavar="TTF",
         help="which axes are periodic, T or F for each, or one letter for all",
     )
-    command.add_argument("--format", metavar="NAME", help="ase format, if it is not recognised")
+    command.add_argument(
+        "--columns", type=values.columns, metavar="X,Y,Z",
+        help="of text, the coordinates: names of columns, or numbers from 1 on"
+    )  # fmt: skip
+    command.add_argument(
+        "--format", metavar="NAME", help="format of ASE or MDAnalysis, if it is not recognised"
+    )
     if has_frames:
         command.add_argument(
             "--index", type=values.frames, metavar="N",

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.scene import MAX_DIM, MAX_POINTS
 
-__all__ = ["Unreadable", "read_arrays"]
+__all__ = ["Unreadable", "is_numpy", "read_arrays"]
 
 _SCENE = ("points", "box", "periodic")
 _MAGIC = np.lib.format.MAGIC_PREFIX
@@ -31,6 +31,16 @@ _COPIES = 2  # of the points: what is read, and the search's own
 
 class Unreadable(Exception):
     """A file that is not read, with the reason."""
+
+
+def is_numpy(file: str) -> bool:
+    """Whether a file is one by its name, or without one by what it begins with."""
+    suffix = os.path.splitext(file)[1]
+    if suffix or not os.path.isfile(file):
+        return suffix.lower() in (".npy", ".npz")
+    with open(file, "rb") as stream:
+        start = stream.read(len(_MAGIC))
+    return start == _MAGIC or start.startswith(b"PK\x03\x04")
 
 
 def read_arrays(

@@ -56,8 +56,8 @@ class ListFile(NamedTuple):
     counts_from: int
 
 
-def refuse_list(file: str) -> None:
-    """InputError if a file that should hold points has the columns of a list of pairs.
+def refuse_list(file: str, source: str) -> None:
+    """InputError that names `source` if a file has the columns of a list of pairs, not of points.
 
     A file that cannot be read is left to the reader of points, which says why.
     """
@@ -82,7 +82,7 @@ def refuse_list(file: str) -> None:
         plain += [name + end for name in plain for end in "01"]
     if _endpoints(plain) is not None:
         raise InputError(
-            f"{file}: is a list of pairs ({_shown(names)}), not points; "
+            f"{source}: is a list of pairs ({_shown(names)}), not points; "
             "halfshell verify STRUCTURE LIST checks one"
         )
 

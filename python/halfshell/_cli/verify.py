@@ -22,7 +22,13 @@ from halfshell._cli.files import Scene
 from halfshell._cli.pair_files import read_list
 from halfshell._cli.peers import PairList, ask_peer, find_peer
 from halfshell._cli.progress import progress_bar
-from halfshell._cli.scene import load_scene, read_points, unit_suffix
+from halfshell._cli.scene import (
+    describe_points,
+    describe_source,
+    load_scene,
+    read_points,
+    unit_suffix,
+)
 from halfshell._terminal import printable
 
 __all__ = ["Check", "check_by_integers", "check_by_search", "run", "sample_points"]
@@ -236,9 +242,8 @@ def _saved_list(args: Namespace) -> tuple[str, PairList, Scene, float]:
 
 def _json(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: list[Check]) -> str:
     report: dict[str, Any] = {
-        "file": scene.source,
+        **describe_source(scene),
         "list": author,
-        "points": len(scene.points),
         "cutoff": cutoff,
         "inclusive": pairs.inclusive,
         "full": pairs.full,
@@ -264,6 +269,7 @@ def _text(author: str, pairs: PairList, scene: Scene, cutoff: float, checks: lis
     kind = "both directions of each pair" if pairs.full else "each pair once"
     n = len(scene.points)
     lines = [
+        *describe_points(scene),
         ("list of", author),
         ("cutoff", f"{cutoff:.6g}{unit_suffix(scene)}   ({rule})"),
         ("rows", f"{len(pairs.i):,}   ({kind})"),

@@ -60,6 +60,22 @@ def foreign_periodic(box: Any, ndim: int) -> Any:
     return flags[:2] if ndim == 2 else flags
 
 
+def placeholder(rows: Any, is_pdb: bool) -> str:
+    """Why a box is none, which a file or an object has only because a box must stand there.
+
+    Vectors that are all zero, or parallel as angles of zero make them, or no numbers; in what PDB
+    or mmCIF files say, where lengths are in angstrom, also a cube of 1 x 1 x 1. Else nothing.
+    """
+    rows = np.asarray(rows, dtype=np.float64)
+    if not rows.any():
+        return "its vectors are zero"
+    if np.isnan(rows).any():
+        return "it has no lengths or angles"
+    if is_pdb and np.array_equal(rows, np.eye(len(rows))):
+        return "1 x 1 x 1 is a placeholder in such files"
+    return ""
+
+
 def _matrix_of(box: Any, name: str) -> Any:
     try:
         return box.to_matrix()
