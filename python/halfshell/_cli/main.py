@@ -163,6 +163,10 @@ def _add_scene_options(
         help="of text, the coordinates: names of columns, or numbers from 1 on"
     )  # fmt: skip
     command.add_argument(
+        "--trajectory", metavar="FILE",
+        help="frames of which the first FILE is the topology, as MDAnalysis reads both"
+    )  # fmt: skip
+    command.add_argument(
         "--format", metavar="NAME", help="format of ASE or MDAnalysis, if it is not recognised"
     )
     if has_frames:

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -47,6 +48,7 @@ class Structure(NamedTuple):
     reader: str = ""
     unit: str = ""
     no_box: str = ""
+    frame: str = ""
 
 
 def kind_of_file(file: str) -> str:
@@ -58,8 +60,10 @@ def kind_of_file(file: str) -> str:
 # ---- ASE ---------------------------------------------------------------------------------------
 
 
-def by_ase(file: str, file_format: str | None, frames: Frames) -> list[Structure]:
+def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Structure]:
     """Frames as ASE reads them: one, by default the last, unless `frames` is a range.
+
+    Those of a range are read one by one, where the reader of the format does so.
 
     LAMMPS data, mmCIF and VASP 4 are told from what the file holds, because ASE does not.
 
@@ -80,12 +84,16 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> list[Structure
             name = file_format or (own[0] if own else filetype(file))
             read = partial(ase.io.read, file, format=name, do_not_split_by_at_sign=True)
             read = partial(_all_of, own[1]) if own else read
-            one = -1 if frames is None else frames
-            found: Any = read(index=one)
-            found = found if isinstance(frames, slice) else [found]
-            if not all(map(len, found)):  # such as that between ENDMDL and END of a PDB file
-                whole = [atoms for atoms in read(index=slice(None)) if len(atoms)]
-                found = whole[one] if isinstance(one, slice) else [whole[one]]
+            found: Any
+            if isinstance(frames, slice) and not own:
+                found = ase.io.iread(file, frames, format=name, do_not_split_by_at_sign=True)
+            elif isinstance(frames, slice):
+                found = read(index=frames)
+            else:
+                number = -1 if frames is None else frames
+                found = [read(index=number)]
+                if not len(found[0]):  # such as that between ENDMDL and END of a PDB file
+                    found = [[atoms for atoms in read(index=slice(None)) if len(atoms)][number]]
         except UnknownFileTypeError:
             raise UnknownFormat from None
         except (IndexError, StopIteration) as error:
@@ -93,7 +101,12 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> list[Structure
             detail = f" ({' '.join(str(error).split())})" if str(error) else ""
             raise InputError(what + detail) from None
     reader = f"ASE {ase.__version__}, {name}"
-    return [_of_atoms(atoms, tuple(remarks), reader, "lammps" in name) for atoms in found]
+    for frame, atoms in _each(found, frames, remarks):
+        if len(atoms):
+            one = _of_atoms(atoms, tuple(remarks), reader, "lammps" in name)
+            yield one._replace(frame=frame)
+        elif isinstance(frames, slice) and min(frames.start or 0, frames.stop or 0) < 0:
+            raise InputError(f"{frame} holds no atoms: count frames from the first on")
 
 
 def _all_of(read: Callable[[], list[Any]], index: int | slice) -> Any:
@@ -199,11 +212,18 @@ def _of_vasp4(file: str) -> list[Any]:
 # ---- MDAnalysis --------------------------------------------------------------------------------
 
 
-def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[Structure]:
-    """Frames as MDAnalysis reads them, where it is installed; see `by_ase`."""
+def by_mdanalysis(
+    file: str, file_format: str | None, frames: Frames, trajectory: str | None = None
+) -> Iterator[Structure]:
+    """Frames as MDAnalysis reads them, where it is installed; see `by_ase`.
+
+    With `trajectory` they are in that file, and `file` is its topology.
+    """
     try:
         import MDAnalysis
     except ImportError:
+        if trajectory is not None:
+            raise missing_extra("--trajectory", "MDAnalysis") from None
         raise UnknownFormat from None
     path = Path(file)
     kind = (file_format or kind_of_file(file)[1:] or path.name.split("_")[0]).upper()
@@ -214,11 +234,12 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
                 raise UnknownFormat
         kind = "DATA"
     formats = {"topology_format": kind} if kind in parsers else {}
-    formats |= {"format": kind} if kind in readers else {}
+    formats |= {"format": kind} if kind in readers and trajectory is None else {}
+    parts = [file] if trajectory is None else [file, trajectory]
     with _warnings() as remarks:
         for guesses in (("elements",), ()):
             try:
-                universe = MDAnalysis.Universe(file, to_guess=guesses, **formats)
+                universe = MDAnalysis.Universe(*parts, to_guess=guesses, **formats)
                 break
             except (ValueError, TypeError, NotImplementedError):
                 if guesses:
@@ -230,12 +251,12 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
                     ) from None
                 raise
         try:
-            trajectory = universe.trajectory
+            steps = universe.trajectory
         except AttributeError:
             raise InputError(
                 "holds a topology without coordinates: give these with --trajectory"
             ) from None
-        numbers = range(len(trajectory))
+        numbers = range(len(steps))
         one = -1 if frames is None else frames
         try:
             chosen = numbers[one] if isinstance(one, slice) else [numbers[one]]
@@ -243,8 +264,9 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
             raise InputError(f"has no frame {frames}") from None
         species, how = _elements_of(universe.atoms)
         reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
-        found = [_of_frame(trajectory[k], species, reader) for k in chosen]
-    return [one._replace(remarks=tuple(remarks)) for one in found]
+    found = (_of_frame(steps[k], species, reader) for k in chosen)
+    for frame, one in _each(found, frames, remarks, chosen):
+        yield one._replace(remarks=tuple(remarks), frame=frame)
 
 
 def _elements_of(atoms: Any) -> tuple[NDArray[np.str_] | None, str]:
@@ -276,6 +298,43 @@ def _warnings() -> Iterator[list[str]]:
         told = (" ".join(str(w.message).split()) for w in caught
                 if issubclass(w.category, UserWarning))  # fmt: skip
         texts += dict.fromkeys(told)
+
+
+def _each(
+    found: Iterable[Any], frames: Frames, remarks: list[str], numbers: Sequence[int] = ()
+) -> Iterator[tuple[str, Any]]:
+    """Frames one by one, with words for which it is of several, read when they are wanted.
+
+    What is warned of is put to the remarks. InputError names the frame at which reading fails.
+    """
+    iterator = iter(found)
+    for count in itertools.count():
+        frame = _words_for(count, frames, numbers)
+        with _warnings() as more:
+            try:
+                one = next(iterator, None)
+            except MemoryError:
+                raise
+            except Exception as error:
+                if not count:
+                    raise
+                reason = " ".join(str(error).split())
+                raise InputError(f"{frame}: {type(error).__name__}: {reason}") from None
+        remarks += [text for text in more if text not in remarks]
+        if one is None:
+            return
+        yield frame, one
+
+
+def _words_for(count: int, frames: Frames, numbers: Sequence[int]) -> str:
+    if not isinstance(frames, slice):
+        return ""
+    if count < len(numbers):
+        return f"frame {numbers[count]}"
+    start, step = frames.start or 0, frames.step or 1
+    if start < 0 or step < 0:
+        return f"frame {count}, counted from the first that --index names"
+    return f"frame {start + count * step}"
 
 
 # ---- elements ----------------------------------------------------------------------------------
