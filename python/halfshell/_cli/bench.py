@@ -105,7 +105,8 @@ def _print(rows: Sequence[ReportRow], reason: str, scene: Scene) -> None:
                      "times our time")  # fmt: skip
     if reason:
         lines.append(f"the cutoff was chosen: {reason}; --cutoff sets it")
-    lines.append(f"{scene.points.shape[1]}-D" + (f", read by {scene.reader}" if scene.reader else ""))
+    read = f"read by {scene.reader}: " if scene.reader else ""
+    lines.append(f"{read}points in {scene.points.shape[1]}-D")
     lines.append(f"medians, one thread for each, on {cpu_name()}")
     for line in lines:
         console.print(f"* {printable(line)}", markup=False, soft_wrap=True)

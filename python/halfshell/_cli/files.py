@@ -3,9 +3,9 @@
 
 What reads a file is decided by one rule. Each reader that may know the format is tried, and the
 first that yields sensible points wins: at least one point, finite coordinates, a box of the same
-dimensions. A box that is a placeholder is left out, and elements that a residue cannot have are told
-from the names of its atoms instead. The summary names the reader, and what it took for coordinates
-or left out. If no reader wins, the error says what each of them said.
+dimensions. A box that is a placeholder is left out, and elements that a residue cannot have are
+told from the names of its atoms instead. The summary names the reader, and what it took for
+coordinates or left out. If no reader wins, the error says what each of them said.
 
 =========================================  ====================================================
 file                                       readers, in this order
@@ -13,8 +13,9 @@ file                                       readers, in this order
 NumPy's, by name or content                NumPy
 .csv, .tsv, .pts, or with --columns        text, by columns
 .ply; .pcd; .vtk, .vtp, .vtu ...           plyfile, pyvista; pypcd4; pyvista
-.txt, .dat                                 text, ASE, MDAnalysis
+.txt, .dat, or a name without a suffix     text, ASE, MDAnalysis
 any other; --format is for these two       ASE, MDAnalysis, then text if neither knows the format
+                                           (or if it is .xyz, as clouds are named too)
 =========================================  ====================================================
 
 What stands in a header is compared with the size of the file before any of them demands memory.
@@ -30,6 +31,7 @@ import os
 import re
 import secrets
 import shutil
+import struct
 import sys
 import tempfile
 import traceback
@@ -60,8 +62,10 @@ from halfshell._terminal import printable
 
 __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 
-_TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat")
+_TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
+
+_LAST = "text without a known format"
 
 Frames = int | slice | None
 _Reader = Callable[[str], Iterable[Structure]]  # the frames of a file, one by one
@@ -211,6 +215,7 @@ def _read(
     """The frames of the first reader that yields a sensible one."""
     with _as_path(file, file_format) as (path, name_of_path):
         source = name_of_path
+        claimed = _refuse_claims(path, source)
         if file_format is None and columns is None:
             refuse_list(path, source)
         readers = _readers(path, file_format, frames, columns)
@@ -225,6 +230,8 @@ def _read(
         said: dict[str, str] = {}
         unknown: list[str] = []
         for name, read in readers:
+            if name == _LAST and said and kind_of_file(path) != ".xyz":
+                continue
             is_chosen = False
             try:
                 for one in read(path):
@@ -234,7 +241,7 @@ def _read(
                     )  # fmt: skip
                     _check(scene)
                     is_chosen = True
-                    yield scene
+                    yield _with_claim(scene, claimed)
                 if is_chosen:
                     return
                 raise InputError("has none of these frames")
@@ -245,6 +252,8 @@ def _read(
                 _forget(error)
                 if is_chosen or isinstance(error, MemoryError):
                     raise InputError(f"{source}: {said[name]}") from None
+    if kind_of_file(path) == "" and len(said) > 1:
+        del said["text"]  # which other formats are as well
     raise InputError(f"{source}: {_refusal(said, unknown, file_format)}")
 
 
@@ -265,6 +274,14 @@ def _forget(error: BaseException) -> None:
         traceback.clear_frames(error.__traceback__)
     finally:
         sys.unraisablehook = hook
+
+
+def _with_claim(scene: Scene, claimed: int) -> Scene:
+    """The scene with a remark if it has fewer points than the header of its file says."""
+    if len(scene.points) >= claimed:
+        return scene
+    remark = f"its header says {claimed:,} points, {len(scene.points):,} were read"
+    return replace(scene, remarks=(*scene.remarks, remark))
 
 
 def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) -> str:
@@ -293,7 +310,6 @@ def _as_path(file: str, file_format: str | None) -> Iterator[tuple[str, str]]:
         raise InputError(f"{file}: is a folder")
     source = "standard input" if is_input else file
     if not is_input and (os.path.isfile(file) or os.path.isdir(file) or is_numpy(file)):
-        _refuse_claims(file, source)
         yield file, source
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -307,7 +323,6 @@ def _as_path(file: str, file_format: str | None) -> Iterator[tuple[str, str]]:
                         shutil.copyfileobj(stream, copy)
         except OSError as error:
             raise InputError(f"{source}: cannot be read: {one_line(error)}") from None
-        _refuse_claims(path, source)
         yield path, source
 
 
@@ -316,7 +331,8 @@ def _readers(
 ) -> list[tuple[str, _Reader]]:
     """The readers that may know a file, by name, in the order in which they are tried."""
     suffix = kind_of_file(path)
-    text = ("text", partial(_by_text, columns=columns or (), is_pts=suffix == ".pts"))
+    by_text = partial(_by_text, columns=columns or (), is_pts=suffix == ".pts")
+    text = ("text", by_text)
     structures: list[tuple[str, _Reader]] = [
         ("ASE", partial(by_ase, file_format=file_format, frames=frames)),
         ("MDAnalysis", partial(by_mdanalysis, file_format=file_format, frames=frames)),
@@ -334,7 +350,7 @@ def _readers(
     elif suffix in _TEXT_FIRST:
         return [text, *structures]
     else:
-        return [*structures, text]
+        return [*structures, (_LAST, partial(by_text, least=2))]
     if frames is not None:
         raise InputError(f"{path}: --index is for formats with several frames")
     return readers
@@ -368,9 +384,11 @@ def _by_numpy(path: str) -> list[Structure]:
     return [Structure(points, box, tuple(bool(flag) for flag in flags), reader=reader)]
 
 
-def _by_text(path: str, columns: Sequence[str], is_pts: bool) -> list[Structure]:
+def _by_text(
+    path: str, columns: Sequence[str], is_pts: bool, least: int = 1
+) -> list[Structure]:
     try:
-        points, what = read_points(path, columns, is_pts)
+        points, what = read_points(path, columns, is_pts, least)
     except UnicodeDecodeError:
         raise InputError("is not text") from None
     return [Structure(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
@@ -381,8 +399,8 @@ def _by_cloud(path: str, reader: Any) -> list[Structure]:
     return [Structure(points, reader=name)]
 
 
-# What headers say of the number of points, the least number of bytes for each of them, and the names
-# of files in which the number could otherwise be a point or a title.
+# What headers say of the number of points, the least number of bytes for each of them, and the
+# suffixes of the format where others may have a number in this place.
 _CLAIMS = (
     (re.compile(rb"\s*(\d+)\s"), 2, (".xyz", ".extxyz", ".txyz", ".arc", ".pts")),
     (re.compile(rb"[^\n]*\n\s*(\d+)\s"), 2, (".gro",)),
@@ -395,10 +413,10 @@ _CLAIMS = (
 )
 
 
-def _refuse_claims(path: str, source: str) -> None:
-    """InputError for a file that is empty, or whose header says more points than it can hold."""
+def _refuse_claims(path: str, source: str) -> int:
+    """How many points a header says, or 0; InputError if a file is empty, or cannot hold these."""
     if not os.path.isfile(path):
-        return
+        return 0
     size = os.path.getsize(path)
     if size == 0:
         raise InputError(f"{source}: is empty")
@@ -414,22 +432,24 @@ def _refuse_claims(path: str, source: str) -> None:
                 if not kinds or kind in kinds
             )  # fmt: skip
             claimed, least = next(((int(m[1]), least) for m, least in found if m), (0, 1))
-    except (OSError, ValueError):
-        return  # which its reader will say
+    except (OSError, ValueError, struct.error):
+        return 0  # which its reader will say
     if claimed > size // least:
         raise InputError(
             f"{source}: says that it holds {claimed:,} points, more than its {size:,} bytes can"
         )
+    return claimed
 
 
 def _claim_of_dcd(head: bytes) -> int:
     """The number of atoms in the third record of a DCD file, of either order and width."""
     width = 4 if head[4:8] == b"CORD" else 8
-    order = "little" if head[0] == 84 else "big"
+    order = "<" if head[0] == 84 else ">"
     at = 0
     for _ in range(2):
-        at += int.from_bytes(head[at : at + width], order) + 2 * width
-    return int.from_bytes(head[at + width : at + width + 4], order)
+        at += struct.unpack_from(f"{order}i", head, at if order == "<" else at + width - 4)[0]
+        at += 2 * width
+    return int(struct.unpack_from(f"{order}i", head, at + width)[0])
 
 
 def _check(scene: Scene) -> None:

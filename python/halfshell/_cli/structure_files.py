@@ -26,6 +26,11 @@ __all__ = ["Structure", "UnknownFormat", "by_ase", "by_mdanalysis", "kind_of_fil
 Frames = int | slice | None
 
 _PACKED = {".gz", ".bz2", ".xz"}
+_OF_CELL = ((0, 9), (9, 9), (18, 9), (27, 7), (34, 7), (41, 7))  # numbers of a line CRYST1
+_CELL_OF_MMCIF = (
+    "length_a", "length_b", "length_c", "angle_alpha", "angle_beta", "angle_gamma"
+)  # fmt: skip
+_CIF_WORD = re.compile(r"""'(.*?)'(?=\s)|"(.*?)"(?=\s)|(\S+)""")
 _LAMMPS_STYLES = (None, "molecular", "charge", "full", "atomic")  # None: what the file says
 
 
@@ -121,14 +126,13 @@ def _of_atoms(atoms: Any, remarks: tuple[str, ...], reader: str, is_lammps: bool
     elif names is not None and residues is not None and not _plausible(species, residues):
         species = _elements(names, residues)
         reader = f"{reader}: elements by names of atoms"
-    elif (atoms.numbers == 0).all():
-        species = None
     box = atoms.cell.array if atoms.cell.rank > 0 else None
     no_box = placeholder(atoms.cell.array, residues is not None) if atoms.pbc.any() else ""
     periodic = tuple(bool(flag) for flag in atoms.pbc)
     if no_box:
         box, periodic = None, (False,) * 3
     unit = "" if is_lammps else "angstrom"
+    species = None if species is None else _known(species)
     return Structure(atoms.positions, box, periodic, species, remarks, reader, unit, no_box)
 
 
@@ -140,6 +144,9 @@ def _ase_needs_help(file: str) -> tuple[str, Callable[[], list[Any]]] | None:
         return "mmcif", partial(_of_mmcif, file)
     if re.search(rb"^\s*\d+\s+atoms\b", head[:4000], re.M) and b"atom types" in head:
         return "lammps-data", partial(_of_lammps, file)
+    cell = re.search(rb"^CRYST1(.{48})", head, re.M)
+    if cell and any(not float(cell[1][k : k + width].strip() or 0) for k, width in _OF_CELL):
+        return "proteindatabank", partial(_of_pdb_without_cell, file)
     lines = head.splitlines()[:8]
     counts = lines[5].split() if len(lines) == 8 else ()
     vectors = [_numbers_of(line) for line in lines[1:5]]
@@ -173,28 +180,69 @@ def _of_lammps(file: str) -> list[Any]:
 
 
 def _of_mmcif(file: str) -> list[Any]:
-    """The models of an mmCIF file, whose coordinates are Cartesian."""
+    """The models of an mmCIF file, whose coordinates are Cartesian; ASE's parser takes minutes."""
     from ase import Atoms
-    from ase.io.cif import parse_cif
 
-    with open_bytes(file) as stream:
-        block = next(iter(parse_cif(io.TextIOWrapper(stream, "utf-8"))))
-    sites = {key: np.array(block[f"_atom_site.{key}"], str) for key in
-             ("type_symbol", "cartn_x", "cartn_y", "cartn_z")}  # fmt: skip
-    points = np.stack([sites[f"cartn_{axis}"].astype(float) for axis in "xyz"], axis=1)
-    symbols = np.array([s.capitalize() if s.capitalize() in SYMBOLS else "X"
-                        for s in sites["type_symbol"].tolist()])  # fmt: skip
-    names = ("length_a", "length_b", "length_c", "angle_alpha", "angle_beta", "angle_gamma")
-    cell = [block.get(f"_cell.{name}", None) for name in names]
-    known = all(isinstance(value, (int, float)) for value in cell)
-    models = np.array(block.get("_atom_site.pdbx_pdb_model_num", np.zeros(len(points))))
+    cell, sites = _mmcif_tables(file)
+    keys = ["type_symbol", "cartn_x", "cartn_y", "cartn_z"]
+    if not all(sites.get(key) for key in keys):
+        raise InputError("holds no atoms")
+    symbols, *axes = (np.array(sites[key]) for key in keys)
+    points = np.stack(axes, axis=1).astype(np.float64)
+    species = ["H" if s == "D" else s.capitalize() for s in symbols.tolist()]
+    species = [s if s in SYMBOLS else "X" for s in species]
+    known = [cell.get(part, "?") for part in _CELL_OF_MMCIF]
+    has_cell = all(re.fullmatch(r"[\d.]+", value) for value in known)
+    models = np.array(sites.get("pdbx_pdb_model_num") or [""] * len(points))
     frames = []
     for model in dict.fromkeys(models.tolist()):
         part = models == model
-        atoms = Atoms(symbols[part], points[part], cell=cell if known else None, pbc=known)
-        atoms.set_array("residuenames", np.full(len(atoms), "?"))  # as a PDB file has some
+        atoms = Atoms(np.array(species)[part], points[part], pbc=has_cell)
+        if has_cell and all(map(float, known)):
+            atoms.cell = [float(value) for value in known]
+        atoms.arrays["residuenames"] = np.full(len(atoms), "?")  # as of a PDB file
         frames.append(atoms)
     return frames
+
+
+def _mmcif_tables(file: str) -> tuple[dict[str, str], dict[str, list[str]]]:
+    """Values of ``_cell`` and columns of ``_atom_site``, by names in small letters."""
+    cell: dict[str, str] = {}
+    sites: dict[str, list[str]] = {}
+    in_rows = False
+    with open_bytes(file) as stream:
+        for line in io.TextIOWrapper(stream, "utf-8"):
+            if line.startswith("_atom_site."):
+                sites[line.split()[0][len("_atom_site.") :].lower()] = []
+                in_rows = True
+            elif in_rows and line[:1] not in "#_\n" and line[:5] not in ("loop_", "data_"):
+                words = line.split()
+                if "'" in line or '"' in line:
+                    words = [quoted or double or word for quoted, double, word
+                             in _CIF_WORD.findall(line)]  # fmt: skip
+                if len(words) != len(sites):
+                    raise InputError(f"an atom has {len(words)} values, not {len(sites)}")
+                for column, word in zip(sites.values(), words):
+                    column.append(word)
+            else:
+                in_rows = False
+                if line.startswith("_cell."):
+                    name, _, value = line[len("_cell.") :].strip().partition(" ")
+                    cell[name.lower()] = value.strip()
+    return cell, sites
+
+
+def _of_pdb_without_cell(file: str) -> list[Any]:
+    """The models of a PDB file whose lengths or angles are zero, which ASE does not take."""
+    import ase.io
+
+    with open_bytes(file) as stream:
+        lines = [line for line in stream.read().decode("utf-8").splitlines(keepends=True)
+                 if not line.startswith("CRYST1")]  # fmt: skip
+    found = ase.io.read(io.StringIO("".join(lines)), index=slice(None), format="proteindatabank")
+    for atoms in found:
+        atoms.pbc = True  # with a cell of zeros: a box is said, and none
+    return list(found)
 
 
 def _of_vasp4(file: str) -> list[Any]:
@@ -212,6 +260,13 @@ def _of_vasp4(file: str) -> list[Any]:
 # ---- MDAnalysis --------------------------------------------------------------------------------
 
 
+# What it does not know by these names.
+_NAMES_OF_MDANALYSIS = {
+    "RST7": "INPCRD", "RST": "INPCRD", "LAMMPSTRJ": "LAMMPSDUMP", "DUMP": "LAMMPSDUMP",
+    "LMP": "DATA", "PDBX": "MMCIF",
+}  # fmt: skip
+
+
 def by_mdanalysis(
     file: str, file_format: str | None, frames: Frames, trajectory: str | None = None
 ) -> Iterator[Structure]:
@@ -225,14 +280,11 @@ def by_mdanalysis(
         if trajectory is not None:
             raise missing_extra("--trajectory", "MDAnalysis") from None
         raise UnknownFormat from None
-    path = Path(file)
-    kind = (file_format or kind_of_file(file)[1:] or path.name.split("_")[0]).upper()
+    kind = (file_format or kind_of_file(file)[1:] or Path(file).name.split("_")[0]).upper()
+    kind = _NAMES_OF_MDANALYSIS.get(kind, kind)
     parsers, readers = (getattr(MDAnalysis, part, {}) for part in ("_PARSERS", "_READERS"))
     if kind not in parsers and kind not in readers:
-        with open_bytes(file) as stream:
-            if not re.search(rb"^\s*\d+\s+atoms\b", stream.read(4000), re.M):
-                raise UnknownFormat
-        kind = "DATA"
+        raise UnknownFormat
     formats = {"topology_format": kind} if kind in parsers else {}
     formats |= {"format": kind} if kind in readers and trajectory is None else {}
     parts = [file] if trajectory is None else [file, trajectory]
@@ -241,10 +293,10 @@ def by_mdanalysis(
             try:
                 universe = MDAnalysis.Universe(*parts, to_guess=guesses, **formats)
                 break
-            except (ValueError, TypeError, NotImplementedError):
+            except (ValueError, TypeError, NotImplementedError) as error:
                 if guesses:
                     continue  # there may be no names to guess elements by
-                if kind in readers and kind not in parsers:
+                if "deduce the number of atoms" in str(error):
                     raise InputError(
                         "holds coordinates alone, which are read with a topology: give that as "
                         "FILE, and this with --trajectory"
@@ -273,11 +325,12 @@ def _elements_of(atoms: Any) -> tuple[NDArray[np.str_] | None, str]:
     found = getattr(atoms, "elements", None)
     if found is None:
         return None, ""
-    species = np.array([str(symbol).capitalize() for symbol in found])
+    species = np.array([str(symbol).capitalize() or "X" for symbol in found])
     names, residues = getattr(atoms, "names", None), getattr(atoms, "resnames", None)
     if names is not None and residues is not None and not _plausible(species, residues):
-        return _elements(names, residues), ": elements by names of atoms"
-    return species, ""
+        species = _elements(names, residues)
+        return _known(species), ": elements by names of atoms"
+    return _known(species), ""
 
 
 def _of_frame(frame: Any, species: NDArray[np.str_] | None, reader: str) -> Structure:
@@ -348,6 +401,10 @@ DT DU RA RC RG RU ADE CYT GUA THY URA HOH WAT SOL TIP TIP3 TIP4 TIP5 T3P SPC SPC
 _LIGHT = frozenset(("H", "D", "C", "N", "O", "S", "P", "Se", "X", ""))
 _IONS = {"SOD": "Na", "POT": "K", "CLA": "Cl", "CAL": "Ca", "CES": "Cs", "LIT": "Li"}  # of CHARMM
 _HEAVY = frozenset("FE ZN MG MN CL BR NA CU CO NI SE SI AL LI".split())  # that ligands may have
+
+
+def _known(species: NDArray[np.str_]) -> NDArray[np.str_] | None:
+    return None if (species == "X").all() else species
 
 
 def _plausible(species: Any, residues: Any) -> bool:

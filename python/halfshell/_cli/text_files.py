@@ -59,7 +59,7 @@ def open_bytes(file: str) -> IO[bytes]:
 
 
 def read_points(
-    file: str, columns: Sequence[str] = (), is_pts: bool = False
+    file: str, columns: Sequence[str] = (), is_pts: bool = False, least: int = 1
 ) -> tuple[NDArray[np.float64], str]:
     """Read the points of a text file, and say of which columns.
 
@@ -75,6 +75,8 @@ def read_points(
         Names, or numbers from 1 on, of those that are coordinates; default: told from the names.
     is_pts : bool
         Columns without names are those of a PTS file: x y z, intensity, colours.
+    least : int
+        Of coordinates, in a file that its name does not tell to be text.
 
     Raises
     ------
@@ -85,7 +87,10 @@ def read_points(
     """
     with open_bytes(file) as stream:
         lines = io.TextIOWrapper(stream, encoding="utf-8-sig")
-        return _read(_Lines(lines), columns, is_pts)
+        points, what = _read(_Lines(lines), columns, is_pts)
+    if points.shape[1] < least:
+        raise BadLine(f"has {points.shape[1]} column of numbers")
+    return points, what
 
 
 class _Lines:

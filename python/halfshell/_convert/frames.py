@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from halfshell._convert.foreign import attribute, is_a, kind_of
+from halfshell._convert.foreign_box import without_placeholder
 from halfshell._convert.scene import brings_its_box
 
 _MISSING = object()
@@ -81,6 +82,7 @@ def _of_mdtraj(values: Any) -> tuple[Any, Any] | None:
 def _with(points: Any, own: Any, box: Any, periodic: Any, whose: str) -> Frame:
     if own is not None and box is not None:
         raise ValueError(f"box is given twice: {whose} bring their own")
+    own = without_placeholder(own, whose)
     return Frame(points, box if own is None else own, periodic)
 
 

@@ -44,7 +44,7 @@ def test_a_box_of_mdanalysis_is_that_of_its_frame(tmp_path):
     universe = MDAnalysis.Universe.empty(3, trajectory=True)
     universe.atoms.positions = np.arange(9.0).reshape(3, 3)
     universe.dimensions = [8.0, 9.0, 10.0, 90.0, 90.0, 60.0]
-    found = structure_files._frame(universe.trajectory[0], None, ())
+    found = structure_files._of_frame(universe.trajectory[0], None, "")
     assert found.box.tolist() == universe.trajectory.ts.triclinic_dimensions.tolist()
     assert found.periodic == (True, True, True) and found.points.dtype == np.float32
 
