@@ -66,29 +66,24 @@ class Check:
 def check_by_search(pairs: PairList, scene: Scene, cutoff: float) -> tuple[Check, bool]:
     """Compare with the exact search; what differs is confirmed in rational arithmetic.
 
-    Also returns whether the list is full: of one that does not say so, what it comes nearer to.
+    Also returns whether the list is full, as `verify` finds.
     """
     n = len(scene.points)
     rows = sample_points(scene, max(1, n * SEARCH_ROWS // max(SEARCH_ROWS, len(pairs.i))))
     part = pairs.among(rows, n)
     points = scene.points if rows is None else scene.points[rows]
-    found: list[tuple[Check, bool]] = []
-    for full in (False, True) if pairs.full is None else (pairs.full,):
-        verdict = hs.verify(
-            points,
-            cutoff,
-            part.i,
-            part.j,
-            part.S,
-            box=scene.box,
-            periodic=scene.periodic if scene.box is not None else None,
-            inclusive=pairs.inclusive,
-            full=full,
-        )
-        found.append((_check("search", verdict, rows, len(points)), full))
-        if verdict:
-            break
-    return min(found, key=lambda one: (not one[0].ok, sum(map(len, one[0].faults.values()))))
+    verdict = hs.verify(
+        points,
+        cutoff,
+        part.i,
+        part.j,
+        part.S,
+        box=scene.box,
+        periodic=scene.periodic if scene.box is not None else None,
+        inclusive=pairs.inclusive,
+        full=bool(pairs.full),
+    )
+    return _check("search", verdict, rows, len(points)), verdict.is_full
 
 
 def check_by_integers(
