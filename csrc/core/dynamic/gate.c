@@ -6,105 +6,65 @@
 #include "gate.h"
 
 #include "../base/os_thread.h"
-#include "../memory/account.h"
 
-#if defined(_WIN32)
-#define CURRENT_PROCESS() 0 /* no fork */
-#else
-#include <unistd.h>
-#define CURRENT_PROCESS() ((int64_t)getpid())
-#endif
+#define WRITER      (INT64_C(1) << 31)
+#define PER_PROCESS (INT64_C(1) << 32)
 
-typedef struct hs_queue {
-    hs_mutex     mutex;
-    hs_condition changed;
-} hs_queue;
-
-bool
-hs_gate_init(hs_gate *gate)
+/* The state where no thread of this process is inside. */
+static int64_t
+empty(void)
 {
-    gate->state = gate->waiting = 0;
-    gate->process = CURRENT_PROCESS();
-    gate->queue = hs_alloc(NULL, HS_FOR_CELLS, 1, sizeof *gate->queue);
-    if (gate->queue != NULL) {
-        hs_mutex_init(&gate->queue->mutex);
-        hs_condition_init(&gate->queue->changed);
+    return hs_atomic_load(&hs_n_forks) * PER_PROCESS;
+}
+
+/* Adds to what is inside, unless that is too much; threads of a parent are not. */
+static bool
+try_enter(hs_gate *gate, int64_t most, int64_t more)
+{
+    const int64_t state = hs_atomic_load(&gate->state), none = empty();
+    const int64_t inside = state < none ? 0 : state - none;
+    return inside <= most && hs_atomic_swap_if(&gate->state, state, none + inside + more);
+}
+
+static bool
+try_read(void *gate)
+{
+    return try_enter(gate, WRITER - 2, 1);
+}
+
+static bool
+try_write(void *gate)
+{
+    return try_enter(gate, 0, WRITER);
+}
+
+static void
+wake(void)
+{
+    if (hs_atomic_load(&hs_n_waiting) > 0) {
+        hs_wake_waiting();
     }
-    return gate->queue != NULL;
 }
 
 void
-hs_gate_destroy(hs_gate *gate)
+hs_gate_init(hs_gate *gate)
 {
-    hs_condition_destroy(&gate->queue->changed);
-    hs_mutex_destroy(&gate->queue->mutex);
-    hs_free(NULL, gate->queue);
-}
-
-/* One more reader, or the writer. */
-static bool
-try_read(hs_gate *gate)
-{
-    const int64_t state = hs_atomic_load(&gate->state);
-    return state >= 0 && hs_atomic_swap_if(&gate->state, state, state + 1);
-}
-
-static bool
-try_write(hs_gate *gate)
-{
-    return hs_atomic_swap_if(&gate->state, 0, -1);
-}
-
-/* Where threads of a parent were inside when this process was forked off, they never leave. */
-static void
-forget_the_parent(hs_gate *gate)
-{
-    const int64_t process = CURRENT_PROCESS();
-    if (gate->process != process) {
-        gate->process = process;
-        gate->state = gate->waiting = 0;
-        hs_mutex_init(&gate->queue->mutex);
-        hs_condition_init(&gate->queue->changed);
-    }
-}
-
-/* A wait ends on its own after a while, so that a wake-up that came too early costs time only. */
-static HS_NO_INLINE void
-wait_for(hs_gate *gate, bool (*try_enter)(hs_gate *))
-{
-    forget_the_parent(gate);
-    hs_mutex_lock(&gate->queue->mutex);
-    (void)hs_atomic_add(&gate->waiting, 1);
-    while (!try_enter(gate)) {
-        hs_condition_wait_briefly(&gate->queue->changed, &gate->queue->mutex);
-    }
-    (void)hs_atomic_add(&gate->waiting, -1);
-    hs_mutex_unlock(&gate->queue->mutex);
-}
-
-static void
-wake(hs_gate *gate)
-{
-    if (hs_atomic_load(&gate->waiting) > 0) {
-        hs_mutex_lock(&gate->queue->mutex);
-        hs_condition_wake(&gate->queue->changed);
-        hs_mutex_unlock(&gate->queue->mutex);
-    }
+    gate->state = empty();
 }
 
 void
 hs_gate_read(hs_gate *gate)
 {
     if (!try_read(gate) && !try_read(gate)) {
-        wait_for(gate, try_read);
+        hs_wait_for(try_read, gate);
     }
 }
 
 void
 hs_gate_read_end(hs_gate *gate)
 {
-    if (hs_atomic_add(&gate->state, -1) == 1) {
-        wake(gate);
+    if (hs_atomic_add(&gate->state, -1) % WRITER == 1) {
+        wake();
     }
 }
 
@@ -112,13 +72,13 @@ void
 hs_gate_write(hs_gate *gate)
 {
     if (!try_write(gate)) {
-        wait_for(gate, try_write);
+        hs_wait_for(try_write, gate);
     }
 }
 
 void
 hs_gate_write_end(hs_gate *gate)
 {
-    hs_atomic_store(&gate->state, 0);
-    wake(gate);
+    hs_atomic_store(&gate->state, empty());
+    wake();
 }

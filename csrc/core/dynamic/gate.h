@@ -9,16 +9,12 @@
 
 #include "../base/base.h"
 
+/* How many readers are inside, or that a writer is, and after how many forks (os_thread.h). */
 typedef struct hs_gate {
-    volatile int64_t state;   /* readers inside, or -1: a writer */
-    volatile int64_t waiting; /* threads */
-    int64_t          process; /* that made it: in a child, threads that were inside are gone */
-    struct hs_queue *queue;   /* owned: where threads wait */
+    volatile int64_t state;
 } hs_gate;
 
-/* False when memory is refused. */
-bool hs_gate_init(hs_gate *gate);
-void hs_gate_destroy(hs_gate *gate);
+void hs_gate_init(hs_gate *gate);
 
 void hs_gate_read(hs_gate *gate);
 void hs_gate_read_end(hs_gate *gate);

@@ -113,11 +113,8 @@ hs_list_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure *fa
     if (status == HS_OK) {
         measure_box(made);
         hs_axes_init(&made->axes, &made->lattice, made->cell_size, one_cell, made->max_radius);
-        if (!hs_gate_init(&made->gate)) {
-            status = HS_ERR_MEMORY;
-        } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
-                                    made->max_radius)) {
-            hs_gate_destroy(&made->gate);
+        hs_gate_init(&made->gate);
+        if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice, made->max_radius)) {
             status = HS_ERR_MEMORY;
         }
     }
@@ -144,7 +141,6 @@ hs_list_free(hs_dynamic *list)
 {
     free_points(list);
     hs_offsets_free(&list->offsets);
-    hs_gate_destroy(&list->gate);
     hs_free(NULL, list);
 }
 

@@ -44,7 +44,7 @@ def run(args: Namespace) -> int:
     if args.peers in (("all",), ("none",)):
         peers = args.peers[0]
     try:
-        plan = plan_of((), ("exact",), peers, "quick", args.patience)
+        plan = plan_of((), ("exact",), peers, "quick", args.patience or 3.0)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
     given = scenes.Scene(

@@ -10,7 +10,7 @@ coordinates or left out. If no reader wins, the error says what each of them sai
 =========================================  ====================================================
 file                                       readers, in this order
 =========================================  ====================================================
-NumPy's, by name or content                NumPy
+NumPy's, by name, or without one content   NumPy
 .csv, .tsv, .pts, or with --columns        text, by columns
 .ply; .pcd; .vtk, .vtp, .vtu ...           plyfile, pyvista; pypcd4; pyvista
 .txt, .dat, or a name without a suffix     text, ASE, MDAnalysis
@@ -34,7 +34,8 @@ import shutil
 import struct
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -48,6 +49,7 @@ import halfshell as hs
 from halfshell._cli.cloud_files import CLOUDS, read_cloud
 from halfshell._cli.errors import InputError, one_line
 from halfshell._cli.numpy_files import Unreadable, is_numpy, read_arrays
+from halfshell._cli.pair_files import refuse_list
 from halfshell._cli.structure_files import (
     Structure,
     UnknownFormat,
@@ -66,7 +68,7 @@ ROWS_CHECKED = 1 << 16  # at a time: some megabytes
 _LAST = "as text"
 
 Frames = int | slice | None
-_Reader = Callable[[str], list[Structure]]  # the frames of a file
+_Reader = Callable[[str], Iterable[Structure]]  # the frames of a file, one by one
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,8 @@ class Scene:
         What read the file, and what of it; empty for what ships with the package.
     no_box : str
         Why the box that the file has is none, or nothing.
+    frame : str
+        Which of several frames this is, for messages.
     """
 
     points: NDArray[Any]
@@ -104,6 +108,12 @@ class Scene:
     remarks: tuple[str, ...] = ()
     reader: str = ""
     no_box: str = ""
+    frame: str = ""
+
+    @property
+    def where(self) -> str:
+        """The file, and the frame of several."""
+        return f"{self.source}: {self.frame}" if self.frame else self.source
 
     @property
     def box_rows(self) -> NDArray[np.float64] | None:
@@ -123,6 +133,7 @@ def read_scene(
     file_format: str | None = None,
     index: int | None = None,
     columns: Sequence[str] | None = None,
+    trajectory: str | None = None,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
 ) -> Scene:
@@ -139,6 +150,8 @@ def read_scene(
         Frame, for formats with several; default: the last.
     columns : sequence of str, optional
         Of a text file, the columns that are coordinates: names, or numbers from 1 on.
+    trajectory : str, optional
+        A file with frames, of which `file` is the topology, as MDAnalysis reads both.
     box : ndarray, shape (d,) or (d, d), optional
         Takes the place of the file's box; all axes repeat unless `periodic` says otherwise.
     periodic : tuple of bool, length 1 or d, optional
@@ -150,12 +163,13 @@ def read_scene(
         With the reason in one line.
     """
     if file is None:
-        options = (("--index", index), ("--format", file_format), ("--columns", columns))
+        options = (("--index", index), ("--format", file_format), ("--columns", columns),
+                   ("--trajectory", trajectory))  # fmt: skip
         for option, value in options:
             if value is not None:
                 raise InputError(f"{option} needs a file: give one")
         return _with_overrides(_shipped_scene(), box, periodic)
-    (scene,) = _read(file, file_format, index, columns)
+    (scene,) = _read(file, file_format, index, columns, trajectory)
     return _with_overrides(scene, box, periodic)
 
 
@@ -165,18 +179,22 @@ def read_frames(
     *,
     file_format: str | None = None,
     columns: Sequence[str] | None = None,
+    trajectory: str | None = None,
     box: NDArray[np.float64] | None = None,
     periodic: tuple[bool, ...] | None = None,
-) -> list[Scene]:
-    """Read some frames of a file, at least one, as `read_scene` reads one.
+) -> Iterator[Scene]:
+    """Read some frames of a file one by one, at least one, as `read_scene` reads one.
+
+    None is kept. The reader is chosen by the first; one that fails later is an error that names
+    the frame.
 
     Raises
     ------
     InputError
         With the reason in one line.
     """
-    scenes = _read(file, file_format, frames, columns)
-    return [_with_overrides(scene, box, periodic) for scene in scenes]
+    for scene in _read(file, file_format, frames, columns, trajectory):
+        yield _with_overrides(scene, box, periodic)
 
 
 def _shipped_scene() -> Scene:
@@ -188,42 +206,74 @@ def _shipped_scene() -> Scene:
 
 
 def _read(
-    file: str, file_format: str | None, frames: Frames, columns: Sequence[str] | None
-) -> list[Scene]:
-    """The frames that the first reader yields of which all are sensible."""
-    with _as_path(file, file_format) as (path, source):
+    file: str,
+    file_format: str | None,
+    frames: Frames,
+    columns: Sequence[str] | None,
+    trajectory: str | None,
+) -> Iterator[Scene]:
+    """The frames of the first reader that yields a sensible one."""
+    with _as_path(file, file_format) as (path, name_of_path):
+        source = name_of_path
         claimed = _refuse_claims(path, source)
+        if file_format is None and columns is None:
+            refuse_list(path, source)
+        readers = _readers(path, file_format, frames, columns)
+        if trajectory is not None:
+            if not os.path.exists(trajectory):
+                raise InputError(f"{trajectory}: no such file")
+            _refuse_claims(trajectory, trajectory)
+            source = f"{source} with {trajectory}"
+            whole = partial(by_mdanalysis, file_format=file_format, frames=frames,
+                            trajectory=trajectory)  # fmt: skip
+            readers = [("MDAnalysis", whole)]
         said: dict[str, str] = {}
         unknown: list[str] = []
-        for name, read in _readers(path, file_format, frames, columns):
+        for name, read in readers:
             if name == _LAST and said and kind_of_file(path) != ".xyz":
                 continue
+            is_chosen = False
             try:
-                found = read(path)
-                if not found:
-                    raise InputError("has none of these frames")
-                scenes = [
-                    Scene(one.points, one.box, one.periodic, source, one.species, one.unit,
-                          one.remarks, one.reader, one.no_box)
-                    for one in found
-                ]  # fmt: skip
-                for scene in scenes:
+                for one in read(path):
+                    scene = Scene(
+                        one.points, one.box, one.periodic, source, one.species, one.unit,
+                        one.remarks, one.reader, one.no_box, one.frame,
+                    )  # fmt: skip
                     _check(scene)
-                return [_with_claim(scene, claimed) for scene in scenes]
+                    is_chosen = True
+                    yield _with_claim(scene, claimed)
+                if is_chosen:
+                    return
+                raise InputError("has none of these frames")
             except UnknownFormat:
                 unknown.append(name)
-            except MemoryError as error:
-                reason = one_line(error) if str(error) else "does not fit in memory"
-                raise InputError(f"{source}: {reason}") from None
-            except (InputError, BadLine, Unreadable) as error:
-                said[name] = one_line(error)
-            except OSError as error:
-                said[name] = f"cannot be read: {one_line(error)}"
             except (Exception, SystemExit) as error:  # a reader may fail in any way
-                said[name] = f"cannot be read: {type(error).__name__}: {one_line(error)}"
+                said[name] = _reason(error).replace(path, name_of_path)
+                _forget(error)
+                if is_chosen or isinstance(error, MemoryError):
+                    raise InputError(f"{source}: {said[name]}") from None
     if kind_of_file(path) == "" and len(said) > 1:
         del said["text"]  # which other formats are as well
-    raise InputError(f"{source}: {_refusal(said, unknown, file_format)}".replace(path, source))
+    raise InputError(f"{source}: {_refusal(said, unknown, file_format)}")
+
+
+def _reason(error: BaseException) -> str:
+    """Why a reader failed, in one line."""
+    if isinstance(error, MemoryError):
+        return one_line(error) if str(error) else "does not fit in memory"
+    if isinstance(error, (InputError, BadLine, Unreadable)):
+        return one_line(error)
+    kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
+    return f"cannot be read: {kind}{one_line(error)}"
+
+
+def _forget(error: BaseException) -> None:
+    """Drop what a reader left behind; Python would print how that, half made, fails to end."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        traceback.clear_frames(error.__traceback__)
+    finally:
+        sys.unraisablehook = hook
 
 
 def _with_claim(scene: Scene, claimed: int) -> Scene:
@@ -244,7 +294,7 @@ def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) 
         return "; ".join(told)
     form = "the format" if file_format is None else f"the format {file_format!r}"
     many = f"{' and '.join(unknown)} {'do' if len(unknown) > 1 else 'does'} not know {form}"
-    if set(said) <= {"text", _LAST}:
+    if set(said) <= {_LAST}:
         many = f"unknown format: {many} (see `ase info --formats`; force one with --format)"
         return "; ".join([many, *told])
     return "; ".join([*told, many])
@@ -404,27 +454,27 @@ def _claim_of_dcd(head: bytes) -> int:
 
 def _check(scene: Scene) -> None:
     """Say what is wrong with points or box before anything is computed from them."""
-    points = scene.points
+    points, frame = scene.points, scene.frame and f"{scene.frame}: "
     if points.dtype.kind not in "fiub":
-        raise InputError(f"points are of type {points.dtype}; they must be numbers")
+        raise InputError(f"{frame}points are of type {points.dtype}; they must be numbers")
     if not len(points):
-        raise InputError("holds no points")
+        raise InputError(f"{frame}holds no points")
     if points.shape[1] == 0:
-        raise InputError(f"points have shape {points.shape}; they must be (n, d)")
+        raise InputError(f"{frame}points have shape {points.shape}; they must be (n, d)")
     for first in range(0, len(points), ROWS_CHECKED):
         block = points[first : first + ROWS_CHECKED]
         if not np.isfinite(block).all():
             row, column = (int(k) for k in np.argwhere(~np.isfinite(block))[0])
             value = block[row, column]
-            raise InputError(f"point {first + row}, coordinate {column} is {value}")
+            raise InputError(f"{frame}point {first + row}, coordinate {column} is {value}")
     if scene.box is None:
         return
     ndim = points.shape[1]
     if scene.box.dtype.kind not in "fiu" or not np.isfinite(scene.box).all():
-        raise InputError(f"the box must be finite numbers, it is {scene.box.tolist()}")
+        raise InputError(f"{frame}the box must be finite numbers, it is {scene.box.tolist()}")
     if scene.box.shape not in ((ndim,), (ndim, ndim)):
         raise InputError(
-            f"the box has shape {scene.box.shape}; "
+            f"{frame}the box has shape {scene.box.shape}; "
             f"it must be ({ndim},) or ({ndim}, {ndim})"
         )
 
@@ -457,7 +507,7 @@ def _with_overrides(
             )
         scene = replace(scene, periodic=periodic * (ndim // len(periodic)))
     if scene.box is None and any(scene.periodic):
-        raise InputError(f"{scene.source}: has periodic axes but no box (give --box)")
+        raise InputError(f"{scene.where}: has periodic axes but no box (give --box)")
     return scene
 
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 import math
 import sys
 from argparse import Namespace
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import IO, Any
 
@@ -44,21 +46,24 @@ def load_scene(args: Namespace) -> tuple[Scene, float, str]:
     return scene, *choose_cutoff(scene)
 
 
-def load_frames(args: Namespace) -> tuple[list[Scene], float, str]:
-    """Return the frames that --index names, and the cutoff as `load_scene` does, of the first."""
+def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
+    """Return the first frame that --index names, and all, which are read when they are wanted.
+
+    Then the cutoff as `load_scene` does, of the first.
+    """
     if not isinstance(args.index, slice):
         scene, cutoff, reason = load_scene(args)
-        return [scene], cutoff, reason
+        return scene, iter([scene]), cutoff, reason
     if args.file is None:
         raise InputError("--index names frames: give a file that has some")
-    scenes = read_frames(
-        args.file, args.index, file_format=args.format, columns=args.columns, box=args.box,
-        periodic=args.periodic,
+    frames = read_frames(
+        args.file, args.index, file_format=args.format, columns=args.columns,
+        trajectory=args.trajectory, box=args.box, periodic=args.periodic,
     )  # fmt: skip
-    _tell_remarks(scenes[0])
-    if args.cutoff is not None:
-        return scenes, args.cutoff, ""
-    return scenes, *choose_cutoff(scenes[0])
+    first = next(frames)
+    _tell_remarks(first)
+    cutoff, reason = (args.cutoff, "") if args.cutoff is not None else choose_cutoff(first)
+    return first, chain([first], frames), cutoff, reason
 
 
 def read_points(args: Namespace) -> Scene:
@@ -68,6 +73,7 @@ def read_points(args: Namespace) -> Scene:
         file_format=args.format,
         index=args.index,
         columns=args.columns,
+        trajectory=args.trajectory,
         box=args.box,
         periodic=args.periodic,
     )

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -52,6 +53,7 @@ class Structure(NamedTuple):
     reader: str = ""
     unit: str = ""
     no_box: str = ""
+    frame: str = ""
 
 
 def kind_of_file(file: str) -> str:
@@ -63,8 +65,10 @@ def kind_of_file(file: str) -> str:
 # ---- ASE ---------------------------------------------------------------------------------------
 
 
-def by_ase(file: str, file_format: str | None, frames: Frames) -> list[Structure]:
+def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Structure]:
     """Frames as ASE reads them: one, by default the last, unless `frames` is a range.
+
+    Those of a range are read one by one, where the reader of the format does so.
 
     LAMMPS data, mmCIF and VASP 4 are told from what the file holds, because ASE does not.
 
@@ -85,12 +89,16 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> list[Structure
             name = file_format or (own[0] if own else filetype(file))
             read = partial(ase.io.read, file, format=name, do_not_split_by_at_sign=True)
             read = partial(_all_of, own[1]) if own else read
-            one = -1 if frames is None else frames
-            found: Any = read(index=one)
-            found = found if isinstance(frames, slice) else [found]
-            if not all(map(len, found)):  # such as that between ENDMDL and END of a PDB file
-                whole = [atoms for atoms in read(index=slice(None)) if len(atoms)]
-                found = whole[one] if isinstance(one, slice) else [whole[one]]
+            found: Any
+            if isinstance(frames, slice) and not own:
+                found = ase.io.iread(file, frames, format=name, do_not_split_by_at_sign=True)
+            elif isinstance(frames, slice):
+                found = read(index=frames)
+            else:
+                number = -1 if frames is None else frames
+                found = [read(index=number)]
+                if not len(found[0]):  # such as that between ENDMDL and END of a PDB file
+                    found = [[atoms for atoms in read(index=slice(None)) if len(atoms)][number]]
         except UnknownFileTypeError:
             raise UnknownFormat from None
         except (IndexError, StopIteration) as error:
@@ -98,7 +106,12 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> list[Structure
             detail = f" ({' '.join(str(error).split())})" if str(error) else ""
             raise InputError(what + detail) from None
     reader = f"ASE {ase.__version__}, {name}"
-    return [_of_atoms(atoms, tuple(remarks), reader, "lammps" in name) for atoms in found]
+    for frame, atoms in _each(found, frames, remarks):
+        if len(atoms):
+            one = _of_atoms(atoms, tuple(remarks), reader, "lammps" in name)
+            yield one._replace(frame=frame)
+        elif isinstance(frames, slice) and min(frames.start or 0, frames.stop or 0) < 0:
+            raise InputError(f"{frame} holds no atoms: count frames from the first on")
 
 
 def _all_of(read: Callable[[], list[Any]], index: int | slice) -> Any:
@@ -257,11 +270,18 @@ _NAMES_OF_MDANALYSIS = {
 _NOT_OF_POINTS = re.compile(r"[Mm]ass|atom types|guess types|dt information|[Ee]lement")
 
 
-def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[Structure]:
-    """Frames as MDAnalysis reads them, where it is installed; see `by_ase`."""
+def by_mdanalysis(
+    file: str, file_format: str | None, frames: Frames, trajectory: str | None = None
+) -> Iterator[Structure]:
+    """Frames as MDAnalysis reads them, where it is installed; see `by_ase`.
+
+    With `trajectory` they are in that file, and `file` is its topology.
+    """
     try:
         import MDAnalysis
     except ImportError:
+        if trajectory is not None:
+            raise missing_extra("--trajectory", "MDAnalysis") from None
         raise UnknownFormat from None
     kind = (file_format or kind_of_file(file)[1:] or Path(file).name.split("_")[0]).upper()
     kind = _NAMES_OF_MDANALYSIS.get(kind, kind)
@@ -269,14 +289,17 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
     if kind not in parsers and kind not in readers:
         raise UnknownFormat
     with _warnings() as remarks:
-        universe = (_of_topology if kind in parsers else _of_coordinates)(file, kind, readers)
+        if kind in parsers or trajectory is not None:
+            universe = _of_topology(file, kind, trajectory)
+        else:
+            universe = _of_coordinates(file, kind)
         try:
-            trajectory = universe.trajectory
+            steps = universe.trajectory
         except AttributeError:
             raise InputError(
                 "holds a topology without coordinates: give these with --trajectory"
             ) from None
-        numbers = range(len(trajectory))
+        numbers = range(len(steps))
         one = -1 if frames is None else frames
         try:
             chosen = numbers[one] if isinstance(one, slice) else [numbers[one]]
@@ -284,34 +307,38 @@ def by_mdanalysis(file: str, file_format: str | None, frames: Frames) -> list[St
             raise InputError(f"has no frame {frames}") from None
         species, how = _elements_of(universe.atoms)
         reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
-        found = [_of_frame(trajectory[k], species, reader) for k in chosen]
-    told = tuple(remark for remark in remarks if not _NOT_OF_POINTS.search(remark))
-    return [one._replace(remarks=told) for one in found]
+    found = (_of_frame(steps[k], species, reader) for k in chosen)
+    for frame, one in _each(found, frames, remarks, chosen):
+        told = tuple(remark for remark in remarks if not _NOT_OF_POINTS.search(remark))
+        yield one._replace(remarks=told, frame=frame)
 
 
-def _of_topology(file: str, kind: str, readers: Any) -> Any:
-    """The universe of a file that says which atoms there are."""
-    from MDAnalysis import Universe
+def _of_topology(file: str, kind: str, trajectory: str | None) -> Any:
+    """The universe of a file that says which atoms there are, with frames of its own or another."""
+    import MDAnalysis
 
-    formats = {"topology_format": kind, **({"format": kind} if kind in readers else {})}
+    formats = {"topology_format": kind} if kind in MDAnalysis._PARSERS else {}
+    parts = [file] if trajectory is None else [file, trajectory]
+    if trajectory is None and kind in MDAnalysis._READERS:
+        formats["format"] = kind
     try:
-        return Universe(file, to_guess=("elements",), **formats)
+        return MDAnalysis.Universe(*parts, to_guess=("elements",), **formats)
     except (ValueError, TypeError, NotImplementedError):  # there may be no names to guess by
-        return Universe(file, to_guess=(), **formats)
+        return MDAnalysis.Universe(*parts, to_guess=(), **formats)
 
 
-def _of_coordinates(file: str, kind: str, readers: Any) -> Any:
+def _of_coordinates(file: str, kind: str) -> Any:
     """The universe of a file that has nothing but coordinates."""
-    from MDAnalysis import Universe
+    import MDAnalysis
 
     try:
-        n_atoms = readers[kind].parse_n_atoms(file)
+        n_atoms = MDAnalysis._READERS[kind].parse_n_atoms(file)
     except NotImplementedError:
         raise InputError(
             "holds coordinates alone, which are read with a topology: give that as FILE, and this "
             "with --trajectory"
         ) from None
-    universe = Universe.empty(n_atoms)
+    universe = MDAnalysis.Universe.empty(n_atoms)
     universe.load_new(file, format=kind)
     return universe
 
@@ -346,6 +373,43 @@ def _warnings() -> Iterator[list[str]]:
         told = (" ".join(str(w.message).split()) for w in caught
                 if issubclass(w.category, UserWarning))  # fmt: skip
         texts += dict.fromkeys(told)
+
+
+def _each(
+    found: Iterable[Any], frames: Frames, remarks: list[str], numbers: Sequence[int] = ()
+) -> Iterator[tuple[str, Any]]:
+    """Frames one by one, with words for which it is of several, read when they are wanted.
+
+    What is warned of is put to the remarks. InputError names the frame at which reading fails.
+    """
+    iterator = iter(found)
+    for count in itertools.count():
+        frame = _words_for(count, frames, numbers)
+        with _warnings() as more:
+            try:
+                one = next(iterator, None)
+            except MemoryError:
+                raise
+            except Exception as error:
+                if not count:
+                    raise
+                reason = " ".join(str(error).split())
+                raise InputError(f"{frame}: {type(error).__name__}: {reason}") from None
+        remarks += [text for text in more if text not in remarks]
+        if one is None:
+            return
+        yield frame, one
+
+
+def _words_for(count: int, frames: Frames, numbers: Sequence[int]) -> str:
+    if not isinstance(frames, slice):
+        return ""
+    if count < len(numbers):
+        return f"frame {numbers[count]}"
+    start, step = frames.start or 0, frames.step or 1
+    if start < 0 or step < 0:
+        return f"frame {count}, counted from the first that --index names"
+    return f"frame {start + count * step}"
 
 
 # ---- elements ----------------------------------------------------------------------------------

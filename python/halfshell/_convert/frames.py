@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import attribute, is_a, kind_of
 from halfshell._convert.foreign_box import without_placeholder
 from halfshell._convert.scene import brings_its_box
@@ -33,7 +34,7 @@ def frames_of(frames: Any) -> tuple[Iterator[Any], int | None]:
     if whole is not None:
         return iter(zip(*whole)), len(whole[0])
     try:
-        iterator = iter(frames)
+        iterator = iter(as_array(frames, "frames") if is_a(frames, memoryview) else frames)
     except MemoryError:
         raise
     except Exception as error:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from halfshell import _core
+from halfshell._convert.arrays import as_array
 from halfshell._convert.foreign import exact_number, is_a, kind_of, shown
 from halfshell._unknown import nearest_word
 
@@ -40,12 +41,11 @@ def kernels() -> list[str]:
 
 
 def as_flag(value: Any, name: str) -> bool:
-    """A bool; also one of NumPy's, and the integers 0 and 1."""
+    """A bool, also one of NumPy's; no number."""
     if value is True or value is False:
         return value
-    number = exact_number(value)
-    if is_a(number, int) and number in (0, 1):
-        return bool(number)
+    if is_a(value, np.bool_):
+        return bool(np.generic.item(value))
     raise TypeError(f"{name} must be True or False, got {shown(value)}")
 
 
@@ -87,7 +87,7 @@ def as_list(value: Any, name: str, of_what: str) -> list[Any]:
     """What a sequence has."""
     if not hasattr(type(value), "__iter__"):
         raise TypeError(f"{name} must be a sequence of {of_what}, got {kind_of(value)}")
-    return list(value)
+    return list(as_array(value, name) if is_a(value, memoryview) else value)
 
 
 def as_choice(value: Any, name: str, choices: tuple[str, ...]) -> str:

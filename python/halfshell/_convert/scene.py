@@ -39,6 +39,9 @@ def as_points(values: Any, name: str = "points", ndim: int = 3) -> PointArray:
         if shape[0] > MAX_POINTS:
             raise OverflowError(f"fewer than 2**31 {name} can be searched, got {shape[0]}")
 
+    if type(values) not in (np.ndarray, list, tuple):  # a Molecule of pymatgen has no box
+        places = attribute(values, "cart_coords", name, _MISSING)
+        values = values if places is _MISSING or brings_its_box(values, name) else places
     array = as_real_array(values, name, check_shape=check)
     return np.empty((0, ndim)) if array.shape == (0,) else array
 
@@ -173,13 +176,13 @@ def as_box_alone(box: Any, periodic: Any) -> tuple[int, FloatArray | None, int]:
 def brings_its_box(points: Any, name: str = "points") -> bool:
     """Whether points are an object with ``positions``, ``cell`` and ``pbc``, like ASE's Atoms.
 
-    Or a universe or a group of atoms of MDAnalysis.
+    Or a Structure of pymatgen, or a universe or a group of atoms of MDAnalysis.
     """
     if type(points) in (np.ndarray, list, tuple):
         return False
-    if all(
-        attribute(points, part, name, _MISSING) is not _MISSING
-        for part in ("positions", "cell", "pbc")
+    if any(
+        all(attribute(points, part, name, _MISSING) is not _MISSING for part in parts)
+        for parts in (("positions", "cell", "pbc"), ("cart_coords", "lattice"))
     ):
         return True
     from halfshell._convert.atom_groups import is_group  # which few calls need
@@ -202,18 +205,23 @@ def _own_scene(
     atoms: Any, name: str = "points", ndim: int = 3
 ) -> tuple[PointArray, FloatArray | None, int]:
     """`as_scene` of an object that brings its box."""
-    array = as_points(attribute(atoms, "positions", name), name, ndim)
+    places = attribute(atoms, "positions", name, _MISSING)
+    owner, cell = atoms, "cell"
+    if places is _MISSING:  # a Structure of pymatgen
+        places = attribute(atoms, "cart_coords", name)
+        owner, cell = attribute(atoms, "lattice", "box"), "matrix"
+    array = as_points(places, name, ndim)
     ndim = array.shape[1]
     try:
-        bits = as_periodic_bits(attribute(atoms, "pbc", "periodic"), ndim, default=False)
+        bits = as_periodic_bits(attribute(owner, "pbc", "periodic"), ndim, default=False)
         if not bits:
             return array, None, 0
         from halfshell._convert.foreign_box import without_placeholder
 
         arrays = attribute(atoms, "arrays", name)
         is_pdb = is_a(arrays, dict) and "residuenames" in arrays
-        cell = attribute(atoms, "cell", "box")
-        vectors = without_placeholder(as_array(cell, "box"), name, is_pdb)
+        given = as_array(attribute(owner, cell, "box"), "box")
+        vectors = without_placeholder(given, name, is_pdb)
         return (array, None, 0) if vectors is None else (array, as_box(vectors, ndim), bits)
     except (TypeError, ValueError, OverflowError) as error:
         kinds = (TypeError, OverflowError, ValueError)

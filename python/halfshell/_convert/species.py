@@ -99,6 +99,8 @@ def _elements_of(owner: Any, owners: str) -> _Kinds | None:
     if not brings_its_box(owner, owners):
         return None
     numbers = attribute(owner, "numbers", owners)
+    if numbers is None:
+        numbers = attribute(owner, "atomic_numbers", owners)  # of pymatgen
     if numbers is not None:
         array = as_array(numbers, f"{owners}.numbers", "hold integers")
         if array.dtype.kind not in "iu":

@@ -62,7 +62,8 @@ def summary(points: Array, n_pieces: int) -> Summary:
     largest = float(max(points.max(initial=0.0), -points.min(initial=0.0)))
     error = None
     if not np.isfinite(largest):
-        row, column = np.argwhere(~np.isfinite(points))[0].tolist()
+        wrong = np.argwhere(~np.isfinite(points)).tolist()
+        row, column = wrong[0] if wrong else (0, 0)  # if another thread changes them
         value = points[row, column]
         error = ValueError(f"points must be finite, got points[{row}, {column}] = {value}")
     sample = points[::step].astype(np.float64)

@@ -133,7 +133,7 @@ def test_an_empty_last_frame_is_none(scene, tmp_path):
     text = "".join(f"MODEL {k}\n{TWO}ENDMDL\n" for k in (1, 2)) + "END\n"
     assert len(scene("mm.pdb", text).points) == 2
     assert len(scene("mm.pdb", text, index=-1).points) == 2
-    assert len(read_frames(str(tmp_path / "mm.pdb"), slice(None))) == 2
+    assert len([*read_frames(str(tmp_path / "mm.pdb"), slice(None))]) == 2
     with pytest.raises(InputError, match="has no frame 2"):
         scene("mm.pdb", text, index=2)
 
@@ -222,7 +222,7 @@ def test_mmcif(scene, refused, tmp_path):
         assert found.species.tolist() == ["C", "H"] and "mmcif" in found.reader
         first = scene(name, MMCIF.format("20.5"), index=0)
         assert first.species.tolist() == ["C", "Zn"]
-    assert len(read_frames(str(tmp_path / "a.cif"), slice(None))) == 2
+    assert len([*read_frames(str(tmp_path / "a.cif"), slice(None))]) == 2
     packed = scene("b.cif.gz", gzip.compress(MMCIF.format("1.000").encode()))
     assert packed.box is None and "placeholder" in packed.no_box
     assert scene("c.cif", MMCIF.format("0.0")).no_box

@@ -32,11 +32,11 @@ def test_what_ase_does_not_know_mdanalysis_may(universe_file):
     scene = read_scene(str(universe_file))
     assert scene.points.tolist() == np.arange(12.0).reshape(4, 3).tolist()
     assert scene.box is None and not any(scene.periodic)
-    assert len(read_frames(str(universe_file), slice(None))) == 1
+    assert len(list(read_frames(str(universe_file), slice(None)))) == 1
     with pytest.raises(InputError, match="has no frame 3"):
         read_scene(str(universe_file), index=3)
     with pytest.raises(InputError, match="has none of these frames"):
-        read_frames(str(universe_file), slice(5, None))
+        list(read_frames(str(universe_file), slice(5, None)))
 
 
 def test_a_box_of_mdanalysis_is_that_of_its_frame(tmp_path):
