@@ -265,11 +265,7 @@ def _choose(
         return groups.get("xyz") or next(iter(groups.values()))
     if groups:
         raise BadLine(f"line {line}: {what}: several may be coordinates; choose with --columns")
-    is_list = {"i", "j"} <= {name.lower() for name in names}
-    raise BadLine(
-        f"line {line}: {what}: none are known as coordinates; --columns says which are"
-        + ("; a list of pairs is checked by halfshell verify STRUCTURE LIST" if is_list else "")
-    )
+    raise BadLine(f"line {line}: {what}: none are known as coordinates; --columns says which are")
 
 
 def _groups(names: Sequence[str]) -> dict[str, list[int]]:

@@ -486,7 +486,7 @@ def test_columns_that_are_named(scene, content, columns, points):
         ("0,5,0,0,0,0\n", "with decimal commas, separate the columns by ;"),
         ("0,5 0,0 0,0\n", "line 1: '0,5' has a decimal comma"),
         ("x;y\n0,5;1\n0.5;1\n", "line 3, field 1: '0.5': the file has decimal commas and"),
-        ("i,j,d\n0,1,0.5\n", "a list of pairs is checked by halfshell verify"),
+        ("i,j,d\n0,1,0.5\n", "is a list of pairs (i, j, d), not points"),
         ("a,b,c\n1,2,3\n", "columns 'a', 'b', 'c': none are known as coordinates"),
         ("ra,dec,z\n1,2,3\n", "none are known as coordinates"),
         ("pos_x,pos_y,com_x,com_y\n1,2,3,4\n", "several may be coordinates"),
