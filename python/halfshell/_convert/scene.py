@@ -195,8 +195,12 @@ def brings_its_box(points: Any, name: str = "points") -> bool:
 def _group(points: Any, name: str) -> tuple[Any, Any] | None:
     """Positions and box vectors of a group of MDAnalysis; None for what is like ASE's Atoms."""
     from halfshell._convert.atom_groups import is_group, of_group
+    from halfshell._convert.foreign_box import without_placeholder
 
-    return of_group(points, name) if is_group(points, name) else None
+    if not is_group(points, name):
+        return None
+    positions, vectors = of_group(points, name)
+    return positions, without_placeholder(vectors, name)
 
 
 def _own_scene(
@@ -214,7 +218,13 @@ def _own_scene(
         bits = as_periodic_bits(attribute(owner, "pbc", "periodic"), ndim, default=False)
         if not bits:
             return array, None, 0
-        return array, as_box(as_array(attribute(owner, cell, "box"), "box"), ndim), bits
+        from halfshell._convert.foreign_box import without_placeholder
+
+        arrays = attribute(atoms, "arrays", name)
+        is_pdb = is_a(arrays, dict) and "residuenames" in arrays
+        given = as_array(attribute(owner, cell, "box"), "box")
+        vectors = without_placeholder(given, name, is_pdb)
+        return (array, None, 0) if vectors is None else (array, as_box(vectors, ndim), bits)
     except (TypeError, ValueError, OverflowError) as error:
         kinds = (TypeError, OverflowError, ValueError)
         kind = next(one for one in kinds if isinstance(error, one))
