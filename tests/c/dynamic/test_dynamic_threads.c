@@ -106,7 +106,7 @@ who_holds_a_list_keeps_others_out(void)
     hs_dynamic_hold(list);
     hs_dynamic_hold(list); /* once is enough */
     CHECK(hs_thread_start(&other, insert_one, list));
-    while (hs_atomic_load(&list->gate.waiting) == 0)
+    while (hs_atomic_load(&hs_n_waiting) == 0)
         hs_nap();
     for (int64_t id = 2; id < 40; id++) {
         CHECK(hs_dynamic_insert(list, (hs_key){id, 0}, (double[]){0.0, 0.0, 0.0}, NULL) == HS_OK);
