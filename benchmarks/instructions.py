@@ -38,7 +38,7 @@ MOST = 1.03  # of the other file's count
 
 def _call(name: str, times: int) -> None:
     """Make the calls that are counted, after one that is in both counts."""
-    ours = ours_for(Halfshell({"threads": 1}), load(name))
+    ours = ours_for(Halfshell(), load(name))
     assert ours is not None
     call = ours.prepare(load(name))
     for _ in range(1 + times):
@@ -78,7 +78,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.against:
         with options.against.open(newline="", encoding="utf-8") as file:
             old = {row["scene"]: int(row["instructions"]) for row in csv.DictReader(file)}
-    found = {name: count(name) for name in options.scenes}
+    found = {}
+    for name in options.scenes:
+        found[name] = count(name)
+        print(f"{name}  {found[name]:,}", file=sys.stderr, flush=True)
     if options.output:
         with options.output.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([("scene", "instructions"), *found.items()])
