@@ -85,6 +85,7 @@ else:
         compile_args += ["-O1", "-g1", "-UNDEBUG"]
         compile_args += ["-fsanitize=address,undefined,float-cast-overflow"]
         compile_args += ["-fno-sanitize-recover=all"]  # whatever they find ends the process
+        compile_args += ["-fno-wrapv"]  # which Python's own flags hide overflow with
         link_args += ["-fsanitize=address,undefined"]
     if os.environ.get("HS_DEBUG"):
         compile_args += ["-O0", "-g3", "-UNDEBUG"]

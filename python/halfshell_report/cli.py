@@ -15,42 +15,41 @@ from typing import TYPE_CHECKING, Any
 
 from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.files import replacing
-from halfshell._cli.scene import load_scene, unit_suffix
+from halfshell._cli.scene import describe_source, load_scene, unit_suffix
 from halfshell._machine import cpu_name, unknown_kernel, usable_cpus
 from halfshell._terminal import printable
 
 if TYPE_CHECKING:
+    from halfshell._cli.files import Scene
     from halfshell_report.rows import ReportRow
     from halfshell_report.run import Plan
 
 __all__ = ["add_options", "add_peers", "run", "run_bench"]
 
-#: What ``--quick`` runs unless scenes are named: one of each kind, under a minute in all.
-QUICK = (
-    "uniform", "fcc-shell", "silicon-shell", "fcc-rotated", "near-ties", "hair-ties",
-    "float32-ulp", "half-box", "offset-1e9", "many-boxes", "needle", "angle-5", "sheared-1000",
-    "slab", "lognormal", "coincident", "subnormal", "plane-2d", "head-on", "stiff-chain",
-    "balls-decades", "balls-ties", "balls-rounded", "balls-giant", "needles",
-)  # fmt: skip
 _FULL_SECONDS = 10.0  # of a processor, a scene of full size by all methods of ours
 _DETAILED = 4  # scenes at most whose tables are printed unasked
 
 
 def add_options(command: ArgumentParser) -> None:
     """Add the options of the command."""
-    command.add_argument("--quick", action="store_true", help="under a minute: small, few scenes")
-    command.add_argument(
-        "--size",
-        choices=("small", "quick", "full"),
+    sizes = command.add_mutually_exclusive_group()
+    sizes.add_argument(
+        "--size", choices=("small", "quick", "full"), default="quick",
         help="size of the scenes: some hundred, some thousand, about 100,000 points; "
         "default: quick",
+    )  # fmt: skip
+    sizes.add_argument(
+        "--quick", action="store_const", const="quick", dest="size", help="the same as --size quick"
     )
-    command.add_argument("--scenes", type=_names, metavar="A,B", help="which; default: all")
+    command.add_argument(
+        "--scenes", type=_names, metavar="A,B",
+        help="which, or 'all'; default: with --size quick one of each kind, about 20 s, else all",
+    )  # fmt: skip
     command.add_argument(
         "--methods", type=_names, metavar="A,B",
         help="of exact, double, single, float32, verlet, stale; default: all",
     )  # fmt: skip
-    add_peers(command, "; default: 60, with --quick 3, and 4 for all scenes together")
+    add_peers(command, "; default: 60; with --size quick 1, and 2 for all scenes")
     command.add_argument(
         "-o", "--output", metavar="DIR", default="halfshell-report",
         help="folder for report.csv and report.html; default: halfshell-report",
@@ -143,9 +142,7 @@ def _list() -> int:
 def _plan(args: Namespace) -> Plan:
     from halfshell_report.run import plan_of
 
-    scenes: Sequence[str] | None = args.scenes
-    if scenes is None and args.quick:
-        scenes = QUICK
+    scenes: Sequence[str] | str | None = "all" if args.scenes == ("all",) else args.scenes
     peers: Sequence[str] | str | None = "all" if args.peers is None else args.peers
     if args.peers in (("all",), ("none",)):
         peers = args.peers[0]
@@ -154,7 +151,7 @@ def _plan(args: Namespace) -> Plan:
         if names == ():
             raise InputError(f"{option} names nothing")
     try:
-        return plan_of(scenes, args.methods, peers, args.size or "quick", args.patience)
+        return plan_of(scenes, args.methods, peers, args.size, args.patience)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
 
@@ -243,7 +240,7 @@ def run_bench(args: Namespace) -> int:
     if args.peers in (("all",), ("none",)):
         peers = args.peers[0]
     try:
-        plan = plan_of((), ("exact",), peers, "quick", args.patience)
+        plan = plan_of((), ("exact",), peers, "quick", args.patience or 3.0)
     except ValueError as error:
         raise InputError(f"{error} (halfshell report --list names them)") from None
     given = scenes.Scene(
@@ -256,9 +253,9 @@ def run_bench(args: Namespace) -> int:
     if args.peers is None:
         rows = [row for row in rows if row.status != "not installed"]
     if args.json:
-        print(json.dumps(_bench_facts(rows, args), indent=2))
+        print(json.dumps(describe_source(scene) | _bench_facts(rows, args), indent=2))
     else:
-        _print_bench(rows, reason)
+        _print_bench(rows, reason, scene)
     return int(bool(rows[0].wrong))
 
 
@@ -269,13 +266,13 @@ def _bench_facts(rows: Sequence[ReportRow], args: Namespace) -> dict[str, Any]:
     )  # fmt: skip
     first = rows[0]
     return {
-        "file": first.scene, "points": first.points, "cutoff": first.cutoff,
+        "cutoff": first.cutoff,
         "cutoff_chosen": args.cutoff is None, "cpu": cpu_name(), "cpus_usable": usable_cpus(),
         "methods": [{name: getattr(row, name) for name in names} for row in rows],
     }  # fmt: skip
 
 
-def _print_bench(rows: Sequence[ReportRow], reason: str) -> None:
+def _print_bench(rows: Sequence[ReportRow], reason: str, scene: Scene) -> None:
     from rich.console import Console
 
     from halfshell_report.findings import scene_table
@@ -292,6 +289,8 @@ def _print_bench(rows: Sequence[ReportRow], reason: str) -> None:
                      "times our time")  # fmt: skip
     if reason:
         lines.append(f"the cutoff was chosen: {reason}; --cutoff sets it")
+    read = f"read by {scene.reader}: " if scene.reader else ""
+    lines.append(f"{read}points in {scene.points.shape[1]}-D")
     lines.append(f"medians, one thread for each, on {cpu_name()}")
     for line in lines:
         console.print(f"* {printable(line)}", markup=False, soft_wrap=True)

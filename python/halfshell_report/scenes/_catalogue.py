@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from halfshell import _show
+from halfshell._convert.options import as_flag
 
 __all__ = [
     "SIZES", "Floats", "Motion", "Rule", "Scene", "Size", "Updates", "add", "load", "names",
@@ -273,7 +274,8 @@ def names(*, radii: bool = False, supports: bool = False, updates: bool = False)
     >>> scenes.names(supports=True)
     ('needles', 'needles-strict')
     """
-    asked = ("radii",) * radii + ("supports",) * supports + ("updates",) * updates or ("cutoff",)
+    given = {"radii": radii, "supports": supports, "updates": updates}
+    asked = [kind for kind, wanted in given.items() if as_flag(wanted, kind)] or ["cutoff"]
     return tuple(name for name, entry in _ENTRIES.items() if entry.kind in asked)
 
 

@@ -11,7 +11,7 @@ void test_ball(void);
 
 /* The image in which the entry has this S. */
 static void
-turn_to(const hs_ball *ball, uint32_t place, const int64_t *S, hs_ball_image *turned)
+turn_to(hs_ball *ball, uint32_t place, const int64_t *S, hs_ball_image *turned)
 {
     int64_t image[2], shift[2] = {INT64_MIN, 0};
     for (image[0] = -6; image[0] <= 6; image[0]++) {
@@ -166,7 +166,9 @@ balls_reach_as_far_as_errors_may(void)
         for (int k = 0; k < 2; k++)
             centre[k] = 30.0 * (random_unit(&random) - 0.5);
         CHECK(hs_ball_init(&ball, list, centre, 3.0, &failure) == HS_OK);
-        const double  t = ball.centre.t[trial % 2], error = ball.error + axis->leak;
+        const double  t = ball.centre.t[trial % 2];
+        const double  terms = hs_axis_terms(&list->lattice, ball.centre.x, trial % 2);
+        const double  error = hs_axis_rounding(2) * (2.0 * terms + 24.0) + axis->leak;
         const int64_t next = hs_axis_cell(axis, t + 3.0) + 1;
         const double  edge = (double)next * axis->width - axis->half;
         if (!(next < axis->n - 1 && t - 7.0 > -axis->half))
@@ -215,7 +217,7 @@ thresholds_are_scaled_with_the_lengths(void)
     CHECK(memcmp(ends[0], ends[1], sizeof ends[0]) == 0);
 }
 
-/* Errors are those of the points that there are, and not of those that there were. */
+/* A far point hardly matters to others; a list that was emptied is as exact as a new one. */
 static void
 emptied_lists_are_as_exact_as_new_ones(void)
 {
@@ -233,7 +235,7 @@ emptied_lists_are_as_exact_as_new_ones(void)
     CHECK(hs_dynamic_place(list, far, &placed, &failure) == HS_OK);
     CHECK(hs_update_insert(list, (hs_key){0, 0}, &placed, &failure) == HS_OK);
     CHECK(hs_ball_init(&with_far, list, centre, 1.0, &failure) == HS_OK);
-    CHECK(with_far.error > at_first.error && list->magnitude > 0.0);
+    CHECK(with_far.error < 1.5 * at_first.error && list->magnitude > 0.0);
     hs_list_clear(list);
     CHECK(hs_ball_init(&emptied, list, centre, 1.0, &failure) == HS_OK);
     CHECK(emptied.error == at_first.error && list->magnitude == 0.0);

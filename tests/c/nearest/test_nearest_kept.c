@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* test_nearest_kept.c: one of those that come at once builds the tree that is kept, the others do
  * with one of their own; rows end at the largest distance; radii at both ends of the numbers. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 200809L
+#endif
+#include "../../../csrc/core/base/os_thread.h"
 #include "../../../csrc/core/nearest/nearest_kept.h"
 #include "../../../csrc/core/nearest/nearest_write.h"
 #include "../../../csrc/core/memory/account.h"
@@ -57,6 +61,9 @@ whoever_comes_while_it_is_built_does_without(void)
     CHECK(!borrows(kept, INFINITY));
     hs_nearest_kept_end(kept, false); /* it could not be built: the next one tries */
     CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    hs_test_fork(); /* a thread of the parent built it */
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
     hs_nearest_kept_end(kept, false);
     CHECK(borrows(kept, INFINITY));
     CHECK(borrows(kept, 1.0));

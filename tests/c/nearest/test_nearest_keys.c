@@ -58,6 +58,22 @@ equal_keys_keep_their_order(void)
     CHECK(wrong == 0);
 }
 
+/* A step of such a bound would be infinite. */
+static void
+bounds_may_be_zero_or_tiny(void)
+{
+    static const double bounds[] = {0.0, 0x1p-1074, 0x1p-1000, 0x1p-999};
+    const hs_options    options = hs_options_default();
+    for (int b = 0; b < 4; b++) {
+        hs_nearest_pace pace = {.options = &options};
+        hs_nearest_key *sorted = keys, *other = spare;
+        for (int32_t e = 0; e < 20; e++)
+            given[e] = keys[e] = (hs_nearest_key){e % 3 == 0 ? bounds[b] : 0.0, e};
+        hs_nearest_sort(&pace, &sorted, &other, 20, bounds[b]);
+        CHECK(are_sorted(sorted, 20));
+    }
+}
+
 /* One more than 64 is merged, and nothing is stepped over. */
 static void
 few_keys_are_counted_and_many_merged(void)
@@ -148,6 +164,7 @@ void
 test_nearest_keys(void)
 {
     RUN(equal_keys_keep_their_order);
+    RUN(bounds_may_be_zero_or_tiny);
     RUN(few_keys_are_counted_and_many_merged);
     RUN(the_least_are_selected);
     RUN(steps_are_polled_between);
