@@ -10,7 +10,7 @@ from ase.neighborlist import natural_cutoffs, neighbor_list
 
 import halfshell as hs
 from boundary import as_if_atoms
-from halfshell._convert.species import _SYMBOLS
+from halfshell._convert.species import SYMBOLS
 from oracles import same_arrays
 from refused_calls import assert_refused
 
@@ -79,7 +79,7 @@ def test_matscipy_agrees():
 
 
 def test_the_symbols_are_those_of_ase():
-    assert chemical_symbols == _SYMBOLS
+    assert chemical_symbols == SYMBOLS
 
 
 def test_elements_of_two_sets():
