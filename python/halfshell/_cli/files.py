@@ -227,6 +227,8 @@ def _read(
             whole = partial(by_mdanalysis, file_format=file_format, frames=frames,
                             trajectory=trajectory)  # fmt: skip
             readers = [("MDAnalysis", whole)]
+        elif frames is not None and "ASE" not in dict(readers):
+            raise InputError(f"{source}: --index is for formats with several frames")
         said: dict[str, str] = {}
         unknown: list[str] = []
         for name, read in readers:
@@ -253,7 +255,7 @@ def _read(
                 if is_chosen or isinstance(error, MemoryError):
                     raise InputError(f"{source}: {said[name]}") from None
     if kind_of_file(path) == "" and len(said) > 1:
-        del said["text"]  # which other formats are as well
+        said.pop("text", None)  # a name without a suffix says nothing of text
     raise InputError(f"{source}: {_refusal(said, unknown, file_format)}")
 
 
@@ -338,22 +340,18 @@ def _readers(
         ("MDAnalysis", partial(by_mdanalysis, file_format=file_format, frames=frames)),
     ]
     if columns:
-        readers: list[tuple[str, _Reader]] = [text]
-    elif file_format is not None:
+        return [text]
+    if file_format is not None:
         return structures
-    elif is_numpy(path):
-        readers = [("NumPy", _by_numpy)]
-    elif suffix in CLOUDS:
-        readers = [(one[0], partial(_by_cloud, reader=one)) for one in CLOUDS[suffix]]
-    elif suffix in _TEXT_ALONE:
-        readers = [text]
-    elif suffix in _TEXT_FIRST:
+    if is_numpy(path):
+        return [("NumPy", _by_numpy)]
+    if suffix in CLOUDS:
+        return [(one[0], partial(_by_cloud, reader=one)) for one in CLOUDS[suffix]]
+    if suffix in _TEXT_ALONE:
+        return [text]
+    if suffix in _TEXT_FIRST:
         return [text, *structures]
-    else:
-        return [*structures, (_LAST, partial(by_text, least=2))]
-    if frames is not None:
-        raise InputError(f"{path}: --index is for formats with several frames")
-    return readers
+    return [*structures, (_LAST, partial(by_text, least=2))]
 
 
 def _by_numpy(path: str) -> list[Structure]:
