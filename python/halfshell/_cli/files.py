@@ -48,7 +48,7 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell._cli.cloud_files import CLOUDS, read_cloud
 from halfshell._cli.errors import InputError, one_line
-from halfshell._cli.numpy_files import Unreadable, is_numpy, read_arrays
+from halfshell._cli.numpy_files import is_numpy, read_arrays
 from halfshell._cli.pair_files import refuse_list
 from halfshell._cli.structure_files import (
     Structure,
@@ -57,7 +57,7 @@ from halfshell._cli.structure_files import (
     by_mdanalysis,
     kind_of_file,
 )
-from halfshell._cli.text_files import BadLine, read_points
+from halfshell._cli.text_files import read_points
 from halfshell._terminal import printable
 
 __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
@@ -263,7 +263,7 @@ def _reason(error: BaseException) -> str:
     """Why a reader failed, in one line."""
     if isinstance(error, MemoryError):
         return one_line(error) if str(error) else "does not fit in memory"
-    if isinstance(error, (InputError, BadLine, Unreadable)):
+    if isinstance(error, InputError):
         return one_line(error)
     kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
     return f"cannot be read: {kind}{one_line(error)}"
@@ -357,17 +357,7 @@ def _readers(
 def _by_numpy(path: str) -> list[Structure]:
     if not os.path.isfile(path) and not os.path.isdir(path):  # a pipe may keep us waiting
         raise InputError("cannot be read: not a regular file")
-    try:
-        content, names = read_arrays(path)
-    except (Unreadable, OSError, MemoryError):
-        raise
-    except Exception as error:  # a broken file may fail in any part of zipfile, zlib and NumPy
-        reason = one_line(error)
-        if "Object arrays" in reason:
-            reason = "it holds Python objects"
-        elif "pickled" in reason:  # NumPy's guess where it knows no better
-            reason = "it is not one"
-        raise InputError(f"cannot be read as a NumPy file: {reason}") from None
+    content, names = read_arrays(path)
     if "points" not in content:
         held = ", ".join(map(printable, names)) or "nothing"
         raise InputError(f"has no array 'points' (it holds {held})")
@@ -385,10 +375,7 @@ def _by_numpy(path: str) -> list[Structure]:
 def _by_text(
     path: str, columns: Sequence[str], is_pts: bool, least: int = 1
 ) -> list[Structure]:
-    try:
-        points, what = read_points(path, columns, is_pts, least)
-    except UnicodeDecodeError:
-        raise InputError("is not text") from None
+    points, what = read_points(path, columns, is_pts, least)
     return [Structure(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
 
 
