@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError, missing_extra, one_line
 from halfshell._cli.numpy_files import read_arrays
+from halfshell._cli.text_files import shown_names
 
 __all__ = ["ListFile", "read_list", "refuse_list"]
 
@@ -42,7 +43,6 @@ _AXES = ("01234567", "xyz", "abc")
 _OTHERS = ("cutoff", "inclusive", "n")  # what an archive of ours tells besides
 
 _TEXT, _NUMPY = (".csv", ".txt", ".dat", ".tsv"), (".npy", ".npz")
-MOST_SHOWN = 12  # names of columns in a message
 
 
 class ListFile(NamedTuple):
@@ -83,7 +83,7 @@ def refuse_list(file: str, source: str) -> None:
         plain += [name + end for name in plain for end in "01"]
     if _endpoints(plain) is not None:
         raise InputError(
-            f"{source}: is a list of pairs ({_shown(names)}), not points; "
+            f"{source}: is a list of pairs ({shown_names(names)}), not points; "
             "halfshell verify STRUCTURE LIST checks one"
         )
 
@@ -164,7 +164,7 @@ def _wanted(names: Sequence[str], ndim: int) -> list[str]:
     if ends is None:
         raise InputError(
             f"has no columns i and j, source and target, first and second, or the like "
-            f"(it has {_shown(names)})"
+            f"(it has {shown_names(names)})"
         )
     for stem in _SHIFTS:
         for axes in _AXES:
@@ -187,11 +187,6 @@ def _unnamed(n_columns: int, ndim: int) -> list[str]:
             f"{len(names)} (with shifts): name them in the first line"
         )
     return names[:n_columns]
-
-
-def _shown(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:MOST_SHOWN]) or "nothing"
-    return shown + (", ..." if len(names) > MOST_SHOWN else "")
 
 
 # ---- formats ---------------------------------------------------------------------------------

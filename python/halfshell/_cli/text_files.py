@@ -14,6 +14,7 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import IO
 
 import numpy as np
@@ -21,12 +22,12 @@ from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError
 
-__all__ = ["open_bytes", "read_points"]
+__all__ = ["kind_of_file", "open_bytes", "read_points", "shown_names"]
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 _MOST_UNNAMED = 3
-_SHOWN = 12  # names of columns in a message
+MOST_SHOWN = 12  # names of columns in a message
 _PTS = {n: "x y z intensity r g b".split()[:n] for n in (3, 4, 7)} | {6: "x y z r g b".split()}
 
 # What may stand beside the letter or the number of an axis.
@@ -42,18 +43,27 @@ _AXES = (
 )
 
 
-_PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ\0": "lzma"}
+# Suffixes of packed files, what these begin with, and what unpacks them.
+_PACKED = {
+    ".gz": (b"\x1f\x8b", "gzip"), ".bz2": (b"BZh", "bz2"), ".xz": (b"\xfd7zXZ\0", "lzma")
+}  # fmt: skip
 
 
 def open_bytes(file: str) -> IO[bytes]:
     """Open a file for reading, unpacked if its first bytes say that it is packed."""
     with open(file, "rb") as stream:
         start = stream.read(6)
-    for magic, module in _PACKED.items():
+    for magic, module in _PACKED.values():
         if start.startswith(magic):
             unpacked: IO[bytes] = import_module(module).open(file, "rb")
             return unpacked
     return open(file, "rb")
+
+
+def kind_of_file(file: str) -> str:
+    """The last suffix of a name without that of a compression, in small letters: ``.pdb``."""
+    path = Path(file)
+    return (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
 
 
 def read_points(
@@ -238,9 +248,7 @@ def _choose(
     names: list[str] | None, count: int, columns: Sequence[str], line: int, separator: str | None
 ) -> list[int]:
     """Which columns are coordinates."""
-    what = f"{count} columns" if names is None else "columns " + ", ".join(
-        repr(name) for name in names[:_SHOWN]
-    ) + (" ..." if count > _SHOWN else "")  # fmt: skip
+    what = f"{count} columns" if names is None else "columns " + shown_names(map(repr, names))
     if columns:
         picked = []
         for column in columns:
@@ -294,3 +302,10 @@ def _groups(names: Sequence[str]) -> dict[str, list[int]]:
 
 def _numbers(picked: Sequence[int]) -> str:
     return ", ".join(str(k + 1) for k in picked)
+
+
+def shown_names(names: Iterable[str]) -> str:
+    """Names of columns for a message: the first of many."""
+    shown = list(names)
+    shown[MOST_SHOWN:] = ["..."] * (len(shown) > MOST_SHOWN)
+    return ", ".join(shown) or "nothing"
