@@ -116,18 +116,21 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Scene
     with _warnings() as remarks:
         try:
             name = file_format or (own[0] if own else filetype(file))
-            read = partial(ase.io.read, file, format=name, do_not_split_by_at_sign=True)
-            read = partial(_all_of, own[1]) if own else read
+
+            def read(index: int | slice) -> Any:
+                if own:
+                    return own[1]()[index]
+                some = ase.io.iread if isinstance(index, slice) else ase.io.read
+                return some(file, index, format=name, do_not_split_by_at_sign=True)
+
             found: Any
-            if isinstance(frames, slice) and not own:
-                found = ase.io.iread(file, frames, format=name, do_not_split_by_at_sign=True)
-            elif isinstance(frames, slice):
-                found = read(index=frames)
+            if isinstance(frames, slice):
+                found = read(frames)
             else:
                 number = -1 if frames is None else frames
-                found = [read(index=number)]
+                found = [read(number)]
                 if not len(found[0]):  # such as that between ENDMDL and END of a PDB file
-                    found = [[atoms for atoms in read(index=slice(None)) if len(atoms)][number]]
+                    found = [[atoms for atoms in read(slice(None)) if len(atoms)][number]]
         except UnknownFileTypeError:
             raise UnknownFormat from None
         except (IndexError, StopIteration) as error:
@@ -143,28 +146,20 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Scene
             raise InputError(f"{frame} holds no atoms: count frames from the first on")
 
 
-def _all_of(read: Callable[[], list[Any]], index: int | slice) -> Any:
-    return read()[index]
-
-
 def _of_atoms(atoms: Any, remarks: tuple[str, ...], reader: str, is_lammps: bool) -> Scene:
     names, residues = (atoms.arrays.get(part) for part in ("atomtypes", "residuenames"))
-    species: NDArray[np.str_] | None = np.array(atoms.get_chemical_symbols())
+    species, how = _species(atoms.get_chemical_symbols(), names, residues)
     if is_lammps and np.array_equal(atoms.arrays.get("type", ()), atoms.numbers):
-        species, reader = None, f"{reader}: types, not elements"
-    elif names is not None and residues is not None and not _plausible(species, residues):
-        species = _elements(names, residues)
-        reader = f"{reader}: elements by names of atoms"
+        species, how = None, ": types, not elements"
     box = atoms.cell.array if atoms.cell.rank > 0 else None
     no_box = placeholder(atoms.cell.array, residues is not None) if atoms.pbc.any() else ""
     periodic = tuple(bool(flag) for flag in atoms.pbc)
     if no_box:
         box, periodic = None, (False,) * 3
     unit = "" if is_lammps else "angstrom"
-    species = None if species is None else _known(species)
     return Scene(
-        atoms.positions, box, periodic, species=species, unit=unit, remarks=remarks, reader=reader,
-        no_box=no_box,
+        atoms.positions, box, periodic, species=species, unit=unit, remarks=remarks,
+        reader=reader + how, no_box=no_box,
     )  # fmt: skip
 
 
@@ -337,7 +332,8 @@ def by_mdanalysis(
             chosen = numbers[one] if isinstance(one, slice) else [numbers[one]]
         except IndexError:
             raise InputError(f"has no frame {frames}") from None
-        species, how = _elements_of(universe.atoms)
+        parts = (getattr(universe.atoms, one, None) for one in ("elements", "names", "resnames"))
+        species, how = _species(*parts)
         reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
     found = (_of_frame(steps[k], species, reader) for k in chosen)
     for frame, one in _each(found, frames, remarks, chosen):
@@ -373,18 +369,6 @@ def _of_coordinates(file: str, kind: str) -> Any:
     universe = MDAnalysis.Universe.empty(n_atoms)
     universe.load_new(file, format=kind)
     return universe
-
-
-def _elements_of(atoms: Any) -> tuple[NDArray[np.str_] | None, str]:
-    found = getattr(atoms, "elements", None)
-    if found is None:
-        return None, ""
-    species = np.array([str(symbol).capitalize() or "X" for symbol in found])
-    names, residues = getattr(atoms, "names", None), getattr(atoms, "resnames", None)
-    if names is not None and residues is not None and not _plausible(species, residues):
-        species = _elements(names, residues)
-        return _known(species), ": elements by names of atoms"
-    return _known(species), ""
 
 
 def _of_frame(frame: Any, species: NDArray[np.str_] | None, reader: str) -> Scene:
@@ -459,8 +443,14 @@ _IONS = {"SOD": "Na", "POT": "K", "CLA": "Cl", "CAL": "Ca", "CES": "Cs", "LIT": 
 _HEAVY = frozenset("FE ZN MG MN CL BR NA CU CO NI SE SI AL LI".split())  # that ligands may have
 
 
-def _known(species: NDArray[np.str_]) -> NDArray[np.str_] | None:
-    return None if (species == "X").all() else species
+def _species(symbols: Any, names: Any, residues: Any) -> tuple[NDArray[np.str_] | None, str]:
+    """Elements, None if none is known, and words for where they are from if not the symbols."""
+    if symbols is None:
+        return None, ""
+    species, how = np.array([str(symbol).capitalize() or "X" for symbol in symbols]), ""
+    if names is not None and residues is not None and not _plausible(species, residues):
+        species, how = _elements(names, residues), ": elements by names of atoms"
+    return None if (species == "X").all() else species, how
 
 
 def _plausible(species: Any, residues: Any) -> bool:
