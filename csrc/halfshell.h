@@ -742,8 +742,8 @@ typedef struct hs_box_axes {
 /*
  * For dividing points into parts that see each other's edges: where points are along the axes of a
  * box (NULL: none), and how far places can be apart where some image of a pair is within the
- * cutoff; rounding is in the reach. places, or NULL: places[k * stride + i] of point i along axis k,
- * 0 where the reach is infinite. They do not depend on the other points: largest is at least the
+ * cutoff; rounding is in the reach. places, or NULL: places[k * stride + i] of point i along axis
+ * k, 0 where the reach is infinite. They do not depend on the other points: largest is at least the
  * largest |coordinate| of all points that are ever compared, so that several calls agree. No box,
  * size of numbers or distance from the box makes the reach too small.
  */
