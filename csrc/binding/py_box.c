@@ -138,9 +138,8 @@ places_in_parts(const hs_box *box, const hs_points *points, double cutoff, doubl
             hs_box_places(box, &part, cutoff, largest, places + first, points->n, axes, &failure);
         Py_END_ALLOW_THREADS
         if (status != HS_OK) {
-            const hs_options options = {.cutoff = cutoff};
             failure.row += failure.row >= 0 && is_of_point(status) ? first : 0;
-            hs_raise(status, &failure, &options);
+            hs_raise(status, &failure, NULL);
             return false;
         }
         if (PyErr_CheckSignals() != 0) {

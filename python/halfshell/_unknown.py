@@ -77,7 +77,7 @@ def _meant(name: str, known: list[str]) -> str | None:
 
 
 def _functions_with(name: str) -> list[str]:
-    """The functions that search, as few as two, which have an argument of this name."""
+    """The first two of the functions that search which have an argument of this name."""
     import inspect
 
     import halfshell

@@ -29,6 +29,6 @@ void hs_gate_write_end(hs_gate *gate);
 /* A writer for many calls. False: this thread holds the gate already. */
 bool hs_gate_hold(hs_gate *gate);
 bool hs_gate_is_mine(hs_gate *gate); /* whether this thread holds it */
-void hs_gate_release(hs_gate *gate); /* if it does */
+void hs_gate_release(hs_gate *gate); /* which this thread holds */
 
 #endif

@@ -36,8 +36,8 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -48,16 +48,10 @@ from numpy.typing import NDArray
 import halfshell as hs
 from halfshell._cli.cloud_files import CLOUDS, read_cloud
 from halfshell._cli.errors import InputError, one_line
-from halfshell._cli.numpy_files import Unreadable, is_numpy, read_arrays
+from halfshell._cli.numpy_files import is_numpy, read_arrays
 from halfshell._cli.pair_files import refuse_list
-from halfshell._cli.structure_files import (
-    Structure,
-    UnknownFormat,
-    by_ase,
-    by_mdanalysis,
-    kind_of_file,
-)
-from halfshell._cli.text_files import BadLine, read_points
+from halfshell._cli.structure_files import Frames, Scene, UnknownFormat, by_ase, by_mdanalysis
+from halfshell._cli.text_files import kind_of_file, read_points
 from halfshell._terminal import printable
 
 __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
@@ -65,63 +59,9 @@ __all__ = ["Scene", "read_frames", "read_scene", "replacing"]
 _TEXT_ALONE, _TEXT_FIRST = (".csv", ".tsv", ".pts"), (".txt", ".dat", "")
 ROWS_CHECKED = 1 << 16  # at a time: some megabytes
 
-_LAST = "as text"
+_LAST = "as text"  # the reader of text, where it is tried last
 
-Frames = int | slice | None
-_Reader = Callable[[str], Iterable[Structure]]  # the frames of a file, one by one
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Points with their box, and where they come from.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, d)
-        Finite, n >= 1.
-    box : ndarray, shape (d,) or (d, d), or None
-        Edge lengths, or edge vectors as rows.
-    periodic : tuple of bool, length d
-        Which axes repeat.
-    source : str
-        The file, or what ships with the package; for messages.
-    species : ndarray of str, shape (n,), or None
-        Chemical symbols, where the file has them.
-    unit : str
-        ``"angstrom"`` where it is known, else empty.
-    remarks : tuple of str
-        What the reader of the file warned of.
-    reader : str
-        What read the file, and what of it; empty for what ships with the package.
-    no_box : str
-        Why the box that the file has is none, or nothing.
-    frame : str
-        Which of several frames this is, for messages.
-    """
-
-    points: NDArray[Any]
-    box: NDArray[Any] | None
-    periodic: tuple[bool, ...]
-    source: str
-    species: NDArray[np.str_] | None = None
-    unit: str = ""
-    remarks: tuple[str, ...] = ()
-    reader: str = ""
-    no_box: str = ""
-    frame: str = ""
-
-    @property
-    def where(self) -> str:
-        """The file, and the frame of several."""
-        return f"{self.source}: {self.frame}" if self.frame else self.source
-
-    @property
-    def box_rows(self) -> NDArray[np.float64] | None:
-        """The edge vectors as rows, shape (d, d), or None."""
-        if self.box is None:
-            return None
-        box = np.asarray(self.box, dtype=np.float64)
-        return np.diag(box) if box.ndim == 1 else box
+_Reader = Callable[[str], Iterable[Scene]]  # the frames of a file, one by one
 
 
 # Reading -----------------------------------------------------------------------------------
@@ -227,6 +167,8 @@ def _read(
             whole = partial(by_mdanalysis, file_format=file_format, frames=frames,
                             trajectory=trajectory)  # fmt: skip
             readers = [("MDAnalysis", whole)]
+        elif frames is not None and "ASE" not in dict(readers):
+            raise InputError(f"{source}: --index is for formats with several frames")
         said: dict[str, str] = {}
         unknown: list[str] = []
         for name, read in readers:
@@ -234,11 +176,8 @@ def _read(
                 continue
             is_chosen = False
             try:
-                for one in read(path):
-                    scene = Scene(
-                        one.points, one.box, one.periodic, source, one.species, one.unit,
-                        one.remarks, one.reader, one.no_box, one.frame,
-                    )  # fmt: skip
+                for scene in read(path):
+                    scene = replace(scene, source=source)
                     _check(scene)
                     is_chosen = True
                     yield _with_claim(scene, claimed)
@@ -253,7 +192,7 @@ def _read(
                 if is_chosen or isinstance(error, MemoryError):
                     raise InputError(f"{source}: {said[name]}") from None
     if kind_of_file(path) == "" and len(said) > 1:
-        del said["text"]  # which other formats are as well
+        said.pop("text", None)  # a name without a suffix says nothing of text
     raise InputError(f"{source}: {_refusal(said, unknown, file_format)}")
 
 
@@ -261,7 +200,7 @@ def _reason(error: BaseException) -> str:
     """Why a reader failed, in one line."""
     if isinstance(error, MemoryError):
         return one_line(error) if str(error) else "does not fit in memory"
-    if isinstance(error, (InputError, BadLine, Unreadable)):
+    if isinstance(error, InputError):
         return one_line(error)
     kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
     return f"cannot be read: {kind}{one_line(error)}"
@@ -286,18 +225,15 @@ def _with_claim(scene: Scene, claimed: int) -> Scene:
 
 def _refusal(said: dict[str, str], unknown: list[str], file_format: str | None) -> str:
     """What each reader said, in one line."""
-    reasons = list(dict.fromkeys(said.values()))
-    if not unknown and len(reasons) == 1:
-        return reasons[0]
     told = [f"{name}: {reason}" for name, reason in said.items()]
     if not unknown:
-        return "; ".join(told)
+        return "; ".join(told) if len(set(said.values())) > 1 else next(iter(said.values()))
     form = "the format" if file_format is None else f"the format {file_format!r}"
-    many = f"{' and '.join(unknown)} {'do' if len(unknown) > 1 else 'does'} not know {form}"
+    strange = f"{' and '.join(unknown)} {'do' if len(unknown) > 1 else 'does'} not know {form}"
     if set(said) <= {_LAST}:
-        many = f"unknown format: {many} (see `ase info --formats`; force one with --format)"
-        return "; ".join([many, *told])
-    return "; ".join([*told, many])
+        strange = f"unknown format: {strange} (see `ase info --formats`; force one with --format)"
+        return "; ".join([strange, *told])
+    return "; ".join([*told, strange])
 
 
 @contextmanager
@@ -315,12 +251,9 @@ def _as_path(file: str, file_format: str | None) -> Iterator[tuple[str, str]]:
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "input" + ("" if is_input else Path(file).suffix))
         try:
-            with open(path, "xb") as copy:
-                if is_input:
-                    shutil.copyfileobj(sys.stdin.buffer, copy)
-                else:
-                    with open(file, "rb") as stream:
-                        shutil.copyfileobj(stream, copy)
+            given = nullcontext(sys.stdin.buffer) if is_input else open(file, "rb")
+            with given as stream, open(path, "xb") as copy:
+                shutil.copyfileobj(stream, copy)
         except OSError as error:
             raise InputError(f"{source}: cannot be read: {one_line(error)}") from None
         yield path, source
@@ -332,44 +265,30 @@ def _readers(
     """The readers that may know a file, by name, in the order in which they are tried."""
     suffix = kind_of_file(path)
     by_text = partial(_by_text, columns=columns or (), is_pts=suffix == ".pts")
-    text = ("text", by_text)
+    text: list[tuple[str, _Reader]] = [("text", by_text)]
     structures: list[tuple[str, _Reader]] = [
         ("ASE", partial(by_ase, file_format=file_format, frames=frames)),
         ("MDAnalysis", partial(by_mdanalysis, file_format=file_format, frames=frames)),
     ]
     if columns:
-        readers: list[tuple[str, _Reader]] = [text]
-    elif file_format is not None:
+        return text
+    if file_format is not None:
         return structures
-    elif is_numpy(path):
-        readers = [("NumPy", _by_numpy)]
-    elif suffix in CLOUDS:
-        readers = [(one[0], partial(_by_cloud, reader=one)) for one in CLOUDS[suffix]]
-    elif suffix in _TEXT_ALONE:
-        readers = [text]
-    elif suffix in _TEXT_FIRST:
-        return [text, *structures]
-    else:
-        return [*structures, (_LAST, partial(by_text, least=2))]
-    if frames is not None:
-        raise InputError(f"{path}: --index is for formats with several frames")
-    return readers
+    if is_numpy(path):
+        return [("NumPy", _by_numpy)]
+    if suffix in CLOUDS:
+        return [(one[0], partial(_by_cloud, reader=one)) for one in CLOUDS[suffix]]
+    if suffix in _TEXT_ALONE:
+        return text
+    if suffix in _TEXT_FIRST:
+        return [*text, *structures]
+    return [*structures, (_LAST, partial(by_text, least=2))]
 
 
-def _by_numpy(path: str) -> list[Structure]:
+def _by_numpy(path: str) -> list[Scene]:
     if not os.path.isfile(path) and not os.path.isdir(path):  # a pipe may keep us waiting
         raise InputError("cannot be read: not a regular file")
-    try:
-        content, names = read_arrays(path)
-    except (Unreadable, OSError, MemoryError):
-        raise
-    except Exception as error:  # a broken file may fail in any part of zipfile, zlib and NumPy
-        reason = one_line(error)
-        if "Object arrays" in reason:
-            reason = "it holds Python objects"
-        elif "pickled" in reason:  # NumPy's guess where it knows no better
-            reason = "it is not one"
-        raise InputError(f"cannot be read as a NumPy file: {reason}") from None
+    content, names = read_arrays(path)
     if "points" not in content:
         held = ", ".join(map(printable, names)) or "nothing"
         raise InputError(f"has no array 'points' (it holds {held})")
@@ -381,22 +300,17 @@ def _by_numpy(path: str) -> list[Structure]:
         raise InputError("'periodic' must be one bool, or one for each column of points")
     flags = np.broadcast_to(periodic, points.shape[1])
     reader = f"NumPy, {' and '.join(content)}"
-    return [Structure(points, box, tuple(bool(flag) for flag in flags), reader=reader)]
+    return [Scene(points, box, tuple(bool(flag) for flag in flags), reader=reader)]
 
 
-def _by_text(
-    path: str, columns: Sequence[str], is_pts: bool, least: int = 1
-) -> list[Structure]:
-    try:
-        points, what = read_points(path, columns, is_pts, least)
-    except UnicodeDecodeError:
-        raise InputError("is not text") from None
-    return [Structure(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
+def _by_text(path: str, columns: Sequence[str], is_pts: bool, least: int = 1) -> list[Scene]:
+    points, what = read_points(path, columns, is_pts, least)
+    return [Scene(points, None, (False,) * points.shape[1], reader=f"text, {what}")]
 
 
-def _by_cloud(path: str, reader: Any) -> list[Structure]:
+def _by_cloud(path: str, reader: Any) -> list[Scene]:
     points, name = read_cloud(path, reader)
-    return [Structure(points, reader=name)]
+    return [Scene(points, reader=name)]
 
 
 # What headers say of the number of points, the least number of bytes for each of them, and the

@@ -18,19 +18,16 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from halfshell._cli.errors import InputError, one_line
 from halfshell._convert.memory import refuse_unavailable
 from halfshell._convert.scene import MAX_DIM, MAX_POINTS
 
-__all__ = ["Unreadable", "is_numpy", "read_arrays"]
+__all__ = ["is_numpy", "read_arrays"]
 
 _SCENE = ("points", "box", "periodic")
 _MAGIC = np.lib.format.MAGIC_PREFIX
 MOST_HEADER = 10_000  # bytes, as np.load has it
 _COPIES = 2  # of the points: what is read, and the search's own
-
-
-class Unreadable(Exception):
-    """A file that is not read, with the reason."""
 
 
 def is_numpy(file: str) -> bool:
@@ -57,13 +54,27 @@ def read_arrays(
 
     Raises
     ------
-    Unreadable
-        If an array is refused for its header.
+    InputError
+        If an array is refused for its header, or the file is broken.
     MemoryError
         If it would not fit.
-    Exception
-        What `zipfile` and NumPy raise for broken files.
+    OSError
+        If the file cannot be read.
     """
+    try:
+        return _read(file, wanted)
+    except (InputError, OSError, MemoryError):
+        raise
+    except Exception as error:  # a broken file may fail in any part of zipfile, zlib and NumPy
+        reason = one_line(error)
+        if "Object arrays" in reason:
+            reason = "it holds Python objects"
+        elif "pickled" in reason:  # NumPy's guess where it knows no better
+            reason = "it is not one"
+        raise InputError(f"cannot be read as a NumPy file: {reason}") from None
+
+
+def _read(file: str, wanted: Sequence[str]) -> tuple[dict[str, NDArray[Any]], list[str]]:
     with open(file, "rb") as stream, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of headers that Python 2 wrote
         alone = "points" if "points" in wanted else "alone"
@@ -99,22 +110,22 @@ def _check_header(name: str, stream: IO[bytes], n_bytes: int) -> None:
     shape, dtype, n_header = header
     n_bytes -= n_header
     if min(shape, default=0) < 0:
-        raise Unreadable(f"{name!r} has shape {shape}; no length is negative")
+        raise InputError(f"{name!r} has shape {shape}; no length is negative")
     needed = math.prod(shape) * dtype.itemsize
     what = f"{name!r} of shape {shape} and dtype {dtype}"
     if name in ("box", "periodic"):
         if math.prod(shape) > MAX_DIM**2:
-            raise Unreadable(f"{name!r} has shape {shape}, more than a box has")
+            raise InputError(f"{name!r} has shape {shape}, more than a box has")
     elif name != "points":
         pass
     elif len(shape) != 2:
-        raise Unreadable(f"points have shape {shape}; they must be (n, d)")
+        raise InputError(f"points have shape {shape}; they must be (n, d)")
     elif shape[1] > MAX_DIM:
-        raise Unreadable(f"points have shape {shape}; they must be (n, d) with d <= {MAX_DIM}")
+        raise InputError(f"points have shape {shape}; they must be (n, d) with d <= {MAX_DIM}")
     elif shape[0] > MAX_POINTS:
-        raise Unreadable(f"points have shape {shape}; fewer than 2**31 points can be searched")
+        raise InputError(f"points have shape {shape}; fewer than 2**31 points can be searched")
     if needed > n_bytes:
-        raise Unreadable(f"{what} is cut off: that is {needed:,} bytes, there are {n_bytes:,}")
+        raise InputError(f"{what} is cut off: that is {needed:,} bytes, there are {n_bytes:,}")
     refuse_unavailable(_COPIES * needed, f"{what}, read and searched,")
 
 
@@ -126,7 +137,7 @@ def _read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any], int
     is_old = start[6] == 1
     length = int.from_bytes(start[8:10] if is_old else start[8:12], "little")
     if length > MOST_HEADER:
-        raise Unreadable(f"its header of {length:,} bytes is too long")
+        raise InputError(f"its header of {length:,} bytes is too long")
     whole = io.BytesIO(start + stream.read(length))
     try:
         np.lib.format.read_magic(whole)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import chain
@@ -19,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from halfshell._cli.errors import InputError, missing_extra, one_line
-from halfshell._cli.numpy_files import Unreadable, read_arrays
+from halfshell._cli.numpy_files import read_arrays
+from halfshell._cli.text_files import shown_names
 
 __all__ = ["ListFile", "read_list", "refuse_list"]
 
@@ -41,7 +43,6 @@ _AXES = ("01234567", "xyz", "abc")
 _OTHERS = ("cutoff", "inclusive", "n")  # what an archive of ours tells besides
 
 _TEXT, _NUMPY = (".csv", ".txt", ".dat", ".tsv"), (".npy", ".npz")
-MOST_SHOWN = 12  # names of columns in a message
 
 
 class ListFile(NamedTuple):
@@ -82,7 +83,7 @@ def refuse_list(file: str, source: str) -> None:
         plain += [name + end for name in plain for end in "01"]
     if _endpoints(plain) is not None:
         raise InputError(
-            f"{source}: is a list of pairs ({_shown(names)}), not points; "
+            f"{source}: is a list of pairs ({shown_names(names)}), not points; "
             "halfshell verify STRUCTURE LIST checks one"
         )
 
@@ -101,34 +102,40 @@ def read_list(file: str, n: int, ndim: int) -> ListFile:
     InputError
         With the reason in one line.
     """
-    suffix = Path(file).suffix.lower()
-    others: dict[str, Any] = {}
     try:
-        if suffix in _TEXT:
-            names, columns = _read_text(file, ndim)
-        elif suffix in _NUMPY:
-            names, columns, others = _read_numpy(file, ndim)
-        elif suffix == ".parquet":
-            held, read = _parquet(file)
-            names = _wanted(held, ndim, file)
-            columns = read(names)
-        else:
-            known = ", ".join((*_TEXT, *_NUMPY, ".parquet"))
-            raise InputError(f"{file}: lists of pairs are read from {known}")
-    except (Unreadable, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: {one_line(error)}") from None
-    except (InputError, MemoryError):
+        return _read(file, n, ndim)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: is not text") from None
+    except MemoryError:
         raise
     except Exception as error:  # a broken file may fail in any part of its library
         raise InputError(f"{file}: cannot be read: {one_line(error)}") from None
-    whole = [_whole(file, name, columns[name]) for name in names]
+
+
+def _read(file: str, n: int, ndim: int) -> ListFile:
+    suffix = Path(file).suffix.lower()
+    others: dict[str, Any] = {}
+    if suffix in _TEXT:
+        names, columns = _read_text(file, ndim)
+    elif suffix in _NUMPY:
+        names, columns, others = _read_numpy(file, ndim)
+    elif suffix == ".parquet":
+        held, table_of = _parquet(file)
+        names = _wanted(held, ndim)
+        table = table_of(columns=names)
+        columns = {name: table[name].to_numpy() for name in names}
+    else:
+        raise InputError(f"lists of pairs are read from {', '.join((*_TEXT, *_NUMPY, '.parquet'))}")
+    whole = [_whole(name, columns[name]) for name in names]
     i, j = whole[:2]
     if len({len(column) for column in whole}) > 1:
-        raise InputError(f"{file}: its columns differ in length")
-    counts_from = _first_index(file, i, j, n)
+        raise InputError("its columns differ in length")
+    counts_from = _first_index(i, j, n)
     shift = np.column_stack(whole[2:]) if whole[2:] else None
     if others.get("n", n) != n:
-        raise InputError(f"{file}: is a list for {others['n']} points; there are {n}")
+        raise InputError(f"is a list for {others['n']} points; there are {n}")
     return ListFile(
         i - counts_from, j - counts_from, shift, others.get("cutoff"), others.get("inclusive"),
         tuple(names), counts_from,
@@ -150,14 +157,14 @@ def _endpoints(plain: Sequence[str]) -> tuple[int, int] | None:
     return None
 
 
-def _wanted(names: Sequence[str], ndim: int, file: str) -> list[str]:
+def _wanted(names: Sequence[str], ndim: int) -> list[str]:
     """The names of i, j and, as far as there are some, the components of the shift."""
     plain = [_plain(name) for name in names]
     ends = _endpoints(plain)
     if ends is None:
         raise InputError(
-            f"{file}: has no columns i and j, source and target, first and second, or the like "
-            f"(it has {_shown(names)})"
+            f"has no columns i and j, source and target, first and second, or the like "
+            f"(it has {shown_names(names)})"
         )
     for stem in _SHIFTS:
         for axes in _AXES:
@@ -166,26 +173,20 @@ def _wanted(names: Sequence[str], ndim: int, file: str) -> list[str]:
                 if len(found) != ndim:
                     held = ", ".join(names[plain.index(one)] for one in found)
                     raise InputError(
-                        f"{file}: has shifts of {len(found)} axes ({held}); points have {ndim} "
-                        "coordinates"
+                        f"has shifts of {len(found)} axes ({held}); points have {ndim} coordinates"
                     )
                 return [names[k] for k in (*ends, *map(plain.index, found))]
     return [names[k] for k in ends]
 
 
-def _unnamed(n_columns: int, ndim: int, file: str) -> list[str]:
+def _unnamed(n_columns: int, ndim: int) -> list[str]:
     names = ["i", "j", *(f"S{axis}" for axis in range(ndim))]
     if n_columns not in (2, len(names)):
         raise InputError(
-            f"{file}: has {n_columns} columns without names; those of a list are 2 (i, j) or "
+            f"has {n_columns} columns without names; those of a list are 2 (i, j) or "
             f"{len(names)} (with shifts): name them in the first line"
         )
     return names[:n_columns]
-
-
-def _shown(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:MOST_SHOWN]) or "nothing"
-    return shown + (", ..." if len(names) > MOST_SHOWN else "")
 
 
 # ---- formats ---------------------------------------------------------------------------------
@@ -218,10 +219,10 @@ def _read_text(file: str, ndim: int) -> tuple[list[str], dict[str, NDArray[Any]]
     if names is None:
         with open(file, encoding="utf-8-sig") as lines:
             row = next((line for k, line in enumerate(lines) if k >= n_lines), "")
-        found = _unnamed(len(row.partition("#")[0].split(between)), ndim, file)
+        found = _unnamed(len(row.partition("#")[0].split(between)), ndim)
         places = list(range(len(found)))
     else:
-        found = _wanted(names, ndim, file)
+        found = _wanted(names, ndim)
         places = [names.index(name) for name in found]
     with open(file, encoding="utf-8-sig") as lines:
         for _ in range(n_lines):
@@ -253,55 +254,45 @@ def _read_numpy(
             rows = array if is_across else array.T
             columns |= {f"{name}{k}": column for k, column in enumerate(rows)}
     if names == ["alone"]:
-        found = _unnamed(len(columns), ndim, file)
+        found = _unnamed(len(columns), ndim)
         return found, dict(zip(found, columns.values(), strict=True)), others
     if _endpoints([_plain(name) for name in columns]) is None:
-        _wanted(names, ndim, file)  # which says what the file holds
-    return _wanted(list(columns), ndim, file), columns, others
+        _wanted(names, ndim)  # which says what the file holds
+    return _wanted(list(columns), ndim), columns, others
 
 
 def _parquet(file: str) -> tuple[list[str], Any]:
-    """Names of the columns, and a function that reads some of them."""
+    """Names of the columns, and a function that reads some of them as a table."""
+    library: Any
     if find_spec("pyarrow") is not None:
-        parquet: Any = import_module("pyarrow.parquet")
-
-        def read(names: list[str]) -> dict[str, NDArray[Any]]:
-            table = parquet.read_table(file, columns=names)
-            return {name: table[name].to_numpy() for name in names}
-
-        return list(parquet.read_schema(file).names), read
+        library = import_module("pyarrow.parquet")
+        return list(library.read_schema(file).names), partial(library.read_table, file)
     if find_spec("polars") is not None:
-        polars: Any = import_module("polars")
-
-        def read_polars(names: list[str]) -> dict[str, NDArray[Any]]:
-            table = polars.read_parquet(file, columns=names)
-            return {name: table[name].to_numpy() for name in names}
-
-        return list(polars.read_parquet_schema(file)), read_polars
+        library = import_module("polars")
+        return list(library.read_parquet_schema(file)), partial(library.read_parquet, file)
     if find_spec("fastparquet") is not None and find_spec("pandas") is not None:
-        pandas: Any = import_module("pandas")
-        frame = pandas.read_parquet(file)
-        return list(frame.columns), lambda names: {name: frame[name].to_numpy() for name in names}
-    raise missing_extra(f"{file}: reading Parquet", "pyarrow")
+        library = import_module("pandas")
+        return list(library.read_parquet(file).columns), partial(library.read_parquet, file)
+    raise missing_extra("reading Parquet", "pyarrow")
 
 
 # ---- values ----------------------------------------------------------------------------------
 
 
-def _whole(file: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
+def _whole(name: str, column: NDArray[Any]) -> NDArray[np.int64]:
     """A column as integers; InputError if there is one that is none."""
     if column.dtype.kind not in "iuf":
-        raise InputError(f"{file}: column {name} has type {column.dtype}, not whole numbers")
+        raise InputError(f"column {name} has type {column.dtype}, not whole numbers")
     with np.errstate(invalid="ignore"):
         whole = column.astype(np.int64)
         wrong = np.flatnonzero(whole != column)
     if len(wrong):
         row = int(wrong[0])
-        raise InputError(f"{file}: {name} of row {row} is {column[row]}, not a whole number")
+        raise InputError(f"{name} of row {row} is {column[row]}, not a whole number")
     return whole
 
 
-def _first_index(file: str, i: NDArray[np.int64], j: NDArray[np.int64], n: int) -> int:
+def _first_index(i: NDArray[np.int64], j: NDArray[np.int64], n: int) -> int:
     """0, or 1 where the points must be counted from 1, because some index is `n` and none is 0."""
     if not len(i):
         return 0
@@ -310,4 +301,4 @@ def _first_index(file: str, i: NDArray[np.int64], j: NDArray[np.int64], n: int) 
         return 0
     if least >= 1 and most == n:
         return 1
-    raise InputError(f"{file}: has points {least} to {most}; there are {n}, 0 to {n - 1}")
+    raise InputError(f"has points {least} to {most}; there are {n}, 0 to {n - 1}")

@@ -25,6 +25,7 @@ __all__ = [
     "describe_box",
     "describe_points",
     "describe_source",
+    "load_frames",
     "load_scene",
     "plot_distribution",
     "radial_distribution",
@@ -56,10 +57,7 @@ def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
         return scene, iter([scene]), cutoff, reason
     if args.file is None:
         raise InputError("--index names frames: give a file that has some")
-    frames = read_frames(
-        args.file, args.index, file_format=args.format, columns=args.columns,
-        trajectory=args.trajectory, box=args.box, periodic=args.periodic,
-    )  # fmt: skip
+    frames = read_frames(args.file, args.index, **_how_to_read(args))
     first = next(frames)
     _tell_remarks(first)
     cutoff, reason = (args.cutoff, "") if args.cutoff is not None else choose_cutoff(first)
@@ -68,17 +66,14 @@ def load_frames(args: Namespace) -> tuple[Scene, Iterator[Scene], float, str]:
 
 def read_points(args: Namespace) -> Scene:
     """Return the scene that the options name; what its reader warned of is said."""
-    scene = read_scene(
-        args.file,
-        file_format=args.format,
-        index=args.index,
-        columns=args.columns,
-        trajectory=args.trajectory,
-        box=args.box,
-        periodic=args.periodic,
-    )
+    scene = read_scene(args.file, index=args.index, **_how_to_read(args))
     _tell_remarks(scene)
     return scene
+
+
+def _how_to_read(args: Namespace) -> dict[str, Any]:
+    names = ("columns", "trajectory", "box", "periodic")
+    return {"file_format": args.format, **{name: getattr(args, name) for name in names}}
 
 
 def _tell_remarks(scene: Scene) -> None:

@@ -9,23 +9,23 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from halfshell._cli.errors import InputError, missing_extra
-from halfshell._cli.text_files import open_bytes
+from halfshell._cli.errors import InputError, missing_extra, one_line
+from halfshell._cli.text_files import kind_of_file, open_bytes
 from halfshell._convert.foreign_box import placeholder
 from halfshell._convert.species import SYMBOLS
 
-__all__ = ["Structure", "UnknownFormat", "by_ase", "by_mdanalysis", "kind_of_file"]
+__all__ = ["Frames", "Scene", "UnknownFormat", "by_ase", "by_mdanalysis"]
 
 Frames = int | slice | None
 
-_PACKED = {".gz", ".bz2", ".xz"}
 _OF_CELL = ((0, 9), (9, 9), (18, 9), (27, 7), (34, 7), (41, 7))  # numbers of a line CRYST1
 _CELL_OF_MMCIF = (
     "length_a", "length_b", "length_c", "angle_alpha", "angle_beta", "angle_gamma"
@@ -38,34 +38,63 @@ class UnknownFormat(Exception):
     """A reader does not know the format of a file."""
 
 
-class Structure(NamedTuple):
-    """What a reader made of a frame.
+@dataclass(frozen=True)
+class Scene:
+    """Points with their box, and where they come from.
 
-    Points with edge vectors (or None), periodic axes and elements as far as they are known; what it
-    warned of, its name with that of the format, and why a box that the file has is none.
+    Attributes
+    ----------
+    points : ndarray, shape (n, d)
+        Finite, n >= 1.
+    box : ndarray, shape (d,) or (d, d), or None
+        Edge lengths, or edge vectors as rows.
+    periodic : tuple of bool, length d
+        Which axes repeat.
+    source : str
+        The file, or what ships with the package; for messages.
+    species : ndarray of str, shape (n,), or None
+        Chemical symbols, where the file has them.
+    unit : str
+        ``"angstrom"`` where it is known, else empty.
+    remarks : tuple of str
+        What the reader of the file warned of.
+    reader : str
+        What read the file, and what of it; empty for what ships with the package.
+    no_box : str
+        Why the box that the file has is none, or nothing.
+    frame : str
+        Which of several frames this is, for messages.
     """
 
     points: NDArray[Any]
     box: NDArray[Any] | None = None
     periodic: tuple[bool, ...] = (False,) * 3
+    source: str = ""
     species: NDArray[np.str_] | None = None
+    unit: str = ""
     remarks: tuple[str, ...] = ()
     reader: str = ""
-    unit: str = ""
     no_box: str = ""
     frame: str = ""
 
+    @property
+    def where(self) -> str:
+        """The file, and the frame of several."""
+        return f"{self.source}: {self.frame}" if self.frame else self.source
 
-def kind_of_file(file: str) -> str:
-    """The last suffix of a name without that of a compression, in small letters: ``.pdb``."""
-    path = Path(file)
-    return (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
+    @property
+    def box_rows(self) -> NDArray[np.float64] | None:
+        """The edge vectors as rows, shape (d, d), or None."""
+        if self.box is None:
+            return None
+        box = np.asarray(self.box, dtype=np.float64)
+        return np.diag(box) if box.ndim == 1 else box
 
 
 # ---- ASE ---------------------------------------------------------------------------------------
 
 
-def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Structure]:
+def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Scene]:
     """Frames as ASE reads them: one, by default the last, unless `frames` is a range.
 
     Those of a range are read one by one, where the reader of the format does so.
@@ -87,53 +116,51 @@ def by_ase(file: str, file_format: str | None, frames: Frames) -> Iterator[Struc
     with _warnings() as remarks:
         try:
             name = file_format or (own[0] if own else filetype(file))
-            read = partial(ase.io.read, file, format=name, do_not_split_by_at_sign=True)
-            read = partial(_all_of, own[1]) if own else read
+
+            def read(index: int | slice) -> Any:
+                if own:
+                    return own[1]()[index]
+                some = ase.io.iread if isinstance(index, slice) else ase.io.read
+                return some(file, index, format=name, do_not_split_by_at_sign=True)
+
             found: Any
-            if isinstance(frames, slice) and not own:
-                found = ase.io.iread(file, frames, format=name, do_not_split_by_at_sign=True)
-            elif isinstance(frames, slice):
-                found = read(index=frames)
+            if isinstance(frames, slice):
+                found = read(frames)
             else:
                 number = -1 if frames is None else frames
-                found = [read(index=number)]
+                found = [read(number)]
                 if not len(found[0]):  # such as that between ENDMDL and END of a PDB file
-                    found = [[atoms for atoms in read(index=slice(None)) if len(atoms)][number]]
+                    found = [[atoms for atoms in read(slice(None)) if len(atoms)][number]]
         except UnknownFileTypeError:
             raise UnknownFormat from None
         except (IndexError, StopIteration) as error:
             what = f"has no frame {frames}" if isinstance(frames, int) else "holds no atoms"
-            detail = f" ({' '.join(str(error).split())})" if str(error) else ""
+            detail = f" ({one_line(error)})" if str(error) else ""
             raise InputError(what + detail) from None
     reader = f"ASE {ase.__version__}, {name}"
     for frame, atoms in _each(found, frames, remarks):
         if len(atoms):
             one = _of_atoms(atoms, tuple(remarks), reader, "lammps" in name)
-            yield one._replace(frame=frame)
+            yield replace(one, frame=frame)
         elif isinstance(frames, slice) and min(frames.start or 0, frames.stop or 0) < 0:
             raise InputError(f"{frame} holds no atoms: count frames from the first on")
 
 
-def _all_of(read: Callable[[], list[Any]], index: int | slice) -> Any:
-    return read()[index]
-
-
-def _of_atoms(atoms: Any, remarks: tuple[str, ...], reader: str, is_lammps: bool) -> Structure:
+def _of_atoms(atoms: Any, remarks: tuple[str, ...], reader: str, is_lammps: bool) -> Scene:
     names, residues = (atoms.arrays.get(part) for part in ("atomtypes", "residuenames"))
-    species: NDArray[np.str_] | None = np.array(atoms.get_chemical_symbols())
+    species, how = _species(atoms.get_chemical_symbols(), names, residues)
     if is_lammps and np.array_equal(atoms.arrays.get("type", ()), atoms.numbers):
-        species, reader = None, f"{reader}: types, not elements"
-    elif names is not None and residues is not None and not _plausible(species, residues):
-        species = _elements(names, residues)
-        reader = f"{reader}: elements by names of atoms"
+        species, how = None, ": types, not elements"
     box = atoms.cell.array if atoms.cell.rank > 0 else None
     no_box = placeholder(atoms.cell.array, residues is not None) if atoms.pbc.any() else ""
     periodic = tuple(bool(flag) for flag in atoms.pbc)
     if no_box:
         box, periodic = None, (False,) * 3
     unit = "" if is_lammps else "angstrom"
-    species = None if species is None else _known(species)
-    return Structure(atoms.positions, box, periodic, species, remarks, reader, unit, no_box)
+    return Scene(
+        atoms.positions, box, periodic, species=species, unit=unit, remarks=remarks,
+        reader=reader + how, no_box=no_box,
+    )  # fmt: skip
 
 
 def _ase_needs_help(file: str) -> tuple[str, Callable[[], list[Any]]] | None:
@@ -175,7 +202,7 @@ def _of_lammps(file: str) -> list[Any]:
         except MemoryError:
             raise
         except Exception as error:
-            said.append(f"{style or 'the style of the file'}: {' '.join(str(error).split())}")
+            said.append(f"{style or 'the style of the file'}: {one_line(error)}")
     raise InputError("no style of atoms fits: " + "; ".join(said))
 
 
@@ -272,7 +299,7 @@ _NOT_OF_POINTS = re.compile(r"[Mm]ass|atom types|guess types|dt information|[Ee]
 
 def by_mdanalysis(
     file: str, file_format: str | None, frames: Frames, trajectory: str | None = None
-) -> Iterator[Structure]:
+) -> Iterator[Scene]:
     """Frames as MDAnalysis reads them, where it is installed; see `by_ase`.
 
     With `trajectory` they are in that file, and `file` is its topology.
@@ -305,12 +332,13 @@ def by_mdanalysis(
             chosen = numbers[one] if isinstance(one, slice) else [numbers[one]]
         except IndexError:
             raise InputError(f"has no frame {frames}") from None
-        species, how = _elements_of(universe.atoms)
+        parts = (getattr(universe.atoms, one, None) for one in ("elements", "names", "resnames"))
+        species, how = _species(*parts)
         reader = f"MDAnalysis {MDAnalysis.__version__}, {kind}{how}"
     found = (_of_frame(steps[k], species, reader) for k in chosen)
     for frame, one in _each(found, frames, remarks, chosen):
         told = tuple(remark for remark in remarks if not _NOT_OF_POINTS.search(remark))
-        yield one._replace(remarks=told, frame=frame)
+        yield replace(one, remarks=told, frame=frame)
 
 
 def _of_topology(file: str, kind: str, trajectory: str | None) -> Any:
@@ -343,24 +371,14 @@ def _of_coordinates(file: str, kind: str) -> Any:
     return universe
 
 
-def _elements_of(atoms: Any) -> tuple[NDArray[np.str_] | None, str]:
-    found = getattr(atoms, "elements", None)
-    if found is None:
-        return None, ""
-    species = np.array([str(symbol).capitalize() or "X" for symbol in found])
-    names, residues = getattr(atoms, "names", None), getattr(atoms, "resnames", None)
-    if names is not None and residues is not None and not _plausible(species, residues):
-        species = _elements(names, residues)
-        return _known(species), ": elements by names of atoms"
-    return _known(species), ""
-
-
-def _of_frame(frame: Any, species: NDArray[np.str_] | None, reader: str) -> Structure:
+def _of_frame(frame: Any, species: NDArray[np.str_] | None, reader: str) -> Scene:
     box = None if frame.dimensions is None else frame.triclinic_dimensions.astype(np.float64)
     no_box = "" if box is None else placeholder(box, False)
     box = None if no_box else box
     points, periodic = frame.positions.copy(), (box is not None,) * 3
-    return Structure(points, box, periodic, species, (), reader, "angstrom", no_box)
+    return Scene(
+        points, box, periodic, species=species, unit="angstrom", reader=reader, no_box=no_box
+    )
 
 
 @contextmanager
@@ -393,8 +411,8 @@ def _each(
             except Exception as error:
                 if not count:
                     raise
-                reason = " ".join(str(error).split())
-                raise InputError(f"{frame}: {type(error).__name__}: {reason}") from None
+                kind = type(error).__name__
+                raise InputError(f"{frame}: {kind}: {one_line(error)}") from None
         remarks += [text for text in more if text not in remarks]
         if one is None:
             return
@@ -425,8 +443,14 @@ _IONS = {"SOD": "Na", "POT": "K", "CLA": "Cl", "CAL": "Ca", "CES": "Cs", "LIT": 
 _HEAVY = frozenset("FE ZN MG MN CL BR NA CU CO NI SE SI AL LI".split())  # that ligands may have
 
 
-def _known(species: NDArray[np.str_]) -> NDArray[np.str_] | None:
-    return None if (species == "X").all() else species
+def _species(symbols: Any, names: Any, residues: Any) -> tuple[NDArray[np.str_] | None, str]:
+    """Elements, None if none is known, and words for where they are from if not the symbols."""
+    if symbols is None:
+        return None, ""
+    species, how = np.array([str(symbol).capitalize() or "X" for symbol in symbols]), ""
+    if names is not None and residues is not None and not _plausible(species, residues):
+        species, how = _elements(names, residues), ": elements by names of atoms"
+    return None if (species == "X").all() else species, how
 
 
 def _plausible(species: Any, residues: Any) -> bool:

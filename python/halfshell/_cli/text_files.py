@@ -14,17 +14,20 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BadLine", "open_bytes", "read_points"]
+from halfshell._cli.errors import InputError
+
+__all__ = ["kind_of_file", "open_bytes", "read_points", "shown_names"]
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 _MOST_UNNAMED = 3
-_SHOWN = 12  # names of columns in a message
+MOST_SHOWN = 12  # names of columns in a message
 _PTS = {n: "x y z intensity r g b".split()[:n] for n in (3, 4, 7)} | {6: "x y z r g b".split()}
 
 # What may stand beside the letter or the number of an axis.
@@ -40,22 +43,27 @@ _AXES = (
 )
 
 
-_PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ\0": "lzma"}
-
-
-class BadLine(Exception):
-    """What is wrong with a line, which is named."""
+# Suffixes of packed files, what these begin with, and what unpacks them.
+_PACKED = {
+    ".gz": (b"\x1f\x8b", "gzip"), ".bz2": (b"BZh", "bz2"), ".xz": (b"\xfd7zXZ\0", "lzma")
+}  # fmt: skip
 
 
 def open_bytes(file: str) -> IO[bytes]:
     """Open a file for reading, unpacked if its first bytes say that it is packed."""
     with open(file, "rb") as stream:
         start = stream.read(6)
-    for magic, module in _PACKED.items():
+    for magic, module in _PACKED.values():
         if start.startswith(magic):
             unpacked: IO[bytes] = import_module(module).open(file, "rb")
             return unpacked
     return open(file, "rb")
+
+
+def kind_of_file(file: str) -> str:
+    """The last suffix of a name without that of a compression, in small letters: ``.pdb``."""
+    path = Path(file)
+    return (path.with_suffix("") if path.suffix.lower() in _PACKED else path).suffix.lower()
 
 
 def read_points(
@@ -80,16 +88,19 @@ def read_points(
 
     Raises
     ------
-    BadLine
-        With the number of the line, from 1 on, and of the field.
-    OSError, UnicodeDecodeError
-        If the file cannot be read as text.
+    InputError
+        With the number of the line, from 1 on, and of the field; or if it is not text.
+    OSError
+        If the file cannot be read.
     """
     with open_bytes(file) as stream:
         lines = io.TextIOWrapper(stream, encoding="utf-8-sig")
-        points, what = _read(_Lines(lines), columns, is_pts)
+        try:
+            points, what = _read(_Lines(lines), columns, is_pts)
+        except UnicodeDecodeError:
+            raise InputError("is not text") from None
     if points.shape[1] < least:
-        raise BadLine(f"has {points.shape[1]} column of numbers")
+        raise InputError(f"has {points.shape[1]} column of numbers")
     return points, what
 
 
@@ -143,14 +154,14 @@ def _read(
         fields = _split(text, separator)
         if len(fields) != len(first):
             hint = _of_commas(separator) if len(fields) > len(first) else ""
-            raise BadLine(
+            raise InputError(
                 f"line {number}: has {len(fields)} fields, the first line has {len(first)}{hint}"
             )
         for k in picked:
             values.append(_number(fields[k], number, k, commas))
     n_points = len(values) // len(picked)
     if promised is not None and promised != n_points:
-        raise BadLine(f"line {counted}: says {promised} points, there are {n_points}")
+        raise InputError(f"line {counted}: says {promised} points, there are {n_points}")
     what = ", ".join(names[k] or f"number {k + 1}" for k in picked) if names else ""
     what = f"columns {what}" if names else f"{len(picked)} columns without names"
     if len(picked) < len(first):
@@ -168,7 +179,7 @@ def _separator(line: tuple[int, str]) -> str | None:
     found = next((one for one in (";", "\t", ",") if one in text), None)
     words = text.split()
     if found == "," and len(words) > 1 and all(map(_DECIMAL_COMMA.fullmatch, words)):
-        raise BadLine(
+        raise InputError(
             f"line {number}: {words[0]!r} has a decimal comma; with these, columns must be "
             "separated by ; or tabs"
         )
@@ -199,7 +210,7 @@ def _number(word: str, line: int, k: int, commas: _Commas) -> float:
     if commas.may_be and ("," in word or "." in word):
         mark = "," if "," in word else "."
         if (commas.seen or mark) != mark:
-            raise BadLine(f"{where}: {word!r}: the file has decimal commas and decimal points")
+            raise InputError(f"{where}: {word!r}: the file has decimal commas and decimal points")
         commas.seen = mark
         if _DECIMAL_COMMA.fullmatch(word):
             text = word.replace(",", ".")
@@ -207,12 +218,12 @@ def _number(word: str, line: int, k: int, commas: _Commas) -> float:
         value = float(text)
         if math.isfinite(value):
             return value
-        raise BadLine(f"{where}: {word} is not a finite number")
+        raise InputError(f"{where}: {word} is not a finite number")
     if not word:
-        raise BadLine(f"{where}: is empty")
+        raise InputError(f"{where}: is empty")
     if re.fullmatch(r"[+-]?(nan|inf|infinity)", word, re.IGNORECASE):
-        raise BadLine(f"{where}: {word} is not a finite number")
-    raise BadLine(f"{where}: {word!r} is not a number")
+        raise InputError(f"{where}: {word} is not a finite number")
+    raise InputError(f"{where}: {word!r} is not a number")
 
 
 # ---- columns -----------------------------------------------------------------------------------
@@ -237,9 +248,7 @@ def _choose(
     names: list[str] | None, count: int, columns: Sequence[str], line: int, separator: str | None
 ) -> list[int]:
     """Which columns are coordinates."""
-    what = f"{count} columns" if names is None else "columns " + ", ".join(
-        repr(name) for name in names[:_SHOWN]
-    ) + (" ..." if count > _SHOWN else "")  # fmt: skip
+    what = f"{count} columns" if names is None else "columns " + shown_names(map(repr, names))
     if columns:
         picked = []
         for column in columns:
@@ -248,14 +257,14 @@ def _choose(
                 found = [int(column) - 1]
             if len(found) != 1:
                 how = "none of the" if not found else "more than one of the"
-                raise BadLine(f"--columns {column}: names {how} {what}")
+                raise InputError(f"--columns {column}: names {how} {what}")
             picked += found
         if len(set(picked)) < len(picked):
-            raise BadLine(f"--columns {','.join(columns)}: names a column twice")
+            raise InputError(f"--columns {','.join(columns)}: names a column twice")
         return picked
     if names is None:
         if count > _MOST_UNNAMED:
-            raise BadLine(
+            raise InputError(
                 f"line {line}: has {count} numbers without names; --columns 1,2,3 says which are "
                 f"coordinates{_of_commas(separator)}"
             )
@@ -264,8 +273,10 @@ def _choose(
     if len(groups) == 1 or "xyz" in groups:
         return groups.get("xyz") or next(iter(groups.values()))
     if groups:
-        raise BadLine(f"line {line}: {what}: several may be coordinates; choose with --columns")
-    raise BadLine(f"line {line}: {what}: none are known as coordinates; --columns says which are")
+        raise InputError(f"line {line}: {what}: several may be coordinates; choose with --columns")
+    raise InputError(
+        f"line {line}: {what}: none are known as coordinates; --columns says which are"
+    )
 
 
 def _groups(names: Sequence[str]) -> dict[str, list[int]]:
@@ -291,3 +302,10 @@ def _groups(names: Sequence[str]) -> dict[str, list[int]]:
 
 def _numbers(picked: Sequence[int]) -> str:
     return ", ".join(str(k + 1) for k in picked)
+
+
+def shown_names(names: Iterable[str]) -> str:
+    """Names of columns for a message: the first of many."""
+    shown = list(names)
+    shown[MOST_SHOWN:] = ["..."] * (len(shown) > MOST_SHOWN)
+    return ", ".join(shown) or "nothing"

@@ -205,19 +205,17 @@ def run(args: Namespace) -> int:
         from halfshell_report.against import ask_peer, find_peer
 
         peer = find_peer(args.against)
-    saved = _saved_list(args) if args.list else None
-    scene, cutoff = saved[2:] if saved else load_scene(args)[:2]
+    if args.list:
+        author, pairs, scene, cutoff = _saved_list(args)
+    else:
+        scene, cutoff, _ = load_scene(args)
     checks = []
     try:
-        if saved:
-            author, pairs = saved[:2]
-        elif peer is None:
-            author = f"halfshell {hs.__version__}"
-            pairs = _own_list(scene, cutoff, args)
-        else:
-            author = peer.name_and_version()
-            pairs = PairList(*ask_peer(peer, scene, cutoff))
-        if saved or peer:
+        if peer:
+            author, pairs = peer.name_and_version(), PairList(*ask_peer(peer, scene, cutoff))
+        elif not args.list:
+            author, pairs = f"halfshell {hs.__version__}", _own_list(scene, cutoff, args)
+        if args.list or peer:
             check, full = check_by_search(pairs, scene, cutoff)
             pairs = replace(pairs, full=full)
             checks.append(check)

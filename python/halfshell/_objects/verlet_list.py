@@ -111,7 +111,7 @@ class VerletList(VerletRows):
             refuse_unknown(VerletList, unknown)
         self._cutoff = as_length(as_cutoff(cutoff), "cutoff")
         self._given_skin = None if isinstance(skin, str) and skin == "auto" else as_skin(skin)
-        self._given = box, periodic  # last
+        self._given = box, periodic  # until `update` brings others
         self._inclusive = as_flag(inclusive, "inclusive")
         self._tracks = as_flag(track_changes, "track_changes")
         self._threads = threads

@@ -207,6 +207,20 @@ def test_archives_that_promise_too_much_are_refused(run, scene, tmp_path):
     assert status == 2 and "is cut off: that is 8,000,000,000,000 bytes" in err
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("list.csv", "is not text"), ("list.npy", "cannot be read as a NumPy file"),
+     ("list.npz", "cannot be read as a NumPy file"), ("list.parquet", "cannot be read"),
+     ("list.xyz", "lists of pairs are read from .csv,")],
+)  # fmt: skip
+def test_files_that_are_no_lists_are_refused_by_name(run, scene, tmp_path, name, words):
+    if name.endswith("parquet"):
+        pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    (tmp_path / name).write_bytes(b"\xff\xfe\x00junk\n" * 9)
+    status, _, err = run("verify", scene, tmp_path / name, "--cutoff", 1)
+    assert status == 2 and err.startswith(f"halfshell: error: {tmp_path / name}: {words}")
+
+
 def test_options_that_make_a_list_are_refused_with_one(run, scene, tmp_path):
     (tmp_path / "list.csv").write_text("i,j\n")
     for option in (["--against", "ase"], ["--kernel", "scalar"]):

@@ -544,9 +544,11 @@ def test_standard_input(monkeypatch, capsys, tmp_path, kind):
     out = capsys.readouterr().out
     assert out.startswith("standard input\n") and "4 in 3-D" in out
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 3
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"")))
-    assert cli.main(["pairs", "-"]) == 2
-    assert "standard input: is empty" in capsys.readouterr().err
+    for kept, options, words in ((b"", (), "is empty"), (stream.getvalue(), ("--index", "0"),
+                                                         "--index is for formats")):  # fmt: skip
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(kept)))
+        assert cli.main(["pairs", "-", *options]) == 2
+        assert f"standard input: {words}" in capsys.readouterr().err
 
 
 def test_clouds_that_have_the_suffix_of_another_format(scene):
@@ -559,5 +561,7 @@ def test_every_reader_says_why(refused):
     need("ase", "MDAnalysis")
     line = refused("bad.xyz", "3\n\nH 0 0 0\n")
     assert "ASE: " in line and "MDAnalysis: " in line and "\n" not in line
+    line = refused("bad", "3\n\nH 0 0 0\n", file_format="xyz")
+    assert "ASE: " in line and "MDAnalysis: " in line
     line = refused("bad.nothing", "what is this\n")
     assert "ASE and MDAnalysis do not know the format" in line
