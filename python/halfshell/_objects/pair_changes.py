@@ -149,7 +149,7 @@ class _Moves:
         places, error_of_new = _in_units(new, to_new)
         with np.errstate(over="ignore", invalid="ignore"):
             self.floats = places[: self.n] - self.old[: self.n]
-            largest = np.abs(self.floats).max(axis=0, initial=0.0)
+            largest = _largest(self.floats)
             # Of the difference of two moves, and of each itself.
             self.error = error_of_old + error_of_new + 2.0**-50 * largest
 
@@ -250,7 +250,7 @@ def _right_inverse(vectors: list[list[Fraction]]) -> list[list[Fraction]]:
 
 def _in_units(points: Floats, to_units: list[list[Fraction]]) -> tuple[Floats, Floats]:
     """points @ to_units, rounded, and a bound on the error, for each column."""
-    largest = np.abs(points).max(axis=0, initial=0.0)
+    largest = _largest(points)
     size = int(np.frexp(largest.max(initial=0.0))[1])
     columns = transposed(to_units)
     most = [max(abs(x) for x in column) for column in columns]  # none is 0
@@ -267,6 +267,11 @@ def _in_units(points: Floats, to_units: list[list[Fraction]]) -> tuple[Floats, F
             return points @ np.ldexp(factors, sizes), np.ldexp(errors, size + sizes) + 2.0**-1000
         places = np.ldexp(points, -size) @ factors
         return np.ldexp(places, size + sizes), np.ldexp(errors, size + sizes)
+
+
+def _largest(x: Floats) -> Floats:
+    """Of each column: several times as quick as all at once."""
+    return np.array([np.abs(column).max(initial=0.0) for column in x.T])
 
 
 def _whole(x: Floats) -> Integers:
