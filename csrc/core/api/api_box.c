@@ -219,7 +219,8 @@ rest_along(const place_axes *axes, int k, int r)
 /*
  * How far shifts may move the places of a pair, in the unit of box vectors, because along[k] is
  * rounded: the sum over rows r of |S_r| rest(k, r). For D = x_j - x_i + sum_r S_r B_r with
- * |D| <= cutoff and |x| <= largest, |S_r| <= a_r + sum_m rest(r, m) |S_m| with a_r = size_r (cutoff + 2 largest).
+ * |D| <= cutoff and |x| <= largest, |S_r| <= a_r + sum_m rest(r, m) |S_m| with
+ * a_r = size_r (cutoff + 2 largest).
  * Where the sum over m of rest(r, m) 2 a_m is at most a_r, as is checked, |S_r| <= 2 a_r follows.
  */
 static void

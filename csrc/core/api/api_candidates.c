@@ -43,8 +43,7 @@ poll_sometimes(range_list *list, int64_t work)
         return HS_OK;
     }
     list->unpolled = 0;
-    return hs_poll(&search->call->options,
-                   (double)list->si / (double)hs_search_asking(search)->n);
+    return hs_poll(&search->call->options, (double)list->si / (double)hs_search_asking(search)->n);
 }
 
 /* Cells low to high of the link's row; along a periodic first axis they may run over images: as
@@ -104,8 +103,8 @@ add_queries(range_list *list)
             continue;
         }
         hs_row_open_at(search, (int32_t)si, &row, &group);
-        status = hs_row_links(search, &search->call->options, &row, list->links, list->hints,
-                              &n_links);
+        status =
+            hs_row_links(search, &search->call->options, &row, list->links, list->hints, &n_links);
         list->unpolled += search->stencil.n_rows;
         for (int64_t l = 0; status == HS_OK && l < n_links; l++) {
             hs_link *link = &list->links[l];

@@ -10,8 +10,7 @@
 HS_ALWAYS_INLINE bool
 hs_rows_go_on(const hs_dynamic *list, int64_t i)
 {
-    return (i + 1) % HS_POLL_POINTS != 0 || list->hooks.poll == NULL ||
-           list->hooks.poll(NULL, 0.0);
+    return (i + 1) % HS_POLL_POINTS != 0 || list->hooks.poll == NULL || list->hooks.poll(NULL, 0.0);
 }
 
 /* Row i made ready. given: receives its numbers, which `placed` borrows. Statuses of

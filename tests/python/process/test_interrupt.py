@@ -37,7 +37,6 @@ SEARCHES = {
     )""",
     "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
     "candidates of many images": "hs.CellList(points[:3000, :1], 1e6, box=[1.0]).candidates()",
-    "count of a million boxes": "hs.count_pairs(points[:9, :1], 1e6, box=[1.0])",
     "count of a million boxes, many": "hs.count_pairs(points[:3000, :1], 1e6, box=[1.0])",
     "rows of cells of many images": "hs.CellList(points[:9], 1e3, box=[1.0] * 3).candidates()",
     "images that are left out": """hs.count_pairs(
