@@ -153,8 +153,9 @@ void hs_dynamic_release(hs_dynamic *list);
 
 /*
  * poll: queries that take long call it every now and then, with the `user` of the visit (NULL for
- * hs_dynamic_any_within) and 0; false: they end with HS_ERR_INTERRUPTED. Changes wait meanwhile,
- * and the list must not be used. A change that has to wait for queries calls `pause` before each
+ * hs_dynamic_any_within) and 0; false: they end with HS_ERR_INTERRUPTED. So do insertions and moves
+ * of many points, with NULL, as long as they have changed nothing. Changes wait meanwhile, and the
+ * list must not be used. A change that has to wait for queries calls `pause` before each
  * wait, and then `resume` with what that returned: for a lock that `poll` needs, as that of an
  * interpreter.
  * Any may be NULL, `resume` with `pause`. Copies have none.

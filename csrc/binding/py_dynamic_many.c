@@ -66,7 +66,10 @@ put_many(PyObject *object, PyObject *const *arguments, Py_ssize_t n_arguments, p
         PyErr_SetString(PyExc_ValueError, "keys and positions must be of one length");
         return NULL;
     }
-    const hs_status status = put(self->list, ids, tags, &positions, &failure);
+    hs_status status;
+    do {
+        status = put(self->list, ids, tags, &positions, &failure);
+    } while (hs_py_dynamic_again(status));
     if (status != HS_OK) {
         return raise_many(self, status, &failure, ids, tags);
     }

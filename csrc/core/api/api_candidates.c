@@ -17,6 +17,7 @@ typedef struct range_list {
     const int64_t   *offsets; /* where the ranges of each query begin; NULL: they are counted */
     int64_t         *counts;
     int64_t         *first, *end;
+    int64_t          si, unpolled; /* the query, in cell order; work since the last poll */
 } range_list;
 
 static void
@@ -31,20 +32,38 @@ add_range(range_list *list, int64_t query, int32_t first, int32_t end)
     }
 }
 
-/* Cells low to high of the link's row; along a periodic first axis they may run over images. */
-static void
+/* Polls after so much more work: rows of cells, of which there may be thousands for one query, and
+ * images of them, of which there may be millions. */
+static hs_status
+poll_sometimes(range_list *list, int64_t work)
+{
+    const hs_search *search = list->search;
+    list->unpolled += work;
+    if (list->unpolled < HS_POLL_POINTS) {
+        return HS_OK;
+    }
+    list->unpolled = 0;
+    return hs_poll(&search->call->options, (double)list->si / (double)hs_search_asking(search)->n);
+}
+
+/* Cells low to high of the link's row; along a periodic first axis they may run over images: as
+ * many as the reach has, below 2^32. */
+static hs_status
 add_window(range_list *list, int64_t query, hs_link *link, int64_t low, int64_t high)
 {
     const hs_search *search = list->search;
     const int64_t    n_x = search->grid.shape[0];
     const bool       repeats = search->scene.lattice.row_of_axis[0] >= 0;
     int64_t          turn = repeats ? hs_floor_divide(low, n_x) : 0;
+    hs_status        status;
     do {
         int32_t first, end;
         hs_link_window(search, link, low - turn * n_x, high - turn * n_x, &first, &end);
         add_range(list, query, first, end);
+        status = poll_sometimes(list, 1);
         turn++;
-    } while (repeats && turn * n_x <= high);
+    } while (status == HS_OK && repeats && turn * n_x <= high);
+    return status;
 }
 
 /* Whether a query lies further beyond an open face than any point can be within the cutoff. */
@@ -72,30 +91,28 @@ add_queries(range_list *list)
 {
     const hs_search *search = list->search;
     const hs_bins   *asking = hs_search_asking(search);
-    int64_t unpolled = HS_POLL_POINTS; /* rows of cells: there may be thousands for one query */
-    for (int64_t si = 0; si < asking->n; si++) {
+    hs_status        status = HS_OK;
+    list->unpolled = HS_POLL_POINTS;
+    for (int64_t si = 0; status == HS_OK && si < asking->n; si++) {
         hs_row       row;
         hs_row_group group;
-        if (unpolled >= HS_POLL_POINTS) {
-            if (hs_poll(&search->call->options, (double)si / (double)asking->n) != HS_OK) {
-                return HS_ERR_INTERRUPTED;
-            }
-            unpolled = 0;
-        }
-        if (is_far_outside(search, si)) {
-            unpolled++;
+        int64_t      n_links = 0;
+        list->si = si;
+        status = poll_sometimes(list, 1);
+        if (status != HS_OK || is_far_outside(search, si)) {
             continue;
         }
         hs_row_open_at(search, (int32_t)si, &row, &group);
-        const int64_t n_links = hs_row_links(search, &row, list->links, list->hints);
-        unpolled += search->stencil.n_rows + 1;
-        for (int64_t l = 0; l < n_links; l++) {
+        status =
+            hs_row_links(search, &search->call->options, &row, list->links, list->hints, &n_links);
+        list->unpolled += search->stencil.n_rows;
+        for (int64_t l = 0; status == HS_OK && l < n_links; l++) {
             hs_link *link = &list->links[l];
-            add_window(list, asking->order[si], link, group.x_first + link->first,
-                       group.x_last + link->last);
+            status = add_window(list, asking->order[si], link, group.x_first + link->first,
+                                group.x_last + link->last);
         }
     }
-    return HS_OK;
+    return status;
 }
 
 /* Offsets from counts, which are zero again. */

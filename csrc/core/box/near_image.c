@@ -13,7 +13,9 @@
 #define HALF_SLACK 0x1p-40
 /* 2^8 images are equally near in 8 dimensions; others are within rounding of these. */
 #define MOST_IMAGES 1024
-#define MOST_STEPS  0x100000
+/* Milliseconds; a pair takes one or two microseconds in three dimensions, some twenty at worst in
+ * eight, which is why none is polled for. */
+#define MOST_STEPS 0x100000
 /* Coordinates beyond this are too many periods away in any box that is not refused. */
 #define MOST_SCALED 0x1p500
 /* Squares of shorter rows, the longest being 1, would be lost. */

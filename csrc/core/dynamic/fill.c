@@ -38,6 +38,9 @@ count_in(hs_dynamic *list, int64_t n, double *const *x, uint32_t *numbers, hs_fa
     double    given[HS_MAX_DIM];
     hs_placed placed;
     for (int64_t i = 0; i < n; i++) {
+        if (!hs_rows_go_on(list, i)) {
+            return HS_ERR_INTERRUPTED;
+        }
         const hs_status status = place_row(list, x, i, given, &placed, failure, ndim);
         if (status != HS_OK) {
             failure->row = i;

@@ -22,6 +22,9 @@ hs_rows_reach(hs_dynamic *list, int64_t n, double *const *x, hs_failure *failure
     double    given[HS_MAX_DIM], bytes = 0.0;
     hs_placed placed;
     for (int64_t i = 0; i < n; i++) {
+        if (!hs_rows_go_on(list, i)) {
+            return HS_ERR_INTERRUPTED;
+        }
         const hs_status status = hs_rows_place(list, x, i, given, &placed, failure);
         if (status != HS_OK) {
             return status;

@@ -156,7 +156,8 @@ walk_images(const hs_nearest *near, const hs_options *options, const hs_nearest_
     return status;
 }
 
-/* The k least squares, in a unit in which the largest of them is an ordinary number. */
+/* The k least squares, in a unit in which the largest of them is an ordinary number. A unit changes
+ * by powers that bring no square from one end to the other: a few times at most. */
 static hs_status
 walk_scaled(const hs_nearest *near, const hs_options *options, const hs_nearest_group *group,
             near_probe *probe, double *error)
@@ -195,6 +196,7 @@ hs_nearest_bound(const hs_nearest *near, const hs_options *options, hs_nearest_b
     const double farthest = hs_nearest_farthest(near, group);
     near_probe   probe = {.near = near, .bounder = bounder};
     double       error, along = hs_smaller(group->radius, near->smallest_period);
+    /* Each time twice as far: some times, until hs_nearest_images_start refuses so many images. */
     for (;;) {
         /* The radius only says which images are looked at, as yet: `along` the axes that repeat. */
         group->radius = group->away > 0.0 ? hypot(group->away, along) : along;

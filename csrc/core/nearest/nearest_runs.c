@@ -110,7 +110,7 @@ hs_nearest_runs_find(const hs_nearest *near, const hs_options *options,
                      hs_nearest_block *block)
 {
     const double reach = block->reach * (1.0 + ROOM) + 4.0 * sqrt(near->tree.ndim) * block->error;
-    int          since_poll = 0;
+    int          since_poll = 0; /* images, as many as hs_nearest_images_start lets be */
     hs_status    status = HS_OK;
     block->n = block->n_runs = block->n_images = 0;
     while (status == HS_OK && hs_nearest_images_next(images)) {

@@ -2,6 +2,7 @@
 /* cell_rows.c: dense rows go by cell ids, sparse rows by a search for their indices. */
 #include "cell_rows.h"
 
+#include "../base/poll.h"
 #include "../cells/sparse_grid.h"
 
 #include <math.h>
@@ -21,6 +22,8 @@
  */
 #define SHARED_PER_POINT 90.0
 #define SHARED           250.0
+
+#define POLL_LINKS (1 << 16) /* rows of the stencil between two polls */
 
 /* The rows and cells of the asking points, in a sparse grid. */
 static const hs_sparse *
@@ -168,14 +171,18 @@ settle_link(const hs_search *search, const hs_row *row, const hs_stencil_row *of
     return true;
 }
 
-int64_t
-hs_row_links(const hs_search *search, const hs_row *row, hs_link *links, int64_t *hints)
+hs_status
+hs_row_links(const hs_search *search, const hs_options *options, const hs_row *row, hs_link *links,
+             int64_t *hints, int64_t *found)
 {
     const hs_stencil *stencil = &search->stencil;
     int64_t           n_links = 0;
     for (int64_t s = 0; s < stencil->n_rows; s++) {
         hs_link *link = &links[n_links];
         int64_t  target[HS_MAX_DIM];
+        if (s % POLL_LINKS == POLL_LINKS - 1 && hs_poll(options, 0.0) != HS_OK) {
+            return HS_ERR_INTERRUPTED;
+        }
         if (!settle_link(search, row, &stencil->rows[s], link, target)) {
             continue;
         }
@@ -191,7 +198,8 @@ hs_row_links(const hs_search *search, const hs_row *row, hs_link *links, int64_t
             n_links += (s == 0 && !search->is_full) || start[0] < start[search->grid.shape[0]];
         }
     }
-    return n_links;
+    *found = n_links;
+    return HS_OK;
 }
 
 void

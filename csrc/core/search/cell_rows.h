@@ -53,10 +53,12 @@ int32_t hs_row_target(const hs_search *search, bool is_ordered);
 bool hs_row_next(const hs_search *search, int32_t target, hs_row *row, hs_row_group *group);
 
 /*
- * Settles which rows neighbour this one, for half lists its own first; returns how many. links:
- * room for search->stencil.n_rows; hints: as many, zero at first, for sparse grids only.
+ * Settles which rows neighbour this one, for half lists its own first, and how many. links: room
+ * for search->stencil.n_rows, which memory alone bounds; hints: as many, zero at first, for sparse
+ * grids only. Polls by these options.
  */
-int64_t hs_row_links(const hs_search *search, const hs_row *row, hs_link *links, int64_t *hints);
+hs_status hs_row_links(const hs_search *search, const hs_options *options, const hs_row *row,
+                       hs_link *links, int64_t *hints, int64_t *n_links);
 
 /* Points [*first, *end) in cells low to high of the link's row; cells beyond it have none. */
 void hs_link_window(const hs_search *search, hs_link *link, int64_t low, int64_t high,

@@ -10,6 +10,10 @@
 
 #include <math.h>
 
+/* Candidates that could be tested while the nearest image of a pair is found: a microsecond, in many
+ * dimensions some. */
+#define WORK_OF_IMAGE 1024
+
 /* Hits of one point that are looked up together. */
 typedef struct hit_batch {
     hs_scanner *scanner;
@@ -84,6 +88,7 @@ drop_nearest(const hs_choice *choice, hit_batch *batch)
     hs_scanner *scanner = batch->scanner;
     int64_t     shift[HS_MAX_DIM];
     hs_status   status = trace_batch(batch, false);
+    scanner->work_since_poll += WORK_OF_IMAGE * (int64_t)batch->n;
     for (int32_t e = 0; status == HS_OK && e < batch->n; e++) {
         bool nearest;
         given_shift(&scanner->trace, e, shift);

@@ -9,7 +9,8 @@
 
 /*
  * Gather cells low to high of the link's row, leaving out points before `from` of the image 0 (the
- * own row). Along a periodic first axis the cells may run over several images.
+ * own row). Along a periodic first axis the cells may run over several images: as many as the reach
+ * has, below 2^32. Each but the outermost gives a run, and appending runs polls.
  */
 static hs_status
 gather_link(hs_walker *walker, hs_link *link, int64_t low, int64_t high, int32_t from)
@@ -47,6 +48,7 @@ static hs_status
 visit_group(hs_walker *walker, const hs_row_group *group)
 {
     hs_cursor *cursor = &walker->cursor;
+    walker->scanner.work_since_poll += cursor->n_links; /* windows may be empty */
     hs_scanner_start(&walker->scanner, group->first, group->last);
     for (int64_t l = 0; l < cursor->n_links; l++) {
         hs_link *link = &cursor->links[l];
@@ -61,12 +63,13 @@ visit_group(hs_walker *walker, const hs_row_group *group)
     return hs_scanner_finish(&walker->scanner);
 }
 
-static void
+static hs_status
 set_links(hs_walker *walker, const hs_row *row)
 {
     hs_cursor *cursor = &walker->cursor;
     walker->scanner.work_since_poll += walker->search->stencil.n_rows;
-    cursor->n_links = hs_row_links(walker->search, row, cursor->links, cursor->hints);
+    return hs_row_links(walker->search, &walker->scanner.options, row, cursor->links, cursor->hints,
+                        &cursor->n_links);
 }
 
 static void
@@ -76,18 +79,23 @@ find_next(const hs_search *search, hs_cursor *cursor)
 }
 
 /* Takes up a row at its first group. */
-static void
+static hs_status
 open_row(hs_walker *walker, int64_t number)
 {
     hs_cursor *cursor = &walker->cursor;
     hs_row_open(walker->search, number, &cursor->row);
-    cursor->row_number = number;
+    cursor->row_number = -1; /* until it has its links */
     cursor->last_first = -1;
     cursor->has_next = cursor->row.first < cursor->row.end;
     if (cursor->has_next) {
-        set_links(walker, &cursor->row);
+        const hs_status status = set_links(walker, &cursor->row);
+        if (status != HS_OK) {
+            return status;
+        }
         find_next(walker->search, cursor);
     }
+    cursor->row_number = number;
+    return HS_OK;
 }
 
 /*
@@ -98,21 +106,19 @@ static hs_status
 walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
 {
     hs_cursor *cursor = &walker->cursor;
+    hs_status  status = HS_OK;
     if (cursor->row_number != number || from <= cursor->last_first) {
-        open_row(walker, number);
+        status = open_row(walker, number);
     }
-    while (cursor->has_next && cursor->next.first < to) {
+    while (status == HS_OK && cursor->has_next && cursor->next.first < to) {
         const hs_row_group group = cursor->next;
         cursor->last_first = group.first;
         find_next(walker->search, cursor);
         if (group.first >= from) {
-            const hs_status status = visit_group(walker, &group);
-            if (status != HS_OK) {
-                return status;
-            }
+            status = visit_group(walker, &group);
         }
     }
-    return HS_OK;
+    return status;
 }
 
 hs_status
@@ -152,8 +158,8 @@ hs_walk_point(hs_walker *walker, int32_t si)
     hs_row_group group;
     hs_row_open_at(walker->search, si, &row, &group);
     walker->cursor.row_number = -1; /* its links are overwritten */
-    set_links(walker, &row);
-    return visit_group(walker, &group);
+    const hs_status status = set_links(walker, &row);
+    return status == HS_OK ? visit_group(walker, &group) : status;
 }
 
 /* A bound on the candidates of a group: all points in every image that the stencil can reach. */

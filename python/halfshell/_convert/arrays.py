@@ -58,7 +58,9 @@ def as_real_array(
     if kind == "b" or (kind == "f" and size == 2):
         return array.astype(np.float64)
     if kind in "iu":
-        _refuse_big_integers(array, name)
+        if size == 8:
+            array = array.copy()  # it may change meanwhile
+            _refuse_big_integers(array, name)
         return array.astype(np.float64)
     if kind == "f":
         raise TypeError(f"{name} must be float64 or narrower: {array.dtype} would be rounded")
@@ -151,7 +153,7 @@ def _element(name: str, where: Iterable[Any]) -> str:
 
 
 def _refuse_big_integers(array: npt.NDArray[Any], name: str) -> None:
-    if array.size == 0 or array.dtype.itemsize < 8:
+    if array.size == 0:
         return
     suspects = (array > _BIGGEST_INTEGER) | (array < -_BIGGEST_INTEGER)
     if not suspects.any():

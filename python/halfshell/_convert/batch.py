@@ -44,6 +44,7 @@ def as_numbers(
         )
     if array.dtype.kind not in "iu" and n > 0:
         raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
+    array = array.copy()  # it may change meanwhile
     if array.dtype == np.uint64:
         for k in np.flatnonzero(array >= np.uint64(2**62)):
             raise ValueError(f"{name} must be less than 2**62, got {name}[{k}] = {array[k]}")

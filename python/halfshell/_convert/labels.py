@@ -31,7 +31,7 @@ def as_kinds(types: Any, n: int) -> npt.NDArray[Any]:
     names = as_names(array)
     if names is None and array.dtype.kind not in "iu" and n:
         raise TypeError(f"types must hold integers or names, got dtype {array.dtype}")
-    return array if names is None else names
+    return (array if names is None else names).copy()  # it may change meanwhile
 
 
 def as_labels(types: Any, query_types: Any) -> Labels:
@@ -52,6 +52,12 @@ def as_labels(types: Any, query_types: Any) -> Labels:
         if name not in named and array.size:
             raise ValueError("types and query_types must both be numbers, or both be names")
         named.setdefault(name, np.empty(array.shape, np.str_))
-    names = np.unique(np.concatenate([one.ravel() for one in named.values()]))
-    places = {name: np.searchsorted(names, one) for name, one in named.items()}
+    every = np.concatenate([one.ravel() for one in named.values()])  # they may change meanwhile
+    names, numbers = np.unique(every, return_inverse=True)
+    ends = np.cumsum([one.size for one in named.values()])
+    parts = np.split(numbers.reshape(-1), ends[:-1])
+    places = {
+        name: part.reshape(one.shape)
+        for (name, one), part in zip(named.items(), parts, strict=True)
+    }
     return places.get("types"), places.get("query_types"), tuple(names.tolist())

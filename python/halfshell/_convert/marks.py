@@ -37,6 +37,7 @@ def as_types(values: npt.ArrayLike, name: str, n: int) -> npt.NDArray[np.int32]:
     one_each(name, n)(array.shape)
     if array.dtype.kind not in "iu" and n > 0:
         raise TypeError(f"{name} must hold integers, got dtype {array.dtype}")
+    array = array.copy()  # it may change meanwhile
     for k in np.flatnonzero((array < 0) | (array >= 2**31 - 1)):
         raise ValueError(
             f"{name} must be from 0 on and below 2**31 - 1, got {name}[{k}] = {array[k]}"

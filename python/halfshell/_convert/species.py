@@ -89,7 +89,7 @@ def _kinds(values: Any, name: str, owner: Any, owners: str, n: int) -> _Kinds:
     else:
         array = as_array(values, name, "hold integers or names")
         names = as_names(array)
-        kinds = _Kinds(as_types(array, name, n) if names is None else names)
+        kinds = _Kinds(as_types(array, name, n) if names is None else names.copy())
     one_each(name, n)(kinds.values.shape)
     return kinds
 
@@ -105,6 +105,7 @@ def _elements_of(owner: Any, owners: str) -> _Kinds | None:
         array = as_array(numbers, f"{owners}.numbers", "hold integers")
         if array.dtype.kind not in "iu":
             raise TypeError(f"{owners}.numbers must hold integers, got dtype {array.dtype}")
+        array = array.copy()  # it may change meanwhile
         for k in np.flatnonzero((array < 0) | (array >= len(SYMBOLS))):
             raise ValueError(
                 f"{owners}.numbers must be below {len(SYMBOLS)}, got numbers[{k}] = {array[k]}"

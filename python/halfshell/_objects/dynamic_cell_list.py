@@ -276,7 +276,7 @@ class DynamicCellList:
         return self._cells.any_within(position, radius, skip)
 
     def insert_many(self, keys: ArrayLike, positions: PointsLike) -> None:
-        """Insert many points, all or none.
+        """Insert many points, all or none: Ctrl-C ends it before the first is put in, or after all.
 
         Parameters
         ----------

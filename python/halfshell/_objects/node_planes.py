@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from halfshell._convert.arrays import as_real_array, in_order
+from halfshell._objects.rational import as_fractions, solved
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Roundings of a distance from a plane, and of a support in its units, relative to their terms.
 _PLANE_ERROR = 64 * 2.0**-53
+#: Squares of lengths down to this, and of their inverses, are ordinary numbers.
+_LEAST = 2.0**-400
 
 
 def as_plane(values: Any, name: str, d: int) -> tuple[FloatArray, FloatArray]:
@@ -58,6 +61,8 @@ def touched_by(
         within = height < reach - margin
         unsure = ~(within | (height > reach + margin)) | ~np.isfinite(margin)
         unsure |= (size < 2.0**-900) | (reach < 2.0**-900)
+        long = np.abs(normal).max()
+        unsure |= not _LEAST < long < 1.0 / _LEAST
     for k in np.flatnonzero(unsure):
         within[k] = _touches_exactly(positions[k], point, normal, supports[k], extent)
     found: npt.NDArray[Any] = within
@@ -78,7 +83,7 @@ def _touches_exactly(
     if np.ndim(h) == 0:
         n = [Fraction(float(h)) * a for a in n]
     else:
-        n = _solved([[Fraction(float(a)) for a in row] for row in h], n)
+        n = [row[0] for row in solved(as_fractions(h), [[a] for a in n])]
     return height * height <= Fraction(extent) ** 2 * sum((a * a for a in n), Fraction(0))
 
 
@@ -89,20 +94,10 @@ def _reach_along(
     if supports.ndim == 1:
         return extent * supports * np.sqrt((normal * normal).sum()), np.zeros(len(supports))
     spread = np.linalg.cond(supports)
+    is_sure = spread < 2.0**30
+    ordinary = np.where(is_sure[:, None, None], supports, np.eye(len(normal)))
     columns = np.broadcast_to(normal, (len(supports), len(normal)))[:, :, None]
-    reach = extent * np.linalg.norm(np.linalg.solve(supports, columns)[:, :, 0], axis=1)
-    return reach, np.where(spread < 2.0**30, 2.0**-40 * spread, np.inf) * reach
-
-
-def _solved(matrix: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:
-    """The solution of a system that has one, by elimination."""
-    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
-    d = len(rows)
-    for k in range(d):
-        pivot = next(m for m in range(k, d) if rows[m][k] != 0)
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [value / rows[k][k] for value in rows[k]]
-        for m in range(d):
-            if m != k:
-                rows[m] = [a - rows[m][k] * b for a, b in zip(rows[m], rows[k], strict=True)]
-    return [row[d] for row in rows]
+    size = np.linalg.norm(np.linalg.solve(ordinary, columns)[:, :, 0], axis=1)
+    is_sure &= (size > _LEAST) & (size < 1.0 / _LEAST)
+    reach = extent * size
+    return reach, np.where(is_sure, 2.0**-40 * spread, np.inf) * reach

@@ -11,6 +11,7 @@ from halfshell._convert.arrays import as_real_array, in_order
 from halfshell._convert.lengths import as_positive, check_lengths
 from halfshell._convert.rules import reach_by_radii, reach_by_supports
 from halfshell._convert.supports import MOST_AXES, as_matrices
+from halfshell._objects.rational import as_fractions, is_definite
 
 if TYPE_CHECKING:
     from halfshell._convert.types import FloatArray, Reach
@@ -62,11 +63,10 @@ def as_supports(values: Any, n: int, d: int) -> FloatArray:
 
 
 def _refuse_indefinite(matrices: FloatArray) -> None:
-    """ValueError for a matrix that is surely not positive definite; the core decides the rest."""
-    try:
-        np.linalg.cholesky(matrices)
-    except np.linalg.LinAlgError:
-        for k in np.flatnonzero(np.linalg.eigvalsh(matrices)[:, 0] <= 0.0):
-            raise ValueError(
-                f"H must be positive definite, got H[{k}] = {matrices[k].tolist()}"
-            ) from None
+    """ValueError for a matrix that is not positive definite, by the least eigenvalue or exactly."""
+    sizes = np.abs(matrices).max(axis=(1, 2), initial=0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        least = np.linalg.eigvalsh(np.nan_to_num(matrices / sizes[:, None, None]))[:, 0]
+    for k in np.flatnonzero(least < 2.0**-40):
+        if not is_definite(as_fractions(matrices[k])):
+            raise ValueError(f"H must be positive definite, got H[{k}] = {matrices[k].tolist()}")

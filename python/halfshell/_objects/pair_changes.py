@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from halfshell import _show
 from halfshell._convert.types import Arrays
+from halfshell._objects.rational import as_fractions, determinant, product, solved, transposed
 
 __all__ = ["PairChanges", "Step", "compare"]
 
@@ -20,6 +22,8 @@ Columns = tuple[npt.NDArray[Any], ...]
 Flags = npt.NDArray[np.bool_]
 
 MOST_KEYS = 2**62  # i, j and the image of a pair are one number where there are fewer
+MOST_PLAIN = 400  # exponents of numbers whose products are ordinary numbers
+MOST_TURNS = 2**60  # more than any pair goes on by: S is int32
 
 
 class PairChanges(NamedTuple):
@@ -79,8 +83,9 @@ def compare(before: Step, old: Columns, now: Step, new: Columns) -> tuple[Intege
 
     Points are told by their numbers, and images of them by continuity: a pair in this step goes
     on from the one whose vector, in units of the box vectors, differs from its own by less than a
-    half along each. What that is depends on the two points alone, so that each pair goes on from
-    one pair at most, however far points have moved.
+    half along each, or by a half that was taken off. What that is depends on the two points alone,
+    so that each pair goes on from one pair at most, however far points have moved. It is decided
+    for the real numbers that points and box vectors are.
     """
     was, then = _Pairs(*old), _Pairs(*new)
     if before.points.shape[1] != now.points.shape[1]:
@@ -112,8 +117,8 @@ def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[I
     axes = sorted(before.axes & now.axes)
     if not axes:
         return _keys(was, was.S, then, then.S) or _rows_as_keys(was, was.S, then, then.S)
-    change, old_places, new_places = _places(before, now, axes)
-    turns = _turns(old_places, new_places)
+    change, moves = _moves_between(before, now, axes)
+    turns = moves.turns()
     if turns is not None and np.array_equal(change, np.eye(len(axes))):
         new = then.S
         if turns.any():
@@ -122,77 +127,114 @@ def _keys_of_both(before: Step, was: _Pairs, now: Step, then: _Pairs) -> tuple[I
         keys = _keys(was, was.S, then, new)
         if keys is not None:
             return keys
-    images = _images(was, then, axes, change, old_places, new_places)
+    images = _images(was, then, axes, change, moves)
     return _keys(was, images[0], then, images[1]) or _rows_as_keys(was, images[0], then, images[1])
 
 
-def _turns(old_places: Floats, new_places: Floats) -> Integers | None:
-    """Whole box vectors that each point has jumped by, if that is clear for all, but for a drift.
+class _Moves:
+    """How far points have moved, in units of the box vectors that they had.
 
-    It is where points have moved by less than a quarter besides, so that any two have by less than
-    a half. 0 for points that one step does not have: they have no pairs to go on.
+    In float64, with a bound on the error; in fractions where that does not tell which integer is
+    the nearest.
     """
-    n = min(len(old_places), len(new_places))
-    moves = new_places[:n] - old_places[:n]
-    for drift in (0.0, moves[0]):
-        whole = _whole(moves - drift)
-        if np.all(np.abs(moves - drift - whole) < 0.2499):
-            turns = np.zeros((max(len(old_places), len(new_places)), whole.shape[1]), np.int64)
-            turns[:n] = whole
-            return turns
-    return None
+
+    def __init__(
+        self, old: Floats, new: Floats, to_old: list[list[Fraction]], to_new: list[list[Fraction]]
+    ) -> None:
+        self.n = min(len(old), len(new))  # points that both steps have
+        self.n_all = max(len(old), len(new))
+        self._points, self._to_units = (old, new), (to_old, to_new)
+        self._known: dict[int, list[Fraction]] = {}
+        self.old, error_of_old = _in_units(old, to_old)
+        places, error_of_new = _in_units(new, to_new)
+        with np.errstate(over="ignore", invalid="ignore"):
+            self.floats = places[: self.n] - self.old[: self.n]
+            largest = _largest(self.floats)
+            # Of the difference of two moves, and of each itself.
+            self.error = error_of_old + error_of_new + 2.0**-50 * largest
+
+    def turns(self) -> Integers | None:
+        """Whole box vectors that each point has jumped by, where that is clear, but for a drift.
+
+        It is where points have moved by less than a quarter besides, so that any two have by less
+        than a half. 0 for points that one step does not have: they have no pairs to go on.
+        """
+        for drift in (0.0, self.floats[:1]):
+            with np.errstate(over="ignore", invalid="ignore"):
+                rest = self.floats - drift
+                whole = np.rint(rest)
+                if np.all(np.abs(rest - whole) + 2.0 * self.error < 0.2499):
+                    turns = np.zeros((self.n_all, whole.shape[1]), np.int64)
+                    turns[: self.n] = whole
+                    return turns
+        return None
+
+    def apart(self, i: npt.NDArray[Any], j: npt.NDArray[Any]) -> Integers:
+        """The integer nearest to what j has moved by more than i; of two, the larger one."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            more = self.floats[j] - self.floats[i] + 0.5
+            whole = np.floor(more)
+            is_sure = np.minimum(more - whole, whole + 1.0 - more) > 2.0 * self.error
+            is_sure &= np.abs(more) < MOST_TURNS
+        found = _whole(np.where(is_sure, whole, 0.0))
+        for k in np.flatnonzero(~is_sure.all(axis=1)):
+            pair = zip(self._exactly(int(i[k])), self._exactly(int(j[k])), strict=True)
+            nearest = (math.floor(b - a + Fraction(1, 2)) for a, b in pair)
+            found[k] = [max(-MOST_TURNS, min(turns, MOST_TURNS)) for turns in nearest]
+        return found
+
+    def _exactly(self, point: int) -> list[Fraction]:
+        move = self._known.get(point)
+        if move is None:
+            old, new = (
+                product(as_fractions(points[point : point + 1]), to_units)[0]
+                for points, to_units in zip(self._points, self._to_units, strict=True)
+            )
+            move = [b - a for a, b in zip(old, new, strict=True)]
+            self._known[point] = move
+        return move
 
 
 def _images(
-    was: _Pairs,
-    then: _Pairs,
-    axes: list[int],
-    change: Integers,
-    old_places: Floats,
-    new_places: Floats,
+    was: _Pairs, then: _Pairs, axes: list[int], change: Integers, moves: _Moves
 ) -> tuple[Integers, Integers]:
     """An image for each pair, small numbers that are the same for a pair that goes on."""
     others = [k for k in range(was.S.shape[1]) if k not in axes]
-    least = min(len(old_places), len(new_places))
 
-    def apart(places: Floats, of: _Pairs) -> Floats:
-        last = len(places) - 1
-        first, second = (places[np.minimum(last, numbers)] for numbers in (of.i, of.j))
-        difference: Floats = second - first
-        return difference
+    def before(of: _Pairs) -> Integers:
+        """Any integers that depend on the two points alone: these make the numbers small."""
+        last = len(moves.old) - 1
+        first, second = (moves.old[np.minimum(last, numbers)] for numbers in (of.i, of.j))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return _whole(np.nan_to_num(second - first))
 
-    old = was.S[:, axes] + _whole(apart(old_places, was))
-    ago, today = apart(old_places, then), apart(new_places, then)
-    goes_on = ((then.i < least) & (then.j < least))[:, None]
-    turns = np.where(goes_on, _whole(today - ago) + _whole(ago), _whole(today))
-    new = then.S[:, axes] @ change + turns
+    goes_on = (then.i < moves.n) & (then.j < moves.n)
+    new = then.S[:, axes] @ change + before(then)
+    new[goes_on] += moves.apart(then.i[goes_on], then.j[goes_on])
     return (
-        _upright(np.hstack([old, was.S[:, others]]), was.i == was.j),
+        _upright(np.hstack([was.S[:, axes] + before(was), was.S[:, others]]), was.i == was.j),
         _upright(np.hstack([new, then.S[:, others]]), then.i == then.j),
     )
 
 
-def _places(
-    before: Step, now: Step, axes: list[int]
-) -> tuple[Integers, Floats, Floats]:
+def _moves_between(before: Step, now: Step, axes: list[int]) -> tuple[Integers, _Moves]:
     """Points of both steps in units of the box vectors before, as they are deformed now.
 
     A box may have got another basis of nearly the same lattice in between. `change` has the new
     vectors as sums of the old ones: the identity for a box that was only deformed.
     """
     assert before.vectors is not None and now.vectors is not None  # as some axes repeat
-    old_inverse = _right_inverse(before.vectors[axes])
-    new_inverse = _right_inverse(now.vectors[axes])
-    one = np.eye(len(axes))
-    change = np.rint(_finite(now.vectors[axes] @ old_inverse))
-    if np.abs(change).max() > 2**20 or round(abs(np.linalg.det(change))) != 1:
-        change = one
-    with np.errstate(over="ignore", invalid="ignore"):
-        return (
-            change.astype(np.int64),
-            _finite(_padded(before.points) @ old_inverse),
-            _finite(_padded(now.points) @ (new_inverse @ change)),
-        )
+    old, new = (as_fractions(step.vectors[axes]) for step in (before, now))  # type: ignore[index]
+    to_old = _right_inverse(old)
+    to_new = to_old if new == old else _right_inverse(new)
+    change = [[math.floor(x + Fraction(1, 2)) for x in row] for row in product(new, to_old)]
+    in_fractions = [[Fraction(x) for x in row] for row in change]
+    if max(abs(x) for row in change for x in row) > 2**20 or abs(determinant(in_fractions)) != 1:
+        change = np.eye(len(axes), dtype=int).tolist()
+    else:
+        to_new = product(to_new, in_fractions)
+    points = (_padded(before.points), _padded(now.points))
+    return np.array(change, np.int64), _Moves(*points, to_old, to_new)
 
 
 def _padded(points: npt.NDArray[Any]) -> Floats:
@@ -200,19 +242,40 @@ def _padded(points: npt.NDArray[Any]) -> Floats:
     return np.zeros((1, points.shape[1])) if len(points) == 0 else points.astype(np.float64)
 
 
-def _right_inverse(vectors: Floats) -> Floats:
-    """A matrix (d, m) with vectors @ matrix = 1, for vectors of any length."""
-    lengths = np.abs(vectors).max(axis=1)
-    return np.asarray(np.linalg.pinv(vectors / lengths[:, None], rcond=0.0) / lengths)
+def _right_inverse(vectors: list[list[Fraction]]) -> list[list[Fraction]]:
+    """A matrix (d, m) with vectors @ matrix = 1, at right angles to what they do not span."""
+    columns = transposed(vectors)
+    return transposed(solved(product(vectors, columns), vectors))
 
 
-def _finite(x: Floats) -> Floats:
-    """Numbers that overflowed are 0: then S alone tells images apart."""
-    return np.where(np.isfinite(x), x, 0.0)
+def _in_units(points: Floats, to_units: list[list[Fraction]]) -> tuple[Floats, Floats]:
+    """points @ to_units, rounded, and a bound on the error, for each column."""
+    largest = _largest(points)
+    size = int(np.frexp(largest.max(initial=0.0))[1])
+    columns = transposed(to_units)
+    most = [max(abs(x) for x in column) for column in columns]  # none is 0
+    sizes = np.array([x.numerator.bit_length() - x.denominator.bit_length() for x in most])
+    factors = np.array(
+        [
+            [float(x / Fraction(2) ** int(of_column)) for x in column]
+            for column, of_column in zip(columns, sizes, strict=True)
+        ]
+    ).T
+    with np.errstate(over="ignore", under="ignore"):
+        errors = np.ldexp(largest, -size) @ np.abs(factors) * 2.0**-48 + 2.0**-1000
+        if max(abs(size), *np.abs(sizes)) < MOST_PLAIN:
+            return points @ np.ldexp(factors, sizes), np.ldexp(errors, size + sizes) + 2.0**-1000
+        places = np.ldexp(points, -size) @ factors
+        return np.ldexp(places, size + sizes), np.ldexp(errors, size + sizes)
+
+
+def _largest(x: Floats) -> Floats:
+    """Of each column: several times as quick as all at once."""
+    return np.array([np.abs(column).max(initial=0.0) for column in x.T])
 
 
 def _whole(x: Floats) -> Integers:
-    return np.rint(np.clip(x, -(2.0**60), 2.0**60)).astype(np.int64)
+    return np.rint(np.clip(x, -MOST_TURNS, MOST_TURNS)).astype(np.int64)
 
 
 def _upright(images: Integers, is_own: Flags) -> Integers:

@@ -339,8 +339,9 @@ class VerletList(VerletRows):
             Each image of a point counts separately. Wrapping a point into the box breaks no pair,
             although S changes. Nor does a change of the lattice basis, as when a sheared box is
             flipped back: a pair continues as the one whose vector, in units of the box
-            vectors, has changed by less than a half along each. Points are identified by their
-            numbers; pairs of points that only one of the two steps has form or break.
+            vectors, has changed by less than a half along each, exactly (a half that was taken off
+            counts as well). Points are identified by their numbers; pairs of points that only one
+            of the two steps has form or break.
 
         Raises
         ------

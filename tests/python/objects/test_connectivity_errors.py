@@ -257,6 +257,32 @@ def test_ellipsoids_near_a_plane(d):
     assert set(near[near < 100]) == set(np.flatnonzero(np.abs(x[:100, 0]) <= 1.0))
 
 
+def test_supports_that_are_singular_in_floats_are_decided_exactly():
+    """Positive definite by its last digits; and numbers whose squares are none."""
+    tight = np.array([[1.0, 1.0], [1.0, 1.0 + 2.0**-52]])
+    flat = np.array([[1.0, 2.0**-30], [2.0**-30, 2.0**-60 + 2.0**-110]])
+    wide = np.eye(2) * 2.0**-3
+    x = np.array([[3.0, 0.0], [3.0, 0.0], [3.0, 0.0], [9.0, 0.0]])
+    nodes = hs.NodeList("a", x, [tight, flat, wide, wide])
+    plane = ([0.0, 0.0], [1.0, 0.0])
+    assert nodes.between_planes(plane, plane, 1.0)[0].tolist() == [0, 1, 2]
+    for exponent in (-1060, -530, 530, 1000):
+        same = ([0.0, 0.0], [2.0**exponent, 0.0])
+        assert nodes.between_planes(same, same, 1.0)[0].tolist() == [0, 1, 2]
+    none = np.array([[1.0, 1.0], [1.0, 1.0]])
+    for bad in (none, none - np.eye(2) * 2.0**-53, np.zeros((2, 2)), none * 2.0**-400):
+        with pytest.raises(ValueError, match="positive definite"):
+            hs.NodeList("a", x[:1], [bad])
+
+
+@pytest.mark.parametrize("exponent", [-530, -300, 0, 300])
+def test_planes_near_round_nodes_in_any_unit(exponent):
+    unit = 2.0**exponent
+    nodes = hs.NodeList("a", np.array([[1.0], [2.0], [3.0]]) * 2.0**-400, [2.0**-399] * 3)
+    plane = ([0.0], [3.0 * unit])
+    assert nodes.between_planes(plane, plane, 1.0)[0].tolist() == [0, 1]
+
+
 def test_planes_that_are_none():
     nodes = hs.NodeList("a", [[0.0, 0.0]], [1.0])
     for enter, exit_plane, message in (

@@ -3,6 +3,7 @@
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -348,3 +349,109 @@ def test_refusals(rng):
     far.update([[0.25, 0.5], [0.5 + 2.0**33, 0.5]])
     with pytest.raises(OverflowError, match="too many box vectors away"):
         far.changes()
+
+
+def goes_on(before, now, old, new):
+    """Pairs of both lists that are the same by the definition, in fractions; one basis for both."""
+    (points_before, vectors_before), (points_now, vectors_now) = before, now
+
+    def in_units(point, vectors):
+        """X with X @ vectors nearest to the point: by the normal equations, and Cramer's rule."""
+        rows = [[Fraction(x) for x in row] for row in vectors.tolist()]
+        target = [Fraction(x) for x in point]
+        gram = [[sum(a * b for a, b in zip(p, q)) for q in rows] for p in rows]
+        right = [sum(a * b for a, b in zip(p, target)) for p in rows]
+        if len(rows) == 1:
+            return [right[0] / gram[0][0]]
+        whole = gram[0][0] * gram[1][1] - gram[0][1] ** 2
+        return [
+            (right[0] * gram[1][1] - right[1] * gram[0][1]) / whole,
+            (right[1] * gram[0][0] - right[0] * gram[0][1]) / whole,
+        ]
+
+    places = [
+        [in_units(x, vectors) for x in points.tolist()]
+        for points, vectors in ((points_before, vectors_before), (points_now, vectors_now))
+    ]
+    axes = range(len(vectors_before))
+    same = set()
+    for i, j, *S in old:
+        more = [
+            (places[1][j][k] - places[1][i][k]) - (places[0][j][k] - places[0][i][k]) for k in axes
+        ]
+        turns = [math.floor(x + Fraction(1, 2)) for x in more]
+        image = tuple(S[k] - turns[k] if k in axes else S[k] for k in range(len(S)))
+        image = upright(i, j, image)
+        if image in new:
+            same.add(((i, j, *S), image))
+    return same
+
+
+@pytest.mark.parametrize("skew", [0, 1, 5, 2**20])
+@pytest.mark.parametrize("n_axes", [1, 2])
+@pytest.mark.parametrize("exponent", [-1060, -1030, -100, 0, 980])
+def test_jumps_by_whole_vectors_are_told_exactly_in_any_unit(rng, exponent, n_axes, skew):
+    """Whole numbers of one unit as coordinates, so that sums of points and vectors are exact."""
+    vectors = np.array([[16, 0], [16 * skew + 3, 16]])[:n_axes]
+    points = rng.integers(0, 16, (25, 2))
+    unit = 2.0**exponent
+    box = np.zeros((2, 2))
+    box[:n_axes] = vectors
+    pair_list = hs.VerletList(
+        7.5 * unit, box=box * unit, periodic=[k < n_axes for k in range(2)], track_changes=True,
+        skin=0.0,
+    )  # fmt: skip
+    pair_list.update(points * unit)
+    seen = rows(*pair_list.changes(quantities="ijS").formed)
+    jumps = rng.integers(-5, 6, (25, n_axes)) @ vectors
+    pair_list.update((points + jumps) * unit)
+    changes = pair_list.changes(quantities="ijS")
+    assert len(seen) > 40
+    assert [len(side[0]) for side in changes] == [0, 0]
+    # Everything at once: moves of up to half a vector and beyond, which many points share exactly.
+    moves = rng.integers(-9, 10, (25, 2))
+    moved = points + rng.integers(-5, 6, (25, n_axes)) @ vectors + moves
+    pair_list.update(moved * unit)
+    i, j, S = hs.pairs(
+        moved * unit, 7.5 * unit, box=box * unit, periodic=[k < n_axes for k in range(2)],
+        quantities="ijS",
+    )  # fmt: skip
+    old = rows(*hs.pairs(
+        (points + jumps) * unit, 7.5 * unit, box=box * unit,
+        periodic=[k < n_axes for k in range(2)], quantities="ijS",
+    ))  # fmt: skip
+    new = rows(i, j, S)
+    same = goes_on((points + jumps, vectors), (moved, vectors), old, new)
+    wanted = new - {b for _, b in same}, old - {a for a, _ in same}
+    counts = check(pair_list.changes(quantities="ijS"), wanted)
+    assert counts.min() > 3 and len(same) > 3
+
+
+def test_a_move_by_just_half_a_vector_does_not_depend_on_wrapping():
+    """One of the two images goes on, the same wherever the points are written down."""
+    found = set()
+    for turns in range(-3, 4):
+        pair_list = hs.VerletList(6.0, box=[8.0], track_changes=True)
+        pair_list.update([[0.0], [1.0]])
+        pair_list.update([[0.0], [5.0 + 8.0 * turns]])
+        formed, broken = pair_list.changes(quantities="ijDS")
+        found.add((tuple(formed[2][:, 0].tolist()), tuple(broken[2][:, 0].tolist())))
+        assert len(formed[0]) + len(broken[0]) == 1
+    assert len(found) == 1
+
+
+def test_far_points_and_another_box_are_compared_exactly(rng):
+    """Coordinates of 2^27 boxes; the deformation of the box moves points by millions of vectors."""
+    vectors = np.array([[8.0, 0.0], [3.0, 8.0]])
+    deformed = np.array([[8.25, 0.5], [3.0, 7.5]])
+    points = rng.integers(0, 8, (30, 2)) + 2.0**-3
+    far = points + rng.integers(-(2**27), 2**27, (30, 2)) @ vectors
+    moved = far + rng.integers(-2, 3, (30, 2)) @ vectors + rng.integers(-4, 5, (30, 2))
+    pair_list = hs.VerletList(5.0, box=vectors, track_changes=True)
+    pair_list.update(far)
+    pair_list.update(moved, box=deformed)
+    old = rows(*hs.pairs(far, 5.0, box=vectors, quantities="ijS"))
+    new = rows(*hs.pairs(moved, 5.0, box=deformed, quantities="ijS"))
+    same = goes_on((far, vectors), (moved, deformed), old, new)
+    wanted = new - {b for _, b in same}, old - {a for a, _ in same}
+    check(pair_list.changes(quantities="ijS"), wanted)

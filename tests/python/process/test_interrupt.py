@@ -36,6 +36,13 @@ SEARCHES = {
         np.concatenate([points > 0.5] * 5), 1_000_000, queries=points[:9] * 0 + 0.5
     )""",
     "candidates": "[hs.CellList(points, 0.1).candidates() for _ in range(10)]",
+    "candidates of many images": "hs.CellList(points[:3000, :1], 1e6, box=[1.0]).candidates()",
+    "count of a million boxes, many": "hs.count_pairs(points[:3000, :1], 1e6, box=[1.0])",
+    "rows of cells of many images": "hs.CellList(points[:9], 1e3, box=[1.0] * 3).candidates()",
+    "images that are left out": """hs.count_pairs(
+        points[:2000], 2.0, box=[[0.3, 0.1, 0], [0, 0.3, 0], [0, 0, 0.3]],
+        exclude=np.stack(np.triu_indices(2000, 1), axis=1),
+    )""",
     "count of many images": "hs.count_pairs(points[:1000], 60.0, box=[1.0] * 3, memory_limit=1e13)",
     "wrap": "hs.Box([[1, 0, 0], [0.4, 1, 0], [0.3, 0.2, 1]]).wrap(np.concatenate([points] * 16))",
     "connectivity": "hs.Connectivity(lists(0.08), memory_limit=1e13)",
@@ -114,6 +121,38 @@ print(json.dumps([outcome, delay, by_clock, resident() - before, is_right]))
     assert by_clock < 30.0  # nothing sleeps
     assert grown < 30_000_000
     assert right
+
+
+def test_an_interrupt_leaves_a_dynamic_list_as_it_was_or_as_it_is_to_be():
+    """Signals come from another process: an insertion keeps the interpreter's lock."""
+    found = run(
+        """
+import json, os, signal, subprocess
+import numpy as np
+import halfshell as hs
+
+n = 1_500_000
+points = np.random.default_rng(0).random((n, 3))
+keys = np.arange(n)
+found = []
+for begun in (0, 1000):
+    for wait in ("0.02", "0.2", "0.5", "0.8"):
+        cells = hs.DynamicCellList(3, 0.05)
+        cells.insert_many(keys[:begun], points[:begun])
+        send = f"sleep {wait}; kill -INT {os.getpid()}"
+        try:
+            with subprocess.Popen(["sh", "-c", send]):
+                cells.insert_many(keys, points)
+        except KeyboardInterrupt:
+            pass
+        near = sorted(cells.within(points[5], 0.05).tolist())
+        some = points[: len(cells)]
+        true = np.flatnonzero(((some - points[5]) ** 2).sum(axis=1) <= 0.05**2).tolist()
+        found.append(len(cells) in (begun, n) and (near == true))
+print(json.dumps(found))
+"""
+    )
+    assert found == [True] * 8
 
 
 def test_a_handler_that_does_not_raise_lets_the_search_finish():

@@ -250,6 +250,16 @@ _TABLE = hs.neighbors(_PLACES, 0.8)
 _FEW = hs.NodeList("a", _PLACES[:200], _RADII[:200] * 4)
 _PAIRS = hs.Connectivity([_FEW]).pairs
 _ROWS = np.array([tuple(pair) for pair in _PAIRS])
+_NAMES = np.array(["H", "O", "C"])[_NUMBERS % 3]
+
+
+class _Elements:
+    """Points that know their elements."""
+
+    def __init__(self, numbers):
+        self.positions, self.numbers, self.cell, self.pbc = _PLACES, numbers, np.eye(3) * 8.0, True
+
+
 CHANGING = {
     "touching": (_NUMBERS, 10**6, lambda x: hs.pairs(_PLACES, 0.5, touching=x)),
     "indices": (_NUMBERS, -7, lambda x: hs.neighbors(_PLACES, 0.5, indices=x)),
@@ -265,6 +275,26 @@ CHANGING = {
     "which pairs": (np.zeros(len(_PAIRS), bool), True, lambda x: hs.Connectivity([_FEW]).remove(x)),
     "pairs of nodes": (_ROWS, -1, _PAIRS.index),
     "excluded nodes": (_ROWS, 10**6, lambda x: hs.Connectivity([_FEW], exclude=x)),
+    "types": (
+        (_NUMBERS % 3).astype(np.int32), 50,
+        lambda x: hs.rdf(_PLACES, 0.5, 9, box=[8.0] * 3, types=x),
+    ),
+    "types as they are": (
+        _NUMBERS // 500, -1, lambda x: hs.pairs(_PLACES, [[0.3, 0.2, 0.1]] * 3, types=x),
+    ),
+    "systems": (
+        (_NUMBERS // 500).astype(np.uint64), 2**63, lambda x: hs.pairs(_PLACES, 0.5, batch=x),
+    ),
+    "systems of a histogram": (
+        _NUMBERS // 500, 10**4,
+        lambda x: hs.rdf(_PLACES, 0.5, 9, box=np.tile(np.eye(3) * 8.0, (3, 1, 1)), batch=x),
+    ),
+    "names": (_NAMES, "Zz", lambda x: hs.rdf(_PLACES, 0.5, 9, box=[8.0] * 3, types=x)["H", "O"]),
+    "elements": (_NUMBERS % 90, 10**6, lambda x: hs.pairs(_Elements(x), {("H", "He"): 0.5})),
+    "species": (_NAMES, "Zz", lambda x: hs.pairs(_PLACES, {("H", "O"): 0.5}, types=x)),
+    "large integers": (
+        np.full(1500, 2**53), 2**53 + 1, lambda x: hs.count_pairs(x[:, None], 0.5),
+    ),
     "masked": (
         np.zeros(1500, bool),
         True,
