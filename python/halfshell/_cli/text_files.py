@@ -27,6 +27,7 @@ __all__ = ["kind_of_file", "open_bytes", "read_points", "shown_names"]
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 _MOST_UNNAMED = 3
+_MOST_AXES = 8
 MOST_SHOWN = 12  # names of columns in a message
 _PTS = {n: "x y z intensity r g b".split()[:n] for n in (3, 4, 7)} | {6: "x y z r g b".split()}
 
@@ -39,8 +40,9 @@ _UNIT = re.compile(r"\s*([\[(].*[\])]|/\s*\w+|_(a|ang|angstrom|nm|um|mm|cm|m|km|
 _AXES = (
     (re.compile(r"(?P<stem>.*?)[\s_.:-]*(?P<axis>[xyz])"), "xyz"),
     (re.compile(r"(?P<axis>[xyz])[\s_.:-]*(?P<stem>.*)"), "xyz"),
-    (re.compile(r"(?P<stem>.*?)[\s_.:-]*(?P<axis>\d)"), "012345678"),
+    (re.compile(r"(?P<stem>.*?)[\s_.:-]*(?P<axis>[0-9])"), "0123456789"),
 )
+_NUMBERED_POINT = re.compile(r"[yz][\s_.:-]*\d+")
 
 
 # Suffixes of packed files, what these begin with, and what unpacks them.
@@ -149,6 +151,8 @@ def _read(
             names = _PTS.get(len(first))
     lines.give_back(*head)
     picked = _choose(names, len(first), columns, number, separator)
+    if len(picked) > _MOST_AXES:
+        raise InputError(f"has {len(picked)} columns of coordinates; at most {_MOST_AXES} can be")
     values, commas = array("d"), _Commas(separator)
     for number, text in lines:
         fields = _split(text, separator)
@@ -282,12 +286,14 @@ def _choose(
 def _groups(names: Sequence[str]) -> dict[str, list[int]]:
     """Columns that are coordinates by their names: of each way of naming, in the order of axes."""
     found: dict[str, dict[int, int]] = {}
-    for k, name in enumerate(names):
-        plain = _UNIT.sub("", name.strip().lower())
+    plains = [_UNIT.sub("", name.strip().lower()) for name in names]
+    axes_of_x = not any(map(_NUMBERED_POINT.fullmatch, plains))  # x0 beside y0 is of a point 0
+    for k, plain in enumerate(plains):
         for pattern, axes in _AXES:
             match = pattern.fullmatch(plain)
-            if match and (match["stem"] in _STEMS or (match["stem"] == "x" and axes != "xyz")):
-                group = found.setdefault(f"{match['stem']}{axes[:3]}", {})
+            stem = match["stem"] if match else None
+            if match and (stem in _STEMS or (stem == "x" and axes != "xyz" and axes_of_x)):
+                group = found.setdefault(f"{stem}{axes[:3]}", {})
                 axis = axes.index(match["axis"])
                 group[axis if axis not in group else -1] = k  # -1: named twice
                 break

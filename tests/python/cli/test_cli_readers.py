@@ -490,6 +490,9 @@ def test_columns_that_are_named(scene, content, columns, points):
         ("a,b,c\n1,2,3\n", "columns 'a', 'b', 'c': none are known as coordinates"),
         ("ra,dec,z\n1,2,3\n", "none are known as coordinates"),
         ("pos_x,pos_y,com_x,com_y\n1,2,3,4\n", "several may be coordinates"),
+        ("x0,y0,z0,x1,y1,z1\n1,2,3,4,5,6\n", "none are known"),  # two points to a line, not axes
+        ("x_1,y_1,x_2,y_2\n1,2,3,4\n", "none are known"),
+        ("x1,x2,x3,x4,x5,x6,x7,x8,x9\n1" + ",1" * 8, "has 9 columns of coordinates; at most 8"),
         ("x,x,y\n1,2,3\n", "none are known"), ("3\n1 2 3\n", "line 1: says 3 points, there are 1"),
         ("x y z\n1e999 0 0\n", "field 1: 1e999 is not a finite number"),
         ("x y z\n\uff11 0 0\n", "is not a number"), ("x,y,z\n", "holds no points"),
