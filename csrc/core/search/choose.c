@@ -10,8 +10,8 @@
 
 #include <math.h>
 
-/* Candidates that could be tested while the nearest image of a pair is found: a microsecond, in many
- * dimensions some. */
+/* Candidates that could be tested while the nearest image of a pair is found: in a microsecond, or
+ * some in many dimensions. */
 #define WORK_OF_IMAGE 1024
 
 /* Hits of one point that are looked up together. */
