@@ -281,6 +281,42 @@ plans_are_in_the_callers_unit(void)
     CHECK(hs_plan_make(AMONG(&points, NULL), &options, &plan, NULL) == HS_OK && plan.sparse);
 }
 
+/* Several searches, or none: of points without a pair there is nothing to say but what they are. */
+static void
+plans_know_a_reach(void)
+{
+    static double   x[1000], radii[1000];
+    const double    none[1] = {-1.0}, x_none[1] = {0.0};
+    const int32_t   type[1000] = {0};
+    harness_random  random = {23};
+    hs_options      options = hs_options_default();
+    hs_plan         plan;
+    int64_t         count = 0;
+    const hs_points points = {x, 1000, 1, HS_FLOAT64, 8, 8}, empty = {x_none, 0, 1, 1, 8, 8};
+    hs_reach        reach = {.rule = HS_RULE_MAX, .radii = radii};
+    for (int i = 0; i < 1000; i++) {
+        x[i] = 1000.0 * random_unit(&random);
+        radii[i] = i % 20 == 0 ? 1.5 : ldexp(1.5, -4 * (1 + i % 2));
+    }
+    hs_among among = {.points = &points, .reach = &reach};
+    options.cutoff = INFINITY;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(hs_pairs_count(&among, &options, &count, NULL) == HS_OK);
+    CHECK(plan.algorithm == HS_HIERARCHY && plan.n_searches == 5);
+    CHECK(fabs(plan.expected_pairs / (double)count - 1.0) < 1e-9); /* all are counted */
+    CHECK(plan.all_pairs || plan.cell_size[0] * (double)plan.reach[0] >= 1.5);
+    options.algorithm = HS_GRID;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(plan.algorithm == HS_GRID && plan.n_searches == 1);
+    CHECK(plan.expected_pairs == (double)count);
+    reach = (hs_reach){.n_types = 1, .types = type, .cutoffs = none};
+    options.cutoff = 1.0;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK);
+    CHECK(plan.n_searches == 0 && plan.expected_pairs == 0.0 && plan.ndim == 1);
+    among.points = &empty;
+    CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 0);
+}
+
 /* What a plan has of the cells where nothing is searched is that of a cutoff of 0, whatever the bound
  * is, even none. */
 static void
@@ -423,6 +459,7 @@ test_api_pairs(void)
     RUN(a_capacity_that_is_too_small_is_named);
     RUN(clusters_are_those_of_the_pairs);
     RUN(plans_are_in_the_callers_unit);
+    RUN(plans_know_a_reach);
     RUN(plans_of_nothing_have_the_cells_of_no_cutoff);
     RUN(plans_join_levels_unless_told_otherwise);
     RUN(single_does_not_flush);

@@ -774,6 +774,61 @@ without_systems_all_else_is_checked(void)
     CHECK(find_rows(NULL) == HS_ERR_KERNEL);
 }
 
+/* Numbers of a call that are sums of those of others. */
+static void
+add_work(const hs_counters *more, hs_counters *sum)
+{
+    sum->pairs += more->pairs;
+    sum->groups += more->groups;
+    sum->candidates += more->candidates;
+    sum->ambiguous += more->ambiguous;
+    sum->by_float64 += more->by_float64;
+    sum->by_double_word += more->by_double_word;
+    sum->by_integers += more->by_integers;
+}
+
+static bool
+is_same_work(const hs_counters *one, const hs_counters *other)
+{
+    return one->pairs == other->pairs && one->groups == other->groups &&
+           one->candidates == other->candidates && one->ambiguous == other->ambiguous &&
+           one->by_float64 == other->by_float64 && one->by_double_word == other->by_double_word &&
+           one->by_integers == other->by_integers;
+}
+
+/* What is done is what calls for each of the systems do, by however many threads: of lattice points
+ * many are at the cutoff, some but for 2^-30, for a rounding, or for the square of 2^-60. */
+static void
+work_of_all_systems_is_added_up(void)
+{
+    harness_random random = {78};
+    hs_counters    single = {.pairs = 0}, sum = {.pairs = 0}, all;
+    int64_t        most_bytes = 0;
+    make_scene();
+    for (int e = 0; e < N_EACH * 3; e++) {
+        const double at = (double)(random_bits(&random) % 6) / (e < N_EACH ? 3.0 : 2.0);
+        s_each.x[e] = at > 0.0 ? at + (double)(e % 7 == 0) * 0x1p-30 : (double)(e % 2) * 0x1p-60;
+    }
+    s_each.options.cutoff = 1.0;
+    s_each.options.counters = &single;
+    for (int n = 0; n < N_SYSTEMS_EACH; n++) {
+        hs_pairs       *rows;
+        const hs_points own = {s_each.x + s_each.first[n] * 3, POINTS_EACH, 3, HS_FLOAT64, 24, 8};
+        const hs_among  among = {.points = &own};
+        CHECK(hs_neighbors_find(&among, &s_each.options, &rows, NULL) == HS_OK);
+        hs_pairs_free(rows);
+        add_work(&single, &sum);
+        most_bytes = single.bytes_peak > most_bytes ? single.bytes_peak : most_bytes;
+    }
+    CHECK(sum.ambiguous > 0 && sum.by_float64 > 0 && sum.by_double_word > 0 && sum.by_integers > 0);
+    s_each.options.counters = &all;
+    for (s_each.options.threads = 1; s_each.options.threads <= 2; s_each.options.threads++) {
+        CHECK(find_rows(NULL) == HS_OK);
+        CHECK(is_same_work(&all, &sum));
+        CHECK(all.bytes[HS_FOR_POINTS] > 0 && all.bytes_peak >= most_bytes);
+    }
+}
+
 /* More threads than systems, and systems that are a range of their own. */
 static void
 few_large_systems(void)
@@ -873,26 +928,26 @@ make_scene_rows(uint64_t seed)
 }
 
 /* One system by itself. */
-typedef struct single {
+typedef struct single_rows {
     hs_points    points, queries;
     hs_box       box;
     hs_selection selection;
     hs_reach     reach;
     hs_options   options;
     hs_among     among;
-} single;
+} single_rows;
 
 static void
-take_single(int n, bool has_queries, single *one)
+take_single(int n, bool has_queries, single_rows *one)
 {
-    *one = (single){.points = points_at(s_rows.x, s_rows.first, n),
-                    .queries = points_at(s_rows.q, s_rows.first_query, n),
-                    .box = s_rows.box,
-                    .selection = {.groups = s_rows.groups + s_rows.first[n],
-                                  .query_groups = s_rows.query_groups + s_rows.first_query[n]},
-                    .reach = {.radii = s_rows.radii + s_rows.first[n],
-                              .query_radii = s_rows.radii + s_rows.first_query[n]},
-                    .options = s_rows.options};
+    *one = (single_rows){.points = points_at(s_rows.x, s_rows.first, n),
+                         .queries = points_at(s_rows.q, s_rows.first_query, n),
+                         .box = s_rows.box,
+                         .selection = {.groups = s_rows.groups + s_rows.first[n],
+                                       .query_groups = s_rows.query_groups + s_rows.first_query[n]},
+                         .reach = {.radii = s_rows.radii + s_rows.first[n],
+                                   .query_radii = s_rows.radii + s_rows.first_query[n]},
+                         .options = s_rows.options};
     for (int k = 0; k < 9; k++)
         one->box.rows[k / 3][k % 3] = s_rows.rows[9 * n + k];
     one->options.threads = 1;
@@ -938,8 +993,8 @@ check_rows(bool has_queries)
                                   NULL) == HS_OK);
     const int64_t *offsets = hs_pairs_offsets(all);
     for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
-        single    one;
-        hs_pairs *own;
+        single_rows one;
+        hs_pairs   *own;
         take_single(n, has_queries, &one);
         CHECK(hs_neighbors_find(&one.among, &one.options, &own, NULL) == HS_OK);
         compare_pairs(all, at, own, n, has_queries);
@@ -962,8 +1017,8 @@ check_rows(bool has_queries)
                              NULL) == HS_OK);
     at = 0;
     for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
-        single    one;
-        hs_pairs *own;
+        single_rows one;
+        hs_pairs   *own;
         take_single(n, has_queries, &one);
         CHECK(hs_nearest_find(&one.among, 3, &one.options, &own, NULL) == HS_OK);
         compare_pairs(near, at, own, n, has_queries);
@@ -1009,6 +1064,47 @@ numbers_may_be_short(void)
         CHECK(j[e] == k[e]);
     hs_pairs_free(wide);
     hs_pairs_free(narrow);
+}
+
+static void
+histograms_are_those_of_single_calls(void)
+{
+    static int64_t counts[N_SYSTEMS_ROWS * CELLS], own_counts[CELLS];
+    static double  sums[N_SYSTEMS_ROWS * CELLS], own_sums[CELLS];
+    for (int kind = 0; kind < 8; kind++) {
+        make_scene_rows(11 + (uint64_t)kind);
+        s_rows.options.threads = kind & 1 ? 3 : 1;
+        s_rows.systems.selection = kind & 4 ? &s_rows.selection : NULL;
+        const hs_points *queries = kind & 2 ? &s_rows.queries : NULL;
+        hs_histogram     wanted = {.n_edges = N_EDGES,
+                                   .edges = s_rows.edges,
+                                   .n_types = N_TYPES_ROWS,
+                                   .of_points = {s_rows.types, s_rows.weights},
+                                   .of_queries = {s_rows.types, s_rows.weights},
+                                   .counts = counts,
+                                   .sums = sums};
+        hs_counters      counters;
+        int64_t          n_pairs = 0;
+        s_rows.options.counters = &counters;
+        CHECK(hs_systems_histogram(&s_rows.points, queries, &s_rows.systems, &s_rows.options,
+                                   &wanted, NULL) == HS_OK);
+        const int64_t of_all = counters.pairs;
+        for (int n = 0; n < N_SYSTEMS_ROWS; n++) {
+            single_rows one;
+            take_single(n, queries != NULL, &one);
+            wanted.of_points =
+                (hs_marks){s_rows.types + s_rows.first[n], s_rows.weights + s_rows.first[n]};
+            wanted.of_queries = (hs_marks){s_rows.types + s_rows.first_query[n],
+                                           s_rows.weights + s_rows.first_query[n]};
+            wanted.counts = own_counts;
+            wanted.sums = own_sums;
+            CHECK(hs_pairs_histogram(&one.among, &one.options, &wanted, NULL) == HS_OK);
+            CHECK(memcmp(counts + n * CELLS, own_counts, sizeof own_counts) == 0);
+            CHECK(memcmp(sums + n * CELLS, own_sums, sizeof own_sums) == 0);
+            n_pairs += counters.pairs;
+        }
+        CHECK(n_pairs == of_all && n_pairs > 50);
+    }
 }
 
 static void
@@ -1101,9 +1197,11 @@ test_api_systems(void)
     RUN(excluded_pairs_of_queries_have_numbers_of_both);
     RUN(memory_may_be_short);
     RUN(without_systems_all_else_is_checked);
+    RUN(work_of_all_systems_is_added_up);
     RUN(few_large_systems);
     RUN(rows_are_those_of_single_calls);
     RUN(numbers_may_be_short);
+    RUN(histograms_are_those_of_single_calls);
     RUN(a_histogram_may_have_no_marks);
     RUN(what_has_no_meaning_is_refused);
 }

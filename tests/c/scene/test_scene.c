@@ -236,6 +236,31 @@ queries_that_fit_are_taken(void)
     CHECK(!hs_scene_takes(&scene, &cloud));
 }
 
+/* One cell with everything, of points that no scale holds. */
+static void
+one_spot_of_open_space(void)
+{
+    double   x[2][2] = {{0x1p1000, 3.0}, {5.0, -0x1p1000}};
+    hs_scene scene;
+    put_range(-0x1p1000, 0x1p1000, &scene);
+    scene.cloud.x[0] = x[0];
+    scene.cloud.x[1] = x[1];
+    scene.extreme = true;
+    scene.formula_error = 7.0;
+    scene.cutoff = scene.cutoff_low = scene.radius = 0.0;
+    hs_scene_put_in_one_cell(&scene);
+    for (int k = 0; k < 2; k++) {
+        CHECK(x[k][0] == 0.0 && x[k][1] == 0.0);
+        CHECK(scene.cloud.lower[k] == 0.0 && scene.cloud.upper[k] == 0.0);
+        CHECK(scene.lattice.row_of_axis[k] == -1);
+    }
+    CHECK(scene.cloud.largest == 0.0 && scene.in_one_cell && !scene.extreme);
+    CHECK(scene.cutoff == 1.0 && scene.cutoff_low == 1.0 && scene.radius == 1.0);
+    CHECK(scene.formula_error == 0.0 && scene.scale.exponent == 0);
+    CHECK(hs_scale_apply(scene.unscale, 3.0) == 3.0 && hs_scale_apply(scene.pending, 3.0) == 3.0);
+    CHECK(scene.lattice.ndim == 2 && scene.lattice.n_periodic == 0 && scene.lattice.aligned);
+}
+
 /* Scene scale: whether gaps are closed, which cutoff and scale a scene goes by, and why some boxes
  * have none. */
 
@@ -656,6 +681,7 @@ test_scene(void)
 {
     RUN(lost_digits_are_kept);
     RUN(queries_that_fit_are_taken);
+    RUN(one_spot_of_open_space);
     RUN(what_is_refused_is_named);
     RUN(queries_too_far_to_count_get_another_scene);
     RUN(scenes_that_hold_nothing_take_nothing);
