@@ -848,6 +848,42 @@ shifts_that_do_not_fit_name_the_callers_row(void)
     CHECK(found == NULL && failure.row == 0 && failure.in_queries);
 }
 
+/* Each set needs the radii that the rule looks at, and no more; sets without points need none. */
+static void
+both_sets_need_what_the_rule_looks_at(void)
+{
+    for (int rule = 0; rule <= HS_RULE_END; rule++) {
+        for (int lacks = 1; lacks < 4; lacks++) {
+            const bool needs_points = rule != HS_RULE_GATHER,
+                       needs_queries = rule != HS_RULE_SCATTER;
+            const bool is_short = (lacks & 1 && needs_points) || (lacks & 2 && needs_queries);
+            for (int empty = 0; empty < 2; empty++) {
+                make_plain((hs_rule)rule, 9);
+                scene_entries.points.n = empty ? 0 : scene_entries.points.n;
+                scene_entries.queries.n = empty ? 0 : scene_entries.queries.n;
+                if (lacks & 1) {
+                    scene_entries.reach.radii = NULL;
+                    scene_entries.reach.types = NULL;
+                }
+                if (lacks & 2) {
+                    scene_entries.reach.query_radii = NULL;
+                    scene_entries.reach.query_types = NULL;
+                }
+                const hs_status status = is_short && !empty ? HS_ERR_ARGUMENT : HS_OK;
+                refuses(COUNT, status, -1);
+                refuses(ROWS, status, -1);
+                refuses(ROW_COUNTS, status, -1);
+            }
+        }
+    }
+    make_plain(HS_RULE_GATHER, 9);
+    scene_entries.radii[2] = NAN; /* of a point, which is not looked at */
+    refuses(ROWS, HS_OK, -1);
+    scene_entries.radii[20 + 5] = NAN;
+    entry_call e = entry_of(ROWS);
+    CHECK(run_entry(&e) == HS_ERR_RADII && e.failure.row == 5 && e.failure.in_queries);
+}
+
 /* Also where no two points can be a pair, so that nothing is searched. */
 static void
 kernel_and_box_are_checked_where_nothing_is_searched(void)
@@ -937,6 +973,7 @@ test_api_reach(void)
     RUN(types_take_any_rule);
     RUN(tables_have_no_extent);
     RUN(shifts_that_do_not_fit_name_the_callers_row);
+    RUN(both_sets_need_what_the_rule_looks_at);
     RUN(kernel_and_box_are_checked_where_nothing_is_searched);
     RUN(other_functions_refuse_a_reach);
     RUN(every_entry_fails_cleanly);

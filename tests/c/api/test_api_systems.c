@@ -750,6 +750,30 @@ memory_may_be_short(void)
     }
 }
 
+/* The row of a box is not that of a point. */
+static void
+rows_of_boxes_stay(void)
+{
+    static double boxes[N_SYSTEMS_EACH * 9];
+    const hs_box  box = {.ndim = 3, .periodic = {true, true, true}};
+    hs_failure    failure;
+    make_scene();
+    for (int n = 0; n < N_SYSTEMS_EACH; n++) {
+        for (int k = 0; k < 3; k++)
+            boxes[9 * n + 4 * k] = 3.0;
+    }
+    s_each.systems.box = &box;
+    s_each.systems.rows = boxes;
+    boxes[9 * 7 + 8] = 0.0;
+    CHECK(hs_systems_coordination(&s_each.points, NULL, &s_each.systems, &s_each.options,
+                                  s_each.counts, &failure) == HS_ERR_BOX_DEPENDENT);
+    CHECK(failure.row == 2 && failure.system == 7);
+    boxes[9 * 7 + 8] = INFINITY;
+    CHECK(hs_systems_coordination(&s_each.points, NULL, &s_each.systems, &s_each.options,
+                                  s_each.counts, &failure) == HS_ERR_BOX_FINITE);
+    CHECK(failure.row == 2 && failure.column == 2 && failure.system == 7);
+}
+
 /* What all systems share is looked at where there are none. */
 static void
 without_systems_all_else_is_checked(void)
@@ -1196,6 +1220,7 @@ test_api_systems(void)
     RUN(excluded_pairs_are_sorted_by_system);
     RUN(excluded_pairs_of_queries_have_numbers_of_both);
     RUN(memory_may_be_short);
+    RUN(rows_of_boxes_stay);
     RUN(without_systems_all_else_is_checked);
     RUN(work_of_all_systems_is_added_up);
     RUN(few_large_systems);

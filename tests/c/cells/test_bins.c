@@ -7,8 +7,64 @@
 #include "../../../csrc/core/threads/passes.h"
 #include "../support/harness.h"
 #include "../support/pair_checks.h"
+#include "../support/random_scenes.h"
 
 void test_bins(void);
+
+/* Bins: points in cell order: each once, in its own cell, in the caller's order within it. */
+
+static random_scene shared;
+
+/* Scene, grid and bins of the shared scene; false where the scene is refused. */
+static bool
+sort_scene(hs_account *account, const hs_options *options, hs_scene *scene, hs_grid *grid,
+           hs_bins *bins)
+{
+    const hs_points points = points_of(&shared.scene);
+    hs_failure      failure;
+    hs_account_init(account, options);
+    if (hs_scene_init(account, NULL, &points, shared.scene.box, options, scene, &failure) != HS_OK)
+        return false;
+    if (hs_grid_init(scene, grid, &failure) != HS_OK) {
+        hs_scene_free(account, scene);
+        return false;
+    }
+    return hs_bins_build(account, NULL, options, scene, grid, bins) == HS_OK;
+}
+
+/* X = r - w B is the point, moved by whole box vectors: exactly so in aligned boxes. */
+static void
+coordinates_and_turns_travel_with_their_point(void)
+{
+    harness_random random = {141421};
+    for (int trial = 0; trial < 120; trial++) {
+        hs_account account;
+        hs_scene   scene;
+        hs_grid    grid;
+        hs_bins    bins;
+        make_scene(&random, trial % 2 ? SCENE_ALIGNED : SCENE_TRICLINIC, 1 + trial % 4, 200, 40.0,
+                   0, &shared);
+        shared.scene.cutoff = 0.3;
+        hs_options options = options_of(&shared.scene);
+        options.want = WANT_ALL;
+        if (!sort_scene(&account, &options, &scene, &grid, &bins))
+            continue;
+        const int d = bins.ndim, m = bins.n_periodic;
+        bool      right = bins.turns.known;
+        for (int64_t si = 0; right && si < bins.n; si++) {
+            const double *r = shared.x + (int64_t)bins.order[si] * d;
+            for (int k = 0; k < d; k++) {
+                double moved = r[k];
+                for (int b = 0; b < m; b++)
+                    moved -= (double)hs_turns_get(&bins.turns, b, si) * scene.lattice.rows[b][k];
+                right = right && fabs(moved - bins.x[k][si]) < 1e-9;
+                right = right && (!bins.keeps_originals || bins.originals[k][si] == r[k]);
+            }
+        }
+        CHECK(right);
+        hs_bins_free(&account, &bins);
+    }
+}
 
 /* Bins threads: points are sorted into the same order by any number of threads, with as much
  * memory as there is, until a poll says no. */
@@ -175,6 +231,7 @@ sparse_pays_where_points_crowd(void)
 void
 test_bins(void)
 {
+    RUN(coordinates_and_turns_travel_with_their_point);
     RUN(any_team_finds_the_same_order);
     RUN(sparse_pays_where_points_crowd);
 }

@@ -154,6 +154,30 @@ touch(int threads, int64_t n, asked *counts, int64_t *of_j, int64_t *of_vector)
     return status;
 }
 
+static int64_t
+pages_of(int64_t bytes)
+{
+    return bytes >= 8 * PART ? (bytes + PAGE - 1) / PAGE : 0;
+}
+
+static void
+each_page_is_written_to_once(void)
+{
+    static const int64_t sizes[] = {0, 100, 5461, 5462, 5500, PAIRS};
+    const size_t         before = hs_test_touch_parts(PART);
+    for (int threads = 1; threads <= 6; threads++) {
+        for (int s = 0; s < 6; s++) {
+            asked         counts = {.most = 1000};
+            int64_t       of_j, of_vector;
+            const int64_t parts = (sizes[s] * 24 + PART - 1) / PART;
+            CHECK(touch(threads, sizes[s], &counts, &of_j, &of_vector) == HS_OK);
+            CHECK(of_j == pages_of(sizes[s] * 8) && of_vector == pages_of(sizes[s] * 24));
+            CHECK(counts.polls == (of_vector == 0 ? 0 : (parts + threads - 1) / threads));
+        }
+    }
+    CHECK(hs_test_touch_parts(before) == PART);
+}
+
 static void
 the_caller_may_stop_it(void)
 {
@@ -170,5 +194,6 @@ test_columns(void)
 {
     RUN(the_callers_memory_is_not_counted);
     RUN(endless_outputs_are_refused);
+    RUN(each_page_is_written_to_once);
     RUN(the_caller_may_stop_it);
 }

@@ -141,66 +141,6 @@ same_pairs(const hs_options *options, const hs_pairs *a, const hs_pairs *b)
     return same;
 }
 
-/* Into arrays of the caller: the room that is needed, or less. */
-static void
-check_out(hs_options options, const hs_pairs *expected, int64_t room)
-{
-    const hs_points points = points_of(&scene);
-    const int64_t   n = hs_pairs_length(expected);
-    hs_pairs       *pairs = NULL;
-    hs_failure      failure;
-    caller_arrays   c;
-    make_arrays(options.want, scene.ndim, options.index_bytes, room, &c);
-    options.out = &c.arrays;
-    const hs_status status = hs_pairs_find(AMONG(&points, scene.box), &options, &pairs, &failure);
-    if (room < n) {
-        CHECK(status == HS_ERR_CAPACITY && failure.expected_pairs == (double)n);
-        CHECK(untouched_from(&c, room));
-    } else {
-        CHECK(status == HS_OK && hs_pairs_length(pairs) == n);
-        CHECK(same_as_result(&c, expected, n) && untouched_from(&c, n));
-    }
-    hs_pairs_free(pairs);
-    free_arrays(&c);
-}
-
-static void
-check_crowd(hs_options options)
-{
-    const hs_points points = points_of(&scene);
-    options.threads = 1;
-    hs_pairs     *alone = find(&options);
-    const int64_t n = hs_pairs_length(alone);
-    for (int threads = 2; threads <= MOST_THREADS; threads++) {
-        int64_t count = -1;
-        options.threads = threads;
-        hs_pairs *together = find(&options);
-        CHECK(same_pairs(&options, alone, together));
-        hs_pairs_free(together);
-        check_out(options, alone, n);
-        if (n > 0) {
-            check_out(options, alone, threads % 2 ? n - 1 : n / 3);
-        }
-        CHECK(hs_pairs_count(AMONG(&points, scene.box), &options, &count, NULL) == HS_OK &&
-              count == n);
-    }
-    hs_pairs_free(alone);
-}
-
-static void
-any_number_of_threads_finds_the_same(void)
-{
-    for (int kind = 0; kind < CROWDS; kind++) {
-        hs_options options = options_of(make_crowd(kind));
-        for (int variant = 0; variant < 4; variant += IS_SLOW ? 3 : 1) {
-            options.sorted = variant & 1;
-            options.want = variant & 2 ? WANT_EVERYTHING : HS_WANT_I | HS_WANT_J;
-            options.index_bytes = variant == 3 ? 4 : 8;
-            check_crowd(options);
-        }
-    }
-}
-
 /* ---- interrupts ---- */
 
 /* ---- failures ---- */
@@ -334,7 +274,6 @@ the_last_pairs_need_their_room(void)
 void
 test_parallel(void)
 {
-    RUN(any_number_of_threads_finds_the_same);
     RUN(a_failing_allocation_ends_all_threads);
 #if HAS_THREAD_LIMIT
     RUN(fewer_threads_find_the_same);

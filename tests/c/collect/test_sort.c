@@ -2,7 +2,6 @@
 /* test_sort.c: pairs and rows in order. */
 #include "../../../csrc/core/collect/sort_deal.h"
 #include "../../../csrc/core/collect/sort_pairs.h"
-#include "../support/poll_checks.h"
 #include "../support/search_unit.h"
 
 void test_sort(void);
@@ -155,53 +154,6 @@ rows_have_each_pair_both_ways(void)
     search_unit_close(&unit);
 }
 
-/* Any number of threads writes the same bytes, as pairs and as rows both ways, and stops. */
-static void
-threads_sort_the_same_bytes(void)
-{
-    enum { N = 300000 };
-    harness_random random = {366};
-    search_unit_points(6, POINTS, 2, 1.0, &unit);
-    search_unit_open(NULL, 0.5, false, HS_WANT_I, &unit);
-    for (int trial = 0; trial < 4; trial++) {
-        const bool both_ways = trial % 2;
-        hs_output  found, alone, sorted;
-        int64_t    offsets[POINTS + 1], same[POINTS + 1];
-        fill_pairs(&random, N, POINTS, trial < 2, &found);
-        hs_output *targets[] = {&alone, &sorted, &sorted, &sorted};
-        for (int t = 0; t < 4; t++) {
-            refusal once = {.nth = t == 3 ? 3 : 0};
-            hs_call_set_poll(refuse_once, &once, &unit.call);
-            unit.call.team = hs_team_create(1 + t);
-            hs_output_init(&unit.call.account, 2, found.columns, 4, targets[t]);
-            const hs_status status =
-                both_ways ? hs_sort_rows(&unit.call, POINTS, &found, true, offsets, targets[t])
-                          : hs_sort_pairs(&unit.call, 0, POINTS, &found, targets[t]);
-            hs_team_free(unit.call.team);
-            unit.call.team = NULL;
-            CHECK(status == (t == 3 ? HS_ERR_INTERRUPTED : HS_OK));
-            if (t == 0) {
-                memcpy(same, offsets, sizeof same);
-                continue;
-            }
-            const int64_t n = both_ways ? 2 * N : N;
-            for (int k = 0; t < 3 && k < HS_QUANTITIES; k++) {
-                const size_t size = (size_t)n * hs_output_width(&found, 1u << k);
-                CHECK(!(found.columns >> k & 1u) ||
-                      memcmp(hs_output_column(&alone, 1u << k), hs_output_column(&sorted, 1u << k),
-                             size) == 0);
-            }
-            CHECK(t == 3 || sorted.n_pairs == n);
-            CHECK(!both_ways || t == 3 || memcmp(same, offsets, sizeof same) == 0);
-            hs_output_free(&sorted);
-        }
-        hs_output_free(&alone);
-        hs_output_free(&found);
-    }
-    hs_call_set_poll(NULL, NULL, &unit.call);
-    search_unit_close(&unit);
-}
-
 /* Sorts by this many threads; returns the most bytes that are held meanwhile, beside the pairs. */
 static int64_t
 sort_by(int threads, const hs_output *found, hs_output *sorted)
@@ -251,6 +203,5 @@ test_sort(void)
 {
     RUN(all_pairs_are_there_in_order);
     RUN(rows_have_each_pair_both_ways);
-    RUN(threads_sort_the_same_bytes);
     RUN(one_thread_sorts_a_crowd);
 }

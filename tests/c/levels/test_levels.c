@@ -303,6 +303,33 @@ covers_each_once(const planned *made)
 /* Level plan: whatever the rule and the radii, each pair of points is in exactly one step, whose
  * cutoff is no less than its limit. */
 
+/* So do sums of which the largest alone is no float64. */
+static void
+sums_above_an_exact_one_are_not_it(void)
+{
+    const hs_reach reach = {
+        .rule = HS_RULE_SUM, .radii = points.radii, .query_radii = queries.radii};
+    planned        made;
+    int            joined = 0;
+    harness_random random = {77};
+    reach_fill(&random, 2, 1, 1.0, 0, 1.0, &points);
+    reach_fill(&random, 5, 1, 1.0, 0, 0.0, &queries);
+    queries.radii[1] = 0x1p-60;
+    queries.radii[3] = 0.375;
+    queries.radii[4] = 0.1875;
+    make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
+    CHECK(covers_each_once(&made));
+    for (int64_t s = 0; s < made.plan.n; s++) {
+        const hs_level_step *step = &made.plan.steps[s];
+        if (step->asking.end - step->asking.first == 2) {
+            CHECK(step->has_limits && step->cutoff == nextafter(1.0, 2.0));
+            joined++;
+        }
+    }
+    CHECK(joined == 1);
+    free_plan(&made);
+}
+
 /* More types than a table of limits is laid out for are searched two by two. A plan is single where
  * one step has all points. */
 static void
@@ -336,6 +363,27 @@ many_types_are_searched_in_pairs(void)
         const bool by_table = made.plan.steps[0].by_table;
         CHECK(made.plan.n == 1);
         CHECK(hs_level_plan_is_single(&made.levels, &made.plan) == by_table);
+        free_plan(&made);
+    }
+}
+
+/* Queries of one level that look among all points ask for less than all levels. */
+static void
+a_level_of_two_is_not_all(void)
+{
+    const hs_reach reach = {
+        .rule = HS_RULE_GATHER, .radii = points.radii, .query_radii = queries.radii};
+    harness_random random = {79};
+    planned        made;
+    reach_fill(&random, 10, 1, 1.0, 0, 0.1, &points);
+    reach_fill(&random, 10, 1, 1.0, 0, 0.1, &queries);
+    points.radii[4] = 0.9;
+    for (int upper = 0; upper < 2; upper++) {
+        for (int i = 0; i < 10; i++)
+            queries.radii[i] = upper ? 0.9 : 0.1;
+        make_plan_as(&reach, true, HUGE_VAL, HS_HIERARCHY, &made);
+        CHECK(made.levels.n == 2 && made.plan.n == 1 && made.plan.steps[0].asking.first == upper);
+        CHECK(!hs_level_plan_is_single(&made.levels, &made.plan));
         free_plan(&made);
     }
 }
@@ -603,7 +651,9 @@ test_levels(void)
 {
     RUN(the_first_that_is_wrong_is_named);
     RUN(a_division_can_be_stopped);
+    RUN(sums_above_an_exact_one_are_not_it);
     RUN(many_types_are_searched_in_pairs);
+    RUN(a_level_of_two_is_not_all);
     RUN(it_can_be_stopped);
     RUN(some_plans_are_never_joined);
     RUN(opening_a_step_of_many_supports_can_be_stopped);

@@ -21,11 +21,6 @@
 
 #if CAN_LIMIT_ADDRESSES
 #include <sys/mman.h>
-#include <sys/wait.h>
-#endif
-
-#if defined(__linux__)
-#include <sys/wait.h>
 #endif
 
 void test_results(void);
@@ -545,6 +540,59 @@ failures_lose_nothing(void)
 
 /* Chunk: memory from malloc in the pool, and columns that grow where little is left. */
 
+#if !defined(HS_EMULATED) && !HS_WATCHED_MALLOC
+/* A chunk as hs_chunk_new makes it where there are no pages. */
+static void *
+chunk_from_malloc(size_t bytes)
+{
+    char *raw = malloc(bytes + 2 * sizeof(hs_chunk) + 64);
+    CHECK(raw != NULL);
+    char *data = raw + sizeof(hs_chunk);
+    data += (64 - (uintptr_t)data % 64) % 64;
+    *hs_chunk_of(data) =
+        (hs_chunk){.raw = raw, .lead = (size_t)(data - raw), .capacity = bytes, .touched = bytes};
+    return data;
+}
+
+/* It cannot be shrunk for sure: what wants less than half of it gets none of it, but for scratch,
+ * which comes back at once. */
+static void
+the_pool_wastes_no_more_than_half_of_a_chunk(void)
+{
+    const size_t sizes[] = {4 * MB - 64, 4 * MB, 5 * MB, 8 * MB, 8 * MB + 64, MB, MB + 64};
+    const bool   suits[] = {false, true, true, true, false, true, false};
+    hs_pool_clear();
+    void *data = chunk_from_malloc(8 * MB);
+    CHECK(hs_pool_give(data) && hs_pool_held() == 8 * MB);
+    for (int s = 0; s < 7; s++) {
+        void *taken = hs_pool_take(sizes[s]);
+        CHECK((taken == data) == suits[s] && (taken == NULL) == !suits[s]);
+        CHECK(hs_pool_held() == (taken == NULL ? 8 * MB : 0));
+        CHECK(taken == NULL || hs_pool_give(taken));
+    }
+    hs_pool_clear();
+    CHECK(hs_pool_held() == 0);
+}
+
+#endif
+
+#if !defined(HS_EMULATED)
+/* From malloc, that is: then the next list of about this length finds room in it. */
+static void
+little_is_not_cut_off(void)
+{
+    const size_t least = MB - MB / 8;
+    void        *data = hs_chunk_new(MB);
+    CHECK(data != NULL);
+    data = hs_chunk_cut(data, least, NULL);
+    CHECK(hs_chunk_of(data)->capacity == MB);
+    data = hs_chunk_cut(data, least - 1, NULL);
+    CHECK(hs_chunk_of(data)->capacity == least - 1);
+    hs_chunk_free(data);
+}
+
+#endif
+
 #if !defined(HS_EMULATED) && CAN_LIMIT_ADDRESSES
 /* What the pool has no room for is given back, oldest first. */
 static void
@@ -628,14 +676,10 @@ test_results(void)
 {
 #if !HS_WATCHED_MALLOC
     RUN(the_limit_holds);
-#endif
-#if !defined(_WIN32)
-    RUN(many_threads);
-#endif
-#if !HS_WATCHED_MALLOC
     RUN(without_the_lock);
 #endif
 #if !defined(_WIN32)
+    RUN(many_threads);
     RUN(fork_in_the_middle);
 #endif
 #if !defined(HS_EMULATED)
@@ -650,7 +694,11 @@ test_results(void)
     RUN(what_was_written_is_resident);
     RUN(failures_lose_nothing);
     hs_pool_clear();
+    RUN(little_is_not_cut_off);
     RUN(a_limit_may_be_heard_of_while_it_is_passed);
+#if !HS_WATCHED_MALLOC
+    RUN(the_pool_wastes_no_more_than_half_of_a_chunk);
+#endif
 #if CAN_LIMIT_ADDRESSES
     RUN(what_is_too_much_for_the_pool_is_freed);
     RUN(columns_grow_by_little_where_little_is_left);

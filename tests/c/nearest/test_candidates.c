@@ -368,6 +368,22 @@ groups_far_wider_than_their_radius_are_refused(void)
     close_scene();
 }
 
+/* Where nothing else can be tried that is an error. */
+static void
+too_many_images_are_refused(void)
+{
+    const hs_box   box = {.ndim = 2, .periodic = {true, true}, .rows = {{4.0}, {0.0, 4.0}}};
+    harness_random random = {33};
+    open_scene(&random, 2, &box);
+    hs_nearest_group group = group_from_block(0, 0x1p40);
+    CHECK(fill(&group, 1e9, NULL) == HS_TOO_MUCH);
+    CHECK(fill(&group, INFINITY, NULL) == HS_ERR_MEMORY);
+    group = group_from_block(0, 40.0);
+    CHECK(fill(&group, 100.0, NULL) == HS_TOO_MUCH); /* before they are walked through */
+    CHECK(fill(&group, INFINITY, NULL) == HS_OK);
+    close_scene();
+}
+
 void
 test_candidates(void)
 {
@@ -378,4 +394,5 @@ test_candidates(void)
     RUN(leaves_that_are_shared_hold_all_that_is_near);
     RUN(uncertain_leaves_are_not_taken);
     RUN(groups_far_wider_than_their_radius_are_refused);
+    RUN(too_many_images_are_refused);
 }

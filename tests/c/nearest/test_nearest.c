@@ -3,6 +3,7 @@
  * they stop. */
 #include "../../../csrc/core/collect/columns.h"
 #include "../../../csrc/core/memory/account.h"
+#include "../../../csrc/core/nearest/nearest_kept.h"
 #include "../../../csrc/core/nearest/nearest_write.h"
 #include "../support/among.h"
 #include "../support/harness.h"
@@ -28,6 +29,55 @@ static hs_points
 points_on_line(const double *x, int64_t n)
 {
     return (hs_points){x, n, 1, HS_FLOAT64, 8, 8};
+}
+
+/* Prepares a search that may use what is kept; whether it does. */
+static bool
+borrows(hs_nearest_kept *kept, double limit)
+{
+    const hs_points points = points_on_line(line, 4);
+    const hs_sets   sets = {
+          .points = &points, .is_full = true, .is_plain = true, .is_wide = true, .trees = kept};
+    hs_options options = hs_options_default();
+    hs_failure failure;
+    options.cutoff = limit;
+    options.want = HS_WANT_J;
+    hs_call_begin(&options, &unit.call);
+    hs_search_begin(&unit.call, &unit.search);
+    unit.call.team = hs_team_create(2);
+    unit.near = (hs_nearest){.search = &unit.search, .k = 1, .of_spot = 2, .omits_self = true};
+    CHECK(hs_nearest_prepare(&unit.near, &sets, NULL, limit, &failure) == HS_OK);
+    CHECK(unit.near.tree.n_nodes == 1 && unit.near.limit > 0.0);
+    const bool borrowed = unit.search.is_borrowed;
+    hs_nearest_release(&unit.near);
+    hs_search_close(&unit.search);
+    hs_call_dismiss(&unit.call);
+    hs_account_close(&unit.call.account);
+    return borrowed;
+}
+
+static void
+whoever_comes_while_it_is_built_does_without(void)
+{
+    const int64_t    blocks = hs_test_live_blocks();
+    hs_nearest_kept *kept = hs_nearest_kept_new();
+    hs_nearest      *room = NULL, *other = NULL;
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    CHECK(hs_nearest_kept_get(kept, &other) == NULL && other == NULL);
+    CHECK(!borrows(kept, INFINITY));
+    hs_nearest_kept_end(kept, false); /* it could not be built: the next one tries */
+    CHECK(hs_nearest_kept_get(kept, &room) == NULL && room != NULL);
+    hs_nearest_kept_end(kept, false);
+    CHECK(borrows(kept, INFINITY));
+    CHECK(borrows(kept, 1.0));
+    CHECK(!borrows(kept, 0x1p-900)); /* has a scale of its own */
+    const hs_nearest *built = hs_nearest_kept_get(kept, &room);
+    CHECK(built != NULL && room == NULL && built->tree.n_nodes == 1);
+    CHECK(built->search->call->team == NULL); /* it was the call's that built it */
+    CHECK(hs_nearest_kept_get(kept, &other) == built && other == NULL);
+    hs_nearest_kept_free(kept);
+    hs_nearest_kept_free(NULL);
+    CHECK(hs_test_live_blocks() == blocks);
 }
 
 /* Points that a radius beyond the largest distance has let in. */
@@ -459,6 +509,7 @@ one_refusal_ends_the_search(void)
 void
 test_nearest(void)
 {
+    RUN(whoever_comes_while_it_is_built_does_without);
     RUN(rows_end_at_the_largest_distance);
     RUN(radii_are_found_far_from_a_guess);
     RUN(points_that_wrapping_makes_equal);

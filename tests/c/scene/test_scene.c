@@ -236,31 +236,6 @@ queries_that_fit_are_taken(void)
     CHECK(!hs_scene_takes(&scene, &cloud));
 }
 
-/* One cell with everything, of points that no scale holds. */
-static void
-one_spot_of_open_space(void)
-{
-    double   x[2][2] = {{0x1p1000, 3.0}, {5.0, -0x1p1000}};
-    hs_scene scene;
-    put_range(-0x1p1000, 0x1p1000, &scene);
-    scene.cloud.x[0] = x[0];
-    scene.cloud.x[1] = x[1];
-    scene.extreme = true;
-    scene.formula_error = 7.0;
-    scene.cutoff = scene.cutoff_low = scene.radius = 0.0;
-    hs_scene_put_in_one_cell(&scene);
-    for (int k = 0; k < 2; k++) {
-        CHECK(x[k][0] == 0.0 && x[k][1] == 0.0);
-        CHECK(scene.cloud.lower[k] == 0.0 && scene.cloud.upper[k] == 0.0);
-        CHECK(scene.lattice.row_of_axis[k] == -1);
-    }
-    CHECK(scene.cloud.largest == 0.0 && scene.in_one_cell && !scene.extreme);
-    CHECK(scene.cutoff == 1.0 && scene.cutoff_low == 1.0 && scene.radius == 1.0);
-    CHECK(scene.formula_error == 0.0 && scene.scale.exponent == 0);
-    CHECK(hs_scale_apply(scene.unscale, 3.0) == 3.0 && hs_scale_apply(scene.pending, 3.0) == 3.0);
-    CHECK(scene.lattice.ndim == 2 && scene.lattice.n_periodic == 0 && scene.lattice.aligned);
-}
-
 /* Scene scale: whether gaps are closed, which cutoff and scale a scene goes by, and why some boxes
  * have none. */
 
@@ -602,6 +577,40 @@ large_frames_can_be_stopped(void)
     hs_frame_free(&frame);
 }
 
+/* As many, of one type and dimension, in boxes that repeat along the same axes. */
+static void
+frames_match_or_do_not(void)
+{
+    const double     x[12] = {0.0};
+    const hs_options options = hs_options_default();
+    hs_box           box = {.ndim = 2, .periodic = {true, false}, .rows = {{1, 0}, {0, 1}}};
+    const hs_box     longer = {.ndim = 2, .periodic = {true, false}, .rows = {{1, 0.5}, {0, 7}}};
+    const hs_box     wide = {.ndim = 2, .periodic = {true, false}, .rows = {{1, 0}, {9, 9}}};
+    const hs_box     other = {.ndim = 2, .periodic = {false, true}, .rows = {{1, 0}, {0, 1}}};
+    const hs_box     both = {.ndim = 2, .periodic = {true, true}, .rows = {{1, 0}, {0, 1}}};
+    const hs_points  one = {x, 5, 2, HS_FLOAT64, 16, 8}, fewer = {x, 4, 2, HS_FLOAT64, 16, 8};
+    const hs_points  narrow = {x, 5, 2, HS_FLOAT32, 8, 4}, flat = {x, 5, 1, HS_FLOAT64, 8, 8};
+    const struct {
+        const hs_points *points;
+        const hs_box    *box;
+        bool             matches;
+    } cases[] = {{&one, &box, true},    {&one, &longer, true}, {&one, &wide, true},
+                 {&fewer, &box, false}, {&flat, NULL, false},  {&narrow, &box, false},
+                 {&one, &both, false},  {&one, &other, false}, {&one, NULL, false}};
+    hs_frame   base = {0}, frame = {0};
+    hs_failure failure = HS_NO_FAILURE;
+    CHECK(hs_frame_take(&one, &box, &options, &base, &failure) == HS_OK);
+    for (int c = 0; c < 9; c++) {
+        CHECK(hs_frame_take(cases[c].points, cases[c].box, &options, &frame, &failure) == HS_OK);
+        CHECK(hs_frames_match(&base, &frame) == cases[c].matches);
+        CHECK(hs_frames_match(&frame, &base) == cases[c].matches);
+        if (cases[c].matches)
+            CHECK(hs_frames_share_box(&base, &frame) == (c != 1));
+    }
+    hs_frame_free(&base);
+    hs_frame_free(&frame);
+}
+
 /* Gaps failures: while far points are drawn together, allocations may fail and polls may say no. */
 
 enum { FAR = HS_POLL_POINTS + 1000 };
@@ -681,7 +690,6 @@ test_scene(void)
 {
     RUN(lost_digits_are_kept);
     RUN(queries_that_fit_are_taken);
-    RUN(one_spot_of_open_space);
     RUN(what_is_refused_is_named);
     RUN(queries_too_far_to_count_get_another_scene);
     RUN(scenes_that_hold_nothing_take_nothing);
@@ -694,6 +702,7 @@ test_scene(void)
     RUN(any_layout_is_copied);
     RUN(the_first_that_is_not_finite_is_named);
     RUN(large_frames_can_be_stopped);
+    RUN(frames_match_or_do_not);
     RUN(any_allocation_may_fail);
     RUN(any_poll_may_end_it);
 }

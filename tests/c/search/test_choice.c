@@ -139,6 +139,32 @@ systems_choose_as_well(void)
           HS_ERR_ARGUMENT);
 }
 
+/* Queries of systems that have numbers of points pair as these do. */
+static void
+numbers_of_queries_hold_in_systems(void)
+{
+    static int64_t numbers[CROWD], counted[CROWD];
+    const int64_t  first[] = {0, 100, CROWD}, first_query[] = {0, 1, 2};
+    make_crowd(0.0);
+    hs_points queries = points_choice;
+    queries.n = 2;
+    numbers[0] = 5;
+    numbers[1] = 100;
+    selection_choice.query_numbers = numbers;
+    selection_choice.labels = labels_choice;
+    const hs_systems systems = {.n = 2,
+                                .first = first,
+                                .box = &line,
+                                .selection = &selection_choice,
+                                .first_query = first_query};
+    CHECK(hs_systems_coordination(&points_choice, &queries, &systems, &options_choice, counted,
+                                  NULL) == HS_OK);
+    CHECK(counted[0] == 2 * 99 + 3 && counted[1] == 2 * 199 + 3); /* itself at S = 0 too */
+    numbers[1] = CROWD;
+    CHECK(hs_systems_coordination(&points_choice, &queries, &systems, &options_choice, counted,
+                                  NULL) == HS_ERR_ARGUMENT);
+}
+
 /* Images of excluded pairs are those of each system's box, which is looked at first. */
 static void
 a_bad_box_of_a_system_is_told(void)
@@ -778,6 +804,7 @@ test_choice(void)
     RUN(numbers_go_with_queries);
     RUN(single_precision_chooses_as_well);
     RUN(systems_choose_as_well);
+    RUN(numbers_of_queries_hold_in_systems);
     RUN(a_bad_box_of_a_system_is_told);
     RUN(bad_selections_are_refused);
     RUN(searches_leave_out_what_integers_say);

@@ -257,6 +257,31 @@ every_question_has_its_answer(void)
     CHECK(differ > 100 && bounded > 40);
 }
 
+/* Digits of an entry this small are lost in the unit of the search, so that floats tell nothing. */
+static void
+ties_of_entries_far_apart_are_decided_by_integers(void)
+{
+    harness_random random = {1504};
+    for (int strict = 0; strict < 2; strict++) {
+        const question ask = {.ndim = 2,
+                              .rule = HS_RULE_MAX,
+                              .unit = 1.0,
+                              .extent = 1.0,
+                              .bound = 5.0,
+                              .is_strict = strict};
+        hs_stages      stages = {0, 0, 0};
+        fill(&random, 2, 2, 1.0);
+        for (int i = 0; i < N; i++) {
+            const double matrix[] = {1.0, 0.0, 0.0, 0x1.8p-1010};
+            memcpy(matrices[0] + 4 * i, matrix, sizeof matrix);
+            x[0][2 * i] = i == 1 ? 1.0 : 10.0 * i;
+            x[0][2 * i + 1] = 0.0;
+        }
+        CHECK(count_with(&ask, &stages) == !strict);
+        CHECK(stages.by_integers == 1);
+    }
+}
+
 /* With no extent, only what lies on one spot; strictly, nothing. */
 static void
 no_extent_holds_nothing_but_zero(void)
@@ -315,6 +340,7 @@ test_limits(void)
 {
     RUN(what_the_filter_leaves_is_decided);
     RUN(every_question_has_its_answer);
+    RUN(ties_of_entries_far_apart_are_decided_by_integers);
     RUN(no_extent_holds_nothing_but_zero);
     RUN(kernels_read_what_float32_holds);
 }

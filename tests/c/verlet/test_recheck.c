@@ -460,78 +460,6 @@ what_does_not_fit_is_told(void)
     hs_verlet_free(list);
 }
 
-/* Lists of many slabs, with images and without: any number of threads writes the same bytes in the
- * same order, to new arrays and to the caller's, and counts the same. */
-static void
-threads_write_the_same_bytes(void)
-{
-    enum { POINTS = 3000, MOST = 60000 };
-    static const unsigned wants[] = {HS_WANT_I | HS_WANT_J, HS_WANT_BOTH,
-                                     HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR,
-                                     HS_WANT_I | HS_WANT_J | HS_WANT_VECTOR | HS_WANT_SHIFT};
-    static double         x[3 * POINTS], distance[MOST], vector[3 * MOST];
-    static int32_t        i[MOST], j[MOST], both[2 * MOST], shift[3 * MOST];
-    const hs_pair_arrays  arrays = {.capacity = MOST,
-                                    .index_bytes = 4,
-                                    .i = i,
-                                    .j = j,
-                                    .both = both,
-                                    .distance = distance,
-                                    .vector = vector,
-                                    .shift = shift};
-    harness_random        random = {11};
-    hs_box                box = {.ndim = 3};
-    hs_verlet            *list = hs_verlet_new();
-    const hs_points       points = points_in_space(x, POINTS);
-    for (int k = 0; k < 3; k++) {
-        box.rows[k][k] = 10.0;
-        box.periodic[k] = true;
-    }
-    for (int e = 0; e < 3 * POINTS; e++) {
-        x[e] = 10.0 * random_unit(&random);
-    }
-    hs_options  options = hs_options_default();
-    hs_counters counters;
-    bool        rebuilt;
-    options.cutoff = 1.0;
-    options.counters = &counters;
-    CHECK(hs_verlet_update(list, &points, &box, &options, 0.2, false, &rebuilt, NULL) == HS_OK);
-    for (int w = 0; w < 4; w++) {
-        hs_pairs *alone = NULL, *found = NULL;
-        options.want = wants[w];
-        options.index_bytes = 4;
-        options.threads = 1;
-        CHECK(hs_verlet_find(list, &options, &alone, NULL) == HS_OK);
-        const int64_t n = hs_pairs_length(alone), candidates = counters.candidates;
-        CHECK(n > 15000 && n < MOST && candidates > 20000);
-        for (options.threads = 2; options.threads < 6; options.threads += 3) {
-            CHECK(hs_verlet_find(list, &options, &found, NULL) == HS_OK);
-            CHECK(hs_pairs_length(found) == n && counters.candidates == candidates);
-            CHECK(same_columns(found, alone, options.want, 3, 4));
-            hs_pairs_free(found);
-            options.out = &arrays;
-            CHECK(hs_verlet_find(list, &options, &found, NULL) == HS_OK);
-            options.out = NULL;
-            CHECK(hs_pairs_length(found) == n);
-            hs_pairs_free(found);
-            const size_t size = (size_t)n * sizeof(int32_t);
-            CHECK((options.want & HS_WANT_BOTH) ||
-                  (memcmp(i, hs_pairs_array(alone, HS_WANT_I), size) == 0 &&
-                   memcmp(j, hs_pairs_array(alone, HS_WANT_J), size) == 0));
-            CHECK(!(options.want & HS_WANT_DISTANCE) ||
-                  memcmp(distance, hs_pairs_array(alone, HS_WANT_DISTANCE), 2 * size) == 0);
-            CHECK(!(options.want & HS_WANT_VECTOR) ||
-                  memcmp(vector, hs_pairs_array(alone, HS_WANT_VECTOR), 6 * size) == 0);
-            CHECK(!(options.want & HS_WANT_SHIFT) ||
-                  memcmp(shift, hs_pairs_array(alone, HS_WANT_SHIFT), 3 * size) == 0);
-            CHECK(!(options.want & HS_WANT_BOTH) ||
-                  memcmp(both, hs_pairs_array(alone, HS_WANT_BOTH), 2 * size) == 0);
-        }
-        hs_pairs_free(alone);
-    }
-    hs_verlet_free(list);
-}
-
 /* Lists of many slabs: a thread that meets a pair whose S passes int32 names its lower number, and
  * all threads stop. */
 static void
@@ -589,6 +517,5 @@ test_recheck(void)
     RUN(only_what_is_ordinary_is_written);
     RUN(large_lags_and_images_are_not_written);
     RUN(what_does_not_fit_is_told);
-    RUN(threads_write_the_same_bytes);
     RUN(threads_stop_at_shifts_that_do_not_fit);
 }
